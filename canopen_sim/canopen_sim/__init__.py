@@ -7,8 +7,8 @@ The names here are the public API.
 
 from .deviations import Fault, FaultInjection
 from .device import Device
+from .drive.axis import ServoModel
 from .drive.drive import Drive
-from .drive.servo import ServoModel
 from .host import DeviceHost
 from .runner import DeviceRunner
 from .simulation import simulated_devices

@@ -13,6 +13,7 @@ from arm_canopen.standard import (
     CobId,
     drive_axes,
     is_drive,
+    LSS_REQUEST,
     NmtCommand,
     NmtState,
     NODE_ID_MAX,
@@ -22,10 +23,9 @@ from arm_canopen.standard import (
 )
 from arm_canopen.standard.sdo import Abort
 
+from .deviations import Service
+from .drive.axis import ServoModel
 from .drive.drive import Drive
-from .drive.rate import INCREMENTS_PER_SECOND, RateUnits
-from .drive.servo import ServoModel
-from .drive.shared_errors import SharedErrors
 from .injector import FaultInjector
 from .line import FaultLine, Traffic
 from .objects.object_store import ObjectStore
@@ -33,17 +33,17 @@ from .objects.parameter_memory import ParameterMemory
 from .objects.parameter_storage import ParameterStorage
 from .services.emcy_producer import EmcyProducer
 from .services.error_control import ErrorControl
-from .services.heartbeat import HeartbeatProducer
 from .services.lss_slave import LssSlave
-from .services.nmt_slave import boot_up_frame, NmtSlave
+from .services.nmt_slave import NmtSlave
 from .services.rpdo import Handler, RpdoEngine
-from .services.sdo_servers import SdoServers
-from .services.services import Services
+from .services.sdo_server import SdoServers
 from .services.sync_consumer import SyncConsumer
 from .services.time_consumer import TimeConsumer
 from .services.tpdo import TpdoEngine
 from .timed import Timed
 
+RateUnits = Mapping[int, tuple[float, float]]
+"""By axis: what 1 of its velocities is in [inc/s], and of its accelerations in [inc/s^2]."""
 SYNC_LENGTH_ERROR = 0x8240
 COMMUNICATION_OBJECTS = (0x1000, 0x1FFF)
 ALL_OBJECTS = (0x0000, 0xFFFF)
@@ -76,7 +76,7 @@ class Device:
         servo: ServoModel | None = None,
         handlers_changed: Callable[[], None] | None = None,
         memory: ParameterMemory | None = None,
-        rate_units: RateUnits = INCREMENTS_PER_SECOND,
+        rate_units: RateUnits | None = None,
     ) -> None:
         """Build a device that is switched off.
 
@@ -89,8 +89,7 @@ class Device:
             servo: Time constants of the motor.
             handlers_changed: Called when :attr:`handlers` is another mapping.
             memory: What it keeps without power; by default what lasts as long as the object.
-            rate_units: What 1 of the velocities of an axis is in [inc/s], and of its accelerations
-                in [inc/s^2], by its number; by the EDS where it is left out.
+            rate_units: Units of the axes that do not have those of the EDS.
 
         Raises:
             ValueError: The node id is out of range.
@@ -106,28 +105,33 @@ class Device:
         self.store = ObjectStore(dictionary.for_node(self.node_id))
         self._line = FaultLine(send, self._send_abort, self._identify)
         self._send = self._line.send
-        self._nmt = NmtSlave(self.node_id, self, boot_time)
+        self._nmt = NmtSlave(self.node_id, self._reset, self._nmt_changed, boot_time)
         self._errors = EmcyProducer(self.store, self._send)
         self._sync = SyncConsumer(self.store, self._on_sync, self._on_sync_length, self._subscribe)
-        self.drives = self._build_drives(servo or ServoModel(), rate_units)
-        self._build_services()
-        self.faults = FaultInjector(self, self._line)
-        self._powered_parts = self._timed_parts()
-        self._parts = self._powered_parts
-
-    def _build_drives(self, servo: ServoModel, rate_units: RateUnits) -> tuple[Drive, ...]:
-        shared, dictionary = SharedErrors(self._errors), self.store.dictionary
-        return tuple(
+        self.drives = tuple(
             Drive(
                 self.store,
-                shared,
+                self._errors,
                 self._sync,
-                servo,
+                servo or ServoModel(),
                 number=axis,
-                rate_units=rate_units.get(axis) or self._own_rate_units(axis),
+                rate_units=(rate_units or {}).get(axis) or self._own_rate_units(axis),
             )
             for axis in (drive_axes(dictionary) if is_drive(dictionary) else ())
         )
+        self._build_services()
+        self.faults = FaultInjector(self, self._line)
+        self._powered_parts: list[Timed] = [
+            self.faults,
+            self._nmt,
+            self._sdo,
+            self._errors,
+            self._error_control,
+            self._rpdos,
+            self._tpdos,
+            *self.drives,
+        ]
+        self._parts = self._powered_parts
 
     def _own_rate_units(self, axis: int) -> tuple[float, float]:
         """Return the units of velocities and accelerations that the EDS says."""
@@ -141,7 +145,6 @@ class Device:
     def _build_services(self) -> None:
         node_id, store, send, nmt = self.node_id, self.store, self._send, self._nmt
         self._sdo = SdoServers(node_id, store, send, self._subscribe)
-        self._producer = HeartbeatProducer(node_id, store, lambda: nmt.state, send)
         self._error_control = ErrorControl(
             store, nmt, self._errors, self.drives, send=send, subscribe=self._subscribe
         )
@@ -150,33 +153,9 @@ class Device:
         self._lss = LssSlave(node_id, store, self._memory, send, nmt.initialise)
         self.clock = TimeConsumer(store, self._subscribe)
         self._rpdos = RpdoEngine(
-            store, self._on_pdo_changed, self._errors.set_error, self._sync.window_closed
+            store, self._subscribe, self._errors.set_error, self._sync.window_closed
         )
-        self._tpdos = TpdoEngine(store, self._on_pdo_changed, send)
-        self._services = Services(
-            nmt,
-            self._lss,
-            self._sdo,
-            self._sync,
-            self.clock,
-            self._error_control,
-            self._rpdos,
-            self._tpdos,
-        )
-
-    def _timed_parts(self) -> list[Timed]:
-        return [
-            self.faults,
-            self._nmt,
-            self._sdo,
-            self._errors,
-            self._error_control.consumer,
-            self._producer,
-            self._error_control.guarding,
-            self._rpdos,
-            self._tpdos,
-            *self.drives,
-        ]
+        self._tpdos = TpdoEngine(store, self._subscribe, send)
 
     @property
     def drive(self) -> Drive | None:
@@ -237,12 +216,12 @@ class Device:
         self._line.clear()
         self._errors.reset()
         self._errors.allow(False, now)
-        self._producer.stop()
+        self._error_control.stop()
+        self._error_control.reset()
         self._rpdos.stop(now)
         self._tpdos.stop()
         for drive in self.drives:
             drive.reset(now)
-        self._error_control.guarding.reset()
         self._lss.pending_id = self._memory.node_id or self.first_id
         self._nmt.switch_off()
         self._parts = [self.faults]
@@ -272,10 +251,10 @@ class Device:
         """Let frames pass through the faults of the line (from the injector)."""
         self._subscribe()
 
-    def reset(self, command: NmtCommand, now: float) -> None:
-        """Return to the defaults of the whole device or of its communication (from NMT)."""
+    def _reset(self, command: NmtCommand, now: float) -> None:
+        """Return to the defaults of the whole device or of its communication."""
         whole = command is NmtCommand.RESET_NODE
-        self._producer.stop()
+        self._error_control.stop()
         self._rpdos.stop(now)
         self._tpdos.stop()
         if self._lss.pending_id != self.node_id:
@@ -296,16 +275,16 @@ class Device:
             else:
                 drive.connection_lost(now)
                 for code in sorted(drive.faults):
-                    self._errors.report(code, now)
+                    self._errors.report(code, now, drive)
         self._error_control.reset()
         self._subscribe()
 
-    def nmt_changed(self, previous: NmtState, now: float) -> None:
-        """Start and stop services as the NMT state requires (from NMT; CiA 301, table 46)."""
+    def _nmt_changed(self, previous: NmtState, now: float) -> None:
+        """Start and stop services as the NMT state requires (CiA 301, table 46)."""
         state = self._nmt.state
         if previous is NmtState.BOOT_UP:
-            self._send(boot_up_frame(self.node_id))
-            self._producer.start(now)
+            self._send(Frame(CobId.HEARTBEAT + self.node_id, bytes((NmtState.BOOT_UP,))))
+            self._error_control.start(now)
             for drive in self.drives:
                 drive.start(now)
         if state is NmtState.STOPPED:
@@ -323,7 +302,7 @@ class Device:
 
     def _subscribe(self) -> None:
         """Offer the services of the present NMT state."""
-        handlers = self._services.handlers(self._on_sdo) if self.powered else {}
+        handlers = self._present_handlers() if self.powered else {}
         if self._line.faults:
             filtered = self._line.filtered
             handlers = {can_id: filtered(handler) for can_id, handler in handlers.items()}
@@ -331,12 +310,40 @@ class Device:
         if self._handlers_changed is not None:
             self._handlers_changed()
 
+    def _present_handlers(self) -> dict[int, Handler]:
+        """Map each identifier to its handler in this NMT state (CiA 301, table 46)."""
+        state = self._nmt.state
+        handlers: dict[int, Handler] = {
+            CobId.NMT: self._nmt.receive,
+            LSS_REQUEST: self._lss.receive,
+        }
+        if state is not NmtState.BOOT_UP:
+            watched = self._error_control
+            handlers.update(dict.fromkeys(watched.can_ids, watched.receive))
+        if state in (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL):
+            handlers.update(dict.fromkeys(self._sdo.can_ids, self._on_sdo))
+            handlers[self._sync.can_id] = self._sync.receive
+            if self.clock.can_id is not None:
+                handlers[self.clock.can_id] = self.clock.receive
+        if state is NmtState.OPERATIONAL:
+            handlers.update(self._rpdos.handlers(self._tpdos.poll))
+        return handlers
+
+    def _identify(self, frame: Frame, outgoing: bool) -> Traffic:
+        can_id = frame.can_id
+        if can_id in (self._sdo.response_ids if outgoing else self._sdo.can_ids):
+            return Traffic(Service.SDO, outgoing)
+        if can_id == CobId.HEARTBEAT + self.node_id:
+            return Traffic(Service.HEARTBEAT if any(frame.data) else Service.BOOT_UP, outgoing)
+        engine = self._tpdos if outgoing else self._rpdos
+        number = 0 if frame.is_remote else engine.number_of(can_id)
+        return Traffic(Service.PDO if number else Service.OTHER, outgoing, number)
+
     def _renumber(self, node_id: int) -> None:
         """Take another node id; all that follows from it is read again by the reset."""
         self.node_id = node_id
         self.store.renumber(self._dictionary.for_node(node_id))
-        guarding = self._error_control.guarding
-        for part in (self._nmt, self._sdo, self._producer, guarding, self._lss):
+        for part in (self._nmt, self._sdo, self._error_control, self._lss):
             part.node_id = node_id
 
     def _refresh(self, now: float) -> None:
@@ -346,12 +353,9 @@ class Device:
 
     def _on_remote(self, frame: Frame, now: float) -> None:
         if frame.can_id == CobId.HEARTBEAT + self.node_id:
-            self._error_control.guarding.request(now)
+            self._error_control.guard(now)
             return
         self._tpdos.request(frame.can_id, now)
-
-    def _identify(self, frame: Frame, outgoing: bool) -> Traffic:
-        return self._services.identify(frame, outgoing)
 
     def _send_abort(self, abort: Abort) -> None:
         self._send(Frame(self._sdo.default.response_id, abort.encode()))
@@ -372,6 +376,3 @@ class Device:
 
     def _on_sync_length(self, wrong: bool, now: float) -> None:
         self._errors.set_error(SYNC_LENGTH_ERROR, wrong, now)
-
-    def _on_pdo_changed(self, _now: float) -> None:
-        self._subscribe()

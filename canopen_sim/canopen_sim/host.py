@@ -10,9 +10,8 @@ from collections.abc import Callable
 from arm_canopen.can import Frame
 from arm_canopen.standard import ObjectDictionary, UNCONFIGURED
 
-from .device import Device
-from .drive.rate import INCREMENTS_PER_SECOND, RateUnits
-from .drive.servo import ServoModel
+from .device import Device, RateUnits
+from .drive.axis import ServoModel
 from .objects.parameter_memory import ParameterMemory
 from .services.rpdo import Handler
 from .timed import NEVER, Timed
@@ -60,18 +59,11 @@ class DeviceHost:
         boot_time: float = 0.0,
         servo: ServoModel | None = None,
         memory: ParameterMemory | None = None,
-        rate_units: RateUnits = INCREMENTS_PER_SECOND,
+        rate_units: RateUnits | None = None,
     ) -> Device:
         """Add a device, switched off; the next :meth:`advance` starts it.
 
-        Args:
-            node_id: CANopen node id.
-            dictionary: Its objects.
-            boot_time: How long its start takes in [s].
-            servo: Time constants of the motor.
-            memory: What it keeps without power.
-            rate_units: What 1 of the velocities of an axis is in [inc/s], and of its accelerations
-                in [inc/s^2], by its number.
+        The arguments are those of :class:`~.device.Device`.
 
         Raises:
             ValueError: The node id is out of range, or another device has it.

@@ -19,7 +19,7 @@ import pytest
 
 from arm_canopen import DriveState as State
 from arm_canopen.standard import drive_state, ObjectDictionary
-from canopen_sim.drive.states import decode_command, DriveCommand
+from canopen_sim.drive.state_machine import decode_command, DriveCommand
 
 pytestmark = pytest.mark.slow
 

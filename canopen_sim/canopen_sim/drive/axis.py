@@ -1,140 +1,394 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""An axis: the motion that is demanded of a motor, and the motor that follows it."""
+r"""An axis: the motion that is demanded of a motor, and the motor that follows it.
+
+The demand goes in phases of constant acceleration. A phase follows from the state at its
+beginning and from the goal (a velocity, or a position to stand at), so a goal can change at any
+time without a jump. A step of the axis ends where a phase does, and the solution within a phase
+is exact: neither demand nor motor depends on how often they are looked at.
+
+The motor position :math:`y` follows the demand :math:`r` through a first-order lag,
+:math:`\tau \dot y = r - y`. On a phase with velocity :math:`v` and acceleration :math:`a`
+
+.. math::
+    y(s) = q(s) + (y_0 - q(0))\, e^{-s/\tau}, \qquad q(s) = r(s) - \tau r'(s) + \tau^2 a.
+
+A demand that is faster than the motor passes a rate limiter before, in steps of 1 ms. Without
+torque the motor coasts against its brake: its velocity decays with another time constant.
+
+Of a torque :math:`T` the motor makes :math:`\dot v = g\,(T - L - T_c \operatorname{sign} v - b v)`
+with the load :math:`L`, dry friction :math:`T_c` and viscous friction :math:`b`. A positive load
+pulls towards negative positions and needs a positive torque to be held, as gravity does.
+
+Positions are in [inc], velocities in [inc/s], accelerations in [inc/s^2], torques in [0.1 % of
+the rated torque], times on the steady clock in [s].
+"""
 
 from __future__ import annotations
 
-from .motor import MotorModel
-from .profile import hold, Limits, Motion, plan_velocity, Point
-from .servo import Servo, ServoModel, SETTLED
+from collections.abc import Callable
+from dataclasses import dataclass
+import math
+from typing import NamedTuple
+
+from ..timed import NEVER
 from .switches import Switches
+
+LIMITER_STEP = 0.001  # [s] of the rate limiter
+SETTLED = 1e-4  # [inc] a smaller distance is none
+ROUNDING = 1e-6  # [inc] a smaller gap between demand and limiter is rounding
+TORQUE_STEP = 0.002  # [s] how long a torque is taken as constant
+
+TORQUE_GAIN = 20.0  # [inc/s^2 per 0.1 % of the rated torque]
+DRY_FRICTION = 20.0  # [0.1 % of the rated torque]
+VISCOUS_FRICTION = 0.01  # [0.1 % of the rated torque per inc/s]
+
+
+@dataclass(frozen=True, slots=True)
+class ServoModel:
+    """Time constants of a motor.
+
+    Attributes:
+        lag: Of the position loop in [s]; the following error is velocity times lag.
+        coasting: Of the velocity in [s] when the power stage is off.
+    """
+
+    lag: float = 0.002
+    coasting: float = 0.03
+
+
+class Limits(NamedTuple):
+    """Bounds of a motion; all are positive.
+
+    Attributes:
+        velocity: Highest speed.
+        acceleration: While the speed grows.
+        deceleration: While it shrinks.
+    """
+
+    velocity: float
+    acceleration: float
+    deceleration: float
+
+
+NO_BOUNDS = (-math.inf, math.inf)
 
 
 class Axis:
     """Demand and motor of a drive, at one point in time.
 
     Attributes:
-        time: Steady time of the state in [s].
-        motion: The demand, now and in future.
-        demand: Position, velocity and acceleration demanded now.
-        speed: Highest speed of the motor in [inc/s].
-        motor: What it makes of a torque.
-        load: Torque that it takes to hold the axis, in [0.1 % of the rated torque].
+        time: Steady time of the state.
+        demand: Position demanded now.
+        demand_velocity: Velocity demanded now.
+        phase_end: When the demand changes its acceleration; NEVER at the end of a motion.
+        position: Where the motor is.
+        powered: The motor has torque: the position loop is closed.
+        speed_limited: The motor is behind a demand that was faster than it can turn.
+        speed: Highest speed of the motor.
+        load: Torque that it takes to hold the axis.
         switches: Where its switches are.
-        origin: Where the mechanical zero is in [inc]; homing moves it.
+        origin: Where the mechanical zero is; homing moves it.
     """
 
     def __init__(self, model: ServoModel) -> None:
         self.time = 0.0
-        self.speed = float('inf')
-        self.motor = MotorModel()
+        self.demand = 0.0
+        self.demand_velocity = 0.0
+        self.phase_end = NEVER
+        self.position = 0.0
+        self.powered = False
+        self.speed_limited = False
+        self.speed = math.inf
         self.load = 0.0
         self.origin = 0.0
         self.switches = Switches()
-        self.motion = hold(0.0, 0.0)
-        self.demand = Point(0.0, 0.0, 0.0)
-        self._servo = Servo(model)
-
-    @property
-    def position(self) -> float:
-        """Actual position in [inc]."""
-        return self._servo.position
+        self._model = model
+        self._stops = NO_BOUNDS
+        self._setpoint = 0.0  # output of the rate limiter
+        self._free_velocity = 0.0  # without torque
+        self._acceleration = 0.0
+        self._phase_velocity = 0.0  # at the end of the phase
+        self._plan = self._constant
+        self._target = 0.0  # position to stand at
+        self._wanted = 0.0  # velocity to reach
+        self._limits = Limits(math.inf, math.inf, math.inf)
 
     @property
     def velocity(self) -> float:
-        """Actual velocity in [inc/s]."""
-        return self._servo.velocity
+        """Actual velocity."""
+        if not self.powered:
+            return self._free_velocity
+        return 0.0 if self.blocked else (self._setpoint - self.position) / self._model.lag
 
     @property
     def following_error(self) -> float:
-        """Demand minus actual position in [inc]."""
-        return self.demand.position - self._servo.position
+        """Demand minus actual position."""
+        return self.demand - self.position
 
     @property
     def blocked(self) -> bool:
-        """The motor pushes against a mechanical stop."""
-        return self._servo.blocked
-
-    @property
-    def torque(self) -> float:
-        """Torque that the demanded motion takes, in [0.1 % of the rated torque]."""
-        if not self.powered:
-            return 0.0
-        acceleration = 0.0 if self.arrived else self.demand.acceleration
-        return self.motor.torque(self.velocity, acceleration, self.load)
-
-    def set_stops(self, low: float, high: float) -> None:
-        """Put mechanical stops at positions in [inc], infinite for none."""
-        self._servo.stops = (low, high)
-
-    @property
-    def powered(self) -> bool:
-        """The motor has torque."""
-        return self._servo.powered
-
-    @property
-    def speed_limited(self) -> bool:
-        """The demand is faster than the motor can turn."""
-        return self._servo.limited
+        """The position loop pushes the motor against a mechanical stop."""
+        low, high = self._stops
+        if not self.powered or low < self.position < high:
+            return False
+        gap = self._setpoint - self.position
+        return (self.position >= high and gap > 0.0) or (self.position <= low and gap < 0.0)
 
     @property
     def arrived(self) -> bool:
         """The demand has come to the end of its motion, a constant velocity included."""
-        return self.time >= self.motion.end
+        return self.phase_end == NEVER
 
     @property
     def settled(self) -> bool:
         """Demand and motor stand still, and will not move by themselves."""
-        if not self._servo.powered:
-            return self._servo.velocity == 0.0
-        at_rest = self.arrived and self.demand.velocity == 0.0
-        return at_rest and (self.blocked or abs(self.following_error) < SETTLED)
+        if not self.powered:
+            return self._free_velocity == 0.0
+        at_rest = self.phase_end == NEVER and self.demand_velocity == 0.0
+        return at_rest and (abs(self.demand - self.position) < SETTLED or self.blocked)
+
+    @property
+    def torque(self) -> float:
+        """Torque that the demanded motion takes."""
+        if not self.powered:
+            return 0.0
+        velocity = self.velocity
+        dry = math.copysign(DRY_FRICTION, velocity) if velocity else 0.0
+        inertia = 0.0 if self.arrived else self._acceleration / TORQUE_GAIN
+        return inertia + dry + VISCOUS_FRICTION * velocity + self.load
+
+    def set_stops(self, low: float, high: float) -> None:
+        """Put mechanical stops at positions, infinite for none."""
+        self._stops = (low, high)
 
     def power_on(self, deceleration: float) -> None:
         """Close the position loop where the motor is; one that still runs out is ramped down."""
-        self.demand = self._servo.power_on()
+        self._setpoint = self.position + self._free_velocity * self._model.lag
+        self.powered = True
         self.stop(deceleration)
 
     def power_off(self) -> None:
         """Open the position loop; the motor runs out against its brake."""
-        self._servo.power_off()
+        self._free_velocity = self.velocity
+        self.powered = self.speed_limited = False
         self._rest()
 
-    def follow(self, motion: Motion) -> None:
-        """Take another motion, which begins now where the demand is."""
-        self.motion = motion
-        self.demand = motion.at(self.time)
+    def move(self, target: float, limits: Limits) -> None:
+        """Go to a position and stand still there, as fast as the limits allow."""
+        self._target, self._limits = target, limits
+        self._begin(self._move_phase)
 
-    def stop(self, deceleration: float) -> None:
-        """Ramp down to a stop, from where the motor is rather than from a demand far ahead."""
-        start = self.demand
-        if self._servo.limited or self.arrived:  # a cyclic set-point has no speed
-            start = Point(self._servo.setpoint, self._servo.velocity, 0.0)
-        limits = Limits(self.speed, deceleration, deceleration)
-        self.follow(plan_velocity(start, 0.0, limits, self.time))
+    def ramp(
+        self, velocity: float, limits: Limits, bounds: tuple[float, float] = NO_BOUNDS
+    ) -> bool:
+        """Ramp to a velocity and keep it, or stop where a position bound lies ahead.
+
+        Returns:
+            The motion ends at a bound.
+        """
+        speed = min(abs(velocity), limits.velocity)
+        self._wanted, self._limits = math.copysign(speed, velocity), limits
+        bound = bounds[velocity > 0.0]
+        bounded = velocity != 0.0 and math.isfinite(bound)
+        if bounded and (bound - self._stopping_place(limits.deceleration)) * velocity > 0.0:
+            self.move(bound, limits._replace(velocity=speed))
+            return True
+        if bounded:  # it cannot stop before the bound
+            self._wanted = 0.0
+        self._begin(self._ramp_phase)
+        return bounded
+
+    def line(self, target: float, duration: float) -> None:
+        """Go to a position at constant velocity in a given time, then stand still."""
+        self._target = target
+        self._plan = self._stand
+        self.demand_velocity = (target - self.demand) / duration
+        self._cruise(duration)
+
+    def stop(self, deceleration: float) -> float:
+        """Ramp down to a stop; return where that is.
+
+        It begins where the motor is, if the demand is far ahead of it or a cyclic set-point,
+        which has no velocity.
+        """
+        if self.speed_limited or self.arrived:
+            self.demand, self.demand_velocity = self._setpoint, self.velocity
+        place = self._stopping_place(deceleration)
+        self.ramp(0.0, Limits(math.inf, deceleration, deceleration))
+        return place
+
+    def push(self, torque: float) -> None:
+        """Let a torque act for :data:`TORQUE_STEP`; the velocity is kept then."""
+        if self.blocked:
+            self.demand, self.demand_velocity = self.position, 0.0
+        velocity = self.demand_velocity
+        holds = self.rests(torque)
+        drive = torque - self.load
+        rate = 0.0
+        if velocity or not holds:
+            dry = math.copysign(DRY_FRICTION, velocity or drive)
+            rate = TORQUE_GAIN * (drive - dry - VISCOUS_FRICTION * velocity)
+        end = velocity + rate * TORQUE_STEP
+        if velocity * end < 0.0 and holds:
+            end = 0.0  # friction brings it to rest, and does not turn it back
+        end = min(max(end, -self.speed), self.speed)
+        rate = max(abs(rate), abs(end - velocity) / TORQUE_STEP)  # more where it was too fast
+        self.ramp(end, Limits(math.inf, rate, rate))
+
+    def rests(self, torque: float) -> bool:
+        """Return whether friction holds a standing motor against a torque and the load."""
+        return abs(torque - self.load) <= DRY_FRICTION
 
     def shift(self, offset: float) -> None:
-        """Move the zero of the position by an offset in [inc]; the motor does not turn."""
-        self._servo.shift(offset)
+        """Move the zero of the position by an offset; the motor does not turn."""
         self.origin += offset
-        segments = self.motion.segments
-        self.motion = Motion([s._replace(position=s.position + offset) for s in segments])
-        self.demand = self.demand._replace(position=self.demand.position + offset)
+        self.position += offset
+        self._setpoint += offset
+        self.demand += offset
+        self._target += offset
+        self._stops = (self._stops[0] + offset, self._stops[1] + offset)
 
     def advance(self, now: float) -> None:
-        """Go on to a time in [s]; earlier ones are ignored."""
-        if now <= self.time:
-            return
-        if self._servo.powered:
-            self._servo.follow(self.motion, self.time, now, self.speed)
-            self.time = now
-            self.demand = self.motion.at(now)
-        else:
-            self._servo.coast(now - self.time)
-            self.time = now
+        """Go on to a time; earlier ones are ignored."""
+        while self.time < now:
+            self.step(now)
+
+    def step(self, until: float) -> None:
+        """Go on to a time, or to the end of the present phase if that comes before."""
+        if self.settled:
+            if self.powered and not self.blocked:
+                self.position = self._setpoint = self.demand
+            self.time = max(self.time, until)
+        elif not self.powered:
+            self._coast(until - self.time)
+            self.time = until
             self._rest()
+        else:
+            until = min(until, self.phase_end)
+            duration = until - self.time
+            if self._behind(duration):
+                duration = min(duration, LIMITER_STEP)
+                until = min(until, self.time + duration)
+                self._limit_rate(duration)
+            else:
+                self._follow(duration)
+            self.time = until
+        while self.phase_end <= self.time:
+            self.demand_velocity = self._phase_velocity
+            self._plan()
+
+    def _begin(self, plan: Callable[[], None]) -> None:
+        self._plan = plan
+        plan()
+
+    def _ramp_phase(self) -> None:
+        velocity, wanted, limits = self.demand_velocity, self._wanted, self._limits
+        if velocity == wanted:
+            self._constant()
+        elif velocity * wanted < 0.0:
+            self._accelerate(0.0, limits.deceleration)
+        else:
+            faster = abs(wanted) > abs(velocity)
+            self._accelerate(wanted, limits.acceleration if faster else limits.deceleration)
+
+    def _move_phase(self) -> None:
+        top, up, down = self._limits
+        velocity, way = self.demand_velocity, self._target - self.demand
+        braking = velocity * velocity / (2.0 * down)
+        if abs(way) < SETTLED and braking < SETTLED:
+            self._stand()
+            return
+        # from here on towards positive positions
+        sign = math.copysign(1.0, way - math.copysign(braking, velocity))
+        velocity, way = sign * velocity, sign * way
+        peak = math.sqrt(max(down * (2.0 * up * way + velocity * velocity) / (up + down), 0.0))
+        peak = min(top, peak)
+        if velocity < 0.0:  # moves away from the target, or cannot stop before it
+            self._accelerate(0.0, down)
+        elif velocity > top:
+            self._accelerate(sign * top, down)
+        elif velocity < peak * (1.0 - 1e-9):
+            self._accelerate(sign * peak, up)
+        elif way - braking > SETTLED:
+            self._cruise((way - braking) / velocity)
+        else:
+            self._accelerate(0.0, down)
+
+    def _accelerate(self, velocity: float, rate: float) -> None:
+        change = velocity - self.demand_velocity
+        self._acceleration = math.copysign(rate, change)
+        self._phase_velocity = velocity
+        self.phase_end = self.time + abs(change) / rate
+
+    def _cruise(self, duration: float) -> None:
+        self._acceleration = 0.0
+        self._phase_velocity = self.demand_velocity
+        self.phase_end = self.time + duration
+
+    def _constant(self) -> None:
+        self._cruise(NEVER)
+
+    def _stand(self) -> None:
+        self.demand, self.demand_velocity = self._target, 0.0
+        self._constant()
 
     def _rest(self) -> None:
         """Let the demand be where the motor is, so that nothing jumps when power comes."""
-        self.demand = Point(self._servo.position, 0.0, 0.0)
-        self.motion = hold(self._servo.position, self.time)
+        self._target = self.position
+        self._stand()
+
+    def _stopping_place(self, deceleration: float) -> float:
+        velocity = self.demand_velocity
+        return self.demand + velocity * abs(velocity) / (2.0 * deceleration)
+
+    def _coast(self, duration: float) -> None:
+        coasting = self._model.coasting
+        decay = math.exp(-duration / coasting)
+        self.position += self._free_velocity * coasting * (1.0 - decay)
+        self._free_velocity *= decay
+        if self._halt_at_stops() or abs(self._free_velocity) * coasting < SETTLED:
+            self._free_velocity = 0.0
+
+    def _behind(self, duration: float) -> bool:
+        """Return whether the motor cannot follow the demand for a time."""
+        last = self.demand_velocity + self._acceleration * duration
+        caught = abs(self.demand - self._setpoint) <= ROUNDING
+        return not caught or abs(self.demand_velocity) > self.speed or abs(last) > self.speed
+
+    def _advance_demand(self, duration: float) -> None:
+        change = self._acceleration * duration
+        self.demand += (self.demand_velocity + 0.5 * change) * duration
+        self.demand_velocity += change
+
+    def _follow(self, duration: float) -> None:
+        """Let the motor follow the demand (see the module)."""
+        lag, acceleration = self._model.lag, self._acceleration
+        bend = lag * lag * acceleration
+        offset = self.position - (self.demand - lag * self.demand_velocity + bend)
+        self._advance_demand(duration)
+        self._setpoint = self.demand
+        self.speed_limited = False
+        self.position = self.demand - lag * self.demand_velocity + bend
+        self.position += offset * math.exp(-duration / lag)
+        self._halt_at_stops()
+
+    def _limit_rate(self, duration: float) -> None:
+        """Let the motor follow the demand as far as its speed allows."""
+        self._advance_demand(duration)
+        lag, reach = self._model.lag, self.speed * duration
+        gap = self.demand - self._setpoint
+        moved = min(max(gap, -reach), reach)
+        self.speed_limited = abs(gap - moved) > ROUNDING
+        behind = lag * moved / duration if duration else 0.0
+        offset = self.position - self._setpoint + behind
+        self._setpoint = self._setpoint + moved if self.speed_limited else self.demand
+        self.position = self._setpoint - behind + offset * math.exp(-duration / lag)
+        self._halt_at_stops()
+
+    def _halt_at_stops(self) -> bool:
+        low, high = self._stops
+        if low <= self.position <= high:
+            return False
+        self.position = min(max(self.position, low), high)
+        return True

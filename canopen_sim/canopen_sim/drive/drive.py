@@ -3,8 +3,7 @@
 """A simulated drive: state machine, modes of operation, faults and a motor (CiA 402-2).
 
 The drive looks at its axis when SYNC comes, and otherwise every few milliseconds while anything
-moves or has to be waited for. How often it looks has no influence on the motion, which is known
-in closed form.
+moves or has to be waited for. How often it looks has no influence on the motion.
 """
 
 from __future__ import annotations
@@ -16,20 +15,22 @@ from arm_canopen.standard import Controlword, STATE_WORDS, Statusword
 
 from ..deviations import Fault, FaultInjection
 from ..objects.object_store import ObjectStore
+from ..services.emcy_producer import EmcyProducer
 from ..timed import NEVER
-from .axis import Axis
+from .axis import Axis, ServoModel
 from .modes.mode import Dwell, Mode, SyncClock, TARGET_REACHED
 from .modes.selection import ModeSelection
 from .objects import DriveObjects, MILLISECOND, NO_WINDOW
-from .servo import ServoModel
-from .shared_errors import SharedErrors
-from .state_machine import chosen, POWERED_STATES, StateMachine, VOLTAGE_STATES
-from .states import (
+from .state_machine import (
     AbortConnectionOption,
+    chosen,
     decode_command,
     DriveCommand,
     FAULT_RESET_BIT,
+    POWERED_STATES,
+    StateMachine,
     StopOption,
+    VOLTAGE_STATES,
 )
 from .switches import INTERLOCK_BIT, Switches
 
@@ -63,7 +64,7 @@ class Drive:
     def __init__(
         self,
         store: ObjectStore,
-        errors: SharedErrors,
+        errors: EmcyProducer,
         clock: SyncClock,
         model: ServoModel,
         *,
@@ -96,13 +97,13 @@ class Drive:
         self._idle = True
         objects.mode.listener = self._on_mode
         objects.controlword.listener = self._on_controlword
-        objects.max_velocity.listener = self._on_max_velocity
-        objects.max_motor_speed.listener = self._on_max_velocity
+        objects.max_velocity.variable.listener = self._on_max_velocity
+        objects.max_motor_speed.variable.listener = self._on_max_velocity
         for target in (
             objects.target_position,
-            objects.target_velocity,
+            objects.target_velocity.variable,
             objects.interpolation_target,
-            objects.vl_target,
+            objects.vl_target.variable,
             objects.target_torque,
         ):
             target.listener = self._on_setpoint
@@ -136,7 +137,6 @@ class Drive:
         self._axis.advance(now)
         self._machine.reset()
         self._word = 0
-        self._errors.forget(self.number)
         self.faults.clear()
         self._following.clear()
         self._modes.reset()
@@ -217,10 +217,8 @@ class Drive:
         self, velocity: float | None, acceleration: float | None, now: float
     ) -> None:
         """Use other units; None for its own. The numbers in its objects stay the same."""
-        self._objects.rate_units = (
-            velocity or self._rate_units[0],
-            acceleration or self._rate_units[1],
-        )
+        own_velocity, own_acceleration = self._rate_units
+        self._objects.rate_units[:] = velocity or own_velocity, acceleration or own_acceleration
         self._on_max_velocity(now)
         self._publish(now)
 
@@ -305,13 +303,13 @@ class Drive:
 
     def _move(self, now: float) -> None:
         """Advance the axis to a time, and what depends on where it is."""
-        while self._machine.operating and self._mode.next_event <= now:
-            event = self._mode.next_event
-            self._axis.advance(event)
-            self._mode.event(event)
-        self._axis.advance(now)
-        if self._machine.operating:
-            self._mode.update(now)
+        axis, mode = self._axis, self._mode if self._machine.operating else None
+        if mode is None:
+            axis.advance(now)
+        else:
+            while axis.time < now:
+                axis.step(min(now, mode.due))
+                mode.step(axis.time)
         self._watch_following_error(now)
         self._machine.advance(now)
 
@@ -329,13 +327,13 @@ class Drive:
         self.faults.add(code)
         self._objects.error_code.put(code)
         self._machine.fault(at_once=at_once)
-        self._errors.report(self.number, code, now)
+        self._errors.report(code, now, self)
 
     def _reset_fault(self, now: float) -> None:
         if any(fault.value.code for fault in self.causes):
             return
         for code in sorted(self.faults):
-            self._errors.clear(self.number, code, now)
+            self._errors.clear(code, now, self)
         self.faults.clear()
         self._following.clear()
         self._objects.error_code.put(0)
@@ -355,7 +353,7 @@ class Drive:
         if self._machine.operating:
             self._apply_halt(now)
             self._mode.command(word, previous, now)
-            self._mode.update(now)
+            self._mode.step(now)
         self._publish(now)
 
     @property
@@ -395,7 +393,7 @@ class Drive:
     def _begin_mode(self, now: float) -> None:
         self._mode.halted = self._halted
         self._mode.start(self._word, now)
-        self._mode.update(now)
+        self._mode.step(now)
 
     def _publish(self, now: float) -> None:
         """Write what can be seen from outside, and decide when to look again."""
@@ -404,12 +402,12 @@ class Drive:
         objects.position_actual.put(axis.position)
         objects.position_internal.put(axis.position - axis.origin)
         objects.velocity_actual.put(axis.velocity)
-        objects.position_demand.put(axis.demand.position)
-        objects.velocity_demand.put(axis.demand.velocity)
+        objects.position_demand.put(axis.demand)
+        objects.velocity_demand.put(axis.demand_velocity)
         objects.following_error.put(axis.following_error)
         inputs = axis.switches.inputs(axis.position - axis.origin)
         objects.digital_inputs.put(inputs | (0 if self._machine.voltage else INTERLOCK_BIT))
-        objects.vl_demand.put(axis.demand.velocity)
+        objects.vl_demand.put(axis.demand_velocity)
         objects.vl_actual.put(axis.velocity)
         self._publish_torque()
         self._schedule(now)
@@ -455,6 +453,5 @@ class Drive:
         period = CONTROL_PERIOD
         if self._clock.period <= SYNC_PERIOD_MAX and self._clock.alive(now):
             period = SYNC_TIMEOUT_PERIODS * self._clock.period
-        self.deadline = now + period
-        if now < self._axis.motion.end < self.deadline:
-            self.deadline = self._axis.motion.end
+        phase_end = self._axis.phase_end
+        self.deadline = phase_end if now < phase_end < now + period else now + period

@@ -11,11 +11,7 @@ from arm_canopen import OperationMode
 from arm_canopen.standard import AXIS_OFFSET, Index, TARGET_OBJECTS
 
 from ..objects.object_store import Integer, ObjectStore
-from .profile import Limits
-from .rate import Rate, RateUnit
-
-Bind: TypeAlias = Callable[..., Integer]
-BindRate: TypeAlias = Callable[..., Rate]
+from .axis import Limits
 
 ACCELERATIONS = frozenset(
     {
@@ -36,10 +32,41 @@ UNSET_RAMP = 100_000.0  # [inc/s^2] where a dictionary gives 0 for a ramp
 PERIOD_MIN = 0.001  # [s] shortest interpolation period that is believed
 
 
+class Rate:
+    """An object in a unit of its drive, seen in increments per second (or second squared).
+
+    Attributes:
+        variable: The object.
+    """
+
+    __slots__ = ('_kind', '_units', 'variable')
+
+    def __init__(self, variable: Integer, units: list[float], kind: int) -> None:
+        self.variable = variable
+        self._units = units
+        self._kind = kind
+
+    @property
+    def value(self) -> float:
+        """What it holds in [inc/s]."""
+        return self.variable.value * self._units[self._kind]
+
+    def put(self, rate: float) -> None:
+        """Store a rate in [inc/s], rounded and held within the type of the object."""
+        self.variable.put(rate / self._units[self._kind])
+
+
+Bind: TypeAlias = Callable[..., Integer]
+BindRate: TypeAlias = Callable[..., Rate]
+
+
 class DriveObjects:
     """All objects of a drive, bound once; units are increments, and [inc/s] of velocities.
 
     Those that a dictionary lacks get a harmless value and stay invisible.
+
+    Attributes:
+        rate_units: What 1 of its velocities is in [inc/s], of its accelerations in [inc/s^2].
     """
 
     def __init__(
@@ -57,10 +84,10 @@ class DriveObjects:
             return store.integer(index + axis * AXIS_OFFSET, subindex, default=default)
 
         def rate(index: int, subindex: int = 0, *, default: int = 0) -> Rate:
-            unit = self._acceleration_unit if index in ACCELERATIONS else self._velocity_unit
-            return Rate(bind(index, subindex, default=default), unit)
+            variable = bind(index, subindex, default=default)
+            return Rate(variable, self.rate_units, index in ACCELERATIONS)
 
-        self._velocity_unit, self._acceleration_unit = (RateUnit(unit) for unit in rate_units)
+        self.rate_units = list(rate_units)
         self._bind_states(bind)
         self._bind_actual_values(bind, rate)
         self._bind_windows(bind, rate)
@@ -166,15 +193,6 @@ class DriveObjects:
         self.max_torque = bind(Index.MAX_TORQUE, default=NOMINAL_TORQUE)
         self.positive_torque = bind(Index.POSITIVE_TORQUE_LIMIT, default=NO_TORQUE_LIMIT)
         self.negative_torque = bind(Index.NEGATIVE_TORQUE_LIMIT, default=NO_TORQUE_LIMIT)
-
-    @property
-    def rate_units(self) -> tuple[float, float]:
-        """What 1 of its velocities is in [inc/s], of its accelerations in [inc/s^2]."""
-        return self._velocity_unit.value, self._acceleration_unit.value
-
-    @rate_units.setter
-    def rate_units(self, units: tuple[float, float]) -> None:
-        self._velocity_unit.value, self._acceleration_unit.value = units
 
     @property
     def speed(self) -> float:

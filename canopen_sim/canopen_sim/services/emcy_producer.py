@@ -51,7 +51,7 @@ class EmcyProducer:
         self._cob_id = store.integer(Index.EMCY_COB_ID, default=COB_ID_INVALID)
         self._cob_id.check = lambda value: check_cob_id(self._cob_id, value)
         self._inhibit = store.integer(Index.EMCY_INHIBIT_TIME)  # [100 us]
-        self._active: set[int] = set()
+        self._active: dict[int, set[object]] = {}  # who has an error, by its code
         self._pending: deque[Emergency] = deque(maxlen=PENDING_MAX)
         self._allowed = False
         self._next_time = 0.0
@@ -89,34 +89,41 @@ class EmcyProducer:
         self._allowed = allowed
         self._flush(now)
 
-    def report(self, code: int, now: float, vendor: bytes = bytes(5)) -> None:
+    def report(
+        self, code: int, now: float, source: object = None, vendor: bytes = bytes(5)
+    ) -> None:
         """Report that an error occurred; one that is active already is not repeated.
 
         Args:
             code: Error code of CiA 301 or CiA 402.
             now: Steady time in [s].
+            source: The part that has it, such as an axis; it is gone when all have lost it.
             vendor: Five manufacturer-specific bytes.
         """
-        if code in self._active:
+        sources = self._active.setdefault(code, set())
+        known = bool(sources)
+        sources.add(source)
+        if known:
             return
-        self._active.add(code)
         self._update_register()
         self._record(code)
         self._last = Emergency(code, self._register.value, vendor)
         self._queue(self._last, now)
 
-    def set_error(self, code: int, present: bool, now: float) -> None:
+    def set_error(self, code: int, present: bool, now: float, source: object = None) -> None:
         """Report an error that is present at a time in [s], or clear one that is not."""
         if present:
-            self.report(code, now)
+            self.report(code, now, source)
         else:
-            self.clear(code, now)
+            self.clear(code, now, source)
 
-    def clear(self, code: int, now: float) -> None:
+    def clear(self, code: int, now: float, source: object = None) -> None:
         """Report that an error is gone; the error register of the message has what remains."""
-        if code not in self._active:
+        sources = self._active.get(code, set())
+        sources.discard(source)
+        if sources or code not in self._active:
             return
-        self._active.discard(code)
+        del self._active[code]
         self._update_register()
         self._queue(Emergency(0, self._register.value), now)
 

@@ -1,21 +1,36 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Whom a device watches, and what it does when it misses one (CiA 301, 7.5.2.33)."""
+"""NMT error control of a device: what it sends, whom it watches, and what a loss causes.
+
+Heartbeat producer and consumer, node guarding as the guarded device sees it, life guarding and
+the error behaviour (CiA 301, 7.2.8.2.2 and 7.5.2.17 to 7.5.2.33).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Protocol
 
 from arm_canopen.can import Frame
-from arm_canopen.standard import Index, NmtState
+from arm_canopen.standard import (
+    AbortCode,
+    CobId,
+    ConsumerHeartbeatTime,
+    Index,
+    NmtState,
+    parse_heartbeat,
+)
+from arm_canopen.standard.datatypes import Value
 
-from ..objects.object_store import ObjectStore
+from ..objects.object_store import Integer, ObjectStore, refusal
+from ..timed import NEVER
 from .emcy_producer import EmcyProducer
-from .heartbeat import HeartbeatConsumer
 from .nmt_slave import NmtSlave
-from .node_guarding import GuardedNode
 
+MILLISECOND = 0.001  # [s]
+GOLDEN_RATIO = 0.618034  # its multiples, less their whole part, are spread most evenly
+TOGGLE = 0x80
 HEARTBEAT_ERROR = 0x8130  # EMCY: life guard error or heartbeat error
 ERROR_STATES: dict[int, NmtState] = {0: NmtState.PRE_OPERATIONAL, 2: NmtState.STOPPED}
 """Where a communication error leads from Operational, by 0x1029:01; 1 leads nowhere."""
@@ -24,20 +39,23 @@ ERROR_STATES: dict[int, NmtState] = {0: NmtState.PRE_OPERATIONAL, 2: NmtState.ST
 class Axis(Protocol):
     """What stops when a connection is lost."""
 
-    @property
-    def faults(self) -> Container[int]:
-        """Its error codes that are latched."""
-
     def connection_lost(self, now: float) -> None:
         """Stop as 0x6007 says."""
 
 
 class ErrorControl:
-    """Heartbeat consumer and life guarding of one device, with what follows from a loss.
+    """Error control of one device.
+
+    It sends the NMT state at the period of 0x1017. The devices of a network are often configured
+    in the same instant; so that their heartbeats do not crowd, the first one after a start is
+    early by a part of the period that depends on the node id.
+
+    It watches the devices that 0x1016 names, each from its first heartbeat on. And it answers
+    the remote frames of a master that guards it; life guarding begins with the first request. A
+    device that sends heartbeats is not guarded, and one without 0x100C cannot be.
 
     Attributes:
-        consumer: Watches the devices that 0x1016 names.
-        guarding: Answers who guards this device, and notices their end.
+        node_id: Id of the device.
     """
 
     def __init__(
@@ -50,7 +68,7 @@ class ErrorControl:
         send: Callable[[Frame], None],
         subscribe: Callable[[], None],
     ) -> None:
-        """Bind 0x1016, 0x100C, 0x100D and 0x1029.
+        """Bind 0x100C, 0x100D, 0x1016, 0x1017 and 0x1029.
 
         Args:
             store: Objects of the device.
@@ -60,49 +78,143 @@ class ErrorControl:
             send: Takes the frames.
             subscribe: Called when other identifiers are listened to.
         """
+        self.node_id = nmt.node_id
         self._nmt = nmt
         self._errors = errors
         self._drives = drives
+        self._send = send
+        self._subscribe = subscribe
         self._behaviour = store.integer(Index.ERROR_BEHAVIOUR, 1)
-        self.consumer = HeartbeatConsumer(
-            store, self._heartbeat_lost, self._heartbeat_back, subscribe
-        )
-        self.guarding = GuardedNode(
-            nmt.node_id, store, lambda: nmt.state, send, self._guarding_changed
-        )
+        self._next_heartbeat = NEVER
+        self._period = store.integer(Index.PRODUCER_HEARTBEAT)  # [ms]
+        self._period.listener = self.start
+        self._periods: dict[int, float] = {}  # [s] of those watched, by node id
+        self._watched: dict[int, float] = {}  # when the next heartbeat counts as lost
+        self._first_loss = NEVER
+        self._consumers = [
+            store.integer(entry.index, entry.subindex)
+            for entry in store.dictionary.subindices(Index.CONSUMER_HEARTBEAT)
+            if entry.subindex > 0
+        ]
+        for variable in self._consumers:
+            variable.check = partial(self._check_consumer, variable)
+            variable.listener = lambda _now: self._watch()
+        self._toggle = False
+        self._life_end = NEVER
+        self._has_guarding = (Index.GUARD_TIME, 0) in store
+        self._guard_time = store.integer(Index.GUARD_TIME)  # [ms]
+        self._factor = store.integer(Index.LIFE_TIME_FACTOR)
+        self._guard_time.listener = self._factor.listener = self._change_life_time
+
+    @property
+    def deadline(self) -> float:
+        """Steady time in [s] of the next heartbeat, or at which one counts as lost."""
+        return min(self._next_heartbeat, self._first_loss, self._life_end)
+
+    @property
+    def can_ids(self) -> list[int]:
+        """Identifiers of the heartbeats that it wants to receive."""
+        return [CobId.HEARTBEAT + node_id for node_id in self._periods]
 
     def reset(self) -> None:
-        """Watch no node before its next heartbeat."""
-        self.consumer.reset()
-        self.guarding.reset()
+        """Begin anew, as after a reset of the communication: the toggle bit is 0."""
+        self._toggle = False
+        self._life_end = NEVER
+        self._watch()
+
+    def start(self, now: float) -> None:
+        """Begin a new series of heartbeats, or none when the period is 0."""
+        period = self._period.value * MILLISECOND
+        phase = self.node_id * GOLDEN_RATIO % 1.0
+        self._next_heartbeat = now + period * (1.0 - phase) if period else NEVER
+
+    def stop(self) -> None:
+        """Send no heartbeat until :meth:`start`."""
+        self._next_heartbeat = NEVER
+
+    def receive(self, frame: Frame, now: float) -> None:
+        """Take a heartbeat of another device."""
+        node_id = frame.can_id - CobId.HEARTBEAT
+        period = self._periods.get(node_id)
+        if period is None or parse_heartbeat(frame.data) is None:
+            return
+        self._watched[node_id] = now + period
+        self._first_loss = min(self._watched.values())
+        self._errors.clear(HEARTBEAT_ERROR, now, node_id)
+
+    def guard(self, now: float) -> None:
+        """Answer a remote frame for the state of this device."""
+        state = self._nmt.state
+        if state is NmtState.BOOT_UP or self._period.value or not self._has_guarding:
+            return
+        word = state | (TOGGLE if self._toggle else 0)
+        self._toggle = not self._toggle
+        self._send(Frame(CobId.HEARTBEAT + self.node_id, bytes((word,))))
+        self._life_end = now + self._life_time
+        self._errors.clear(HEARTBEAT_ERROR, now, self)
+
+    def advance(self, now: float) -> None:
+        """Send a heartbeat when it is due; report those that stayed away."""
+        if now >= self._next_heartbeat:
+            self._send(Frame(CobId.HEARTBEAT + self.node_id, bytes((self._nmt.state,))))
+            period = self._period.value * MILLISECOND
+            self._next_heartbeat += period
+            if self._next_heartbeat <= now:  # a process that stood still does not catch up
+                self._next_heartbeat = now + period
+        if now >= self._first_loss:
+            late = [node_id for node_id, due in self._watched.items() if due <= now]
+            for node_id in late:
+                del self._watched[node_id]
+            self._first_loss = min(self._watched.values(), default=NEVER)
+            for node_id in late:
+                self._lose(now, node_id, node_id)
+        if now >= self._life_end:
+            self._life_end = NEVER
+            self._lose(now, self)
 
     def postpone(self, stalled: float) -> None:
         """Leave out a time in [s] in which nothing was received."""
-        self.consumer.postpone(stalled)
-        self.guarding.postpone(stalled)
+        for node_id in self._watched:
+            self._watched[node_id] += stalled
+        self._first_loss += stalled
+        self._life_end += stalled
 
-    def _heartbeat_lost(self, node_id: int, now: float) -> None:
-        self._lose(now, node_id)
+    @property
+    def _life_time(self) -> float:
+        """How long requests may stay away in [s]; NEVER when nothing watches for them."""
+        return self._guard_time.value * self._factor.value * MILLISECOND or NEVER
 
-    def _heartbeat_back(self, _node_id: int, now: float) -> None:
-        self._regain(now)
+    def _change_life_time(self, now: float) -> None:
+        if self._life_end != NEVER:  # it is being guarded
+            self._life_end = now + self._life_time
 
-    def _guarding_changed(self, lost: bool, now: float) -> None:
-        if lost:
-            self._lose(now)
-        else:
-            self._regain(now)
+    def _watch(self) -> None:
+        """Watch the nodes of 0x1016, from the next heartbeats on."""
+        entries = (_consumer(variable.value) for variable in self._consumers)
+        self._periods = {node_id: period for node_id, period in entries if period}
+        self._watched.clear()
+        self._first_loss = NEVER
+        self._subscribe()
 
-    def _lose(self, now: float, node_id: int = 0) -> None:
+    def _lose(self, now: float, source: object, node_id: int = 0) -> None:
         """React to a communication error as 0x1029:01 and 0x6007 of the drive select."""
-        self._errors.report(HEARTBEAT_ERROR, now, bytes((node_id, 0, 0, 0, 0)))
+        vendor = bytes((node_id, 0, 0, 0, 0))
+        self._errors.report(HEARTBEAT_ERROR, now, source, vendor)
         for drive in self._drives:
             drive.connection_lost(now)
         target = ERROR_STATES.get(self._behaviour.value)
         if target is not None and self._nmt.state is NmtState.OPERATIONAL:
             self._nmt.enter(target, now)
 
-    def _regain(self, now: float) -> None:
-        latched = any(HEARTBEAT_ERROR in drive.faults for drive in self._drives)
-        if not (latched or self.consumer.missing or self.guarding.lost):
-            self._errors.clear(HEARTBEAT_ERROR, now)
+    def _check_consumer(self, variable: Integer, value: Value) -> None:
+        node_id, period = _consumer(int(value)) if isinstance(value, int) else (0, 0.0)
+        others = (_consumer(other.value) for other in self._consumers if other is not variable)
+        # one device cannot have two consumer times (CiA 301, 7.5.2.17)
+        if period and any(node_id == other and time for other, time in others):
+            raise refusal(AbortCode.PARAMETER_INCOMPATIBLE, variable.entry)
+
+
+def _consumer(word: int) -> tuple[int, float]:
+    """Return node id and time in [s] of an entry of 0x1016; time 0 when it is not used."""
+    entry = ConsumerHeartbeatTime.parse(word)
+    return entry.node_id, entry.time_ms * MILLISECOND if entry.used else 0.0

@@ -4,12 +4,11 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Callable
 
 from arm_canopen.can import Frame
 from arm_canopen.standard import (
     ALL_NODES,
-    CobId,
     COMMANDED_STATES,
     NmtCommand,
     NmtState,
@@ -21,16 +20,6 @@ from arm_canopen.standard import (
 from ..timed import NEVER
 
 
-class NmtObserver(Protocol):
-    """What the rest of the device does when the NMT state changes."""
-
-    def reset(self, command: NmtCommand, now: float) -> None:
-        """Return to the defaults of the whole device or of its communication."""
-
-    def nmt_changed(self, previous: NmtState, now: float) -> None:
-        """Another state was entered, boot-up done included."""
-
-
 class NmtSlave:
     """NMT state of one device; it executes commands for its id and for all.
 
@@ -40,18 +29,26 @@ class NmtSlave:
         deadline: When Initialisation ends, as steady time in [s].
     """
 
-    def __init__(self, node_id: int, observer: NmtObserver, boot_time: float) -> None:
+    def __init__(
+        self,
+        node_id: int,
+        reset: Callable[[NmtCommand, float], None],
+        changed: Callable[[NmtState, float], None],
+        boot_time: float,
+    ) -> None:
         """Begin switched off; the first :meth:`advance` starts Initialisation.
 
         Args:
             node_id: Id of the device.
-            observer: Notified of resets and new states.
+            reset: Returns to the defaults of the whole device or of its communication.
+            changed: Called with the previous state when another was entered, also after boot-up.
             boot_time: How long Initialisation takes in [s].
         """
         self.state = NmtState.BOOT_UP
         self.deadline = 0.0
         self.node_id = node_id
-        self._observer = observer
+        self._reset = reset
+        self._changed = changed
         self._boot_time = boot_time
         self._powered = False
 
@@ -71,7 +68,7 @@ class NmtSlave:
         if state is self.state:
             return
         previous, self.state = self.state, state
-        self._observer.nmt_changed(previous, now)
+        self._changed(previous, now)
 
     def advance(self, now: float) -> None:
         """Begin Initialisation after power-on; end it when its time is over."""
@@ -94,15 +91,10 @@ class NmtSlave:
 
     def _initialise(self, command: NmtCommand, now: float) -> None:
         self.state = NmtState.BOOT_UP
-        self._observer.reset(command, now)
+        self._reset(command, now)
         if self.node_id > NODE_ID_MAX:  # LSS has to give it one first
             self.deadline = NEVER
             return
         self.deadline = now + self._boot_time
         if self._boot_time <= 0.0:
             self.advance(now)
-
-
-def boot_up_frame(node_id: int) -> Frame:
-    """Return the frame by which a device reports that Initialisation is over."""
-    return Frame(CobId.HEARTBEAT + node_id, bytes((NmtState.BOOT_UP,)))

@@ -11,6 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Generic, TypeVar
 
 from arm_canopen import CodecError, SdoAbortError
 from arm_canopen.standard import (
@@ -22,6 +23,7 @@ from arm_canopen.standard import (
     MappedObject,
     ObjectEntry,
     PDO_BITS_MAX,
+    PDO_COUNT_MAX,
     PdoCodec,
     RTR_FORBIDDEN,
     SYNCHRONOUS_MAX,
@@ -40,6 +42,7 @@ class PdoChannel(ABC):
     """One PDO: its communication record and its mapping.
 
     Attributes:
+        number: From 1.
         enabled: It exists (bit 31 of the COB-ID is clear) and its mapping can be used.
         can_id: Its identifier.
         transmission: Transmission type (CiA 301, tables 69 and 71).
@@ -53,18 +56,20 @@ class PdoChannel(ABC):
     def __init__(
         self,
         store: ObjectStore,
-        communication: int,
-        mapping: int,
+        number: int,
+        records: tuple[int, int],
         changed: Callable[[PdoChannel, float], None],
     ) -> None:
         """Bind the parameter objects of one PDO.
 
         Args:
             store: Objects of the device.
-            communication: Index of its communication record.
-            mapping: Index of its mapping record.
+            number: Offset of its records from the first ones.
+            records: Index of the first communication record, and of the first mapping record.
             changed: Called with the PDO and the time when a client changed it.
         """
+        self.number = number + 1
+        communication, mapping = (index + number for index in records)
         self._store = store
         self._cob_id = store.integer(communication, 1, default=COB_ID_INVALID)
         self._type = store.integer(communication, 2)
@@ -190,6 +195,37 @@ def total_bits(variables: Sequence[Scalar]) -> int:
     return sum(bit_length(variable.entry.data_type) or 0 for variable in variables)
 
 
-def channel_numbers(store: ObjectStore, first: int, last: int) -> list[int]:
+Channel = TypeVar('Channel', bound=PdoChannel)
+
+
+class PdoEngine(Generic[Channel]):
+    """All PDOs of a device in one direction.
+
+    Attributes:
+        channels: Those of the dictionary.
+        active: Those that exist, while the device is Operational.
+    """
+
+    def __init__(self, changed: Callable[[], None]) -> None:
+        """Begin stopped; ``changed`` is called when a client changed a PDO."""
+        self.channels: list[Channel] = []
+        self.active: list[Channel] = []
+        self._running = False
+        self._changed = changed
+
+    def configure(self) -> None:
+        """Read the parameter objects again, after a reset."""
+        for channel in self.channels:
+            channel.configure()
+
+    def number_of(self, can_id: int) -> int:
+        """Return the number of the active PDO with an identifier, 0 when there is none."""
+        return next((pdo.number for pdo in self.active if pdo.can_id == can_id), 0)
+
+    def _select(self) -> None:
+        self.active = [pdo for pdo in self.channels if self._running and pdo.enabled]
+
+
+def channel_numbers(store: ObjectStore, first: int) -> list[int]:
     """Return the offsets from ``first`` of the PDO records that a dictionary has."""
-    return [index - first for index in range(first, last + 1) if store.dictionary.has_index(index)]
+    return [n for n in range(PDO_COUNT_MAX) if store.dictionary.has_index(first + n)]

@@ -12,26 +12,23 @@ from arm_canopen.standard import (
     DataType,
     Index,
     ObjectEntry,
-    PDO_COUNT_MAX,
     SYNCHRONOUS_MAX,
 )
 
 from ..objects.object_store import make_variable, ObjectStore, Variable
 from ..timed import NEVER
-from .pdo_channel import channel_numbers, PdoChannel, TRANSMISSION_EVENT
+from .pdo_channel import channel_numbers, PdoChannel, PdoEngine, TRANSMISSION_EVENT
 
 LENGTH_ERROR = 0x8210  # EMCY: PDO not processed due to length error
 TIMEOUT_ERROR = 0x8250  # EMCY: RPDO timeout
 Handler = Callable[[Frame, float], None]
-ErrorReport = Callable[[int, bool, float], None]
-ChannelReport = Callable[[PdoChannel, int, bool, float], None]
+ErrorReport = Callable[[int, bool, float, object], None]
 
 
 class Rpdo(PdoChannel):
     """One receive PDO: writes what it carries into the object dictionary.
 
     Attributes:
-        number: From 1.
         deadline: Steady time in [s] at which the next one is overdue.
     """
 
@@ -42,28 +39,17 @@ class Rpdo(PdoChannel):
         store: ObjectStore,
         number: int,
         changed: Callable[[PdoChannel, float], None],
-        report: ChannelReport,
+        report: ErrorReport,
         too_late: Callable[[float], bool],
     ) -> None:
-        """Bind the records of an RPDO.
-
-        Args:
-            store: Objects of the device.
-            number: Offset of its records from 0x1400 and 0x1600.
-            changed: Called with the PDO and the time when a client changed it.
-            report: Called with the PDO, a code, whether that error is there, and the time.
-            too_late: Returns whether the synchronous window is over at a time.
-        """
+        """Bind the records of an RPDO; see :class:`RpdoEngine`."""
         self.deadline = NEVER
         self._short = self._late = False
         self._report = report
         self._too_late = too_late
         self._held: bytes | None = None
         self._listeners: tuple[Callable[[float], None], ...] = ()
-        self.number = number + 1
-        super().__init__(
-            store, Index.RPDO_COMMUNICATION + number, Index.RPDO_MAPPING + number, changed
-        )
+        super().__init__(store, number, (Index.RPDO_COMMUNICATION, Index.RPDO_MAPPING), changed)
 
     def configure(self) -> None:
         """Read the parameter objects."""
@@ -83,14 +69,14 @@ class Rpdo(PdoChannel):
         short = len(frame.data) < self.codec.size
         if short is not self._short:
             self._short = short
-            self._report(self, LENGTH_ERROR, short, now)
+            self._report(LENGTH_ERROR, short, now, self)
         if short:
             return
         if self.event_time:
             self.deadline = now + self.event_time
             if self._late:
                 self._late = False
-                self._report(self, TIMEOUT_ERROR, False, now)
+                self._report(TIMEOUT_ERROR, False, now, self)
         if self.transmission <= SYNCHRONOUS_MAX:
             if not self._too_late(now):  # discarded otherwise (CiA 301, 7.5.2.8)
                 self._held = frame.data
@@ -116,7 +102,7 @@ class Rpdo(PdoChannel):
         if now >= self.deadline:
             self.deadline = NEVER
             self._late = True
-            self._report(self, TIMEOUT_ERROR, True, now)
+            self._report(TIMEOUT_ERROR, True, now, self)
 
     def _write_objects(self, data: bytes) -> None:
         for variable, value in zip(self.variables, self.codec.unpack(data), strict=True):
@@ -164,17 +150,13 @@ def _chained(receivers: Sequence[Handler], finished: Callable[[float], None]) ->
     return handle
 
 
-class RpdoEngine:
-    """All receive PDOs of a device.
-
-    Attributes:
-        active: Those that exist, while the device is Operational.
-    """
+class RpdoEngine(PdoEngine[Rpdo]):
+    """All receive PDOs of a device."""
 
     def __init__(
         self,
         store: ObjectStore,
-        changed: Callable[[float], None],
+        changed: Callable[[], None],
         report: ErrorReport,
         too_late: Callable[[float], bool],
     ) -> None:
@@ -182,30 +164,21 @@ class RpdoEngine:
 
         Args:
             store: Objects of the device.
-            changed: Called with the time when a client changed one of them.
-            report: Called with a code, whether that error is there, and the time.
+            changed: Called when a client changed one of them.
+            report: Called with a code, whether that error is there, the time, and a PDO.
             too_late: Returns whether the synchronous window is over at a time.
         """
-        first = int(Index.RPDO_COMMUNICATION)
-        self.active: list[Rpdo] = []
-        self._running = False
-        self._changed = changed
+        super().__init__(changed)
         self._report = report
-        self._wrong: dict[int, set[PdoChannel]] = {LENGTH_ERROR: set(), TIMEOUT_ERROR: set()}
         self.channels = [
-            Rpdo(store, number, self._channel_changed, self._channel_error, too_late)
-            for number in channel_numbers(store, first, first + PDO_COUNT_MAX - 1)
+            Rpdo(store, number, self._channel_changed, report, too_late)
+            for number in channel_numbers(store, Index.RPDO_COMMUNICATION)
         ]
 
     @property
     def deadline(self) -> float:
         """Steady time in [s] at which the first of them is overdue."""
         return min((rpdo.deadline for rpdo in self.active), default=NEVER)
-
-    def configure(self) -> None:
-        """Read the parameter objects again, after a reset."""
-        for rpdo in self.channels:
-            rpdo.configure()
 
     def start(self) -> None:
         """Receive from now on."""
@@ -216,10 +189,9 @@ class RpdoEngine:
         """Receive no more; errors of reception are over."""
         for rpdo in self.active:
             rpdo.reset()
-        for code, channels in self._wrong.items():
-            if channels:
-                channels.clear()
-                self._report(code, False, now)
+        for rpdo in self.channels:
+            for code in (LENGTH_ERROR, TIMEOUT_ERROR):
+                self._report(code, False, now, rpdo)
         self._running = False
         self._select()
 
@@ -242,10 +214,6 @@ class RpdoEngine:
         for rpdo in self.active:
             rpdo.advance(now)
 
-    def number_of(self, can_id: int) -> int:
-        """Return the number of the active PDO with an identifier, 0 when there is none."""
-        return next((rpdo.number for rpdo in self.active if rpdo.can_id == can_id), 0)
-
     def handlers(self, finished: Callable[[float], None]) -> dict[int, Handler]:
         """Return what takes the frames of each identifier; several PDOs may share one.
 
@@ -257,20 +225,6 @@ class RpdoEngine:
             receivers.setdefault(rpdo.can_id, []).append(rpdo.receive)
         return {can_id: _chained(chain, finished) for can_id, chain in receivers.items()}
 
-    def _select(self) -> None:
-        self.active = [rpdo for rpdo in self.channels if self._running and rpdo.enabled]
-
-    def _channel_changed(self, _channel: PdoChannel, now: float) -> None:
+    def _channel_changed(self, _channel: PdoChannel, _now: float) -> None:
         self._select()
-        self._changed(now)
-
-    def _channel_error(self, channel: PdoChannel, code: int, present: bool, now: float) -> None:
-        # an error is there until the last of the PDOs that had it is well again
-        channels = self._wrong[code]
-        before = bool(channels)
-        if present:
-            channels.add(channel)
-        else:
-            channels.discard(channel)
-        if bool(channels) is not before:
-            self._report(code, bool(channels), now)
+        self._changed()

@@ -7,11 +7,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from arm_canopen.can import Frame
-from arm_canopen.standard import Index, ObjectEntry, PDO_COUNT_MAX, SYNCHRONOUS_MAX
+from arm_canopen.standard import Index, ObjectEntry, SYNCHRONOUS_MAX
 
 from ..objects.object_store import ObjectStore
 from ..timed import NEVER
-from .pdo_channel import channel_numbers, PdoChannel, TRANSMISSION_EVENT
+from .pdo_channel import channel_numbers, PdoChannel, PdoEngine, TRANSMISSION_EVENT
 
 ACYCLIC = 0  # sent at a SYNC when something changed
 RTR_SYNC = 252  # sampled at SYNC, sent on a remote frame
@@ -22,7 +22,6 @@ class Tpdo(PdoChannel):
     """One transmit PDO.
 
     Attributes:
-        number: From 1.
         deadline: Steady time in [s] at which it is to be sent.
     """
 
@@ -42,24 +41,14 @@ class Tpdo(PdoChannel):
         changed: Callable[[PdoChannel, float], None],
         send: Callable[[Frame], None],
     ) -> None:
-        """Bind the records of a TPDO.
-
-        Args:
-            store: Objects of the device.
-            number: Offset of its records from 0x1800 and 0x1A00.
-            changed: Called with the PDO and the time when a client changed it.
-            send: Takes the frames.
-        """
+        """Bind the records of a TPDO; see :class:`TpdoEngine`."""
         self.deadline = NEVER
         self._send = send
         self._sent: bytes | None = None
         self._sampled: bytes | None = None
         self._free_time = 0.0  # end of the inhibit time
         self._countdown = 0
-        self.number = number + 1
-        super().__init__(
-            store, Index.TPDO_COMMUNICATION + number, Index.TPDO_MAPPING + number, changed
-        )
+        super().__init__(store, number, (Index.TPDO_COMMUNICATION, Index.TPDO_MAPPING), changed)
 
     def start(self, now: float) -> None:
         """Begin as on entering Operational: an event-driven PDO is sent once."""
@@ -133,43 +122,34 @@ class Tpdo(PdoChannel):
         self._send(Frame(self.can_id, payload))
 
 
-class TpdoEngine:
+class TpdoEngine(PdoEngine[Tpdo]):
     """All transmit PDOs of a device.
 
     Attributes:
-        active: Those that exist, while the device is Operational.
         deadline: Steady time in [s] at which one of them is to be sent.
     """
 
     def __init__(
         self,
         store: ObjectStore,
-        changed: Callable[[float], None],
+        changed: Callable[[], None],
         send: Callable[[Frame], None],
     ) -> None:
         """Bind every TPDO of a dictionary.
 
         Args:
             store: Objects of the device.
-            changed: Called with the time when a client changed one of them.
+            changed: Called when a client changed one of them.
             send: Takes the frames.
         """
-        first = int(Index.TPDO_COMMUNICATION)
-        self.active: list[Tpdo] = []
+        super().__init__(changed)
         self.deadline = NEVER
-        self._running = False
-        self._changed = changed
         self._synchronous: list[Tpdo] = []
         self._event_driven: list[Tpdo] = []
         self.channels = [
             Tpdo(store, number, self._channel_changed, send)
-            for number in channel_numbers(store, first, first + PDO_COUNT_MAX - 1)
+            for number in channel_numbers(store, Index.TPDO_COMMUNICATION)
         ]
-
-    def configure(self) -> None:
-        """Read the parameter objects again, after a reset."""
-        for tpdo in self.channels:
-            tpdo.configure()
 
     def start(self, now: float) -> None:
         """Send from now on."""
@@ -185,14 +165,9 @@ class TpdoEngine:
         self._select()
         self.deadline = NEVER
 
-    def number_of(self, can_id: int) -> int:
-        """Return the number of the active PDO with an identifier, 0 when there is none."""
-        return next((tpdo.number for tpdo in self.active if tpdo.can_id == can_id), 0)
-
     def _select(self) -> None:
-        self.active = [
-            tpdo for tpdo in self.channels if self._running and tpdo.enabled and tpdo.variables
-        ]
+        super()._select()
+        self.active = [tpdo for tpdo in self.active if tpdo.variables]
         self._synchronous = [
             tpdo for tpdo in self.active if tpdo.is_synchronous or tpdo.transmission == RTR_SYNC
         ]
@@ -203,7 +178,7 @@ class TpdoEngine:
         if isinstance(channel, Tpdo) and channel in self.active:
             channel.start(now)
             self.advance(now)
-        self._changed(now)
+        self._changed()
 
     def sync(self, counter: int, now: float) -> None:
         """Send those whose turn this SYNC is."""

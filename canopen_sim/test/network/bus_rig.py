@@ -26,7 +26,6 @@ from arm_canopen.master.runner import Clock
 from arm_canopen.master.scheduler import Promise
 from arm_canopen.standard import ObjectDictionary
 from canopen_sim import Device, ServoModel
-from canopen_sim.drive.rate import INCREMENTS_PER_SECOND, RateUnits
 
 FRAME_TIME = 0.00012  # [s] a frame of 8 bytes at 1 Mbit/s
 START = 100.0  # [s] of virtual steady time; not 0, which means "never" in places
@@ -172,7 +171,7 @@ class VirtualNetwork:
         absent: Iterable[str] = (),
         dictionaries: Mapping[str, ObjectDictionary] | None = None,
         servo: ServoModel | None = None,
-        rate_units: RateUnits = INCREMENTS_PER_SECOND,
+        rate_units: Mapping[int, tuple[float, float]] | None = None,
         beside_master: bool = False,
     ) -> None:
         """Connect everything and switch the devices on; the master waits for :meth:`start`.

@@ -192,8 +192,7 @@ def test_enabling_holds_the_motor_where_it_was_moved_by_hand(mode: OperationMode
     loaded.net.do(JOINT, 'disable')
     drive = loaded.net.devices[JOINT].drive
     assert drive is not None
-    drive._axis.shift(-1234)
-    drive._publish(loaded.net.now)
+    drive.count_from(drive.position - 1234, loaded.net.now)
     loaded.net.run(0.1)
     rest = loaded.position
     loaded.net.do(JOINT, 'enable')
@@ -218,8 +217,7 @@ def test_a_drive_that_keeps_its_mode_does_not_jump_when_it_is_enabled() -> None:
     loaded.net.drives[JOINT].control.select(
         loaded.net.drives[JOINT].control.modes[OperationMode.NO_MODE]
     )
-    drive._axis.shift(-1234)
-    drive._publish(loaded.net.now)
+    drive.count_from(drive.position - 1234, loaded.net.now)
     loaded.net.run(0.1)
     rest = loaded.position
     loaded.net.do(JOINT, 'init')
@@ -235,8 +233,7 @@ def test_factors_that_contradict_each_other_move_nothing(mode: OperationMode) ->
     loaded = Loaded(scales=scales, sdo_writes=(*MOTION_WRITES, sdo_write(0x607C, 0, 5_000)))
     drive = loaded.net.devices[JOINT].drive
     assert drive is not None
-    drive._axis.shift(7_000)
-    drive._publish(loaded.net.now)
+    drive.count_from(drive.position + 7_000, loaded.net.now)
     loaded.net.run(0.1)
     loaded.enable(mode)
     loaded.net.run(1.0)

@@ -4,17 +4,16 @@
 
 from __future__ import annotations
 
+from enum import auto, Enum
 import math
 
 from arm_canopen import OperationMode
 from arm_canopen.standard import Controlword, Statusword
 
 from ...timed import NEVER
-from ..axis import Axis
-from ..homing_run import HomingRun, Phase
+from ..axis import Axis, Limits
 from ..objects import DriveObjects
-from ..profile import Limits, plan_velocity
-from ..switches import INDEX_METHODS, PRESENT_POSITION_METHODS, REFERENCES
+from ..switches import INDEX_METHODS, PRESENT_POSITION_METHODS, Reference, REFERENCES, Switches
 from .mode import Mode, SyncClock, TARGET_REACHED
 
 HOMING_START = int(Controlword.HOMING_START)
@@ -23,6 +22,109 @@ HOMING_ERROR = int(Statusword.HOMING_ERROR)
 
 NO_HOMING = 0
 STEP = 0.001  # [s] how often the switches are looked at; edges are latched exactly
+
+
+class Phase(Enum):
+    """What a search does."""
+
+    SEARCH = auto()  # fast, until the switch is active
+    LEAVE = auto()  # slowly past the edge, out of the active range
+    RETURN = auto()  # slowly back over the edge
+    INDEX = auto()  # slowly to the index pulse
+    FOUND = auto()
+    FAILED = auto()
+
+
+class HomingRun:
+    """One search for a switch and an index pulse, as a sequence of directions and speeds.
+
+    Attributes:
+        phase: What it does.
+        direction: Where it goes: -1, 1.
+        home: Mechanical position of home in [inc], once found.
+    """
+
+    def __init__(self, method: int, switches: Switches, position: float) -> None:
+        """Begin a search.
+
+        Args:
+            method: A number of :data:`~.switches.REFERENCES` or
+                :data:`~.switches.INDEX_METHODS`.
+            switches: Where the switches are.
+            position: Mechanical position of the axis in [inc].
+        """
+        self.home = position
+        self._switches = switches
+        self._turned = False
+        self._reference: Reference | None = REFERENCES.get(method)
+        if self._reference is None:
+            self.direction = INDEX_METHODS[method]
+            self._seek_index(position, self.direction)
+        else:
+            self.phase = Phase.SEARCH
+            self.direction = self._reference.first
+
+    @property
+    def fast(self) -> bool:
+        """It moves with the speed of the search for a switch."""
+        return self.phase is Phase.SEARCH
+
+    @property
+    def done(self) -> bool:
+        """It has ended."""
+        return self.phase in (Phase.FOUND, Phase.FAILED)
+
+    def look(self, position: float) -> None:
+        """See where the axis is, mechanically in [inc]."""
+        if self._reference is None or self.phase is Phase.INDEX:
+            self._look_for_index(position)
+            return
+        active = self._switches.active(self._reference.switch, position)
+        if self.phase is Phase.SEARCH:
+            self._search(active, position)
+        elif self.phase is Phase.LEAVE:
+            self._leave(self._reference, active, position)
+        elif self.phase is Phase.RETURN and active:
+            self._pass_edge(self._reference)
+
+    def _search(self, active: bool, position: float) -> None:
+        if active and self._reference is not None:
+            self.phase, self.direction = Phase.LEAVE, self._reference.side
+        elif self._switches.limit_ahead(self.direction, position):
+            self.direction = -self.direction
+            if self._turned:
+                self.phase = Phase.FAILED
+            self._turned = True
+
+    def _leave(self, reference: Reference, active: bool, position: float) -> None:
+        if active:
+            if self._switches.limit_ahead(self.direction, position):
+                self.phase = Phase.FAILED
+            return
+        edge = self._switches.edge(reference.switch, reference.side)
+        if (position - edge) * self.direction < 0.0:
+            return  # it ran over the whole switch, and comes back
+        if reference.final == reference.side:
+            self._pass_edge(reference)
+        else:
+            self.phase, self.direction = Phase.RETURN, reference.final
+
+    def _pass_edge(self, reference: Reference) -> None:
+        edge = self._switches.edge(reference.switch, reference.side)
+        if reference.to_index:
+            self._seek_index(edge, reference.final)
+        else:
+            self.home, self.phase = edge, Phase.FOUND
+
+    def _seek_index(self, position: float, direction: int) -> None:
+        self.phase, self.direction = Phase.INDEX, direction
+        self.home = self._switches.next_index(position, direction)
+
+    def _look_for_index(self, position: float) -> None:
+        if (position - self.home) * self.direction >= 0.0:
+            self.phase = Phase.FOUND
+        elif self._switches.limit_ahead(self.direction, position):
+            self.phase = Phase.FAILED
 
 
 class Homing(Mode):
@@ -40,12 +142,6 @@ class Homing(Mode):
         self._attained = False
         self._failed = False
         self._run: HomingRun | None = None
-        self._next = NEVER
-
-    @property
-    def next_event(self) -> float:
-        """When the switches are looked at."""
-        return self._next
 
     @property
     def waiting(self) -> bool:
@@ -73,66 +169,57 @@ class Homing(Mode):
         self._begin(self.objects.homing_method.value, now)
 
     def _begin(self, method: int, now: float) -> None:
+        position = self.axis.position - self.axis.origin
         self._attained = self._failed = False
         if method == NO_HOMING:
             self._attained = True
         elif method in PRESENT_POSITION_METHODS:
-            self._attain(self.axis.position - self.axis.origin)
+            self._attain(position)
         elif method in REFERENCES or method in INDEX_METHODS:
-            position = self.axis.position - self.axis.origin
             self._run = HomingRun(method, self.axis.switches, position)
-            self._move(now)
-            self._next = now
+            self._move(self._run, now)
         else:
             self._failed = True
 
     def halt(self, now: float) -> None:
         """Wait with the search."""
-        self._next = NEVER
+        self.due = NEVER
 
     def resume(self, now: float) -> None:
         """Go on with the search."""
         if self._run is not None and not self._run.done:
-            self._move(now)
-            self._next = now
+            self._move(self._run, now)
 
-    def event(self, now: float) -> None:
-        """Look at the switches."""
-        run = self._run
+    def step(self, now: float) -> None:
+        """Look at the switches; take home over when the axis stands."""
+        run, axis = self._run, self.axis
         if run is None:
-            self._next = NEVER
             return
-        before = (run.phase, run.direction)
-        run.look(self.axis.position - self.axis.origin)
-        self._next = NEVER if run.done else now + STEP
-        if run.done:
-            self.axis.stop(self.objects.homing_ramp)
-            self._failed = run.phase is Phase.FAILED
-        elif before != (run.phase, run.direction):
-            self._move(now)
+        if now >= self.due:
+            before = (run.phase, run.direction)
+            run.look(axis.position - axis.origin)
+            self.due = NEVER if run.done else now + STEP
+            if run.done:
+                axis.stop(self.objects.homing_ramp)
+                self._failed = run.phase is Phase.FAILED
+            elif before != (run.phase, run.direction):
+                self._move(run, now)
+        if run.done and axis.settled:
+            self._cancel()
+            if run.phase is Phase.FOUND:
+                self._attain(run.home)
 
-    def _move(self, now: float) -> None:
+    def _move(self, run: HomingRun, now: float) -> None:
         """Go where the search leads."""
-        run, objects = self._run, self.objects
-        if run is None:
-            return
+        objects = self.objects
         speeds = (objects.homing_speed_zero.value, objects.homing_speed_switch.value)
         if not all(speeds):
             self._failed = True
             self._cancel()
             return
         limits = Limits(objects.speed, objects.homing_ramp, objects.homing_ramp)
-        velocity = math.copysign(speeds[run.fast], run.direction)
-        self.axis.follow(plan_velocity(self.axis.demand, velocity, limits, now))
-
-    def update(self, now: float) -> None:
-        """Take home over when the axis stands."""
-        run = self._run
-        if run is None or not run.done or not self.axis.settled:
-            return
-        self._cancel()
-        if run.phase is Phase.FOUND:
-            self._attain(run.home)
+        self.axis.ramp(math.copysign(speeds[run.fast], run.direction), limits)
+        self.due = now
 
     def _attain(self, home: float) -> None:
         self.axis.shift(self.objects.home_offset.value - home - self.axis.origin)
@@ -140,7 +227,7 @@ class Homing(Mode):
 
     def _cancel(self) -> None:
         self._run = None
-        self._next = NEVER
+        self.due = NEVER
 
     def status(self) -> int:
         """Return "target reached", "homing attained" and "homing error"."""

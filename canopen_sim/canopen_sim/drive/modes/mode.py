@@ -13,6 +13,8 @@ from ...timed import NEVER
 from ..axis import Axis
 from ..objects import DriveObjects
 
+TARGET_REACHED = int(Statusword.TARGET_REACHED)
+
 
 class SyncClock(Protocol):
     """What a drive knows of SYNC."""
@@ -35,6 +37,7 @@ class Mode:
         number: Its value of 0x6060.
         halted: Bit 8 of the controlword is set; the axis ramps down or stands.
         limited: A software position limit holds the demand back.
+        due: Steady time in [s] at which a step of the axis has to end.
     """
 
     number: ClassVar[OperationMode]
@@ -45,28 +48,25 @@ class Mode:
         self.clock = clock
         self.halted = False
         self.limited = False
-
-    @property
-    def next_event(self) -> float:
-        """Steady time in [s] at which :meth:`event` has to be called, exactly then."""
-        return NEVER
+        self.due = NEVER
 
     @property
     def waiting(self) -> bool:
         """Some time has to pass before its status is final."""
         return False
 
+    @property
+    def torque(self) -> float | None:
+        """Torque that it applies in [0.1 % of the rated torque]; None when a position is held."""
+        return None
+
     def reset(self) -> None:
         """Forget everything, as after switching on."""
 
     def start(self, word: int, now: float) -> None:
-        """Begin: operation was enabled, or the mode was selected while it was.
-
-        Args:
-            word: The controlword.
-            now: Steady time in [s].
-        """
+        """Begin: operation was enabled with a controlword, or the mode was selected then."""
         self.limited = False
+        self.due = NEVER
         self.axis.stop(self.objects.slow_down)
 
     def command(self, word: int, previous: int, now: float) -> None:
@@ -78,35 +78,19 @@ class Mode:
     def resume(self, now: float) -> None:
         """Halt is over."""
 
-    @property
-    def torque(self) -> float | None:
-        """Torque that it applies in [0.1 % of the rated torque]; None when a position is held."""
-        return None
-
     def load_changed(self, now: float) -> None:
         """See another load torque."""
 
     def setpoint(self, now: float) -> bool:
-        """See a target object written; the axis may be at an earlier time.
-
-        Returns:
-            The motion has changed.
-        """
+        """See a target object written, the axis at an earlier time; return whether it moves."""
         return False
 
     def sync(self, now: float) -> bool:
-        """See a SYNC; the axis may be at an earlier time.
-
-        Returns:
-            The motion has changed.
-        """
+        """See a SYNC, the axis at an earlier time; return whether the motion has changed."""
         return False
 
-    def event(self, now: float) -> None:
-        """Do what is due at :attr:`next_event`."""
-
-    def update(self, now: float) -> None:
-        """Look at the axis after it moved."""
+    def step(self, now: float) -> None:
+        """Look at the axis after a step of it."""
 
     def status(self) -> int:
         """Return bits 10, 12 and 13 of the statusword."""
@@ -137,20 +121,11 @@ class Dwell:
         self.reached = self.pending = False
 
     def update(self, condition: bool, duration: float, now: float) -> None:
-        """Look at the condition.
-
-        Args:
-            condition: It is met now.
-            duration: How long it has to be met in [s].
-            now: Steady time in [s].
-        """
+        """Look at the condition, which has to be met for a duration in [s]."""
         if not condition:
-            self.reached = self.pending = False
+            self.clear()
             return
         if not self.pending and not self.reached:
             self._since = now
         self.reached = self.reached or now - self._since >= duration
         self.pending = not self.reached
-
-
-TARGET_REACHED = int(Statusword.TARGET_REACHED)

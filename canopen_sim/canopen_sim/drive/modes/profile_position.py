@@ -11,9 +11,8 @@ from arm_canopen import OperationMode
 from arm_canopen.standard import Controlword, Statusword
 
 from ...timed import NEVER
-from ..axis import Axis
+from ..axis import Axis, Limits
 from ..objects import DriveObjects, MILLISECOND, NO_WINDOW
-from ..profile import Limits, plan_move, plan_velocity
 from .mode import Dwell, Mode, SyncClock, TARGET_REACHED
 
 NEW_SET_POINT = int(Controlword.NEW_SET_POINT)
@@ -49,7 +48,8 @@ class ProfilePosition(Mode):
     another set-point.
 
     With "change on set-point" the present move passes its target without a stop, where the
-    further set-point lies far enough in the same direction; otherwise it stops there.
+    further set-point lies far enough in the same direction; otherwise it stops there. The step
+    that is due ends at the target.
     """
 
     number = OperationMode.PROFILE_POSITION
@@ -60,17 +60,7 @@ class ProfilePosition(Mode):
         self._next: SetPoint | None = None
         self._preceding = 0.0  # target that a relative one counts from
         self._offered = False  # the master's bit of an accepted set-point is still set
-        self._passing = NEVER  # when the present target is passed without a stop
         self._dwell = Dwell()
-
-    @property
-    def next_event(self) -> float:
-        """End of a move after which another one waits, or its target may be reached."""
-        if self._active is None or self.halted:
-            return NEVER
-        if self._next is not None and self._passing < NEVER:
-            return self._passing
-        return NEVER if self.axis.arrived else self.axis.motion.end
 
     @property
     def waiting(self) -> bool:
@@ -79,11 +69,10 @@ class ProfilePosition(Mode):
 
     def start(self, word: int, now: float) -> None:
         """Stand still and wait for a set-point."""
-        super().start(word, now)
+        self.limited = self._offered = False
+        self.due = NEVER
         self._active = self._next = None
-        self._passing = NEVER
-        self._offered = False
-        self._preceding = self.axis.motion.at(self.axis.motion.end).position
+        self._preceding = self.axis.stop(self.objects.slow_down)
         self._dwell.clear()
 
     def command(self, word: int, previous: int, now: float) -> None:
@@ -93,12 +82,16 @@ class ProfilePosition(Mode):
         elif not word & NEW_SET_POINT:
             self._offered = False
 
+    @property
+    def _arriving(self) -> bool:
+        """The active move has not come to its end."""
+        return self.due < NEVER or not self.axis.arrived
+
     def _offer(self, word: int, now: float) -> None:
         setpoint = self._setpoint(word)
-        busy = self._active is not None and not self.axis.arrived
-        if not busy or word & CHANGE_IMMEDIATELY:
+        if self._active is None or not self._arriving or word & CHANGE_IMMEDIATELY:
             self._next = None
-            self._begin(setpoint, now)
+            self._begin(setpoint)
         elif self._next is None:
             self._next = setpoint
             self._pass_target(now)
@@ -108,24 +101,23 @@ class ProfilePosition(Mode):
         self._preceding = setpoint.target
 
     def _setpoint(self, word: int) -> SetPoint:
-        target = float(self.objects.target_position.value)
+        objects = self.objects
+        target = float(objects.target_position.value)
         if word & RELATIVE:
             target += self._preceding
-        within = self.objects.within_limits(target, self.axis.demand.position)
-        velocity = float(self.objects.profile_velocity.value)
-        return SetPoint(
-            within, self.objects.profile(velocity), within != target, bool(word & BLEND)
-        )
+        within = objects.within_limits(target, self.axis.demand)
+        limits = objects.profile(float(objects.profile_velocity.value))
+        return SetPoint(within, limits, within != target, bool(word & BLEND))
 
-    def _begin(self, setpoint: SetPoint, now: float) -> None:
+    def _begin(self, setpoint: SetPoint) -> None:
         self._active = setpoint
-        self._passing = NEVER
+        self.due = NEVER
         self.limited = setpoint.clipped
         self._dwell.clear()
         if self.halted:
             return
         if setpoint.limits.velocity > 0.0:
-            self.axis.follow(plan_move(self.axis.demand, setpoint.target, setpoint.limits, now))
+            self.axis.move(setpoint.target, setpoint.limits)
         else:  # a profile velocity of 0 leads nowhere
             self.axis.stop(setpoint.limits.deceleration)
 
@@ -134,42 +126,42 @@ class ProfilePosition(Mode):
         active, following = self._active, self._next
         if active is None or following is None or not following.blended or self.halted:
             return
-        start = self.axis.demand
-        way = active.target - start.position
-        if way * (following.target - active.target) <= 0.0 or way * start.velocity < 0.0:
+        axis, (top, up, down) = self.axis, active.limits
+        way = active.target - axis.demand
+        after = following.target - active.target
+        if way * after <= 0.0 or way * axis.demand_velocity < 0.0 or not top:
             return
-        limits = active.limits
-        if not limits.velocity:
-            return
-        cruise = plan_velocity(start, math.copysign(limits.velocity, way), limits, now)
-        passing = cruise.time_at(active.target)
-        if passing == NEVER:
-            return
-        braking = cruise.at(passing).velocity ** 2 / (2.0 * following.limits.deceleration)
-        if braking <= abs(following.target - active.target):  # else it would overrun
-            self._passing = passing
-            self.axis.follow(cruise)
+        speed = abs(axis.demand_velocity)
+        rate = math.copysign(up if top > speed else down, top - speed)
+        ramp = (top * top - speed * speed) / (2.0 * rate)  # [inc] until the speed is reached
+        rest = abs(way) - ramp
+        passing = top if rest >= 0.0 else math.sqrt(speed * speed + 2.0 * rate * abs(way))
+        if passing * passing / (2.0 * following.limits.deceleration) <= abs(after):
+            # otherwise it would overrun the next target
+            self.due = now + (passing - speed) / rate + max(rest, 0.0) / top
+            axis.ramp(math.copysign(top, way), active.limits)
+
+    def halt(self, now: float) -> None:
+        """Stand until :meth:`resume`."""
+        self.due = NEVER
 
     def resume(self, now: float) -> None:
         """Go on with the move that was halted."""
         if self._active is not None:
-            self._begin(self._active, now)
+            self._begin(self._active)
             self._pass_target(now)
 
-    def event(self, now: float) -> None:
-        """Begin the next move where the present one ends."""
-        if self._next is not None:
-            setpoint, self._next = self._next, None
-            self._begin(setpoint, now)
-            self._pass_target(now)
-
-    def update(self, now: float) -> None:
-        """See whether the target is reached."""
+    def step(self, now: float) -> None:
+        """Begin the next move where the present one ends; see whether the target is reached."""
+        axis = self.axis
+        following = None if self.halted else self._next
+        if following is not None and (now >= self.due or not self._arriving):
+            self._next = None
+            self._begin(following)
         window = self.objects.position_window.value
-        target = self._active.target if self._active else self.axis.demand.position
-        error = abs(self.axis.position - target)
-        there = self.axis.arrived and (window == NO_WINDOW or error <= window)
-        there = there and (self._active is None or self.axis.demand.position == target)
+        target = self._active.target if self._active else axis.demand
+        there = axis.arrived and axis.demand == target
+        there = there and (window == NO_WINDOW or abs(axis.position - target) <= window)
         delay = self.objects.position_window_time.value * MILLISECOND
         self._dwell.update(there and self._next is None, delay, now)
 

@@ -11,9 +11,7 @@ from arm_canopen.standard import Statusword
 
 from ..axis import Axis
 from ..objects import DriveObjects, MILLISECOND
-from ..profile import Motion
 from .mode import Dwell, Mode, SyncClock, TARGET_REACHED
-from .velocity_plan import plan_bounded
 
 ZERO_SPEED = int(Statusword.ZERO_SPEED)
 SLIPPAGE_ERROR = 0x2000  # bit 13 of the statusword
@@ -47,9 +45,11 @@ class ProfileVelocity(Mode):
 
     def resume(self, now: float) -> None:
         """Ramp to the target velocity."""
-        self._target = float(self.objects.target_velocity.value)
+        objects = self.objects
+        self._target = float(objects.target_velocity.value)
         self._reached.clear()
-        self.axis.follow(self._plan(now))
+        limits = objects.profile(objects.speed)
+        self._bounded = self.axis.ramp(self._target, limits, objects.position_limits())
 
     def setpoint(self, now: float) -> bool:
         """Ramp to another target velocity."""
@@ -59,13 +59,7 @@ class ProfileVelocity(Mode):
         self.resume(now)
         return True
 
-    def _plan(self, now: float) -> Motion:
-        limits = self.objects.profile(self.objects.speed)
-        bounds = self.objects.position_limits()
-        motion, self._bounded = plan_bounded(self.axis.demand, self._target, limits, bounds, now)
-        return motion
-
-    def update(self, now: float) -> None:
+    def step(self, now: float) -> None:
         """See whether the velocity is reached, and whether it is zero."""
         objects, velocity = self.objects, self.axis.velocity
         self.limited = self._bounded and self.axis.arrived
@@ -85,6 +79,6 @@ class ProfileVelocity(Mode):
         """Return "target reached", "zero speed" and "max slippage error"."""
         zero = ZERO_SPEED if self._standing.reached else 0
         slip = self.objects.max_slippage.value
-        if 0 < slip < abs(self.axis.demand.velocity - self.axis.velocity):
+        if 0 < slip < abs(self.axis.demand_velocity - self.axis.velocity):
             zero |= SLIPPAGE_ERROR
         return zero | (TARGET_REACHED if self._reached.reached else 0)

@@ -13,12 +13,11 @@ from ...deviations import Fault
 from ...objects.object_store import refusal
 from ..axis import Axis
 from ..objects import DriveObjects
-from .cyclic_velocity import CyclicVelocity
 from .homing import Homing
 from .mode import Mode, NoMode, SyncClock
 from .profile_position import ProfilePosition
 from .profile_velocity import ProfileVelocity
-from .streamed_position import CyclicPosition, InterpolatedPosition
+from .streamed import CyclicPosition, CyclicVelocity, InterpolatedPosition
 from .torque import CyclicTorque, ProfileTorque
 from .velocity import Velocity
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What all modes have in common in which the master streams set-points (CiA 402-2).
+"""Modes in which the master streams positions or velocities (CiA 402-2, clauses 13 and 14).
 
 While SYNC comes regularly, a set-point that was written is taken at the next SYNC; otherwise at
 once. It holds until the next one is due: for the period of SYNC when there was one for each
@@ -10,14 +10,18 @@ SYNC, else for the interpolation time period 0x60C2.
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections import deque
 
-from arm_canopen.standard import Statusword
+from arm_canopen import OperationMode
+from arm_canopen.standard import Controlword, Statusword
 
-from ..axis import Axis
-from ..objects import DriveObjects
-from .mode import Mode, SyncClock
+from ..axis import Axis, Limits
+from ..objects import DriveObjects, NO_WINDOW, PERIOD_MIN
+from .mode import Mode, SyncClock, TARGET_REACHED
 
 FOLLOWS_COMMAND = int(Statusword.FOLLOWS_COMMAND)
+ENABLE_INTERPOLATION = int(Controlword.ENABLE_INTERPOLATION)
+INTERPOLATION_ACTIVE = int(Statusword.INTERPOLATION_ACTIVE)
 
 
 class Streamed(Mode):
@@ -66,16 +70,138 @@ class Streamed(Mode):
 
     @abstractmethod
     def take(self, period: float, now: float) -> bool:
-        """Apply the set-point.
+        """Apply the set-point, the axis at an earlier time; return whether it moves.
 
         Args:
             period: When the next one is due in [s].
-            now: Steady time in [s]; the axis may be at an earlier one.
-
-        Returns:
-            The motion has changed.
+            now: Steady time in [s].
         """
+
+    def go(self, wanted: int, period: float, now: float) -> bool:
+        """Go to a position within a period; return whether the motion has changed."""
+        axis = self.axis
+        axis.advance(now)
+        target = self.objects.within_limits(wanted, axis.demand)
+        self.limited = target != wanted
+        if axis.arrived and axis.demand == target:
+            return False
+        axis.line(target, max(period, PERIOD_MIN))
+        return True
 
     def status(self) -> int:
         """Return "drive follows the command value"."""
         return FOLLOWS_COMMAND if self.following and not self.limited else 0
+
+
+class CyclicPosition(Streamed):
+    """Cyclic synchronous position mode: 0x607A plus the position offset 0x60B0."""
+
+    number = OperationMode.CYCLIC_POSITION
+
+    def take(self, period: float, now: float) -> bool:
+        """Go to the set-point within a period."""
+        objects = self.objects
+        return self.go(objects.target_position.value + objects.position_offset.value, period, now)
+
+
+class CyclicVelocity(Streamed):
+    """Ramps from set-point to set-point within a cycle, as far as 0x60C5 and 0x60C6 allow.
+
+    The velocity is 0x60FF plus the velocity offset 0x60B1. The last one holds when the stream
+    ends; software position limits stop the axis.
+    """
+
+    number = OperationMode.CYCLIC_VELOCITY
+
+    def take(self, period: float, now: float) -> bool:
+        """Ramp to the velocity within a period."""
+        objects, axis = self.objects, self.axis
+        wanted = float(objects.target_velocity.value + objects.velocity_offset.value)
+        axis.advance(now)
+        change = abs(wanted - axis.demand_velocity)
+        if not change and axis.arrived:
+            return False
+        needed = max(change / period, objects.slow_down)
+        limits = Limits(
+            axis.speed,
+            min(needed, objects.max_acceleration.value or needed),
+            min(needed, objects.max_deceleration.value or needed),
+        )
+        bounded = axis.ramp(wanted, limits, objects.position_limits())
+        self.limited = abs(wanted) > axis.speed or (bounded and axis.arrived)
+        return True
+
+
+class InterpolatedPosition(Streamed):
+    """Interpolated position mode, linear; bit 4 of the controlword enables it.
+
+    With a buffer of more than one record (0x60C4:02) the set-points wait in it, and each SYNC
+    takes one. Writing 0 to 0x60C4:06 empties it and keeps it shut until 1 is written.
+    """
+
+    number = OperationMode.INTERPOLATED_POSITION
+
+    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
+        super().__init__(objects, axis, clock)
+        self._enabled = False
+        self._buffer: deque[int] = deque()
+        objects.buffer_clear.listener = self._on_clear
+
+    @property
+    def following(self) -> bool:
+        """Set-points are applied."""
+        return self._enabled and not self.halted
+
+    def start(self, word: int, now: float) -> None:
+        """Stand still; bit 4 may be set already."""
+        super().start(word, now)
+        self._buffer.clear()
+        self._enabled = bool(word & ENABLE_INTERPOLATION)
+
+    def take(self, period: float, now: float) -> bool:
+        """Go to the interpolation data record 0x60C1:01 within a period."""
+        return self.go(self.objects.interpolation_target.value, period, now)
+
+    def setpoint(self, now: float) -> bool:
+        """Keep the set-point for its SYNC, or take it."""
+        size = min(self.objects.buffer_size.value, self.objects.buffer_maximum.value)
+        if not self.objects.buffer_clear.value:
+            return False
+        if size > 1 and self.clock.alive(now):
+            if self.following and len(self._buffer) < size:
+                self._buffer.append(self.objects.interpolation_target.value)
+            return False
+        return super().setpoint(now)
+
+    def sync(self, now: float) -> bool:
+        """Take the oldest set-point of the buffer, or the one since the last SYNC."""
+        if not self._buffer:
+            return super().sync(now)
+        if not self.following:
+            return False
+        return self.go(self._buffer.popleft(), self.clock.period, now)
+
+    def _on_clear(self, _now: float) -> None:
+        if not self.objects.buffer_clear.value:
+            self._buffer.clear()
+            self._fresh = False
+
+    def halt(self, now: float) -> None:
+        """Forget what was not taken."""
+        super().halt(now)
+        self._buffer.clear()
+
+    def command(self, word: int, previous: int, now: float) -> None:
+        """Enable or disable interpolation."""
+        enabled = bool(word & ENABLE_INTERPOLATION)
+        if enabled is not self._enabled:
+            self._enabled = enabled
+            self.halt(now)
+            self.axis.stop(self.objects.slow_down)
+
+    def status(self) -> int:
+        """Return "target reached" and "interpolation active"."""
+        window = self.objects.position_window.value
+        near = window == NO_WINDOW or abs(self.axis.following_error) <= window
+        reached = TARGET_REACHED if self.axis.arrived and near else 0
+        return reached | (INTERPOLATION_ACTIVE if self.following else 0)

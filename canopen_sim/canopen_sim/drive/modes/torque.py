@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Modes in which the master commands a torque: profile torque and cyclic synchronous torque.
 
-The motor (:mod:`..motor`) makes a motion of it. Torques are in [0.1 % of the rated torque].
-Software position limits do not act on a torque; the highest speed does. During halt the axis is
-ramped down and held in position.
+The axis makes a motion of it. Torques are in [0.1 % of the rated torque]. Software position
+limits do not act on a torque; the highest speed does. During halt the axis is ramped down and
+held in position.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import math
 from arm_canopen import OperationMode
 
 from ...timed import NEVER
-from ..axis import Axis
+from ..axis import Axis, TORQUE_STEP
 from ..objects import DriveObjects
 from .mode import Mode, SyncClock, TARGET_REACHED
 from .streamed import Streamed
@@ -26,18 +26,12 @@ class TorqueMode(Mode):
     def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
         super().__init__(objects, axis, clock)
         self._torque = 0.0
-        self._next = NEVER
         self._acting = False
-
-    @property
-    def next_event(self) -> float:
-        """Beginning of the next step."""
-        return self._next
 
     @property
     def waiting(self) -> bool:
         """The torque acts on a motor that moves or may move."""
-        return self._next < NEVER
+        return self.due < NEVER
 
     @property
     def torque(self) -> float | None:
@@ -57,43 +51,37 @@ class TorqueMode(Mode):
     def start(self, word: int, now: float) -> None:
         """Hold the axis; the torque begins with the one that holds the load."""
         super().start(word, now)
-        self._hold()
+        self._acting = False
 
     def halt(self, now: float) -> None:
         """Let the axis be held."""
-        self._hold()
+        self._acting = False
+        self.due = NEVER
 
     def act(self, now: float) -> None:
         """Let the torque act from now on."""
         if not self._acting:
             self._acting = True
             self._torque = self.objects.held_torque(self.axis.torque)
-        if self._next == NEVER:
+        if self.due == NEVER:
             self.axis.advance(now)
-            self._next = now
+            self.due = now
 
     def load_changed(self, now: float) -> None:
         """See another load, which may move a motor at rest."""
         if self._acting:
             self.act(now)
 
-    def event(self, now: float) -> None:
-        """Apply the torque for another step."""
-        axis, interval = self.axis, self.axis.motor.interval
-        change = self.slope * interval
+    def step(self, now: float) -> None:
+        """Apply the torque for another step, when one has ended."""
+        axis = self.axis
+        if now < self.due:
+            return
+        change = self.slope * TORQUE_STEP
         self._torque += min(max(self.wanted - self._torque, -change), change)
-        start = axis.demand
-        if axis.blocked:
-            start = start._replace(position=axis.position, velocity=0.0)
-        axis.follow(axis.motor.step(start, self._torque, axis.load, axis.speed, now))
-        self._next = now + interval
-        still = axis.settled and axis.motor.rests(self._torque, axis.load)
-        if still and start.velocity == 0.0 and self._torque == self.wanted:
-            self._next = NEVER
-
-    def _hold(self) -> None:
-        self._acting = False
-        self._next = NEVER
+        still = axis.settled and axis.rests(self._torque) and self._torque == self.wanted
+        axis.push(self._torque)
+        self.due = NEVER if still else now + TORQUE_STEP
 
 
 class ProfileTorque(TorqueMode):
@@ -153,7 +141,7 @@ class CyclicTorque(TorqueMode, Streamed):
     def halt(self, now: float) -> None:
         """Forget set-points and let the axis be held."""
         Streamed.halt(self, now)
-        self._hold()
+        TorqueMode.halt(self, now)
 
     def take(self, period: float, now: float) -> bool:
         """Apply the set-point from now on."""

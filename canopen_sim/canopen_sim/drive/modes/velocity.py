@@ -11,7 +11,6 @@ from arm_canopen import OperationMode
 from ..axis import Axis
 from ..objects import DriveObjects
 from .mode import Mode, SyncClock, TARGET_REACHED
-from .velocity_plan import plan_bounded
 
 ENABLE_RAMP = 0x10  # without it the drive slows down
 UNLOCK_RAMP = 0x20  # without it the velocity stays as it is
@@ -49,11 +48,10 @@ class Velocity(Mode):
         """Ramp to the velocity that controlword and target select."""
         limits = self.objects.velocity_mode_limits
         self._wanted = self._reference(limits.velocity)
-        if not self._word & ENABLE_RAMP:
+        if self._word & ENABLE_RAMP:
+            self.axis.ramp(self._wanted, limits, self.objects.position_limits())
+        else:
             self.axis.stop(self.objects.slow_down)
-            return
-        bounds = self.objects.position_limits()
-        self.axis.follow(plan_bounded(self.axis.demand, self._wanted, limits, bounds, now).motion)
 
     def setpoint(self, now: float) -> bool:
         """Ramp to another target velocity."""
@@ -68,7 +66,7 @@ class Velocity(Mode):
             self.limited = False
             return 0.0
         if not self._word & UNLOCK_RAMP:
-            return self.axis.demand.velocity
+            return self.axis.demand_velocity
         target = float(self.objects.vl_target.value)
         amount = min(max(abs(target), float(self.objects.vl_min.value)), highest)
         held = math.copysign(amount, target) if target else 0.0
@@ -77,5 +75,5 @@ class Velocity(Mode):
 
     def status(self) -> int:
         """Return "target reached"."""
-        reached = self.axis.arrived and self.axis.demand.velocity == self._wanted
+        reached = self.axis.arrived and self.axis.demand_velocity == self._wanted
         return TARGET_REACHED if reached else 0

@@ -1,0 +1,204 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Laws of the simulated axis: its demand keeps its limits, its motor follows the demand."""
+
+from __future__ import annotations
+
+import math
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import pytest
+
+from canopen_sim import ServoModel
+from canopen_sim.drive.axis import Axis, Limits
+
+pytestmark = pytest.mark.slow
+
+MODEL = ServoModel(lag=0.004, coasting=0.03)
+
+rates = st.floats(1.0, 1e6)
+limits = st.builds(Limits, st.floats(1.0, 1e5), rates, rates)
+places = st.floats(-1e6, 1e6).map(lambda value: round(value, 6))
+velocities = st.floats(-1e5, 1e5).map(lambda value: round(value, 6))
+
+
+def axis_at(demand: float = 0.0, velocity: float = 0.0) -> Axis:
+    """Return an axis with torque whose demand is in motion, at a time of a steady clock."""
+    axis = Axis(MODEL)
+    axis.advance(1000.0)
+    axis.power_on(1.0)
+    axis.shift(demand)
+    axis.demand_velocity = velocity
+    return axis
+
+
+def duration_of(axis: Axis) -> float:
+    """Return how long a motion takes, from phase to phase."""
+    begin = axis.time
+    for _ in range(20):
+        if axis.arrived:
+            return axis.time - begin
+        axis.advance(axis.phase_end)
+    raise AssertionError('the demand does not arrive')
+
+
+def shortest(distance: float, bounds: Limits) -> float:
+    """Return the time from rest to rest at best: that of the trapezoid."""
+    top, up, down = bounds
+    peak = min(top, math.sqrt(2.0 * distance * up * down / (up + down)))
+    ramps = peak / up + peak / down
+    return ramps + (distance - 0.5 * peak * ramps) / peak
+
+
+@given(places, velocities, places, limits, st.lists(st.floats(0.0, 1.0), max_size=6))
+def test_a_move_keeps_its_limits_and_ends_at_its_target(
+    start: float, velocity: float, target: float, bounds: Limits, looks: list[float]
+) -> None:
+    """From any state, and however often it is looked at, no faster and no steeper than allowed."""
+    whole = axis_at(start, velocity)
+    whole.move(target, bounds)
+    duration = duration_of(whole)
+    assert (whole.demand, whole.demand_velocity) == (target, 0.0)
+    axis = axis_at(start, velocity)
+    axis.move(target, bounds)
+    begin, fastest = axis.time, max(bounds.velocity, abs(velocity)) * (1.0 + 1e-9)
+    steepest = max(bounds.acceleration, bounds.deceleration)
+    for look in sorted(looks):
+        before, place, time = axis.demand_velocity, axis.demand, axis.time
+        axis.advance(begin + look * duration)
+        passed = axis.time - time
+        rounding = 1e-9 * (abs(start) + abs(target)) + 1e-9 * fastest + 1e-3
+        assert abs(axis.demand_velocity) <= fastest
+        assert abs(axis.demand_velocity - before) <= steepest * passed * (1.0 + 1e-6) + 1e-3
+        assert abs(axis.demand - place) <= fastest * passed + rounding
+    # a look rounds times, and what is left of a distance is gone again at the lowest rate
+    rest = (
+        1e-3
+        + 2.0 * math.sqrt(1e-3 / bounds.deceleration)
+        + 2.0 * math.sqrt(1e-3 / bounds.acceleration)
+    )
+    duration_of(axis)
+    assert axis.demand == target
+    assert axis.time - begin <= duration * (1.0 + 1e-6) + rest
+
+
+@given(st.floats(-1e6, 1e6).filter(lambda value: abs(value) > 1e-2), limits)
+def test_a_move_from_rest_is_time_optimal(distance: float, bounds: Limits) -> None:
+    """From rest to rest no motion within the limits is faster than the trapezoid."""
+    axis = axis_at()
+    axis.move(distance, bounds)
+    assert duration_of(axis) == pytest.approx(shortest(abs(distance), bounds), rel=1e-3, abs=1e-9)
+
+
+@given(velocities, velocities, limits)
+def test_a_ramp_takes_as_long_as_its_rates_say(
+    velocity: float, target: float, bounds: Limits
+) -> None:
+    """Also through a change of direction; then the velocity is kept."""
+    axis = axis_at(0.0, velocity)
+    axis.ramp(target, bounds)
+    wanted = math.copysign(min(abs(target), bounds.velocity), target)
+    _, up, down = bounds
+    if velocity * wanted < 0.0:
+        best = abs(velocity) / down + abs(wanted) / up
+    else:
+        change = abs(wanted) - abs(velocity)
+        best = change / up if change > 0.0 else -change / down
+    assert duration_of(axis) == pytest.approx(best, abs=1e-9)
+    axis.advance(axis.time + 10.0)
+    assert axis.demand_velocity == wanted
+
+
+@given(places, st.floats(1e-3, 10.0))
+def test_a_line_arrives_in_time(target: float, duration: float) -> None:
+    """A line is half way at half time, and stands at its target when its time is over."""
+    axis = axis_at()
+    axis.line(target, duration)
+    axis.advance(axis.time + 0.5 * duration)
+    assert axis.demand == pytest.approx(0.5 * target, rel=1e-6, abs=1e-6)
+    axis.advance(axis.time + 0.500001 * duration)
+    assert (axis.demand, axis.demand_velocity, axis.arrived) == (target, 0.0, True)
+
+
+@given(st.lists(st.floats(0.0, 0.2), max_size=12), st.sampled_from([math.inf, 1000.0]))
+def test_looking_changes_nothing(looks: list[float], speed: float) -> None:
+    """How often a motor is looked at has no influence on where it is."""
+    once, often = axis_at(), axis_at()
+    for axis in (once, often):
+        axis.speed = speed
+        axis.move(120.0, Limits(3000.0, 50_000.0, 30_000.0))
+    begin = once.time
+    for look in sorted(looks):
+        often.advance(begin + look)
+    for axis in (once, often):
+        axis.advance(begin + 0.1)
+        axis.advance(max(begin + 0.1, often.time))
+    once.advance(often.time)
+    # the rate limiter works in steps of 1 ms, which begin where the looks are
+    slack = 1e-6 if math.isinf(speed) else 1.0
+    assert often.position == pytest.approx(once.position, abs=slack)
+
+
+@pytest.mark.parametrize('speed', [math.inf, 1000.0])
+@pytest.mark.parametrize('target', [10.0, 100.0])
+def test_the_motor_follows_by_its_definition(target: float, speed: float) -> None:
+    """Rate limiter and lag agree with small steps of their equations."""
+    axis = axis_at()
+    axis.speed = speed
+    axis.line(target, 0.05)
+    begin, step = axis.time, 1e-5
+    limiter = motor = 0.0
+    for number in range(12_000):
+        demand = min(target, target * (number + 1) * step / 0.05)
+        gap = demand - limiter
+        limiter += math.copysign(min(abs(gap), speed * step), gap)
+        motor += (limiter - motor) / MODEL.lag * step
+        if number % 1000 == 999:
+            axis.advance(begin + (number + 1) * step)
+            # one step of the limiter, 1 ms at 1000 inc/s
+            assert axis.position == pytest.approx(motor, abs=0.1 if math.isinf(speed) else 1.0)
+
+
+@settings(max_examples=50)
+@given(st.lists(st.floats(-1e4, 1e4), min_size=1, max_size=8), st.floats(10.0, 1e4))
+def test_the_motor_is_never_faster_than_its_speed(targets: list[float], speed: float) -> None:
+    """Whatever jumps the set-points make, the motor keeps its speed, and arrives in the end."""
+    axis = axis_at()
+    axis.speed = speed
+    for target in targets:
+        axis.line(target, 0.01)
+        for _ in range(5):
+            before = axis.position
+            axis.advance(axis.time + 0.004)
+            assert abs(axis.velocity) <= speed * (1.0 + 1e-6)
+            assert abs(axis.position - before) <= speed * 0.004 * (1.0 + 1e-6) + 1e-6
+    axis.advance(axis.time + 1e5 / speed)
+    assert axis.settled
+    assert axis.position == pytest.approx(targets[-1], abs=1e-3)
+    assert not axis.speed_limited
+
+
+def test_lag_coasting_and_stops() -> None:
+    """The motor lags by velocity times lag, coasts by velocity times time, stops at the motor."""
+    axis = axis_at()
+    axis.ramp(1000.0, Limits(1e9, 1e4, 1e4))
+    axis.advance(axis.time + 1.0)
+    assert (axis.following_error, axis.velocity) == pytest.approx((1000.0 * MODEL.lag, 1000.0))
+    axis.shift(500.0)
+    assert (axis.following_error, axis.velocity) == pytest.approx((1000.0 * MODEL.lag, 1000.0))
+    place = axis.position
+    axis.power_off()
+    axis.advance(axis.time + 1.0)
+    axis.advance(axis.time - 5.0)  # earlier times are ignored
+    assert (axis.settled, axis.velocity) == (True, 0.0)
+    assert axis.position - place == pytest.approx(1000.0 * MODEL.coasting, abs=0.01)
+    axis.power_on(1.0)
+    axis.speed = 1000.0
+    axis.line(1e6, 0.01)  # a demand that runs away
+    axis.advance(axis.time + 0.1)
+    place = axis.position
+    axis.stop(10_000.0)
+    axis.advance(axis.time + 2.0)
+    assert axis.settled
+    assert axis.position - place == pytest.approx(1000.0**2 / 20_000.0 + 4.0, abs=1.5)
