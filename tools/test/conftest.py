@@ -14,8 +14,7 @@ import pytest
 
 from workspace.environment import Environment
 from workspace.layout import Layout
-from workspace.lock import exclusive
-from workspace.process import Runner
+from workspace.process import exclusive, Runner
 from workspace.underlay import Underlay, UnderlayKind
 
 MANIFEST = """<package format="3">

@@ -4,7 +4,7 @@ from pathlib import Path
 import subprocess
 import sys
 
-from workspace.lock import exclusive
+from workspace.process import exclusive
 
 HOLD = 'import sys; print("holding", flush=True); sys.stdin.read()'
 
@@ -12,7 +12,7 @@ HOLD = 'import sys; print("holding", flush=True); sys.stdin.read()'
 def test_second_holder_waits_for_the_first(tmp_path: Path) -> None:
     """Two set-ups in one checkout never work at the same time."""
     code = (
-        'import sys\nfrom pathlib import Path\nfrom workspace.lock import exclusive\n'
+        'import sys\nfrom pathlib import Path\nfrom workspace.process import exclusive\n'
         'with exclusive(Path(sys.argv[1])): print("mine", flush=True)'
     )
     tools = Path(__file__).parents[1]

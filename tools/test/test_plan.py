@@ -16,11 +16,11 @@ import pytest
 from workspace.build import Builder
 from workspace.environment import choose_python, DOCS, Environment, uv_settings
 from workspace.errors import NetworkError, StepFailedError, WorkspaceError
-from workspace.interpreter import probe
 from workspace.layout import Layout
 from workspace.plan import carry_out, plan, Target
 from workspace.process import Runner
 from workspace.state import EnvironmentState, read_state
+from workspace.system import probe
 from workspace.underlay import Underlay, UnderlayKind
 
 pytestmark = pytest.mark.slow

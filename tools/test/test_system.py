@@ -8,8 +8,14 @@ import sys
 import pytest
 
 from workspace.errors import WorkspaceError
-from workspace.interpreter import Interpreter, probe
-from workspace.system import check, check_supported, missing_packages, SYSTEM_ROS_PACKAGES
+from workspace.system import (
+    check,
+    check_supported,
+    Interpreter,
+    missing_packages,
+    probe,
+    SYSTEM_ROS_PACKAGES,
+)
 from workspace.underlay import Underlay, UnderlayKind
 
 PYTHON = Interpreter('/usr/bin/python3.11', (3, 11), 'x86_64', has_headers=True, has_venv=True)

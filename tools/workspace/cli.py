@@ -13,16 +13,13 @@ import sys
 from .build import default_jobs
 from .environment import choose_python, DOCS, Environment
 from .errors import WorkspaceError
-from .interpreter import probe
 from .layout import this_checkout
-from .lint import lint
-from .lock import exclusive
-from .manual import build_manual
+from .lint import build_manual, lint
 from .pins import renew
 from .plan import carry_out, plan, Target
-from .process import Runner
+from .process import exclusive, Runner
 from .state import read_state
-from .system import missing_packages
+from .system import missing_packages, probe
 from .underlay import find_underlay
 
 

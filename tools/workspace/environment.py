@@ -15,11 +15,10 @@ from typing import NamedTuple
 
 from . import shell, wheels
 from .errors import NetworkError, StepFailedError, WorkspaceError
-from .interpreter import probe
 from .layout import Layout
 from .process import Argument, clean_environment, Runner
 from .state import EnvironmentState, fingerprint, fingerprint_files, read_state, write_state
-from .system import check
+from .system import check, probe
 from .underlay import Underlay, UnderlayKind
 
 REQUIREMENTS = {UnderlayKind.SYSTEM: 'apt.txt', UnderlayKind.WHEELS: 'ros-wheels.txt'}

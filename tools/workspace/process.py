@@ -5,14 +5,37 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+import contextlib
 from dataclasses import dataclass
+import fcntl
+import os
 from pathlib import Path
 import re
 import subprocess
 from typing import TypeAlias
 
 from .errors import NetworkError, StepFailedError
+
+
+@contextlib.contextmanager
+def exclusive(path: Path) -> Iterator[int]:
+    """Hold the lock file locked; wait for another holder and print that.
+
+    The lock goes away with its last holder, however that ends. Programs that are given the
+    descriptor hold it too, so a killed set-up's orphans keep the next one waiting.
+    """
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            print('Waiting for another set-up in this checkout ...', flush=True)
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield descriptor
+    finally:
+        os.close(descriptor)
+
 
 TAIL_LINES = 25
 _UNREACHABLE = re.compile(

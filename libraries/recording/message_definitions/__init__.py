@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Definitions of messages and services (`ros2msg`), and what their Python classes need."""
 
-from .concatenation import concatenated, nested_type
 from .installed import (
+    concatenated,
     DefinitionError,
     message_definition,
+    nested_type,
     service_definitions,
     ServiceDefinitions,
 )

@@ -19,8 +19,7 @@ from .environment import (
     restrict_dds,
     selected_reach,
 )
-from .exceptions import NetworkChoiceError
-from .reach import Interface, Reach
+from .reach import Interface, NetworkChoiceError, Reach
 
 __all__ = [
     'NETWORK_VARIABLE',

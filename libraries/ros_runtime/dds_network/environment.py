@@ -6,10 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, MutableMapping
 
-from .exceptions import NetworkChoiceError
-from .host import read_interfaces
 from .profile import is_own_profile, profile_file
-from .reach import Reach, resolve_reach
+from .reach import NetworkChoiceError, Reach, read_interfaces, resolve_reach
 
 NETWORK_VARIABLE = 'DDS_NETWORK'
 """Interfaces and peers that a person opens DDS to; empty or unset for none."""

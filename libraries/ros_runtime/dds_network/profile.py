@@ -11,8 +11,7 @@ import stat
 import tempfile
 import xml.etree.ElementTree as ET
 
-from .exceptions import NetworkChoiceError
-from .reach import Reach
+from .reach import NetworkChoiceError, Reach
 
 LOCALHOST_PROFILE = Path(__file__).with_name('dds_network_localhost.xml')
 """The profile with loopback alone; all others are made from it."""

@@ -20,8 +20,7 @@ from .environment import (
     SERVER_VARIABLE,
     TRANSPORTS_VARIABLE,
 )
-from .exceptions import NetworkChoiceError
-from .reach import Reach
+from .reach import NetworkChoiceError, Reach
 
 _SUBNET = 'SUBNET'
 _UDP = 'UDPv4'

@@ -2,21 +2,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """What every node's program has to do, once: start, end, and refuse parameters with words."""
 
-from .black_box_parameters import declare_black_box
 from .construction import destroyed_if_refused, destroyed_when_refused
 from .deferred_service import create_deferred_service
-from .discovery import discover_other_nodes, other_nodes
-from .exceptions import ParameterError
-from .joining import init_ros
+from .discovery import discover_other_nodes, other_nodes, ServerMatch
 from .log_bridge import log_as, RosLogBridge
-from .misspelt import refuse_misspelt, refuse_similar
-from .parameter_reader import declare_given, give_defaults, given_values, ParameterReader
-from .program import run_node, run_program
+from .parameter_reader import (
+    declare_given,
+    give_defaults,
+    given_values,
+    ParameterError,
+    ParameterReader,
+    refuse_misspelt,
+    refuse_similar,
+)
+from .program import init_ros, notify_ready, run_node, run_program, stop_on_signals
 from .qos import LATCHED
-from .readiness import notify_ready
-from .realtime import declare_thread_priority, raise_thread_priority, settle_process_memory
-from .server_match import ServerMatch
-from .signals import stop_on_signals
+from .shared_parameters import (
+    declare_black_box,
+    declare_thread_priority,
+    raise_thread_priority,
+    settle_process_memory,
+)
 from .spinning import LINGER, make_executor, spin, spin_beside
 
 __all__ = [

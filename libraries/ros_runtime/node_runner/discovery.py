@@ -1,14 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Nodes of others that publish what a program is about to publish, too."""
+"""Other nodes: those that publish the same, and those whose services know our clients."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+import math
 import threading
 import time
 
-from rclpy.node import Node
+from rcl_interfaces.srv import GetParameterTypes
+from rclpy.client import Client
+from rclpy.node import Node, NodeNameNonExistentError
+from rclpy.task import Future
 
 DISCOVERY_TIME = 2.0  # [s] in which nodes that run are discovered
 _LOOK_PERIOD = 0.1  # [s]
@@ -39,3 +43,67 @@ def discover_other_nodes(
         if found := other_nodes(node, wanted, own):
             return found
     return []
+
+
+PROBE = 'get_parameter_types'
+"""A service of nearly every node that changes nothing."""
+PROBE_PERIOD = 1.0
+"""Time after which the answer of a probe counts as lost, in [s]."""
+
+
+class ServerMatch:
+    """Whether the nodes that offer services have matched the clients of a node.
+
+    A server is found before it has found the client, and rmw_fastrtps drops the answer when that
+    takes it more than 0.1 s, as on a busy machine. A request must not be repeated that moves
+    something. But DDS announces readers in the order in which they were made: once an answer has
+    come to a client that was made later, and whose request may be repeated, the others are
+    matched, too.
+    """
+
+    def __init__(self, node: Node, services: Iterable[str]) -> None:
+        """Begin; the node has made its clients of the services, by these names."""
+        self._node = node
+        self._services = {node.resolve_service_name(name) for name in services}
+        self._probes: dict[str, Client] = {}
+        self._answers: dict[str, list[Future]] = {}
+        self._asked = -math.inf
+
+    def advance(self) -> bool:
+        """Go on, while the node is served; return True when all have matched.
+
+        A node without services of parameters cannot be asked, and counts.
+        """
+        if self._services:
+            self._find_servers()
+        if time.monotonic() - self._asked > PROBE_PERIOD:
+            self._asked = time.monotonic()
+            for name, probe in self._probes.items():
+                if probe.service_is_ready():
+                    self._answers[name].append(probe.call_async(GetParameterTypes.Request()))
+        if self._services or not all(map(_answered, self._answers.values())):
+            return False
+        for probe in self._probes.values():
+            self._node.destroy_client(probe)
+        self._probes.clear()
+        return True
+
+    def _find_servers(self) -> None:
+        for name, namespace in self._node.get_node_names_and_namespaces():
+            try:
+                found = self._node.get_service_names_and_types_by_node(name, namespace)
+            except NodeNameNonExistentError:  # it has ended in between
+                continue
+            offered = {service for service, _ in found}
+            if not offered & self._services:
+                continue
+            self._services -= offered
+            probe = f'{namespace.rstrip("/")}/{name}/{PROBE}'
+            if probe in offered and probe not in self._probes:
+                self._probes[probe] = self._node.create_client(GetParameterTypes, probe)
+                self._answers[probe] = []
+                self._asked = -math.inf
+
+
+def _answered(futures: list[Future]) -> bool:
+    return any(future.done() for future in futures)

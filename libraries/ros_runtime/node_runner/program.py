@@ -5,22 +5,121 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
+import math
+import os
+import signal
+import socket
 import sys
 import threading
+from time import monotonic
 
+import rclpy
+from rclpy.context import Context
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.logging import get_logger
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 
-from dds_network import NETWORK_VARIABLE, NetworkChoiceError
+from dds_network import NETWORK_VARIABLE, NetworkChoiceError, restrict_dds
+from message_definitions import load_type_support
 from realtime_loop import unsettle_memory
 
-from .exceptions import ParameterError
-from .joining import init_ros
 from .log_bridge import log_as, RosLogBridge
-from .signals import stop_on_signals
+from .parameter_reader import ParameterError
 from .spinning import spin
+
+
+def init_ros(args: Sequence[str] | None = None, context: Context | None = None) -> None:
+    """Initialise rclpy without its signal handlers, with DDS on the networks that are open.
+
+    A process that can be reached from outside this host logs so, or that it cannot, though asked.
+
+    Args:
+        args: Command line; None for the process's own.
+        context: What to initialise; None for the default one.
+
+    Raises:
+        NetworkChoiceError: ``DDS_NETWORK`` names what does not exist, or would be ignored.
+        RuntimeError: ROS does not accept the arguments, or its environment variables.
+    """
+    reach = restrict_dds(os.environ)
+    load_type_support()
+    rclpy.init(  # noqa: TID251  # the one place
+        args=None if args is None else list(args),
+        context=context,
+        signal_handler_options=SignalHandlerOptions.NO,
+    )
+    if reach.without_link or not reach.is_this_host:
+        get_logger('dds_network').warning(reach.describe())
+
+
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""Ctrl-C, what stops services, and the closing of the terminal."""
+
+ECHO_TIME = 0.5
+"""A SIGINT this soon after the first signal in [s] is its echo: a key that bounces, or a signal to
+a process and to its group."""
+
+
+def stop_on_signals(
+    *, patient: bool = False, clock: Callable[[], float] = monotonic
+) -> threading.Event:
+    """Set an event at the first signal of :data:`ENDING`; nothing is torn in the middle.
+
+    A second SIGINT, later than :data:`ECHO_TIME`, ends the process at once. A SIGTERM or SIGHUP
+    does not: ``ros2 launch`` and its like send one when the first signal seems to
+    do nothing, while a robot comes to rest. A SIGHUP that is ignored already stays so, as
+    ``nohup`` wants it.
+
+    Initialise rclpy by :func:`.init_ros`; :func:`.run_program` does both.
+
+    Args:
+        patient: Not even a second SIGINT ends the process at once; for programs that have to leave
+            a terminal as it was.
+        clock: Returns steady time in [s].
+    """
+    stop = threading.Event()
+    first = math.inf
+
+    def handle(number: int, _frame: object) -> None:
+        nonlocal first
+        now = clock()
+        if now - first >= ECHO_TIME and number == signal.SIGINT and not patient:
+            signal.signal(number, signal.SIG_DFL)
+            signal.raise_signal(number)
+        first = min(first, now)
+        stop.set()
+
+    for number in ENDING:
+        if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, handle)
+    return stop
+
+
+VARIABLE = 'NOTIFY_SOCKET'
+"""Names the socket of the supervisor, as in sd_notify(3)."""
+
+
+def notify_ready(status: str = '') -> None:
+    """Report ``READY=1`` to the supervisor of this process, if it has one that wants to know.
+
+    That is process_supervisor of this workspace, or systemd for a unit of ``Type=notify``. Only
+    the first call reports, so it may stand where readiness comes and goes.
+
+    Args:
+        status: What the supervisor shall show the user about this process, in one line.
+    """
+    address = os.environ.pop(VARIABLE, '')
+    if not address:
+        return
+    if address.startswith('@'):  # no file: a name in the abstract namespace of Linux
+        address = f'\0{address[1:]}'
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as supervisor, suppress(OSError):
+        said = f'\nSTATUS={status}' if status else ''
+        supervisor.sendto(f'READY=1{said}'.encode(), address)
+
 
 REFUSED = 1
 """Exit code of a program that could not begin."""

@@ -11,11 +11,16 @@ packages, :mod:`.exclusive` keeps a second bring-up away, :mod:`.terminal` and :
 what the processes write.
 """
 
-from .beside import join_in_time
-from .bring_up import bring_up_place, node_process
-from .console import Shutdown, supervise, USAGE_ERROR
+from .bring_up import (
+    add_view,
+    bring_up_place,
+    exclusive,
+    node_process,
+    state_publisher,
+    view_process,
+)
+from .console import join_in_time, Shutdown, supervise, USAGE_ERROR
 from .exceptions import CallError, GivenUpError, StartError, SupervisorError
-from .exclusive import exclusive
 from .nodes import (
     EVERY_NODE,
     Executable,
@@ -29,13 +34,11 @@ from .nodes import (
     write_parameters,
 )
 from .readiness import ServiceManager
-from .robot_state import state_publisher
 from .ros_options import add_namespace, parse_with_ros, RosOptions
 from .runner import Runner
 from .spec import ProcessSpec, StopStep
 from .supervision import Notice, Outcome, Phase, Severity, Supervision
 from .terminal import LineWriter, Painter, severity_of, wants_colour
-from .view import add_view, view_process
 
 __version__ = '0.1.0'
 

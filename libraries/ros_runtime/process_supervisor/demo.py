@@ -23,8 +23,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from .beside import join_in_time
-from .console import explain
+from .console import explain, join_in_time
 from .exceptions import CallError, GivenUpError
 from .runner import Runner
 from .spec import ProcessSpec

@@ -20,10 +20,42 @@ from typing import final
 
 from .exceptions import StartError
 from .guardian import GuardianLink
-from .lines import LineSplitter
 from .readiness import ReadinessSocket, VARIABLE
 from .spec import ProcessSpec
 from .supervision import Notice, Outcome, Phase, Supervision
+
+LONGEST_LINE = 16384
+"""Bytes after which a line is cut: a process that never ends a line must not eat the memory."""
+
+
+class LineSplitter:
+    """Collects bytes and gives back whole lines."""
+
+    def __init__(self) -> None:
+        self._rest = b''
+
+    def feed(self, data: bytes) -> list[str]:
+        """Take in bytes.
+
+        Args:
+            data: As they were read; may end anywhere, also inside a character.
+        """
+        *lines, rest = (self._rest + data).split(b'\n')
+        while len(rest) > LONGEST_LINE:
+            lines.append(rest[:LONGEST_LINE])
+            rest = rest[LONGEST_LINE:]
+        self._rest = rest
+        return [_decode(line) for line in lines]
+
+    def flush(self) -> list[str]:
+        """Give back what is left when the pipe has ended: a line without an end, or nothing."""
+        rest, self._rest = self._rest, b''
+        return [_decode(rest)] if rest else []
+
+
+def _decode(line: bytes) -> str:
+    return line.decode(errors='replace').rstrip('\r')
+
 
 CHUNK = 65536
 """Bytes read from a pipe at once."""

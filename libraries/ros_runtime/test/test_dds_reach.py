@@ -6,8 +6,7 @@ import socket
 import pytest
 
 from dds_network import Interface, NetworkChoiceError, Reach
-from dds_network.host import has_link, read_interfaces
-from dds_network.reach import resolve_reach
+from dds_network.reach import has_link, read_interfaces, resolve_reach
 
 INTERFACES = {'lo': '127.0.0.1', 'eth0': '10.0.0.5', 'wlan0': '192.168.1.5'}
 HOSTS = {

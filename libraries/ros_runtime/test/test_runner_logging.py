@@ -18,9 +18,8 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from node_runner import log_as, RosLogBridge, run_program
-from node_runner.log_bridge import QUEUE_LENGTH
-from node_runner.log_rate import LogRateLimit
-from node_runner.signals import ENDING
+from node_runner.log_bridge import LogRateLimit, QUEUE_LENGTH
+from node_runner.program import ENDING
 
 TIMEOUT = 30.0  # [s]
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import signal
 
 from node_runner import stop_on_signals
-from node_runner.signals import ENDING
+from node_runner.program import ENDING
 
 
 def test_an_echo_of_a_ctrl_c_is_no_second_one() -> None:

@@ -14,13 +14,13 @@ from process_supervisor import join_in_time
 
 PROGRAM = """
 import sys, threading
-from process_supervisor import beside
-beside.ENDING_TIMEOUT = 0.1
+from process_supervisor import console
+console.ENDING_TIMEOUT = 0.1
 def hang():
     threading.Event().wait()
 thread = threading.Thread(target=hang, name='enabling', daemon=True)
 thread.start()
-print(beside.join_in_time(thread))
+print(console.join_in_time(thread))
 sys.exit(0)
 """
 

@@ -13,7 +13,7 @@ import threading
 import pytest
 from small_processes import program, service_manager, TIMEOUT
 
-from process_supervisor import beside, LineWriter, Outcome, Shutdown, supervise
+from process_supervisor import console, LineWriter, Outcome, Shutdown, supervise
 
 Say = Callable[[str], None]
 GivenUp = Callable[[], bool]
@@ -135,7 +135,7 @@ def test_a_shutdown_that_hangs_keeps_nobody_from_the_end(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It says what all threads are doing; the processes were stopped before."""
-    monkeypatch.setattr(beside, 'ENDING_TIMEOUT', 0.1)
+    monkeypatch.setattr(console, 'ENDING_TIMEOUT', 0.1)
     test_over = threading.Event()
     threads: list[threading.Thread] = []
 
@@ -150,7 +150,7 @@ def test_a_shutdown_that_hangs_keeps_nobody_from_the_end(
     outcome = supervise([program('good', notifies_ready=True)], shutdown=shutdown)
     test_over.set()
     threads[0].join(TIMEOUT)
-    atexit.unregister(beside.leave)  # this process goes on
+    atexit.unregister(console.leave)  # this process goes on
     assert outcome.exit_code == 1
     assert outcome.reason.startswith("the thread 'shutdown' did not end within 0.1 s")
     captured = capsys.readouterr()

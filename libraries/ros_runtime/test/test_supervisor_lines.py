@@ -7,7 +7,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from process_supervisor.lines import LineSplitter, LONGEST_LINE
+from process_supervisor.runner import LineSplitter, LONGEST_LINE
 
 texts = st.lists(st.text(st.characters(blacklist_characters='\r\n'), max_size=20), max_size=10)
 

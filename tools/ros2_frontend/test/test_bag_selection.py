@@ -11,10 +11,10 @@ from typing import Any
 from hypothesis import given, strategies
 import pytest
 
-from ros2_frontend.bag.info_text import info_text, size_text
-from ros2_frontend.bag.selection import topic_filter
+from ros2_frontend.bag import topic_filter
 from ros2_frontend.ros.bag_qos import for_playing, for_recording, is_compatible
 from ros2_frontend.ros.recorder import _Subscribed
+from ros2_frontend.verbs.bag_info import info_text, size_text
 from rosbag_files import BagFile, BagMetadata, OfferedQos, Topic, TopicCount
 
 TYPE = 'std_msgs/msg/String'

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from ros2_frontend.index.definition import expand
+from ros2_frontend.index import expand
 
 FILES = {
     'demo/msg/Outer': '# Top\nInner inner # the inner\n\nother/Leaf[] leaves\nuint8 A=1 # one\n',

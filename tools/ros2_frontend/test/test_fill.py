@@ -15,12 +15,10 @@ from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Byte, ByteMultiArray, Float32, Header, Int8, String, UInt8, UInt64
 from std_srvs.srv import SetBool, Trigger
 
-from ros2_frontend.aliases import Message
 from ros2_frontend.cli.errors import FieldValueError
-from ros2_frontend.messages.document import to_document
-from ros2_frontend.messages.fill import Filler
-from ros2_frontend.messages.from_text import parse_mapping
-from ros2_frontend.messages.yaml_text import to_yaml
+from ros2_frontend.messages.document import to_document, to_yaml
+from ros2_frontend.messages.fill import Filler, parse_mapping
+from ros2_frontend.names import Message
 
 NUMBERS = st.floats(allow_nan=False)
 TEXTS = st.text(st.characters(codec='utf-8', exclude_characters='\x85\u2028\u2029'), max_size=8)

@@ -11,9 +11,7 @@ from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Byte, ByteMultiArray, Char, Empty, String
 
-from ros2_frontend.messages.csv_text import to_csv
-from ros2_frontend.messages.document import Abbreviation, to_document
-from ros2_frontend.messages.yaml_text import to_yaml
+from ros2_frontend.messages.document import Abbreviation, to_csv, to_document, to_yaml
 
 TWIST = """\
 linear:

@@ -10,7 +10,7 @@ import pytest
 from rclpy.parameter import parameter_value_to_python
 
 from ros2_frontend.cli.errors import FieldValueError, FrontendError, UnknownNameError
-from ros2_frontend.messages.parameter_file import dump, values_for
+from ros2_frontend.messages.fill import dump, values_for
 from ros2_frontend.ros.parameters import parameter, parse_value
 
 PART = st.from_regex(r'[a-z][a-z0-9_]{0,4}', fullmatch=True)

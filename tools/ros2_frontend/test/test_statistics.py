@@ -8,7 +8,7 @@ from collections import deque
 
 import pytest
 
-from ros2_frontend.verbs.statistics import bandwidth, delay_text, NANOSECONDS, Periods
+from ros2_frontend.verbs.topic_rate import bandwidth, delay_text, NANOSECONDS, Periods
 
 START = 1_700_000_000 * NANOSECONDS
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import pytest
 
-from ros2_frontend.cli.suggest import hint
+from ros2_frontend.cli.errors import hint
 
 
 @pytest.mark.parametrize(

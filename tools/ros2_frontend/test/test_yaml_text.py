@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import pytest
 import yaml
 
-from ros2_frontend.messages.yaml_text import to_yaml
+from ros2_frontend.messages.document import to_yaml
 
 pytestmark = pytest.mark.slow
 

@@ -58,7 +58,7 @@ COMMANDS: Mapping[str, Command | Group] = {
             'show': ('Output the interface definition', 'interface:show'),
         },
     ),
-    'launch': ('Not among the wheels of ROS: names what to run instead', 'launch:launch'),
+    'launch': ('Not among the wheels of ROS: names what to run instead', 'run:launch'),
     'lifecycle': (
         'Various lifecycle related sub-commands',
         {

@@ -15,6 +15,8 @@ Wrong arguments are refused by argparse with exit code 2, as the real command do
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 
 class FrontendError(RuntimeError):
     """A failure that ends the command with exit code 1 and this message."""
@@ -34,3 +36,14 @@ class FieldValueError(FrontendError, ValueError):
 
 class NoAnswerError(FrontendError, TimeoutError):
     """A service that did not appear or did not answer in time."""
+
+
+_ALIKE = 0.75  # types of two packages are 0.6 alike in their middle parts
+
+
+def hint(name: str, known: Iterable[str]) -> str:
+    """Return a line that asks whether one of up to three near names was meant, if any."""
+    from difflib import get_close_matches  # only a command that fails needs it
+
+    near = [f"'{each}'" for each in get_close_matches(name, list(known), cutoff=_ALIKE)]
+    return f'\nDid you mean {" or ".join(near)}?' if near else ''

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""From a message to plain Python data, abbreviated as the options set.
+"""Messages as plain Python data, YAML and CSV, abbreviated as the options set.
 
 The rules are those that `ros2 topic echo` shows: bytes become text of the same code points, long
 values end in `...`, left-out values are named by type. Nothing here imports rclpy: a message is
@@ -13,7 +13,7 @@ from array import array
 from dataclasses import dataclass
 from typing import Any
 
-from ..aliases import Message
+from ..names import Message
 
 _ELLIPSIS = '...'
 _SCALARS = (bool, int, float)
@@ -93,3 +93,56 @@ def _type_name(value_type: Any) -> str:  # noqa: ANN401  # of rosidl_parser
     if hasattr(value_type, 'namespaced_name'):
         return '/'.join(value_type.namespaced_name())
     return 'wstring' if 'WString' in type(value_type).__name__ else 'string'
+
+
+def to_csv(message: Message, abbreviation: Abbreviation = FULL) -> str:
+    """Write all values of a message, depth first; texts are not quoted (as in ros2cli)."""
+    fields = message.get_fields_and_field_types()
+    cells = (
+        _cell(getattr(message, name), slot, abbreviation)
+        for name, slot in zip(fields, message.SLOT_TYPES, strict=True)
+    )
+    return ','.join(cells)
+
+
+def _cell(value: Any, slot: Any, cut: Abbreviation) -> str:  # noqa: ANN401  # of any type
+    if is_array(value):
+        if cut.no_arrays and slot is not None:
+            return describe_array(value, slot)
+        shown = value if cut.length is None else value[: cut.length]
+        cells = [_cell(element, None, cut) for element in shown]
+        return ','.join([*cells, '...'] if len(shown) < len(value) else cells)
+    if hasattr(value, 'SLOT_TYPES'):
+        return to_csv(value, cut)
+    if isinstance(value, str) and cut.no_texts:
+        return describe_text(value)
+    if isinstance(value, str | bytes) and cut.length is not None and len(value) > cut.length:
+        rest: Any = b'...' if isinstance(value, bytes) else '...'
+        value = value[: cut.length] + rest
+    return str(value)
+
+
+_ESCAPES = ('\\U', '\\N')
+
+
+def to_yaml(document: object, flow_style: bool = False) -> str:
+    """Write nested dicts, lists, numbers, bools and texts, with a final line feed.
+
+    libyaml takes a quarter of PyYAML's time, but escapes characters beyond the basic plane and
+    U+0085, which PyYAML (and so ros2cli) prints.
+    """
+    import yaml
+
+    text = ''
+    for dumper in (getattr(yaml, 'CSafeDumper', yaml.SafeDumper), yaml.SafeDumper):
+        text = yaml.dump(
+            document,
+            Dumper=dumper,
+            allow_unicode=True,
+            width=2**31 - 1,
+            default_flow_style=flow_style,
+            sort_keys=False,
+        )
+        if not any(each in text for each in _ESCAPES):
+            break
+    return text

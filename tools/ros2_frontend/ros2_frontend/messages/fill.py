@@ -9,16 +9,37 @@ loses something: `3.7` is no integer and `'false'` no bool.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 import importlib
 from typing import Any
 
-from ..aliases import Message
-from ..cli.errors import FieldValueError
-from ..cli.suggest import hint
-from .from_text import parse_mapping
+from ..cli.errors import FieldValueError, hint, UnknownNameError
+from ..names import Message
+
+
+def parse_mapping(text: str) -> dict[str, Any]:
+    """Read YAML that gives values by name, e.g. `{ target: 10.0 }`; an empty text is none.
+
+    Raises:
+        FieldValueError: It is no YAML, or something else. `target:10.0` is the usual slip.
+    """
+    import yaml
+
+    try:
+        values = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise FieldValueError(f"The passed value is not valid YAML: '{text}'\n{error}") from None
+    if values is None:
+        return {}
+    if not isinstance(values, dict):
+        slip = ' (YAML wants a space after the colon)' if ':' in text else ''
+        raise FieldValueError(
+            f'The passed value needs to be a dictionary in YAML format{slip}: {text}'
+        )
+    return values
+
 
 _HEADER = ('std_msgs', 'msg', 'Header')
 _TIME = ('builtin_interfaces', 'msg', 'Time')
@@ -140,3 +161,62 @@ def filled(
     except FieldValueError as error:
         raise FieldValueError(f'Failed to populate {what}: {error}') from None
     return message
+
+
+_SECTION = 'ros__parameters'
+_ALL_NODES = '/**'
+_SEPARATOR = '.'
+
+
+def dump(node: str, values: Mapping[str, object]) -> str:
+    """Write a parameter file for one node, keys sorted; a point in a name starts a level."""
+    import yaml
+
+    tree: dict[str, Any] = {}
+    for name, value in values.items():
+        *levels, last = name.split(_SEPARATOR)
+        branch = tree
+        for level in levels:
+            branch = branch.setdefault(level, {})
+        branch[last] = value
+    text: str = yaml.safe_dump({node: {_SECTION: tree}})
+    return text
+
+
+def values_for(node: str, text: str, *, use_wildcard: bool = True) -> dict[str, object]:
+    """Read the parameters of one node, and perhaps those for all (`/**`), in a parameter file.
+
+    What names the node goes before what is for all nodes. (rclpy's reader takes a quoted '5' for
+    a number.)
+
+    Raises:
+        UnknownNameError: The file has nothing for the node.
+        FieldValueError: It is no parameter file.
+    """
+    sections = parse_mapping(text)
+    wanted = [*([_ALL_NODES] if use_wildcard else []), node.lstrip('/'), node]
+    found = [key for key in wanted if key in sections]
+    if not found:
+        names = ', '.join(str(key) for key in sections)
+        raise UnknownNameError(
+            f'Param file does not contain parameters for {node}, only for nodes: {names}'
+            + hint(node, [str(key) for key in sections])
+        )
+    values: dict[str, object] = {}
+    for key in found:
+        section = sections[key]
+        if not isinstance(section, dict) or not isinstance(section.get(_SECTION), dict):
+            raise FieldValueError(
+                f"YAML file is not a valid ROS parameter file for node {key}: '{_SECTION}' "
+                'is missing below it'
+            )
+        values.update(_flatten('', section[_SECTION]))
+    return values
+
+
+def _flatten(prefix: str, tree: Mapping[str, object]) -> Iterator[tuple[str, object]]:
+    for name, value in tree.items():
+        if isinstance(value, dict):
+            yield from _flatten(f'{prefix}{name}{_SEPARATOR}', value)
+        else:
+            yield f'{prefix}{name}', value

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from rosbag_files import OfferedQos, UNLIMITED
 
-from ..aliases import Handle
+from ..names import Handle
 
 RECORD_DEPTH = 10_000
 """Messages of a topic that may wait for the recorder: ten seconds at 1 kHz."""

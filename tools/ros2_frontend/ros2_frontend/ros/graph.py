@@ -13,6 +13,7 @@ from __future__ import annotations
 from argparse import Namespace
 from collections.abc import Callable, Iterator
 import contextlib
+import importlib
 import math
 import os
 import time
@@ -20,10 +21,9 @@ from typing import TypeVar
 
 from dds_network import is_this_host
 
-from ..aliases import Handle, NamesAndTypes
-from ..cli.arguments import GRAPH_ARGUMENTS
-from ..cli.verb import Argument, Verb
-from ..names import is_hidden, NodeName
+from ..cli.errors import FrontendError, NoAnswerError
+from ..cli.verb import Argument, GRAPH_ARGUMENTS, Verb
+from ..names import Handle, is_hidden, Message, NamesAndTypes, NodeName
 from .session import open_session, Session
 
 T = TypeVar('T')
@@ -130,3 +130,78 @@ def graph_verb(*arguments: Argument) -> Callable[[Callable[[Graph, Namespace], i
         return Verb((*GRAPH_ARGUMENTS, *arguments), main)
 
     return declare
+
+
+_TIMEOUT = 5.0  # [s] for a service of a node that exists to show up, and to answer
+
+
+def request(
+    session: Session, client: Handle, request_: Message, timeout: float | None = None
+) -> Message:
+    """Call a service by a client of rclpy and return the response.
+
+    Raises:
+        NoAnswerError: None came in `timeout` [s].
+        FrontendError: The answer cannot be read.
+    """
+    future = client.call_async(request_)
+    if not session.spin_until(future.done, timeout):
+        raise NoAnswerError(f"Service '{client.srv_name}' did not answer within {timeout:g} s")
+    if future.exception() is not None:
+        raise FrontendError(f'Exception while calling service: {future.exception()!r}')
+    return future.result()
+
+
+def call(graph: Graph, type_name: str, name: str, **fields: object) -> Message:
+    """Call a service that a node is known to offer, e.g. of `rcl_interfaces/srv/GetParameters`.
+
+    Raises:
+        NoAnswerError: The service did not appear or did not answer.
+    """
+    package, folder, base = type_name.split('/')
+    service_type = getattr(importlib.import_module(f'{package}.{folder}'), base)
+    client = graph.session.node.create_client(service_type, name)
+    if not graph.wait_until(lambda: client.service_is_ready() or None, _TIMEOUT):
+        raise NoAnswerError(f"Wait for service timed out: '{name}' did not appear")
+    return request(graph.session, client, service_type.Request(**fields), _TIMEOUT)
+
+
+def action_names(graph: Graph) -> NamesAndTypes:
+    """Return the actions and their types, sorted by name."""
+    from rclpy.action.graph import get_action_names_and_types
+
+    return sorted(get_action_names_and_types(graph.session.node))
+
+
+def offered_actions(graph: Graph) -> set[str]:
+    """Return the actions that have a server; `action_names` has those with clients alone, too."""
+    return {name for name, _ in action_names(graph) if clients_and_servers(graph, name)[1]}
+
+
+def clients_and_servers(graph: Graph, action: str) -> tuple[NamesAndTypes, NamesAndTypes]:
+    """Return the nodes that use and that offer an action, with the types they use it with."""
+    from rclpy.action.graph import (
+        get_action_client_names_and_types_by_node,
+        get_action_server_names_and_types_by_node,
+    )
+
+    return (
+        _nodes_with(get_action_client_names_and_types_by_node, graph, action),
+        _nodes_with(get_action_server_names_and_types_by_node, graph, action),
+    )
+
+
+def _nodes_with(
+    query: Callable[[Handle, str, str], NamesAndTypes], graph: Graph, action: str
+) -> NamesAndTypes:
+    from rclpy.node import NodeNameNonExistentError
+
+    found: NamesAndTypes = []
+    for node in sorted(graph.nodes(hidden=True)):
+        try:
+            types = dict(query(graph.session.node, node.name, node.namespace)).get(action)
+        except NodeNameNonExistentError:  # it left meanwhile
+            continue
+        if types:
+            found.append((node.full_name, types))
+    return found

@@ -11,11 +11,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ..aliases import Message
 from ..cli.errors import FieldValueError
-from ..names import NodeName
-from .calls import call
-from .graph import Graph
+from ..names import Message, NodeName
+from .graph import call, Graph
 
 # rcl_interfaces/msg/ParameterType -> field of ParameterValue, type in words, what `get` prints
 _TYPES: Mapping[int, tuple[str, str, str]] = {

@@ -10,9 +10,9 @@ import time
 
 from rosbag_files import BagMessage, OfferedQos, Topic
 
-from ..aliases import Handle
 from ..cli.errors import FrontendError
-from ..index.interfaces import class_of, Kind
+from ..index import class_of, Kind
+from ..names import Handle
 from .bag_qos import for_playing, overridden, PLAY_DEPTH, to_profile
 from .session import Session
 

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from ..aliases import Handle
-from ..cli.arguments import positive_float, unsigned_int
+from ..cli.verb import positive_float, unsigned_int
+from ..names import Handle
 from .graph import Graph
 
 _POLICIES = ('history', 'reliability', 'durability', 'liveliness')

@@ -21,10 +21,10 @@ import time
 from message_definitions import concatenated
 from rosbag_files import BagError, BagWriter, OfferedQos, Topic
 
-from ..aliases import Handle
-from ..bag.selection import Accepts
+from ..bag import Accepts
 from ..cli.errors import FrontendError
-from ..index.interfaces import class_of, definition_path, Kind
+from ..index import class_of, definition_path, Kind
+from ..names import Handle
 from .bag_qos import for_recording, is_compatible, offered, overridden, RECORD_DEPTH, to_profile
 from .graph import Graph
 

@@ -19,9 +19,9 @@ import time
 from dds_network import NETWORK_VARIABLE, NetworkChoiceError, restrict_dds
 from message_definitions import load_type_support
 
-from ..aliases import Handle
 from ..cli.errors import FrontendError
 from ..cli.interrupts import deferred_interrupts
+from ..names import Handle
 
 NODE_PREFIX = '_ros2cli'  # a leading underscore hides a node from `ros2 node list`
 

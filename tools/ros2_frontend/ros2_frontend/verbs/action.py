@@ -8,8 +8,7 @@ from argparse import Namespace
 
 from ..cli.verb import flag
 from ..names import absolute
-from ..ros.actions import action_names, clients_and_servers
-from ..ros.graph import Graph, graph_verb
+from ..ros.graph import action_names, clients_and_servers, Graph, graph_verb
 from .names import Names
 
 ACTIONS = Names('action', lambda graph, _: action_names(graph))

@@ -6,12 +6,64 @@ from __future__ import annotations
 
 from argparse import Namespace
 from pathlib import Path
+import time
 
-from rosbag_files import repair
+from rosbag_files import BagMetadata, repair
 
-from ..bag.files import bag_errors, open_bag
-from ..bag.info_text import info_text
+from ..bag import bag_errors, open_bag
 from ..cli.verb import argument, flag, verb
+
+_INDENT = 19
+_NANO = 1_000_000_000
+_UNITS = ('B', 'KiB', 'MiB', 'GiB', 'TiB')
+
+
+def info_text(metadata: BagMetadata, size: int) -> str:
+    """Return the text for a recording whose files have a size in [byte]."""
+    topics = [
+        f'Topic: {each.topic.name} | Type: {each.topic.type} | Count: {each.count} | '
+        f'Serialization Format: {each.topic.serialization}'
+        for each in sorted(metadata.topics, key=lambda each: each.topic.name)
+    ]
+    lines = [
+        '',
+        _block('Files:', [file.path for file in metadata.files]),
+        _block('Bag size:', [size_text(size)]),
+        _block('Storage id:', [metadata.storage]),
+        _block('ROS Distro:', [metadata.distro]),
+        _block('Duration:', [f'{_seconds(metadata.duration)}s']),
+        _block('Start:', [_moment(metadata.start)]),
+        _block('End:', [_moment(metadata.start + metadata.duration)]),
+        _block('Messages:', [str(metadata.count)]),
+        _block('Topic information:', topics),
+        _block('Service:', ['0']),
+        'Service information: ',
+    ]
+    return '\n'.join(lines)
+
+
+def size_text(size: int) -> str:
+    """Return a size in [byte] in the unit that suits it."""
+    value, unit = float(size), 0
+    while value >= 1024 and unit < len(_UNITS) - 1:
+        value, unit = value / 1024, unit + 1
+    return f'{value:.{1 if unit else 0}f} {_UNITS[unit]}'
+
+
+def _block(title: str, lines: list[str]) -> str:
+    return title.ljust(_INDENT) + f'\n{" " * _INDENT}'.join(lines)
+
+
+def _seconds(nanoseconds: int) -> str:
+    seconds, rest = divmod(nanoseconds, _NANO)
+    return f'{seconds}.{rest:09d}'
+
+
+def _moment(nanoseconds: int) -> str:
+    seconds, rest = divmod(nanoseconds, _NANO)
+    day = time.strftime('%b %e %Y %H:%M:%S', time.localtime(seconds))
+    return f'{day}.{rest:09d} ({_seconds(nanoseconds)})'
+
 
 _BAG = argument('bag_path', help='Bag to open')
 _STORAGE = argument('-s', '--storage', choices=['mcap'], help='Storage identifier: mcap')

@@ -10,12 +10,10 @@ import contextlib
 import threading
 import time
 
-from ..bag.files import bag_errors, load_overrides, open_bag
-from ..bag.selection import topic_filter
-from ..cli.arguments import positive_float, unsigned_float
+from ..bag import bag_errors, load_overrides, open_bag, topic_filter
 from ..cli.errors import FrontendError
 from ..cli.keyboard import has_keyboard, keys
-from ..cli.verb import argument, flag, verb
+from ..cli.verb import argument, flag, positive_float, unsigned_float, verb
 from ..names import absolute
 from ..ros.graph import Graph
 from ..ros.player import PlayClock, Player

@@ -12,13 +12,11 @@ import time
 
 from rosbag_files import BagWriter, Preset, WriterOptions
 
-from ..bag.files import bag_errors, load_overrides
-from ..bag.selection import topic_filter
-from ..cli.arguments import unsigned_int
+from ..bag import bag_errors, load_overrides, topic_filter
 from ..cli.errors import FrontendError
 from ..cli.interrupts import deferred_interrupts
 from ..cli.keyboard import keys
-from ..cli.verb import argument, flag, verb
+from ..cli.verb import argument, flag, unsigned_int, verb
 from ..ros.graph import Graph
 from ..ros.recorder import Recorder
 from ..ros.session import open_session

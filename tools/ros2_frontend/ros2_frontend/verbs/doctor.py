@@ -12,8 +12,8 @@ import platform
 import re
 import sys
 
-from ..aliases import Handle
 from ..cli.verb import flag
+from ..names import Handle
 from ..ros.graph import Graph, graph_verb
 
 Finding = tuple[bool, str]

@@ -8,8 +8,8 @@ from collections.abc import Callable
 import re
 from typing import Any
 
-from ..aliases import Message
 from ..cli.errors import FrontendError, UnknownNameError
+from ..names import Message
 
 _INDEX = re.compile(r'\[(-?\d+)\]')
 

@@ -9,11 +9,11 @@ import sys
 
 from ..cli.errors import FrontendError
 from ..cli.verb import Argument, argument, exclusive, flag, verb
-from ..index.definition import expand
-from ..index.interfaces import (
+from ..index import (
     all_interfaces,
     class_of,
     definition_path,
+    expand,
     interfaces_of,
     Kind,
 )
@@ -72,8 +72,7 @@ def package(args: Namespace) -> None:
 )
 def proto(args: Namespace) -> None:
     """Print the defaults of a message, request or goal as YAML."""
-    from ..messages.document import to_document
-    from ..messages.yaml_text import to_yaml
+    from ..messages.document import to_document, to_yaml
 
     kind = Kind(definition_path(args.type).parent.name)
     found = class_of(args.type, kind, 'The passed interface type is invalid')

@@ -7,14 +7,11 @@ from __future__ import annotations
 from argparse import Namespace
 import sys
 
-from ..aliases import Message
 from ..cli.errors import FrontendError, NoAnswerError
 from ..cli.verb import argument, flag
-from ..names import NodeName
-from ..ros.calls import call
-from ..ros.graph import Graph, graph_verb
-from .node import LIST_ARGUMENTS
-from .node_argument import find_node, node_verb, OPTIONAL_NODE
+from ..names import Message, NodeName
+from ..ros.graph import call, Graph, graph_verb
+from .node import find_node, LIST_ARGUMENTS, node_verb, OPTIONAL_NODE
 
 _GET_STATE = 'lifecycle_msgs/srv/GetState'
 _GET_TRANSITIONS = 'lifecycle_msgs/srv/GetAvailableTransitions'

@@ -9,11 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import sys
 
-from ..aliases import NamesAndTypes
-from ..cli.errors import UnknownNameError
-from ..cli.suggest import hint
+from ..cli.errors import hint, UnknownNameError
 from ..cli.verb import Argument, argument, flag
-from ..names import absolute, is_hidden
+from ..names import absolute, is_hidden, NamesAndTypes
 from ..ros.graph import Graph
 
 

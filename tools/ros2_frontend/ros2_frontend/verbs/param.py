@@ -10,12 +10,10 @@ from pathlib import Path
 import re
 import sys
 
-from ..aliases import Message
-from ..cli.arguments import positive_float
 from ..cli.errors import FrontendError, NoAnswerError
-from ..cli.verb import argument, flag
-from ..messages.parameter_file import dump, values_for
-from ..names import NodeName
+from ..cli.verb import argument, flag, positive_float
+from ..messages.fill import dump, values_for
+from ..names import Message, NodeName
 from ..ros.graph import Graph, graph_verb
 from ..ros.parameters import (
     describe,
@@ -27,7 +25,7 @@ from ..ros.parameters import (
     set_values,
     TYPE_NAMES,
 )
-from .node_argument import find_node, node_verb, OPTIONAL_NODE
+from .node import find_node, node_verb, OPTIONAL_NODE
 
 _NAME = argument('parameter_name', help='Name of the parameter')
 _TIMEOUT = argument(

@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 
 from ..cli.errors import FrontendError, UnknownNameError
 from ..cli.verb import argument, flag, verb
-from ..index.packages import executables, package_prefixes, prefix_of
+from ..index import executables, package_prefixes, prefix_of
 
 _NOT_FOUND = 'Package not found'
 _PACKAGE = argument('package_name', help='The package name')

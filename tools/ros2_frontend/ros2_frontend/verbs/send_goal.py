@@ -7,18 +7,13 @@ from __future__ import annotations
 from argparse import Namespace
 import sys
 
-from ..aliases import Handle, Message
-from ..cli.arguments import content, GRAPH_ARGUMENTS
-from ..cli.errors import FrontendError
-from ..cli.suggest import hint
-from ..cli.verb import argument, flag, verb
-from ..index.interfaces import class_of, Kind
-from ..messages.document import to_document
+from ..cli.errors import FrontendError, hint
+from ..cli.verb import argument, content, flag, GRAPH_ARGUMENTS, verb
+from ..index import class_of, Kind
+from ..messages.document import to_document, to_yaml
 from ..messages.fill import filled
-from ..messages.yaml_text import to_yaml
-from ..names import absolute
-from ..ros.actions import offered_actions
-from ..ros.graph import Graph, open_graph
+from ..names import absolute, Handle, Message
+from ..ros.graph import Graph, offered_actions, open_graph
 from ..ros.session import Session
 
 _CANCEL_TIMEOUT = 5.0  # [s]

@@ -9,16 +9,13 @@ import math
 import sys
 import time
 
-from ..aliases import Handle
-from ..cli.arguments import content, GRAPH_ARGUMENTS, positive_float
-from ..cli.errors import NoAnswerError
-from ..cli.suggest import hint
-from ..cli.verb import argument, verb
-from ..index.interfaces import class_of, Kind
+from ..cli.errors import hint, NoAnswerError
+from ..cli.verb import argument, content, GRAPH_ARGUMENTS, positive_float, verb
+from ..index import class_of, Kind
 from ..messages.fill import filled
-from ..names import absolute, is_hidden
-from ..ros.calls import request as send
+from ..names import absolute, Handle, is_hidden
 from ..ros.graph import Graph, open_graph
+from ..ros.graph import request as send
 from .service import SERVICES
 
 _GRACE = 0.02  # [s]; ros2cli, too, prints nothing when the service is there at once

@@ -6,11 +6,48 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Callable
+import sys
 
-from ..aliases import NamesAndTypes
+from ..cli.errors import FrontendError, hint, UnknownNameError
 from ..cli.verb import flag
+from ..index import class_of, Kind
+from ..names import absolute, InterfaceClass, is_hidden, NamesAndTypes
 from ..ros.graph import Graph, graph_verb
 from .names import Names
+
+
+def message_class(name: str) -> InterfaceClass:
+    """Import a message class, by `package/msg/Name` or `package/Name`."""
+    return class_of(name, Kind.MESSAGE, 'The passed message type is invalid')
+
+
+def class_of_topic(topic: str, graph: Graph, *, forever: bool = False) -> InterfaceClass:
+    """Return the message class that a topic carries, once it is there.
+
+    Raises:
+        UnknownNameError: The topic does not appear, unless it is waited for `forever`.
+        FrontendError: It carries several types.
+    """
+    name = absolute(topic)
+
+    def look() -> list[str] | None:
+        return dict(graph.topics(hidden=True)).get(name)
+
+    types = graph.wait_for(look)
+    if types is None:
+        print(f'WARNING: topic [{topic}] does not appear to be published yet')
+        near = hint(name, [other for other, _ in graph.topics(hidden=is_hidden(name))])
+        if not forever:
+            text = 'Could not determine the type for the passed topic'
+            raise UnknownNameError(text + near)
+        print(near.strip(), end='\n' if near else '', file=sys.stderr)
+        types = graph.wait_until(look) or []
+    if len(types) > 1:
+        raise FrontendError(
+            f"Cannot echo topic '{topic}', as it contains more than one type: [{', '.join(types)}]"
+        )
+    return message_class(types[0])
+
 
 TOPICS = Names('topic', Graph.topics)
 

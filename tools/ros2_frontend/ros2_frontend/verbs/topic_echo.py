@@ -7,18 +7,13 @@ from __future__ import annotations
 from argparse import Namespace
 from collections.abc import Callable, Mapping
 
-from ..aliases import Handle, Message
-from ..cli.arguments import GRAPH_ARGUMENTS, positive_float, unsigned_int
-from ..cli.verb import argument, flag, verb
-from ..messages.csv_text import to_csv
-from ..messages.document import Abbreviation, to_document
-from ..messages.yaml_text import to_yaml
-from ..names import absolute
+from ..cli.verb import argument, flag, GRAPH_ARGUMENTS, positive_float, unsigned_int, verb
+from ..messages.document import Abbreviation, to_csv, to_document, to_yaml
+from ..names import absolute, Handle, Message
 from ..ros.graph import open_graph
 from ..ros.qos import matching_profile, SUBSCRIPTION_QOS
 from .expression import compile_filter, parse_path, select
-from .topic import TOPICS
-from .topic_types import class_of_topic, message_class
+from .topic import class_of_topic, message_class, TOPICS
 
 _TRUNCATE_LENGTH = 128
 

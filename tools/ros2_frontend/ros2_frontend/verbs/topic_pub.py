@@ -10,17 +10,23 @@ import math
 import sys
 import time
 
-from ..aliases import Handle
-from ..cli.arguments import content, GRAPH_ARGUMENTS, positive_float, unsigned_int
 from ..cli.errors import NoAnswerError
-from ..cli.verb import argument, exclusive, flag, verb
+from ..cli.verb import (
+    argument,
+    content,
+    exclusive,
+    flag,
+    GRAPH_ARGUMENTS,
+    positive_float,
+    unsigned_int,
+    verb,
+)
 from ..messages.fill import filled, Filler
-from ..names import absolute
+from ..names import absolute, Handle
 from ..ros.graph import Graph
 from ..ros.qos import profile_of, PUBLISHER_QOS
 from ..ros.session import open_session
-from .topic import TOPICS
-from .topic_types import message_class
+from .topic import message_class, TOPICS
 
 _REMINDER = 1.0  # [s] between two lines about what is waited for
 _KEEP_ALIVE = 0.1  # [s]

@@ -1,17 +1,70 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Interface types: which are installed, where they are defined, and their Python classes."""
+"""What is installed: packages, executables, and interfaces with their definitions and classes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from enum import Enum
 import importlib
+import os
 from pathlib import Path
+import sys
 
-from ..aliases import InterfaceClass
-from ..cli.errors import BadTypeError, UnknownNameError
-from ..cli.suggest import hint
+from message_definitions import nested_type
+
+from .cli.errors import BadTypeError, FrontendError, hint, UnknownNameError
+from .names import InterfaceClass
+
+
+def package_prefixes() -> Mapping[str, str]:
+    """Return the prefix path of each installed package by its name, sorted.
+
+    Raises:
+        FrontendError: The environment is not set up.
+    """
+    from ament_index_python.packages import get_packages_with_prefixes
+
+    try:
+        prefixes: dict[str, str] = get_packages_with_prefixes()
+    except OSError as error:  # AMENT_PREFIX_PATH is missing or empty
+        raise FrontendError(f'{error}\nSource env.sh in this shell first.') from error
+    return dict(sorted(prefixes.items()))
+
+
+def prefix_of(package: str, message: str = "Package '{0}' not found") -> Path:
+    """Return the prefix path of a package.
+
+    Raises:
+        UnknownNameError: There is none of that name; it names the nearest, or what makes one of
+            this workspace known. The message may hold `{0}` for the name.
+    """
+    prefixes = package_prefixes()
+    if package not in prefixes:
+        remedy = _remedy(package, Path(sys.prefix).parent) or hint(package, prefixes)
+        raise UnknownNameError(message.format(package) + remedy)
+    return Path(prefixes[package])
+
+
+def _remedy(package: str, workspace: Path) -> str:
+    """Say what is to be done about a package whose sources are in the workspace."""
+    folders = ('.', 'libraries', 'interfaces')
+    if not any((workspace / folder / package / 'package.xml').is_file() for folder in folders):
+        return ''
+    install = workspace / 'install'
+    if (install / package).is_dir() or (install / 'share' / package).is_dir():
+        return '\nIt was built after this shell was set up: source env.sh'
+    return '\nIt may not be built yet: make build, then source env.sh'
+
+
+def executables(package: str) -> list[Path]:
+    """Return the executables of a package, as `ros2 run` finds them: files in `lib/<package>`."""
+    found: list[Path] = []
+    for base, folders, files in os.walk(prefix_of(package) / 'lib' / package):
+        folders[:] = [name for name in folders if not name.startswith('.')]
+        found += [Path(base, name) for name in files if os.access(Path(base, name), os.X_OK)]
+    return sorted(found)
+
 
 _RESOURCE = 'rosidl_interfaces'
 
@@ -104,3 +157,26 @@ def definition_path(name: str) -> Path:
     share = Path(get_package_share_directory(package), folder)
     source = share / f'{base}.{folder}'
     return source if source.is_file() else share / f'{base}.idl'
+
+
+def expand(
+    name: str, read: Callable[[str], str], comments: bool, nested_comments: bool, depth: int = 0
+) -> Iterator[str]:
+    """Yield the lines of `package/kind/Name`, each field of a message type followed by its lines.
+
+    Args:
+        name: The type.
+        read: Gives the definition's text for such a name.
+        comments: Whether to show comments and blank lines of the type itself.
+        nested_comments: Whether to show those of the types of its fields.
+        depth: How deep the definition stands; one tab each.
+    """
+    shown = nested_comments if depth else comments
+    for line in read(name).splitlines():
+        # rosidl, too, starts a comment at the first #
+        text = line.rstrip() if shown else line.partition('#')[0].strip()
+        if text or shown:
+            yield '\t' * depth + text if text else ''
+        nested = nested_type(line, name.partition('/')[0])
+        if nested is not None:
+            yield from expand(nested, read, comments, nested_comments, depth + 1)
