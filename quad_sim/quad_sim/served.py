@@ -7,11 +7,11 @@ What runs against it goes the whole way: servos, board, serial line, and clocks 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
-from enum import Enum
+from functools import partial
 import multiprocessing
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -37,13 +37,6 @@ if TYPE_CHECKING:
 
 START_TIME = 120.0  # [s] in which the process has to be there, on a machine that has much to do
 ANSWER_TIME = 40.0  # [s]
-
-
-class _Request(Enum):
-    STAND = 'stand'
-    KICK = 'kick'
-    BEGIN = 'begin'
-    READ = 'read'
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,23 +98,23 @@ class ServedRobot:
 
     def stand(self) -> None:
         """Put the robot on its feet where it began, whatever it did before."""
-        self._ask(_Request.STAND)
+        self._ask('stand')
 
     def kick(self, x: float, y: float) -> None:
         """Change its velocity at once, ahead and to the left [m/s]."""
-        self._ask(_Request.KICK, (x, y, 0.0))
+        self._ask('kick', x, y)
 
     def begin(self) -> None:
         """Begin to watch it anew."""
-        self._ask(_Request.BEGIN)
+        self._ask('begin')
 
     def read(self) -> Watched:
         """Return what was seen since."""
-        return cast('Watched', self._ask(_Request.READ))
+        return cast('Watched', self._ask('read'))
 
-    def _ask(self, request: _Request, argument: object = None) -> object:
+    def _ask(self, request: str, *arguments: float) -> object:
         try:
-            self._pipe.send((request, argument))
+            self._pipe.send((request, arguments))
         except OSError as error:
             raise SimulationError(f'the simulated robot is gone: {error}') from error
         return self._answer(ANSWER_TIME)
@@ -168,14 +161,6 @@ class _Watch:
         self._meter = Meter(robot, urdf)
         self._pose = pose_positions(Pose.STAND, options.arm)
         self._server = Server(robot, simulation.line, terminal, self._meter.sample)
-        self._actions: dict[_Request, Callable[[Any], object]] = {
-            _Request.STAND: lambda _: self._stand(),
-            _Request.KICK: robot.kick,
-            _Request.BEGIN: lambda _: self._begin(),
-            _Request.READ: lambda _: Watched(
-                self._meter.read(), self._line.command_times.timing()
-            ),
-        }
 
     def answer(self, pipe: Connection) -> None:
         """Carry requests out until there will be no more."""
@@ -184,25 +169,35 @@ class _Watch:
             try:
                 pipe.send(None)
                 while True:
-                    request, argument = pipe.recv()
-                    pipe.send(self._do(request, argument))
+                    request, arguments = pipe.recv()
+                    pipe.send(self._do(request, arguments))
             except (EOFError, OSError):  # whoever asked is gone
                 pass
             finally:
                 self._server.stop()
             life.result()
 
-    def _do(self, request: _Request, argument: object) -> object:
-        action = self._actions[request]
+    def _do(self, request: str, arguments: tuple[Any, ...]) -> object:
+        action = partial(getattr(self, request), *arguments)
         try:
-            return self._server.submit(lambda: action(argument)).result(ANSWER_TIME / 2)
+            return self._server.submit(action).result(ANSWER_TIME / 2)
         except (SimulationError, TimeoutError) as error:
-            return SimulationError(f'{request.value}: {error}')
+            return SimulationError(f'{request}: {error}')
 
-    def _stand(self) -> None:
+    def stand(self) -> None:
+        """Put the robot on its feet."""
         self._robot.reset(pose=self._pose)
-        self._begin()
+        self.begin()
 
-    def _begin(self) -> None:
+    def kick(self, x: float, y: float) -> None:
+        """Change its velocity [m/s]."""
+        self._robot.kick((x, y, 0.0))
+
+    def begin(self) -> None:
+        """Begin to watch it anew."""
         self._meter.begin()
         self._line.command_times.clear()
+
+    def read(self) -> Watched:
+        """Return what was seen since."""
+        return Watched(self._meter.read(), self._line.command_times.timing())

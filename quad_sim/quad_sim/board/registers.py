@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 import math
 
 from quad_hardware.protocol import (
@@ -64,6 +65,14 @@ class Registers:
             **dict.fromkeys(_BODY, self._pose_body),
             **dict.fromkeys(_FEET, self._pose_body),
         }
+        self._readers: dict[int, Callable[[], bytes]] = {
+            Register.BATTERY: lambda: bytes((board.battery.percent,)),
+            Register.FIRMWARE: lambda: board.firmware.encode('ascii'),
+            Register.IMU: self._imu,
+            _TURN: lambda: b'\x00' if board.turning else b'\x01',  # 1: done
+            **{code: partial(self._float, code, axis) for code, axis in _ATTITUDE.items()},
+            **{code: partial(self._whole, code, axis) for code, axis in _WHOLE_DEGREES.items()},
+        }
         self.restart()
 
     def restart(self) -> None:
@@ -90,7 +99,7 @@ class Registers:
         if address in MOTOR_OF_REGISTER:
             data = self._angles()[address - Register.MOTORS :]
         else:
-            data = self._value(address)
+            data = self._readers.get(address, bytes)()
         return data[:count].ljust(count, b'\0')
 
     def _angles(self) -> bytes:
@@ -99,23 +108,14 @@ class Registers:
             self._spans[motor].encode(angles[slot_of(motor)]) for motor in BULK_READ_ORDER
         )
 
-    def _value(self, address: int) -> bytes:
-        function, board = V1.functions[address], self._board
-        if address == Register.BATTERY:
-            return bytes((board.battery.percent,))
-        if address == Register.FIRMWARE:
-            return board.firmware.encode('ascii').ljust(function.length, b'\0')
-        if address == Register.IMU:
-            return self._imu()
-        if address in _ATTITUDE:
-            degrees = board.attitude(board.measure())[_ATTITUDE[address]]
-            return function.pack(value=(degrees,))
-        if address in _WHOLE_DEGREES:
-            degrees = board.attitude(board.measure())[_WHOLE_DEGREES[address]]
-            return function.pack(value=(round(degrees) if math.isfinite(degrees) else 0,))
-        if address == _TURN:
-            return b'\x00' if board.turning else b'\x01'  # 1: done
-        return bytes(function.length)
+    def _float(self, address: int, axis: int) -> bytes:
+        degrees = self._board.attitude(self._board.measure())[axis]
+        return V1.functions[address].pack(value=(degrees,))
+
+    def _whole(self, address: int, axis: int) -> bytes:
+        degrees = self._board.attitude(self._board.measure())[axis]
+        whole = round(degrees) if math.isfinite(degrees) else 0
+        return V1.functions[address].pack(value=(whole,))
 
     def _imu(self) -> bytes:
         measured = self._board.measure()

@@ -27,18 +27,6 @@ MAX_SPEED = 255
 
 
 @dataclass(frozen=True, slots=True)
-class _Scale:
-    gain: float  # [rad/deg], of the gripper [m/deg]
-    offset: float  # [rad], [m]
-
-    def position(self, angle: float) -> float:
-        return self.offset + self.gain * angle
-
-    def angle(self, position: float) -> float:
-        return (position - self.offset) / self.gain
-
-
-@dataclass(frozen=True, slots=True)
 class Mount:
     """How a servo sits on its joint."""
 
@@ -61,16 +49,6 @@ class Mount:
 AS_EXPECTED = Mount()
 
 
-def _scale(joint: Joint, motor: int, model: Model, mount: Mount) -> _Scale:
-    gain, offset = math.pi / 180.0, 0.0
-    if motor == GRIPPER:
-        span = ANGLE_SPANS[model][motor]
-        gain = (joint.limits.upper - joint.limits.lower) / (span.high - span.low)
-        offset = joint.limits.lower - gain * span.low
-    gain *= mount.sign
-    return _Scale(gain, offset - gain * mount.offset)
-
-
 class Servos:
     """All servos of a robot, by motor id."""
 
@@ -91,21 +69,30 @@ class Servos:
         """
         self._plant = plant
         self._joint: dict[int, str] = {}
-        self._scale: dict[int, _Scale] = {}
+        # positions are offset + gain * angle [rad], of the gripper [m]
+        self._gain: dict[int, float] = {}
+        self._offset: dict[int, float] = {}
         for joint in joints:
             motor = MOTOR_OF_JOINT.get(joint.name)
             if motor is None:
                 raise SetupError(f'the board has no servo for joint {joint.name}')
             self._joint[motor] = joint.name
-            self._scale[motor] = _scale(joint, motor, model, mounts.get(motor, AS_EXPECTED))
+            mount = mounts.get(motor, AS_EXPECTED)
+            gain, offset = math.pi / 180.0, 0.0
+            if motor == GRIPPER:
+                span = ANGLE_SPANS[model][motor]
+                gain = (joint.limits.upper - joint.limits.lower) / (span.high - span.low)
+                offset = joint.limits.lower - gain * span.low
+            self._gain[motor] = gain * mount.sign
+            self._offset[motor] = offset - gain * mount.sign * mount.offset
         if unknown := sorted(mounts.keys() - self._joint.keys()):
             raise SetupError(f'no servo has id {unknown[0]}; there are {sorted(self._joint)}')
         self._index = {motor: plant.joint_names.index(name) for motor, name in self._joint.items()}
         # by joint, in the order of the robot's arrays
         order = sorted(self._index, key=lambda motor: self._index[motor])
         self._slots = [slot_of(motor) for motor in order]
-        self._gains = np.array([self._scale[motor].gain for motor in order])
-        self._offsets = np.array([self._scale[motor].offset for motor in order])
+        self._gains = np.array([self._gain[motor] for motor in order])
+        self._offsets = np.array([self._offset[motor] for motor in order])
         # ids of the servos that the robot has, in the order of the wire
         self.fitted = tuple(motor for motor in MOTOR_ORDER if motor in self._joint)
         self.failed: int | None = None  # id of the servo that does not work, None if all do
@@ -118,7 +105,7 @@ class Servos:
             duration: Time of the way [s]; None for the servo's own.
         """
         positions = {
-            self._joint[motor]: self._scale[motor].position(angle)
+            self._joint[motor]: self._offset[motor] + self._gain[motor] * angle
             for motor, angle in angles.items()
             if motor in self._joint
         }
@@ -132,7 +119,8 @@ class Servos:
         if speed >= MAX_SPEED:
             self.command({motor: angle})
             return
-        now = self._scale[motor].angle(float(self._plant.joint_targets[self._index[motor]]))
+        place = float(self._plant.joint_targets[self._index[motor]])
+        now = (place - self._offset[motor]) / self._gain[motor]
         self.command({motor: angle}, abs(angle - now) / (NO_LOAD_SPEED * speed / MAX_SPEED))
 
     def set_speed(self, motors: Iterable[int], speed: int) -> None:

@@ -18,9 +18,8 @@ from gymnasium.envs.registration import register
 
 from .processes import ProcessVectorEnv
 from .randomization import NO_RANDOMIZATION, Randomization
-from .randomized_robot import Observation
 from .rewards import RewardWeights
-from .walking import CommandRanges, WalkingEnv
+from .walking import CommandRanges, Observation, WalkingEnv
 
 ID = 'quad_sim/Walk-v0'
 

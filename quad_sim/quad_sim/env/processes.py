@@ -29,8 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..exceptions import SetupError, SimulationError
-from .randomized_robot import Floats
-from .walking import WalkingEnv
+from .walking import Floats, WalkingEnv
 
 Env = gymnasium.Env[Floats, Floats]
 Seed = int | list[int | None] | None

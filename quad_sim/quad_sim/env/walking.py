@@ -1,28 +1,55 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Walking as commanded: the environment."""
+"""Walking as commanded: the environment, another robot in each episode."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import Enum
 import math
 from typing import Any
 
 import gymnasium
 from gymnasium import spaces
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from quad_description import RobotState
-from quad_description.rotations import Vector
+from quad_description import (
+    ImuSample,
+    JointSample,
+    movable_joints,
+    Pose,
+    pose_positions,
+    robot_urdf,
+    RobotState,
+)
+from quad_description.rotations import down_in_body, Vector
 
-from ..exceptions import SetupError
+from ..exceptions import SetupError, TargetError
+from ..physics import ImuBias, Robot
 from ..plant.servo import ServoModel, ServoParameters
 from .randomization import check_range, NO_RANDOMIZATION, Randomization, Range
-from .randomized_robot import Floats, Observation, PERIOD, RandomizedRobot, row_of
-from .rewards import RewardWeights
+from .rewards import Motion, RewardWeights
 
+PERIOD = 0.02  # [s]
 MAX_TILT = math.radians(70.0)  # as in the vendor's training (luwu_mjlab)
+Floats = NDArray[np.float32]
+
+
+class Observation(Enum):
+    """Parts of an observation in their order: what it is, and how many numbers (0: a joint)."""
+
+    ANGULAR_VELOCITY = ('of base_link in its own frame in [rad/s]', 3)
+    DOWN = ('direction of gravity in base_link', 3)
+    COMMAND = ('velocity ahead and to the left in [m/s], turning in [rad/s]', 3)
+    POSITIONS = ('of the joints, from those of a robot that stands, in [rad]', 0)
+    VELOCITIES = ('of the joints in [rad/s]', 0)
+    ACTION = ('of the step before in [rad]', 0)
+
+    def width(self, joints: int) -> int:
+        """Return how many numbers it has."""
+        return self.value[1] or joints
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,14 +87,15 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
     """A quadruped that is to walk as commanded.
 
     An action is how far the targets of the joints are from a robot that stands in [rad]. Robot,
-    servos and sensors are those of the simulation. An episode is terminated by a fall, and
-    truncated after its time.
+    servos and sensors are those of the simulation; they differ in each episode, by ranges that
+    are data. An episode is terminated by a fall, and truncated after its time.
 
     Attributes:
         robot: The robot in physics.
         period: Time of a step in [s].
         command: Velocity that is commanded: ahead and to the left in [m/s], turning in [rad/s].
         stand: Joint positions of a robot that stands in [rad].
+        state: What its sensors measured last.
     """
 
     def __init__(
@@ -94,20 +122,24 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
             raise SetupError(
                 f'period {period} s, duration {duration} s: give 0 < period < duration'
             )
-        self._weights, self._most = weights or RewardWeights(), round(duration / period)
-        self._body = RandomizedRobot(preset, servo, randomization, period)
-        self.robot, self.period, self.stand = self._body.robot, period, self._body.stand
-        self._commands = commands or CommandRanges()
-        self.action_space = self._body.action_space
+        urdf = robot_urdf(preset)
+        self.robot, self.period = Robot(urdf, servo, noise=randomization.noise), period
+        self.vary(randomization)
+        limits = [joint.limits for joint in movable_joints(urdf)]
+        stand = pose_positions(Pose.STAND)
+        self.stand: Floats = np.array([stand[name] for name in self.robot.joint_names], np.float32)
+        # actions that lead to the limits of the joints in [rad]
+        self._lowest: Floats = np.array([each.lower for each in limits], np.float32) - self.stand
+        self._highest: Floats = np.array([each.upper for each in limits], np.float32) - self.stand
+        self.action_space = spaces.Box(self._lowest, self._highest)
         width = sum(part.width(len(self.stand)) for part in Observation)
         self.observation_space = spaces.Box(-np.inf, np.inf, (width,), np.float32)
+        self._weights, self._most = weights or RewardWeights(), round(duration / period)
+        self._commands = commands or CommandRanges()
         self.command: Vector = (0.0, 0.0, 0.0)
-        self._begin()
-
-    @property
-    def state(self) -> RobotState:
-        """What its sensors measured last."""
-        return self._body.state
+        self._steps = self._command_steps = 0
+        self._sums: dict[str, float] = {}
+        self._begin(None)
 
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
@@ -136,7 +168,7 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
             TargetError: A number is not finite, or there are too many or few.
             SimulationError: The physics blew up.
         """
-        motion = self._body.step(action, self.np_random)
+        motion = self._move(np.asarray(action, np.float32))
         fallen = motion.tilt > MAX_TILT
         terms = self._weights.terms(motion, self.command, self.period, fallen=fallen)
         self._steps += 1
@@ -155,17 +187,74 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         Raises:
             SetupError: A target may come later than its step ends.
         """
-        self._body.vary(randomization)
+        if randomization.delay[1] >= self.period:
+            raise SetupError(
+                f'delay {randomization.delay} s: give less than a period, {self.period} s'
+            )
+        self._randomization = randomization
 
-    def _begin(self, command: Vector | None = None) -> None:
-        self._body.begin(self.np_random)
+    def _begin(self, command: Vector | None) -> None:
+        ranges, random = self._randomization, self.np_random
+        seed = int(random.integers(2**31))
+        self.robot.reset(seed=seed, variation=ranges.variation(random))
+        self._delay = float(random.uniform(*ranges.delay))
+        x, y, z = random.uniform(*ranges.gyro_bias, 3).tolist()
+        self._bias = ImuBias((x, y, z), *random.uniform(*ranges.level_bias, 2).tolist())
+        # of the step before; what the set-points are at the start of an episode
+        self._action: Floats = self.robot.joint_targets.astype(np.float32) - self.stand
+        self.state = self._sense()
         self._is_command_lasting = command is not None
-        self.command = command or self._commands.draw(self.np_random)
+        self.command = command or self._commands.draw(random)
         self._command_steps = max(round(self._commands.time / self.period), 1)
         self._steps, self._sums = 0, dict.fromkeys(self._weights.names, 0.0)
 
+    def _move(self, wanted: Floats) -> Motion:
+        """Send targets, let a period pass, and sense; return what the step brought about."""
+        if wanted.shape != self.stand.shape or not np.isfinite(wanted).all():
+            raise TargetError(
+                f'action {wanted}: give a finite number for each of {len(self.stand)} joints'
+            )
+        wanted = np.clip(wanted, self._lowest, self._highest)
+        robot, ranges, random = self.robot, self._randomization, self.np_random
+        if ranges.kick_interval and random.random() < self.period / ranges.kick_interval:
+            robot.kick((*random.uniform(*ranges.kick, 2).tolist(), 0.0))
+        if self._delay:
+            robot.step(self._delay)
+        robot.set_targets((self.stand + wanted).astype(np.float64))
+        robot.step(self.period - self._delay)
+        pose = robot.base_pose
+        motion = Motion(
+            velocity=robot.base_velocity,
+            tilt=pose.tilt,
+            down=down_in_body(pose.orientation),
+            torques=robot.joint_torques,
+            velocities=robot.joint_velocities,
+            target_speed=(wanted.astype(np.float64) - self._action) / self.period,
+        )
+        self._action, self.state = wanted, self._sense()
+        return motion
+
+    def _sense(self) -> RobotState:
+        measured, time = self.robot.measure(), self.robot.time
+        positions, velocities = measured.positions.tolist(), measured.velocities.tolist()
+        self._joints = JointSample(tuple(positions), tuple(velocities), time)
+        self._imu = ImuSample(
+            self._bias.orientation(*measured.imu.roll_pitch_yaw),
+            self._bias.rates(measured.imu.angular_velocity),
+            measured.imu.specific_force,
+        )
+        return RobotState(self._joints, self._imu, time=time)
+
     def _observation(self) -> Floats:
-        return row_of({**self._body.seen, Observation.COMMAND: self.command})
+        seen: dict[Observation, ArrayLike] = {
+            Observation.ANGULAR_VELOCITY: self._imu.angular_velocity or (),
+            Observation.DOWN: self._imu.down,
+            Observation.COMMAND: self.command,
+            Observation.POSITIONS: np.asarray(self._joints.positions) - self.stand,
+            Observation.VELOCITIES: self._joints.velocities or (),
+            Observation.ACTION: self._action,
+        }
+        return np.concatenate([np.asarray(seen[part], np.float32) for part in Observation])
 
 
 def _lasting_command(options: Mapping[str, Any]) -> Vector | None:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 import math
 from types import MappingProxyType
+from typing import NamedTuple
 
 from ..exceptions import SetupError
 
@@ -34,24 +35,25 @@ class FaultKind(Enum):
 FOREVER = math.inf
 
 
-@dataclass(frozen=True, slots=True)
-class _Setting:
+class Setting(NamedTuple):
+    """A detail of a fault."""
+
     default: float
     lowest: float
     highest: float
     meaning: str
 
 
-_RATE = _Setting(0.01, 0.0, 1.0, 'share of the bytes')
+_RATE = Setting(0.01, 0.0, 1.0, 'share of the bytes')
 
-SETTINGS: Mapping[FaultKind, Mapping[str, _Setting]] = MappingProxyType(
+SETTINGS: Mapping[FaultKind, Mapping[str, Setting]] = MappingProxyType(
     {kind: {} for kind in FaultKind}
     | {
         FaultKind.DROP: {'rate': _RATE},
         FaultKind.FLIP: {'rate': _RATE},
-        FaultKind.SLOW: {'delay': _Setting(0.05, 0.0, 60.0, 'later by [s]')},
-        FaultKind.LIMP: {'motor': _Setting(11.0, 11.0, 54.0, 'id')},
-        FaultKind.BATTERY: {'level': _Setting(5.0, 0.0, 100.0, 'charge [%]')},
+        FaultKind.SLOW: {'delay': Setting(0.05, 0.0, 60.0, 'later by [s]')},
+        FaultKind.LIMP: {'motor': Setting(11.0, 11.0, 54.0, 'id')},
+        FaultKind.BATTERY: {'level': Setting(5.0, 0.0, 100.0, 'charge [%]')},
     }
 )
 """Details of a fault, beside ``at`` and ``for``."""
