@@ -19,8 +19,8 @@ from process_supervisor import (
 )
 
 from .exceptions import BringupError
-from .session import add_arguments, session
-from .shutdown import join_ros, lie_down, stand_still
+from .shutdown import leave
+from .stack import add_arguments, session
 
 HINT = """in a second terminal:
     ros2 run quad_teleop teleop_keyboard{hint}
@@ -77,9 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         with session(arguments, ros, arguments.port) as quad:
             hint = HINT.format(hint=ros.hint, set_mode=ros.resolve('set_mode'))
             sys.stdout.write(f'{quad.title}\n{hint}\n')
-            join = partial(join_ros, namespace=ros.namespace)
-            end = stand_still if arguments.hold else lie_down
-            shutdown = partial(end, make_client=join)
+            shutdown = partial(leave, namespace=ros.namespace, hold=arguments.hold)
             return supervise(quad.processes, shutdown=shutdown).exit_code
     except (BringupError, SupervisorError) as error:
         sys.stderr.write(f'{error}\n')

@@ -5,9 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from process_supervisor import CallError, GivenUpError
+
+if TYPE_CHECKING:
+    from .mode_client import ModeClient
 
 STATE_TIMEOUT = 5.0
 """Longest time in [s] to receive what the controller is doing."""
@@ -27,54 +30,22 @@ TO_LIE = ON_THE_WAY + LYING
 """It lies down already; left now, it would stay half-way."""
 
 
-class Client(Protocol):
-    """What is needed of ROS; :class:`.mode_client.ModeClient` is the real one."""
+def leave(
+    report: Callable[[str], None], given_up: Callable[[], bool], *, namespace: str, hold: bool
+) -> None:
+    """Let the robot lie down, if it is on its feet; a controller that does not help is left.
 
-    @property
-    def state(self) -> str:
-        """State of the controller, empty before it is received."""
-
-    def set_mode(self, mode: str, timeout: float) -> str:
-        """Request a mode; return the answer."""
-
-    def wait_until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
-        """Wait for something."""
-
-    def close(self) -> None:
-        """Leave the ROS graph."""
-
-
-MakeClient = Callable[[Callable[[], bool]], Client]
-"""Joins the ROS graph; the client asks the argument whether its waiting shall be given up."""
-
-
-def join_ros(given_up: Callable[[], bool], namespace: str = '') -> Client:
-    """Make the client; rclpy is loaded only now, a bring-up does not need it."""
+    Args:
+        report: Takes what happens, in words.
+        given_up: Returns whether the person does not want to wait any longer.
+        namespace: Of the controller.
+        hold: Let the robot end its gait instead, so that it is left standing on all its feet.
+    """
+    # rclpy is loaded only now, a bring-up does not need it
     from .mode_client import ModeClient
 
-    return ModeClient('quad_bringup', given_up, namespace)
-
-
-def lie_down(
-    report: Callable[[str], None], given_up: Callable[[], bool], make_client: MakeClient = join_ros
-) -> None:
-    """Let the robot lie down, if it is on its feet; a controller that does not help is left."""
-    _leave(_lie_down, 'lying down', report, make_client(given_up))
-
-
-def stand_still(
-    report: Callable[[str], None], given_up: Callable[[], bool], make_client: MakeClient = join_ros
-) -> None:
-    """Let the robot end its gait, if it walks, so that it is left standing on all its feet."""
-    _leave(_stand_still, 'standing still', report, make_client(given_up))
-
-
-def _leave(
-    end: Callable[[Client, Callable[[str], None]], None],
-    what: str,
-    report: Callable[[str], None],
-    client: Client,
-) -> None:
+    end, what = (_stand_still, 'standing still') if hold else (_lie_down, 'lying down')
+    client = ModeClient('quad_bringup', given_up, namespace)
     try:
         client.wait_until(lambda: bool(client.state), STATE_TIMEOUT, 'the state of the controller')
         end(client, report)
@@ -86,7 +57,7 @@ def _leave(
         client.close()
 
 
-def _stand_still(client: Client, report: Callable[[str], None]) -> None:
+def _stand_still(client: ModeClient, report: Callable[[str], None]) -> None:
     if client.state.removeprefix(ON_THE_WAY) not in STEPPING and client.state != TO_STAND:
         return
     report('standing still first; Ctrl-C again stops at once')
@@ -95,7 +66,7 @@ def _stand_still(client: Client, report: Callable[[str], None]) -> None:
     client.wait_until(lambda: client.state in ends, LIE_TIMEOUT, 'it to stand still')
 
 
-def _lie_down(client: Client, report: Callable[[str], None]) -> None:
+def _lie_down(client: ModeClient, report: Callable[[str], None]) -> None:
     if client.state != TO_LIE and client.state.removeprefix(ON_THE_WAY) not in ON_ITS_FEET:
         return
     report('lying down first; Ctrl-C again stops at once')
@@ -104,7 +75,7 @@ def _lie_down(client: Client, report: Callable[[str], None]) -> None:
         _try_to_lie(client, {LYING})
 
 
-def _try_to_lie(client: Client, ends: set[str]) -> str:
+def _try_to_lie(client: ModeClient, ends: set[str]) -> str:
     """Request it, wait for one of some states, and return that."""
     before = client.state  # a fault of before is no end
     client.set_mode(LYING, LIE_TIMEOUT)

@@ -1,24 +1,47 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The processes of a quadruped: which there are, with which arguments, and when each is ready."""
+"""The processes of a quadruped: from the command line to which there are, and how they are run."""
 
 from __future__ import annotations
 
+import argparse
+from collections.abc import Iterator
+import contextlib
 from dataclasses import dataclass, field
 from functools import partial
+import os
 from pathlib import Path
 
 from process_supervisor import (
+    add_namespace,
+    add_view,
+    bring_up_place,
+    exclusive,
     Executable,
+    find_executable,
     FindExecutable,
+    namespaced_parameters,
     node_process,
     ProcessSpec,
     RosOptions,
     StartError,
     state_publisher,
     view_process,
+    write_parameters,
 )
+from process_supervisor.arguments import add_network, add_timeout, apply_network
+from quad_description import movable_joints, PRESETS, robot_urdf
+from quad_hardware.protocol import V1, V2
 
+from .exceptions import ArgumentError
+
+GAITS = ('trot', 'crawl', 'pace')
+"""Gaits of quad_controller."""
+AUTO, VENDOR = 'auto', 'vendor'
+PROTOCOLS = (AUTO, V2.name, V1.name, VENDOR)
+"""Serial protocols of quad_hardware, and ways to choose one."""
+PORT_REMEDY = 'another --port'
+"""What a second bring-up on a port has to choose."""
 CONTROLLER_FIRST, THEN_BRIDGE, SIMULATOR_LAST = range(3)
 """Order of stopping: the controller, then the bridge, then the robot."""
 SIMULATOR = Executable('quad_sim', 'fake_xgo')
@@ -129,3 +152,146 @@ def _controller_parameters(stack: Stack) -> dict[str, str]:
     if stack.simulate:  # no person is hurt, and nothing breaks
         values['get_up_swings'] = 'true'
     return values
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """A quadruped that is about to be brought up.
+
+    Attributes:
+        title: What runs, and where.
+        port: Its serial port.
+        joints: Names of its joints, in the order of /joint_command.
+        processes: What is to be run.
+    """
+
+    title: str
+    port: str
+    joints: list[str]
+    processes: list[ProcessSpec]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments that bring-up and demo share."""
+    parser.add_argument(
+        '--preset',
+        choices=PRESETS,
+        default='lite',
+        help='which robot it is (default: %(default)s)',
+    )
+    parser.add_argument('--arm', action='store_true', help='the robot has its arm')
+    parser.add_argument(
+        '--servo',
+        metavar='MODEL',
+        help='servos of a simulated robot: firm (like the real ones), vendor_rl (soft, which '
+        'policies of the vendor are trained with), or kp=10,kv=0.25 (default: firm)',
+    )
+    way = parser.add_mutually_exclusive_group()
+    way.add_argument(
+        '--gait',
+        choices=GAITS,
+        default='trot',
+        help='how the geometric gait puts its feet (default: %(default)s)',
+    )
+    way.add_argument(
+        '--policy',
+        metavar='FILE',
+        type=Path,
+        help='ONNX policy to load and check, a file or trot_ppo; mode "policy" lets it walk',
+    )
+    parser.add_argument(
+        '--record',
+        metavar='FOLDER',
+        type=Path,
+        help='record each step of the controller there (MCAP), for replay_policy and Foxglove',
+    )
+    parser.add_argument(
+        '--protocol',
+        choices=PROTOCOLS,
+        default=AUTO,
+        help='protocol of the serial line; auto detects it on a real robot, and is v2 with a '
+        "simulated one; vendor goes through the vendor's xgo_lib2, whose vendor_servo_method is "
+        'given in --calibration (default: %(default)s)',
+    )
+    add_namespace(parser)
+    add_view(parser)
+    add_network(parser)
+    add_timeout(parser)
+
+
+@contextlib.contextmanager
+def session(arguments: argparse.Namespace, ros: RosOptions, port: str | None) -> Iterator[Session]:
+    """Prepare a bring-up; the port and the namespace are its own as long as the block runs.
+
+    Args:
+        arguments: What :func:`add_arguments` parsed; ``calibration`` may be there, too.
+        ros: Options of all nodes.
+        port: Serial port of the robot; None for a simulated one.
+
+    Raises:
+        ArgumentError: A file is not there, or the servos of a real robot were chosen.
+        StartError: An executable or a network is missing, or another bring-up is on this port or
+            in this namespace of the domain.
+    """
+    policy, calibration = (
+        _existing(name, getattr(arguments, name, None)) for name in ('policy', 'calibration')
+    )
+    apply_network(arguments)
+    with contextlib.ExitStack() as stack:
+        if port is not None:
+            name = f'port {os.path.realpath(port)}'  # two names of one port are one port
+            stack.enter_context(exclusive(name, PORT_REMEDY))
+        folder = stack.enter_context(bring_up_place('quad_bringup', ros))
+        urdf = robot_urdf(arguments.preset, arm=arguments.arm)
+        parameters = folder / 'robot_description.yaml'
+        write_parameters(parameters, urdf)
+        wanted = Stack(
+            port=port or str(folder / 'xgo'),
+            preset=arguments.preset,
+            simulate=port is None,
+            servo=_servo(arguments.servo, port),
+            arm=arguments.arm,
+            gait=arguments.gait,
+            protocol=_protocol(arguments.protocol, simulate=port is None),
+            policy=policy,
+            record=arguments.record and arguments.record.expanduser().resolve(),
+            calibration=calibration and namespaced_parameters(calibration, ros, folder),
+            ros=ros,
+            ready_timeout=arguments.timeout,
+            view=arguments.view,
+        )
+        title = f'XGO {wanted.preset}{" with arm" if wanted.arm else ""}' + (
+            f', simulated, on {wanted.port}' if wanted.simulate else f' on {wanted.port}'
+        )
+        joints = [joint.name for joint in movable_joints(urdf)]
+        processes = quad_processes(wanted, parameters, find_executable)
+        yield Session(title, wanted.port, joints, processes)
+
+
+def _protocol(wanted: str, *, simulate: bool) -> str:
+    if simulate and wanted == VENDOR:
+        raise ArgumentError('--protocol vendor is for a real robot; leave it out, or --simulate')
+    # a simulated robot may answer late on a busy machine, which is no reason for the slow protocol
+    return V2.name if simulate and wanted == AUTO else wanted
+
+
+def _servo(model: str | None, port: str | None) -> str | None:
+    if model is not None and port is not None:
+        raise ArgumentError(f'--servo {model} is for a simulated robot; leave it out, or --port')
+    return model
+
+
+def _existing(name: str, path: Path | None) -> Path | None:
+    if path is None:
+        return None
+    if name == 'policy' and not path.suffix:  # the name of a shipped one
+        # only here, as it takes a while and most runs have no policy
+        from quad_controller import find_policy, PolicyError
+
+        try:
+            return find_policy(str(path)).resolve()
+        except PolicyError as error:
+            raise ArgumentError(f'--policy: {error}') from error
+    if not path.is_file():
+        raise ArgumentError(f'--{name}: no file {path}')
+    return path.resolve()

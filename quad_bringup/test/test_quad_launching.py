@@ -24,6 +24,9 @@ def test_without_arguments_it_is_the_real_robot_on_its_own_computer() -> None:
     assert not arguments.simulate
     assert arguments.port == '/dev/ttyAMA0'
     assert arguments.preset == 'lite'
+    simulated = parse(argv({**DEFAULTS, 'simulate': 'true'}))[0]
+    assert simulated.simulate
+    assert simulated.port is None
 
 
 def test_every_argument_reaches_the_bring_up() -> None:
@@ -33,13 +36,6 @@ def test_every_argument_reaches_the_bring_up() -> None:
     assert (arguments.port, arguments.preset, arguments.arm) == ('/dev/ttyUSB0', 'mini', True)
     assert (arguments.policy, arguments.calibration) == (Path('/a.onnx'), Path('/c.yaml'))
     assert parse(argv({**DEFAULTS, 'gait': 'pace'}))[0].gait == 'pace'
-
-
-def test_a_simulated_robot_has_a_port_of_its_own() -> None:
-    """The default port is no reason to refuse."""
-    arguments = parse(argv({**DEFAULTS, 'simulate': 'true'}))[0]
-    assert arguments.simulate
-    assert arguments.port is None
 
 
 def test_a_flag_that_is_neither_true_nor_false_is_refused() -> None:

@@ -9,7 +9,8 @@ from collections.abc import Callable
 import pytest
 
 from process_supervisor import CallError, GivenUpError
-from quad_bringup.shutdown import lie_down, stand_still
+from quad_bringup import mode_client
+from quad_bringup.shutdown import leave
 
 
 class Controller:
@@ -44,98 +45,95 @@ class Controller:
         self.closed = True
 
 
-def leave(controller: Controller, *, given_up: bool = False, hold: bool = False) -> list[str]:
-    """Let it lie down, or stand still; return what was said."""
-    said: list[str] = []
-
-    def make_client(asked: Callable[[], bool]) -> Controller:
-        controller.given_up = asked
-        return controller
-
-    (stand_still if hold else lie_down)(said.append, lambda: given_up, make_client)
-    assert controller.closed
-    return said
+LYING_DOWN = 'lying down first; Ctrl-C again stops at once'
+STANDING_STILL = 'standing still first; Ctrl-C again stops at once'
 
 
-@pytest.mark.parametrize(
-    'state',
-    [
-        'stand',
-        'walk',
-        'turn',
-        'policy',
-        'get_up',
-        'to stand',
-        'to walk',
-        'fault',
-        'to fault',
-        'to lie',
-    ],
-)
-def test_a_robot_on_its_feet_lies_down(state: str) -> None:
-    """Also one that is on its way there or down, or has a fault; the log says how not to wait."""
-    controller = Controller(state)
-    said = leave(controller)
+@pytest.fixture(name='leaves')
+def make_leaves(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
+    """Return what leaves a controller and returns the reports."""
+
+    def leaves(controller: Controller, *, given_up: bool = False, hold: bool = False) -> list[str]:
+        reports: list[str] = []
+
+        def join(name: str, asked: Callable[[], bool], namespace: str) -> Controller:
+            controller.given_up = asked
+            return controller
+
+        monkeypatch.setattr(mode_client, 'ModeClient', join)
+        leave(reports.append, lambda: given_up, namespace='', hold=hold)
+        assert controller.closed
+        return reports
+
+    return leaves
+
+
+Leaves = Callable[..., list[str]]
+
+
+@pytest.mark.parametrize('state', ['', 'to '])
+@pytest.mark.parametrize('mode', ['stand', 'walk', 'turn', 'policy', 'get_up', 'fault'])
+def test_a_robot_on_its_feet_lies_down(mode: str, state: str, leaves: Leaves) -> None:
+    """Also one that is on its way there, or has a fault; the log says how not to wait."""
+    controller = Controller(f'{state}{mode}')
+    assert leaves(controller) == [LYING_DOWN]
     assert controller.modes == ['lie']
-    assert said == ['lying down first; Ctrl-C again stops at once']
+
+
+def test_a_robot_on_its_way_down_is_waited_for(leaves: Leaves) -> None:
+    """Left now, it would stay half-way."""
+    assert leaves(Controller('to lie')) == [LYING_DOWN]
 
 
 @pytest.mark.parametrize('state', ['walk', 'turn', 'policy', 'to walk', 'to stand'])
-def test_a_robot_that_is_to_hold_ends_its_gait_first(state: str) -> None:
+def test_a_robot_that_is_to_hold_ends_its_gait_first(state: str, leaves: Leaves) -> None:
     """So that no foot is in the air when its servos hold; the log says how not to wait."""
     controller = Controller(state)
-    assert leave(controller, hold=True) == ['standing still first; Ctrl-C again stops at once']
+    assert leaves(controller, hold=True) == [STANDING_STILL]
     assert (controller.modes, controller.state) == (['stand'], 'stand')
 
 
-@pytest.mark.parametrize('state', ['stand', 'lie', 'to lie', 'relax', 'fault'])
-def test_a_robot_that_is_to_hold_and_does_not_walk_is_left_as_it_is(state: str) -> None:
+@pytest.mark.parametrize(
+    ('state', 'hold'),
+    [('relax', False), ('lie', False)]
+    + [(state, True) for state in ('stand', 'lie', 'to lie', 'relax', 'fault')],
+)
+def test_a_robot_that_needs_nothing_is_left_as_it_is(
+    state: str, hold: bool, leaves: Leaves
+) -> None:
     """Without a word."""
     controller = Controller(state)
-    assert leave(controller, hold=True) == []
+    assert leaves(controller, hold=hold) == []
     assert controller.modes == []
 
 
-def test_a_robot_that_is_to_hold_and_does_not_stop_is_left() -> None:
-    """It refuses, or fails: said, or seen, and no error."""
-    refusing, failing = Controller('walk'), Controller('walk')
-    refusing.refusal = 'no attitude'
-    failing.outcomes = ['fault']
-    assert leave(refusing, hold=True)[-1].startswith('stopping without standing still')
-    assert leave(failing, hold=True) == ['standing still first; Ctrl-C again stops at once']
-
-
-def test_a_robot_that_fails_on_its_way_down_is_asked_once_more() -> None:
+def test_a_robot_that_fails_on_its_way_down_is_asked_once_more(leaves: Leaves) -> None:
     """A fault on the way stops it; the second request goes on in spite of it, a third is none."""
     once, always = Controller('walk'), Controller('walk')
     once.outcomes = ['fault']
-    assert leave(once) == ['lying down first; Ctrl-C again stops at once']
+    assert leaves(once) == [LYING_DOWN]
     assert (once.modes, once.state) == (['lie', 'lie'], 'lie')
     always.outcomes = ['fault', 'fault']
-    assert 'in vain' in leave(always)[-1]
+    assert 'in vain' in leaves(always)[-1]
     assert always.modes == ['lie', 'lie']
+    holding = Controller('walk')
+    holding.outcomes = ['fault']
+    assert leaves(holding, hold=True) == [STANDING_STILL]
 
 
-@pytest.mark.parametrize('state', ['relax', 'lie'])
-def test_a_robot_that_lies_is_left_as_it_is(state: str) -> None:
-    """Without a word."""
-    controller = Controller(state)
-    assert leave(controller) == []
-    assert controller.modes == []
-
-
-def test_a_controller_that_does_not_help_is_left() -> None:
+def test_a_controller_that_does_not_help_is_left(leaves: Leaves) -> None:
     """It refuses, never gets there, or its state never arrives: reported, and no error."""
     refusing, idle, silent = Controller('walk'), Controller('walk'), Controller('')
     refusing.refusal = 'battery low'
     idle.follows = False
-    assert leave(refusing)[-1].endswith('refused: battery low')
-    assert leave(idle)[-1].endswith('in vain for it to lie')
-    assert leave(silent)[-1].endswith('in vain for the state of the controller')
+    assert leaves(refusing)[-1].endswith('refused: battery low')
+    assert leaves(idle)[-1].endswith('in vain for it to lie')
+    assert leaves(silent)[-1].endswith('in vain for the state of the controller')
+    assert leaves(refusing, hold=True)[-1].startswith('stopping without standing still')
 
 
-def test_ctrl_c_again_ends_the_wait() -> None:
-    """Nothing is asked for any more."""
+def test_ctrl_c_again_ends_the_wait(leaves: Leaves) -> None:
+    """No mode is requested any more."""
     controller = Controller('walk')
-    assert leave(controller, given_up=True) == ['stopping without lying down']
+    assert leaves(controller, given_up=True) == ['stopping without lying down']
     assert controller.modes == []

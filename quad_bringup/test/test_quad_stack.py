@@ -22,8 +22,7 @@ from quad_hardware.calibration.parameter_file import write_parameters as write_c
 from quad_hardware.nodes.parameters import declare_parameters as hardware_parameters
 from quad_hardware.nodes.parameters import NodeSettings as HardwareSettings
 from quad_hardware.protocol import Code, Frame, Kind, Register, ROBOT_KINDS, StreamParser, V2
-from quad_sim import ServoModel
-from quad_sim.options import build, parse_arguments, parse_servo, Simulation
+from quad_sim.options import build, parse_arguments, Simulation
 
 pytestmark = pytest.mark.slow
 
@@ -88,9 +87,13 @@ def test_hardware_has_no_simulator_and_simulation_has(tmp_path: Path) -> None:
     """The bridge opens the port that it is given; only of a simulated robot the IMU is known."""
     port = tmp_path / 'xgo'
     real = processes(tmp_path, Stack(str(port)))
-    simulated = processes(tmp_path, Stack(str(port), simulate=True))
+    soft = Stack(str(port), simulate=True, servo='vendor_rl', view=True)
+    simulated = processes(tmp_path, soft)
     assert set(real) == {'hardware', 'controller', 'robot_state'}
-    assert set(simulated) == {'fake_xgo', *real}
+    assert set(simulated) == {'fake_xgo', *real, 'viewer'}
+    assert not simulated['viewer'].required
+    argv = simulated['fake_xgo'].argv
+    assert argv[argv.index('--servo') + 1] == 'vendor_rl'
     assert bridge_of(real).robot.link == bridge_of(simulated).robot.link
     assert bridge_of(real).robot.link.path == str(port)
     assert simulator_of(simulated)[0] == port
@@ -147,44 +150,9 @@ def test_gait_and_policy_reach_the_controller(tmp_path: Path) -> None:
     assert settings.record == '/runs'
 
 
-def test_soft_servos_reach_the_simulator(tmp_path: Path) -> None:
-    """The vendor's actuator, where it is asked for."""
-    specs = processes(tmp_path, Stack('p', simulate=True, servo='vendor_rl'))
-    argv = specs['fake_xgo'].argv
-    options = parse_arguments(argv[1 : argv.index('--ros-args')])
-    assert parse_servo(options.servo) is ServoModel.VENDOR_RL
-
-
-def test_who_commands_stops_before_who_transmits_before_who_moves(tmp_path: Path) -> None:
-    """So that no process receives commands of one that has ended."""
-    found = processes(tmp_path, Stack('p', simulate=True))
-    orders = {name: spec.stop_order for name, spec in found.items()}
-    assert orders['controller'] < orders['hardware'] < orders['fake_xgo']
-
-
-def test_the_public_robot_state_publisher_runs_where_it_is_installed(tmp_path: Path) -> None:
-    """Ours elsewhere, which says when it is ready; /tf is no reason to end when it dies."""
-    ours = processes(tmp_path, Stack('p'))['robot_state']
-    public = processes(tmp_path, Stack('p'), 'robot_state_publisher')['robot_state']
-    assert ours.argv[0].endswith('robot_viewer/robot_state_publisher')
-    assert public.argv[0].endswith('robot_state_publisher/robot_state_publisher')
-    assert ours.notifies_ready
-    assert not public.notifies_ready
-    assert not ours.required
-    assert not public.required
-
-
 @pytest.mark.parametrize('missing', OURS)
 def test_a_workspace_that_is_not_built_says_so(tmp_path: Path, missing: str) -> None:
     """Whichever package it is."""
     find = underlay(tmp_path, *(name for name in OURS if name != missing))
     with pytest.raises(StartError, match='make build'):
         quad_processes(Stack('p', simulate=True), tmp_path / 'none.yaml', find)
-
-
-def test_the_page_is_there_when_it_is_asked_for(tmp_path: Path) -> None:
-    """Everything else is the same."""
-    without = processes(tmp_path, Stack('/dev/ttyAMA0'))
-    seen = processes(tmp_path, Stack('/dev/ttyAMA0', view=True))
-    assert not seen.pop('viewer').required
-    assert seen == without

@@ -25,7 +25,7 @@ from quad_bringup.examples.walk import (
     Walk,
     wrong_speed,
 )
-from quad_bringup.session import Session
+from quad_bringup.stack import Session
 from quad_description import LEGS
 
 PERIOD = 0.02
@@ -78,16 +78,6 @@ def test_a_constant_velocity_of_the_body_is_found_wherever_it_goes(
         assert found.forward == pytest.approx(velocity.forward, abs=2e-4)
         assert found.left == pytest.approx(velocity.left, abs=2e-4)
         assert found.turn == pytest.approx(velocity.turn, abs=1e-6)
-
-
-def test_the_velocity_of_the_moment_forgets_what_was_before() -> None:
-    """It is that of the last second."""
-    track = Track()
-    drive(track, Velocity(forward=0.3), (0.0, 0.0, 0.0), 2.0)
-    for index in range(100):
-        track.take(pose(102.0 + (index + 1) * PERIOD, 0.6, 0.0, 0.0))
-    assert track.velocity is not None
-    assert track.velocity.forward == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_pose_that_is_not_newer_is_passed_over() -> None:

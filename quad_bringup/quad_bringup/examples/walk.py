@@ -35,7 +35,7 @@ from quad_msgs.msg import JointCommand
 
 from ..exceptions import BringupError
 from ..mode_client import ModeClient
-from ..session import add_arguments, Session, session
+from ..stack import add_arguments, Session, session
 
 GROUND_TRUTH = 'fake_xgo/ground_truth'
 """Topic on which the simulated robot publishes where its body is."""
