@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What happened before a fault: kept in memory, written into a folder when it comes."""
 
-from .box import BlackBox, Contents, Pause
+from .box import BlackBox, BlackBoxSettings, Contents, default_folder, Pause, WINDOW, WINDOW_MAX
 from .player import LogPlayer, PlaybackError, Replay
-from .settings import BlackBoxSettings, default_folder, WINDOW, WINDOW_MAX
 
 __all__ = [
     'WINDOW',

@@ -2,13 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The first motion of a joint: guarded while it moves, then judged by what a person has seen.
 
-`guard` decides, `judgement` concludes, `scales`, `correction` and `bus_edit` correct: without a
+`guard` decides, `judgement` concludes, `correction` and `bus_edit` correct: without a
 clock, bus or terminal, so that a terminal and a page conclude the same.
 """
 
-from .bus_edit import edited, replace_file, yaml_text
-from .correction import Correction, propose
-from .exceptions import BusEditError
+from .bus_edit import BusEditError, edited, replace_file, yaml_text
+from .correction import AxisScales, corrected, Correction, propose
 from .guard import FOLLOWING, MotionGuard, MotionPlan, Order, Outcome, Sample
 from .joint_units import (
     FASTEST,
@@ -21,7 +20,6 @@ from .joint_units import (
     too_few_increments,
 )
 from .judgement import Cause, CAUSES, DriveFacts, judge, Judgement, Seen, Verdict
-from .scales import AxisScales, corrected
 
 __all__ = [
     'CAUSES',

@@ -11,7 +11,10 @@ import re
 
 import yaml
 
-from .exceptions import BusEditError
+
+class BusEditError(ValueError):
+    """The file has a form in which we change nothing; the message says what to write by hand."""
+
 
 BEFORE = 'before: '
 """What a comment behind a value that is changed begins with: it is about the old one."""
