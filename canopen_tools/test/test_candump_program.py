@@ -16,7 +16,7 @@ from can_addresses import free_multicast, free_virtual
 from can_receiving import DEADLINE, unstamped
 from config_samples import write_bus
 import pytest
-from tool_environment import ENVIRONMENT
+from tool_environment import ENVIRONMENT, Output
 
 from arm_canopen import BusError
 from arm_canopen.can import Bus, Frame, LogWriter, open_bus, read_log
@@ -147,7 +147,7 @@ def test_a_reader_that_goes_away_ends_it(start: Start, bus: Bus, name: str) -> N
     assert 'Traceback' not in errors
 
 
-def run_main(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+def run_main(capsys: Output, *arguments: str) -> tuple[int, str, str]:
     """Run it in this process: exit code, output and errors."""
     code = candump.main(arguments)
     captured = capsys.readouterr()
@@ -155,9 +155,7 @@ def run_main(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, 
 
 
 @pytest.mark.parametrize('suffix', ['.log', '.asc', '.blf', ''])
-def test_a_log_is_shown_like_a_bus(
-    suffix: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_a_log_is_shown_like_a_bus(suffix: str, capsys: Output, tmp_path: Path) -> None:
     """--read describes what was logged in any format, with the times of the log."""
     path = tmp_path / f'bus{suffix}'
     with closing(LogWriter(path, 'can0', 1.7e9)) as log:
@@ -173,9 +171,7 @@ def test_a_log_is_shown_like_a_bus(
 TWO_BUSES = '(1.000000) can0 702#05\n(2.000000) vcan1 702#7F\n(3.000000) can0 182#3716\n'
 
 
-def test_each_bus_of_a_log_has_a_column_or_is_chosen(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_each_bus_of_a_log_has_a_column_or_is_chosen(capsys: Output, tmp_path: Path) -> None:
     """One that is not there is an error that names those that are."""
     path = tmp_path / 'two.log'
     path.write_text(TWO_BUSES)
@@ -195,9 +191,7 @@ def test_each_bus_of_a_log_has_a_column_or_is_chosen(
 
 
 @pytest.mark.parametrize('suffix', ['.asc', '.blf', '.log'])
-def test_a_log_is_converted(
-    suffix: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_a_log_is_converted(suffix: str, capsys: Output, tmp_path: Path) -> None:
     """With its times; of several buses one has to be named, and no log becomes itself."""
     source, target = tmp_path / 'screen.txt', tmp_path / f'bus{suffix}'
     source.write_text(
@@ -220,9 +214,7 @@ def test_a_log_is_converted(
     assert source.read_text() == TWO_BUSES
 
 
-def test_a_file_that_is_no_log_is_refused_by_name(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_a_file_that_is_no_log_is_refused_by_name(capsys: Output, tmp_path: Path) -> None:
     """Nothing and success is no answer."""
     path = tmp_path / 'mail.txt'
     path.write_text('Dear all,\n')
@@ -231,9 +223,7 @@ def test_a_file_that_is_no_log_is_refused_by_name(
     assert 'no log of a known format' in err
 
 
-def test_filters_of_a_log_count_from_its_begin(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_filters_of_a_log_count_from_its_begin(capsys: Output, tmp_path: Path) -> None:
     """Two of them can be compared; the time since the line before is that of what is shown."""
     path = tmp_path / 'bus.log'
     with closing(LogWriter(path, 'can0', 1.7e9)) as log:
@@ -245,16 +235,14 @@ def test_filters_of_a_log_count_from_its_begin(
         assert out.startswith(first), style
 
 
-def test_it_ends_after_its_time(capsys: pytest.CaptureFixture[str]) -> None:
+def test_it_ends_after_its_time(capsys: Output) -> None:
     """--timeout ends it on a silent bus, with success."""
     code, out, err = run_main(capsys, free_virtual(), '--timeout', '0.01')
     assert (code, out) == (0, '')
     assert err.endswith('candump: 0 frames, 0 lost\n')
 
 
-def test_quiet_prints_nothing_and_still_logs(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_quiet_prints_nothing_and_still_logs(capsys: Output, tmp_path: Path) -> None:
     """With --quiet the log is all there is, and -n still ends it."""
     name, log = free_virtual(), tmp_path / 'bus.log'
 
@@ -286,7 +274,7 @@ def test_quiet_prints_nothing_and_still_logs(
     ],
 )
 def test_what_cannot_be_opened_is_one_line(
-    capsys: pytest.CaptureFixture[str], arguments: list[str], reason: str
+    capsys: Output, arguments: list[str], reason: str
 ) -> None:
     """A wrong bus or file ends it with exit code 1 and a sentence."""
     code, out, err = run_main(capsys, *arguments)
@@ -308,9 +296,7 @@ def test_what_cannot_be_opened_is_one_line(
         ['one', 'two'],
     ],
 )
-def test_wrong_arguments_are_refused(
-    capsys: pytest.CaptureFixture[str], arguments: list[str]
-) -> None:
+def test_wrong_arguments_are_refused(capsys: Output, arguments: list[str]) -> None:
     """Mistakes on the command line end with exit code 2, as everywhere."""
     with pytest.raises(SystemExit) as ending:
         candump.main(arguments)
@@ -319,7 +305,7 @@ def test_wrong_arguments_are_refused(
 
 
 def test_an_interface_that_goes_away_is_reported(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    capsys: Output, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """When the bus dies the counters and the reason are printed, and the exit code is 1."""
 

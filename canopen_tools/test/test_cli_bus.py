@@ -14,6 +14,7 @@ import time
 from can_addresses import free_virtual
 from device_rig import EDS
 import pytest
+from tool_environment import Output
 
 from arm_canopen.can import Bus, Frame, open_bus
 from arm_canopen.config import load_eds
@@ -96,9 +97,7 @@ def witness(name: str) -> Iterator[Bus]:
 
 
 @pytest.mark.usefixtures('runner')
-def test_scan_finds_devices_with_and_without_heartbeat(
-    name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_scan_finds_devices_with_and_without_heartbeat(name: str, capsys: Output) -> None:
     """Each with its state and identity; one without heartbeat by its answer."""
     assert main(['write', '3', '0x1017', '50', '--type', 'u16', '--can', name]) == 0
     capsys.readouterr()
@@ -112,7 +111,7 @@ def test_scan_finds_devices_with_and_without_heartbeat(
 
 
 def test_scan_compares_with_bus_yml(
-    name: str, runner: DeviceRunner, bus_yml: str, capsys: pytest.CaptureFixture[str]
+    name: str, runner: DeviceRunner, bus_yml: str, capsys: Output
 ) -> None:
     """A device that is another one, or is not there, makes the exit code 1."""
     assert main(['scan', '--can', name, '--bus-config', bus_yml, *LISTEN]) == 0
@@ -135,9 +134,7 @@ def test_scan_compares_with_bus_yml(
 
 
 @pytest.mark.usefixtures('runner', 'master')
-def test_scan_leaves_the_sdo_channels_to_a_master(
-    name: str, witness: Bus, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_scan_leaves_the_sdo_channels_to_a_master(name: str, witness: Bus, capsys: Output) -> None:
     """Beside a master it only listens, and says so; --query reads, with a warning."""
     assert main(['scan', '--can', name, *LISTEN]) == 1
     assert 'no device has sent a frame' in capsys.readouterr().err
@@ -155,16 +152,14 @@ def test_scan_leaves_the_sdo_channels_to_a_master(
     assert {frame.can_id for frame in witness.receive(0.0)} >= {0x602, 0x582, 0x603, 0x583}
 
 
-def test_scan_of_an_empty_bus(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_scan_of_an_empty_bus(name: str, capsys: Output) -> None:
     """Nobody there is exit code 1, with what to look at."""
     assert main(['scan', '--can', name, *LISTEN]) == 1
     assert 'powered, wired and terminated' in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures('runner')
-def test_objects_by_name_and_number(
-    name: str, bus_yml: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_objects_by_name_and_number(name: str, bus_yml: str, capsys: Output) -> None:
     """With a bus.yml by the names of its EDS, for devices by their names."""
     arguments = ['--can', name, '--bus-config', bus_yml]
     assert main(['read', 'left', 'statusw', '0x1018:01', '0x1008', *arguments]) == 0
@@ -180,7 +175,7 @@ def test_objects_by_name_and_number(
 
 
 @pytest.mark.usefixtures('runner')
-def test_objects_without_any_file(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_objects_without_any_file(name: str, capsys: Output) -> None:
     """What the standards describe has name and type; others have the type that is given."""
     assert main(['read', '2', '0x60FB', '--can', name]) == 1
     assert main(['write', '2', '0x607C', '-1', '--type', 'i32', '--can', name]) == 0
@@ -206,13 +201,7 @@ def test_objects_without_any_file(name: str, capsys: pytest.CaptureFixture[str])
 )
 @pytest.mark.usefixtures('runner')
 def test_what_does_not_work_is_reported(
-    name: str,
-    bus_yml: str,
-    *,
-    arguments: list[str],
-    code: int,
-    message: str,
-    capsys: pytest.CaptureFixture[str],
+    name: str, bus_yml: str, *, arguments: list[str], code: int, message: str, capsys: Output
 ) -> None:
     """2 for what the command line or files rule out, 1 for what a device answers."""
     assert main([*arguments, '--can', name, '--bus-config', bus_yml]) == code
@@ -234,7 +223,7 @@ def test_answers_that_deviate_are_read_as_the_master_reads_them(
     *,
     deviation: Fault,
     warning: str,
-    capsys: pytest.CaptureFixture[str],
+    capsys: Output,
 ) -> None:
     """Cut to the type of the object, and what is odd is said once beside them."""
     left = runner.host.devices[0]
@@ -251,7 +240,7 @@ def test_answers_that_deviate_are_read_as_the_master_reads_them(
 
 
 def test_two_devices_with_one_node_id_make_the_scan_fail(
-    name: str, runner: DeviceRunner, capsys: pytest.CaptureFixture[str]
+    name: str, runner: DeviceRunner, capsys: Output
 ) -> None:
     """They are named with the remedy, and a script notices by the exit code."""
     right = runner.host.devices[1]
@@ -262,16 +251,14 @@ def test_two_devices_with_one_node_id_make_the_scan_fail(
 
 
 @pytest.mark.usefixtures('runner')
-def test_an_unknown_type_is_not_guessed_in_writing(
-    name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_unknown_type_is_not_guessed_in_writing(name: str, capsys: Output) -> None:
     """Without a file, an object that no standard describes needs its type."""
     assert main(['write', '2', '0x2000', '1', '--can', name]) == 2
     assert 'name it with --type' in capsys.readouterr().err
 
 
 def test_a_device_that_holds_something_else_is_reported(
-    name: str, witness: Bus, capsys: pytest.CaptureFixture[str]
+    name: str, witness: Bus, capsys: Output
 ) -> None:
     """A write is read back, as a device may round a value or ignore it."""
 
@@ -293,9 +280,7 @@ def test_a_device_that_holds_something_else_is_reported(
     assert 'holds another value than 7' in captured.err
 
 
-def test_a_command_is_not_read_back(
-    name: str, runner: DeviceRunner, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_command_is_not_read_back(name: str, runner: DeviceRunner, capsys: Output) -> None:
     """0x1010 returns what the device can store, not what was written; storing takes its time."""
     slow = FaultInjection(Fault.SDO_DELAY, object=(0x1010, 1), delay=0.7)
     inject = runner.host.devices[0].faults.inject
@@ -305,9 +290,7 @@ def test_a_command_is_not_read_back(
 
 
 @pytest.mark.usefixtures('runner', 'master')
-def test_reading_beside_a_master_is_warned_of(
-    name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_reading_beside_a_master_is_warned_of(name: str, capsys: Output) -> None:
     """The value comes on stdout, the warning beside it."""
     assert main(['read', '2', '0x6041', '--value', '--can', name]) == 0
     captured = capsys.readouterr()
@@ -316,9 +299,7 @@ def test_reading_beside_a_master_is_warned_of(
 
 
 @pytest.mark.usefixtures('runner')
-def test_diff_shows_what_bus_yml_has_otherwise(
-    name: str, bus_yml: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_diff_shows_what_bus_yml_has_otherwise(name: str, bus_yml: str, capsys: Output) -> None:
     """Only what differs, with the line of bus.yml; equal when it was written."""
     arguments = ['--can', name, '--bus-config', bus_yml]
     assert main(['diff', 'left', *arguments]) == 1
@@ -339,7 +320,7 @@ def test_diff_shows_what_bus_yml_has_otherwise(
 
 
 def test_diff_takes_the_entry_of_the_heartbeat_consumer_that_boot_takes(
-    name: str, runner: DeviceRunner, bus_yml: str, capsys: pytest.CaptureFixture[str]
+    name: str, runner: DeviceRunner, bus_yml: str, capsys: Output
 ) -> None:
     """Boot writes to the first one where a device lets nobody read it, and not behind it."""
 
@@ -354,7 +335,7 @@ def test_diff_takes_the_entry_of_the_heartbeat_consumer_that_boot_takes(
 
 
 @pytest.mark.usefixtures('runner')
-def test_diff_with_an_eds(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_diff_with_an_eds(name: str, capsys: Output) -> None:
     """Without bus.yml the defaults of all objects that can be written count."""
     assert main(['diff', '2', '--can', name, '--eds', str(EDS)]) == 0
     main(['write', '2', '0x6098', '35', '--type', 'i8', '--can', name])
@@ -364,9 +345,7 @@ def test_diff_with_an_eds(name: str, capsys: pytest.CaptureFixture[str]) -> None
     )
 
 
-def test_parameters_of_ros_name_bus_and_file(
-    name: str, bus_yml: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_parameters_of_ros_name_bus_and_file(name: str, bus_yml: str, capsys: Output) -> None:
     """The parameters of the nodes work here too."""
     with ExitStack() as stack:
         bus = stack.enter_context(open_bus(name))

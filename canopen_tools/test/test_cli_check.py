@@ -6,15 +6,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+import re
 import shutil
 import signal
 import subprocess
 import sys
 
 from can_addresses import free_multicast
-from config_samples import BUS, DRIVE_ROWS, eds_text, FACTOR_ROWS, write_bus
+from config_samples import BUS, DRIVE_ROWS, eds_text, FACTOR_ROWS, Row, write_bus
 import pytest
-from tool_environment import ENVIRONMENT, REPOSITORY
+from tool_environment import ENVIRONMENT, Output, REPOSITORY
 
 from canopen_tools.cli.main import main
 
@@ -43,7 +44,7 @@ def test_a_process_ends_with_its_exit_code(tmp_path: Path) -> None:
     assert process.stderr == ''
 
 
-def test_the_article_is_checked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_article_is_checked(tmp_path: Path, capsys: Output) -> None:
     """The bus.yml of the article works, with two warnings that --strict makes errors.
 
     Ours differs from it in both.
@@ -65,9 +66,11 @@ def test_the_article_is_checked(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert output.splitlines()[-1] == f'{article}: 0 errors, 2 warnings'
     assert main(['check', str(article), '--strict']) == 1
     assert main(['check', str(PANDA), '--strict']) == 0
+    assert main(['check', str(PANDA), '--bitrate', '250000']) == 1
+    assert 'cannot carry this: 2912 frames/s at 250 kbit/s' in capsys.readouterr().out
 
 
-def test_equal_frames_of_several_devices_are_one_row(capsys: pytest.CaptureFixture[str]) -> None:
+def test_equal_frames_of_several_devices_are_one_row(capsys: Output) -> None:
     """The table has a row for each kind of frame; --frames lists each by its identifier."""
     main(['check', str(PANDA), '--bitrate', '500k'])
     output = capsys.readouterr().out
@@ -79,94 +82,54 @@ def test_equal_frames_of_several_devices_are_one_row(capsys: pytest.CaptureFixtu
     assert [row.split()[4] for row in rows] == [f'{0x280 + node:03X}' for node in range(2, 9)]
 
 
-def test_what_is_polled_is_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Request and response of a mode that no TPDO carries, every 10 ms and a cycle."""
-    main(['check', str(write_bus(tmp_path, eds=eds_text()))])
-    lines = capsys.readouterr().out.splitlines()
-    row = next(line for line in lines if line.startswith('SDO 0x6061'))
-    assert row.split()[2:5] == ['1', '8', '100.0']
-    assert row.endswith('polled, as no TPDO carries it')
-
-
-def test_a_full_bus_is_an_error(capsys: pytest.CaptureFixture[str]) -> None:
-    """What a bit rate cannot carry is refused, with the figures."""
-    assert main(['check', str(PANDA), '--bitrate', '250000']) == 1
-    output = capsys.readouterr().out
-    assert 'cannot carry this: 2912 frames/s at 250 kbit/s are a load of 107%' in output
-
-
-def test_a_good_file_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Nothing wrong is exit code 0, also with --strict."""
-    path = write_bus(tmp_path, eds=eds_text())
-    path.write_text(path.read_text().replace('  tpdo:', '  heartbeat_producer: 100\n  tpdo:', 1))
-    assert main(['check', '--strict', str(path)]) == 0
-    assert capsys.readouterr().out.splitlines()[-1] == f'{path}: 0 errors, 0 warnings'
-
-
-def test_units_are_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A row for each axis: what 1.0 is in increments, in [rad], and of the velocity."""
-    main(['check', str(write_bus(tmp_path, eds=eds_text((*DRIVE_ROWS, *FACTOR_ROWS))))])
-    row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith('joint1'))
-    assert row.split()[:4] == ['joint1', '1000', '0.01', '1000']
-
-
-@pytest.mark.parametrize(('gone', 'named'), [(None, '0x608F, 0x6092'), (0x6092, '0x608F')])
-def test_only_objects_that_the_eds_has_are_named(
-    gone: int | None, named: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """As the source of the units."""
-    rows = [*DRIVE_ROWS, *(row for row in FACTOR_ROWS if row.index != gone)]
-    text = BUS.replace('    node_id: 2\n', '    node_id: 2\n    scale_from_factor_group: true\n')
-    main(['check', str(write_bus(tmp_path, text, eds=eds_text(rows)))])
-    row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith('joint1'))
-    assert row.endswith(f'factor group of the EDS ({named})')
+WITH_FACTORS = (*DRIVE_ROWS, *FACTOR_ROWS)
+ENCODER_ONLY = tuple(row for row in WITH_FACTORS if row.index != 0x6092)
+BY_FACTORS = 'scale_from_factor_group: true'
+SCALES = """scale_pos_to_dev: {0}
+    scale_pos_from_dev: {1}
+    scale_vel_to_dev: {0}
+    scale_vel_from_dev: {1}"""
+SLOW = """scale_vel_to_dev: -2000
+    scale_vel_from_dev: -0.0005
+    sdo: [{index: 0x6081, value: 30}]"""
+EXPLAINED = '\nrad: how far 1.0 is by the factor group'
+UNKNOWN = '\n?: the EDS has no factor group'
+FAR = 'and by the factor group of the EDS only 0.00999 rad'
+SPEEDS = r'0x6081 speed of moves .*0x6083 acceleration .*\njoint1 +0.015 +0.5 +0.5 +0.5\n'
 
 
 @pytest.mark.parametrize(
-    ('scale', 'rad', 'is_far'), [(1e4, '0.1', False), (999.0, '0.00999', True)]
+    ('rows', 'keys', 'shown', 'not_shown'),
+    [
+        (WITH_FACTORS, '', [r'joint1 +1000 +0.01 +1000', EXPLAINED], [UNKNOWN]),
+        (WITH_FACTORS, BY_FACTORS, [r'group of the EDS \(0x608F, 0x6092\)'], [EXPLAINED]),
+        (ENCODER_ONLY, BY_FACTORS, [r'group of the EDS \(0x608F\)'], []),
+        (DRIVE_ROWS, '', [r'joint1 +1000 +\?', UNKNOWN.replace('?', r'\?')], []),
+        (DRIVE_ROWS, SLOW, [SPEEDS], ['0x607F']),
+        (
+            WITH_FACTORS,
+            SCALES.format(1e4, 1e-4),
+            ['joint1 +10000 +0.1 '],
+            ['one of them is wrong'],
+        ),
+        (WITH_FACTORS, SCALES.format(999.0, 1 / 999), [r'joint1 +999 +0.00999 ', FAR], []),
+    ],
 )
-def test_a_scale_far_from_the_factor_group_is_a_warning(
-    scale: float, rad: str, is_far: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_units_and_speeds_of_each_axis(
+    rows: Sequence[Row],
+    keys: str,
+    *,
+    shown: list[str],
+    not_shown: list[str],
+    tmp_path: Path,
+    capsys: Output,
 ) -> None:
-    """A joint is not ten times as fast as its motor; the column is explained."""
-    keys = ', '.join(f'scale_{kind}_to_dev: {scale}' for kind in ('pos', 'vel'))
-    keys += ''.join(f', scale_{kind}_from_dev: {1 / scale}' for kind in ('pos', 'vel'))
-    block = keys.replace(', ', '\n    ')
-    text = BUS.replace('    node_id: 2\n', f'    node_id: 2\n    {block}\n')
-    main(['check', str(write_bus(tmp_path, text, eds=eds_text((*DRIVE_ROWS, *FACTOR_ROWS))))])
-    lines = capsys.readouterr().out.splitlines()
-    row = next(line for line in lines if line.startswith('joint1'))
-    assert row.split()[2] == rad
-    assert any(line.startswith('rad: how far 1.0 is by the factor group') for line in lines)
-    warning = f'and by the factor group of the EDS only {rad} rad'
-    assert any(warning in line for line in lines) is is_far
-
-
-def test_the_speed_of_moves_is_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """In the units of bus.yml, as boot leaves the objects; only what the EDS has."""
-    keys = """scale_vel_to_dev: -2000
-    scale_vel_from_dev: -0.0005
-    sdo: [{index: 0x6081, value: 30}]"""
+    """What 1.0 is in increments and in [rad], by which objects, and how fast its own moves are."""
     text = BUS.replace('    node_id: 2\n', f'    node_id: 2\n    {keys}\n')
-    main(['check', str(write_bus(tmp_path, text, eds=eds_text()))])
-    lines = capsys.readouterr().out.splitlines()
-    head = next(line for line in lines if '0x6081 speed of moves' in line)
-    row = lines[lines.index(head) + 1]
-    assert row.split() == ['joint1', '0.015', '0.5', '0.5', '0.5']
-    assert '0x6083 acceleration' in head
-    assert '0x607F' not in head
-
-
-def test_radians_that_nobody_says_are_explained(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Below the table, and only there where one is unknown."""
-    for rows, asks in ((DRIVE_ROWS, True), ((*DRIVE_ROWS, *FACTOR_ROWS), False)):
-        main(['check', str(write_bus(tmp_path, eds=eds_text(rows)))])
-        lines = capsys.readouterr().out.splitlines()
-        row = next(line for line in lines if line.startswith('joint1'))
-        assert (row.split()[2] == '?') is asks
-        assert any(line.startswith('?: the EDS has no factor group') for line in lines) is asks
+    main(['check', str(write_bus(tmp_path, text, eds=eds_text(rows)))])
+    output = capsys.readouterr().out
+    assert [pattern for pattern in shown if not re.search(pattern, output)] == []
+    assert [text for text in not_shown if text in output] == []
 
 
 @pytest.mark.parametrize(
@@ -184,9 +147,7 @@ def test_radians_that_nobody_says_are_explained(
         (['check', 'bus.yml', '--ros-args', '-p'], '-p needs a value'),
     ],
 )
-def test_wrong_usage_is_2(
-    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_wrong_usage_is_2(arguments: list[str], message: str, capsys: Output) -> None:
     """Wrong usage is reported on stderr, with exit code 2."""
     with pytest.raises(SystemExit) as ending:
         main(arguments)

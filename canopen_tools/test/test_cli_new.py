@@ -17,7 +17,7 @@ from config_samples import DRIVE_ROWS, eds_text, FACTOR_ROWS, Row
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
-from tool_environment import REPOSITORY
+from tool_environment import Output, REPOSITORY
 
 from arm_canopen import CanopenMaster, load_bus, OperationMode
 from arm_canopen.config import check_file
@@ -61,7 +61,7 @@ def without(*indices: int) -> tuple[Row, ...]:
     return tuple(row for row in SAMPLE if row.index not in indices)
 
 
-def test_a_new_bus_boots_and_follows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_new_bus_boots_and_follows(tmp_path: Path, capsys: Output) -> None:
     """On simulated drives, in the mode that it has; units by the EDS and as said."""
     bus_yml = tmp_path / 'robot' / 'bus.yml'
     devices = [f'shoulder={DRIVE}@2', f'elbow={DRIVE}@7', f'lift={DRIVE}@8']
@@ -84,7 +84,7 @@ def test_a_new_bus_boots_and_follows(tmp_path: Path, capsys: pytest.CaptureFixtu
             assert master.sdo(name).read(0x6064) == pytest.approx(0.02 * counts, rel=0.06)
 
 
-def test_devices_of_several_kinds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_devices_of_several_kinds(tmp_path: Path, capsys: Output) -> None:
     """Each has its own block; what is no drive keeps its PDOs."""
     drive, pump = written(tmp_path, 'drive.eds', SAMPLE), written(tmp_path, 'pump.eds', PUMP)
     bus_yml = tmp_path / 'bus.yml'
@@ -208,7 +208,7 @@ def test_velocity_is_in_the_unit_that_the_eds_names(
 
 
 def test_an_epos4_is_asked_for_its_gear(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its EDS says rpm; with the gear the scales are those of the bus.yml that is shipped."""
     monkeypatch.chdir(tmp_path)
@@ -261,7 +261,7 @@ def test_the_target_is_that_of_the_mode(tmp_path: Path) -> None:
 
 
 def test_several_axes_are_not_made_one(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is said what to write."""
     monkeypatch.chdir(tmp_path)
@@ -317,7 +317,7 @@ def test_what_is_not_said_is_asked_for(
     options: Sequence[str],
     words: str,
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    capsys: Output,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """With the option that says it; no file is written."""
@@ -343,7 +343,7 @@ def test_devices_that_cannot_be(
     devices: Sequence[str],
     words: str,
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    capsys: Output,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """They are named."""
@@ -355,7 +355,7 @@ def test_devices_that_cannot_be(
 
 
 def test_nothing_is_overwritten(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Neither a bus.yml, unless --force says so, nor an EDS of the same name."""
     monkeypatch.chdir(tmp_path)
@@ -377,7 +377,7 @@ def test_nothing_is_overwritten(
     ('turn', 'is_doubted'), [('628318.5', False), ('3000000', False), ('62831850', True)]
 )
 def test_a_turn_far_above_the_factor_group_is_doubted(
-    turn: str, is_doubted: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    turn: str, is_doubted: bool, tmp_path: Path, capsys: Output
 ) -> None:
     """On the terminal, and beside the scale; a gear that the drive does not know is none."""
     eds, bus = written(tmp_path, 'drive.eds', SAMPLE), tmp_path / 'bus.yml'
@@ -388,7 +388,7 @@ def test_a_turn_far_above_the_factor_group_is_doubted(
 
 
 def test_a_person_is_asked_for_units(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where the EDS does not say them; again after what is no number of increments."""
     monkeypatch.chdir(tmp_path)
@@ -405,7 +405,7 @@ def test_a_person_is_asked_for_units(
 
 
 def test_a_person_is_asked_what_turns(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where 0x60A9 names turns, and the increments are known by --turn alone."""
     monkeypatch.chdir(tmp_path)

@@ -20,7 +20,7 @@ import time
 
 from can_addresses import free_multicast
 import pytest
-from tool_environment import ENVIRONMENT, REPOSITORY
+from tool_environment import ENVIRONMENT, Output, REPOSITORY
 
 from arm_canopen import DriveState, load_bus
 from arm_canopen.config.model.factor_group import FactorGroup
@@ -277,11 +277,7 @@ def test_who_does_not_agree_moves_nothing(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_no_first_motion(
-    options: list[str],
-    words: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    options: list[str], words: str, tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is refused before the bus is opened."""
     bus_yml = robot(tmp_path, PER_TURN, 8)
@@ -335,7 +331,7 @@ def test_what_is_changed_and_what_is_asked(
 
 
 def test_without_the_keyboard_library(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As in an environment of `pip install ./canopen_tools`: the extra that it needs is named."""
     bus_yml = robot(tmp_path, PER_TURN, 8)
@@ -347,7 +343,7 @@ def test_without_the_keyboard_library(
 
 
 def test_without_a_terminal_nothing_is_begun(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A script holds no key."""
     bus_yml = robot(tmp_path, PER_TURN, 8)

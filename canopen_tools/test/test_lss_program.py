@@ -12,6 +12,7 @@ from can_addresses import free_multicast, free_virtual
 from device_rig import EDS, with_defaults
 from isolation import Isolation
 import pytest
+from tool_environment import Output
 
 from arm_canopen.can import Bus, Frame, open_bus
 from arm_canopen.config import load_eds
@@ -59,9 +60,7 @@ def states(runner: DeviceRunner) -> list[LssState]:
 
 
 @pytest.mark.usefixtures('runner')
-def test_a_scan_of_the_bus_mentions_devices_without_node_id(
-    name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_scan_of_the_bus_mentions_devices_without_node_id(name: str, capsys: Output) -> None:
     """They answer nothing else; once all have a node id, nothing is said."""
     assert main(['scan', '--can', name, '--listen', '0.2']) == 0
     captured = capsys.readouterr()
@@ -73,9 +72,7 @@ def test_a_scan_of_the_bus_mentions_devices_without_node_id(
     assert 'lss' not in capsys.readouterr().err
 
 
-def test_a_device_is_found_and_numbered(
-    name: str, runner: DeviceRunner, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_device_is_found_and_numbered(name: str, runner: DeviceRunner, capsys: Output) -> None:
     """It gets its id and boots; an id that is taken is refused, and nobody is left then."""
     assert main(['lss', 'scan', '--can', name]) == 0
     head, row, count = capsys.readouterr().out.splitlines()
@@ -101,7 +98,7 @@ def test_a_device_is_found_and_numbered(
 
 
 def test_a_device_with_an_id_is_selected_by_its_address(
-    name: str, runner: DeviceRunner, capsys: pytest.CaptureFixture[str]
+    name: str, runner: DeviceRunner, capsys: Output
 ) -> None:
     """What it gets takes effect later, which is reported."""
     assert main(['lss', 'inquire', *ADDRESS, '--can', name]) == 0
@@ -121,7 +118,7 @@ def test_a_device_with_an_id_is_selected_by_its_address(
 
 @pytest.mark.usefixtures('runner')
 def test_the_only_device_is_not_one_of_two(
-    name: str, runner: DeviceRunner, capsys: pytest.CaptureFixture[str]
+    name: str, runner: DeviceRunner, capsys: Output
 ) -> None:
     """Several devices that answer are noticed before any of them is set, and let go."""
     assert main(['lss', 'set', '--only', '--node-id', '9', '--can', name]) == 1
@@ -131,7 +128,7 @@ def test_the_only_device_is_not_one_of_two(
 
 @pytest.mark.parametrize('bitrate', ['500000', '100000'])
 def test_the_bit_rate_is_activated(
-    name: str, runner: DeviceRunner, capsys: pytest.CaptureFixture[str], bitrate: str
+    name: str, runner: DeviceRunner, capsys: Output, bitrate: str
 ) -> None:
     """The delay goes out, and nothing after it at the old bit rate."""
     with open_bus(name) as witness:
@@ -155,9 +152,7 @@ def test_the_bit_rate_is_activated(
         (['scan', '--timeout', '0'], 'not above 0'),
     ],
 )
-def test_wrong_usage(
-    name: str, arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_wrong_usage(name: str, arguments: list[str], message: str, capsys: Output) -> None:
     """2, and nothing is sent."""
     with open_bus(name) as witness:
         try:
@@ -202,9 +197,7 @@ def answers(bus: Bus, request: bytes) -> bool:
     return False
 
 
-def test_a_fake_slave_gets_its_id_on_the_multicast_bus(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_fake_slave_gets_its_id_on_the_multicast_bus(capsys: Output) -> None:
     """The program that waits for its id gets one, boots, and answers its SDO with it."""
     pytest.importorskip('rclpy')
     name = free_multicast()

@@ -15,6 +15,7 @@ from config_samples import DRIVE_ROWS, eds_text, FACTOR_ROWS, Row
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from tool_environment import Output
 
 from arm_canopen import CanopenMaster, load_bus, open_bus
 from arm_canopen.config import Identity, load_eds
@@ -91,7 +92,7 @@ def number(value: int) -> bytes:
     return value.to_bytes(4, 'little')
 
 
-def test_a_scanned_bus_boots_and_moves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_scanned_bus_boots_and_moves(tmp_path: Path, capsys: Output) -> None:
     """Files by vendor, product and revision; units by what each drive holds; names as given."""
     files = tmp_path / 'eds'
     old = written(files, 'old.eds', with_identity(SAMPLE, revision=0x10000))
@@ -126,7 +127,7 @@ def test_a_scanned_bus_boots_and_moves(tmp_path: Path, capsys: pytest.CaptureFix
             assert master.drive('joint3').enable()
 
 
-def test_a_device_brings_its_own_eds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_device_brings_its_own_eds(tmp_path: Path, capsys: Output) -> None:
     """From 0x1021, where no file fits; one that is compressed is not read."""
     path = written(tmp_path, 'hidden.eds', (*SAMPLE, *STORED))
     content = {(4, 0x1021, 0): path.read_bytes()}
@@ -145,9 +146,7 @@ def test_a_device_brings_its_own_eds(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert 'no EDS fits' in capsys.readouterr().err
 
 
-def test_every_problem_is_said_with_its_remedy(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_every_problem_is_said_with_its_remedy(tmp_path: Path, capsys: Output) -> None:
     """Devices without an EDS and with two; then each remedy is taken."""
     mine = written(tmp_path, 'mine.eds', SAMPLE)
     twin = written(tmp_path, 'twin.eds', [*SAMPLE, Row(0x2100, 0, 'More', 7, 'rw', '1')])
@@ -179,7 +178,7 @@ def test_every_problem_is_said_with_its_remedy(
             assert words in capsys.readouterr().err
 
 
-def test_two_devices_with_one_node_id(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_two_devices_with_one_node_id(tmp_path: Path, capsys: Output) -> None:
     """Both answer; by the scan itself, too."""
     path = written(tmp_path, 'drive.eds', SAMPLE)
     bus = free_virtual()
@@ -191,14 +190,14 @@ def test_two_devices_with_one_node_id(tmp_path: Path, capsys: pytest.CaptureFixt
         assert 'node 2: several devices answer' in capsys.readouterr().err
 
 
-def test_a_silent_bus(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_silent_bus(tmp_path: Path, capsys: Output) -> None:
     """What to look at is said."""
     arguments = ['new', '--scan', '--can', free_virtual(), *LISTEN]
     assert main([*arguments, '--output', str(tmp_path / 'bus.yml')]) == 1
     assert 'is the bus powered, wired and terminated' in capsys.readouterr().err
 
 
-def test_all_node_ids_used(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_all_node_ids_used(tmp_path: Path, capsys: Output) -> None:
     """The master needs one."""
     path = written(tmp_path, 'drive.eds', SAMPLE)
     devices = [f'joint{node}={path}@{node}' for node in range(1, 128)]

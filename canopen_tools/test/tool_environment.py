@@ -6,6 +6,9 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import TypeAlias
+
+import pytest
 
 REPOSITORY = Path(__file__).parents[2]
 ENVIRONMENT = os.environ | {
@@ -21,3 +24,6 @@ ENVIRONMENT = os.environ | {
         )
     )
 }
+
+Output: TypeAlias = pytest.CaptureFixture[str]
+"""What a tool has printed, in a test that runs it in its own process."""
