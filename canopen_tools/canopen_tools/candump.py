@@ -269,10 +269,10 @@ def _parser() -> argparse.ArgumentParser:
         metavar='NAME',
         help='of a log of several buses: the one to show, as the log names it, such as can1 or 2',
     )
-    add('-n', '--count', type=_positive_int, help='end after so many frames shown')
+    add('-n', '--count', type=_positive(int), help='end after so many frames shown')
     add(
         '--timeout',
-        type=_positive_float,
+        type=_positive(float),
         default=math.inf,
         metavar='S',
         help='end after S seconds',
@@ -298,18 +298,16 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _positive_int(text: str) -> int:
-    number = int(text)
-    if number <= 0:
-        raise argparse.ArgumentTypeError(f'{text} is not positive')
-    return number
+def _positive(kind: Callable[[str], float]) -> Callable[[str], float]:
+    """Return what reads a number above 0."""
 
+    def read(text: str) -> float:
+        number = kind(text)
+        if not number > 0.0:
+            raise argparse.ArgumentTypeError(f'{text} is not positive')
+        return number
 
-def _positive_float(text: str) -> float:
-    number = float(text)
-    if not number > 0.0:
-        raise argparse.ArgumentTypeError(f'{text} is not positive')
-    return number
+    return read
 
 
 if __name__ == '__main__':

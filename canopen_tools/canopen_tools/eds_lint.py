@@ -34,6 +34,7 @@ from arm_canopen.standard import (
     object_address,
     ObjectDictionary,
     ObjectEntry,
+    PDO_COUNT_MAX,
     PREDEFINED_MAX,
     profile_number,
 )
@@ -207,7 +208,9 @@ class _Linter:
         for index in indices:
             self._check_count(index)
         for entry in self._dictionary:
-            self._check_name(entry)
+            if not entry.name:
+                what = 'the object has no ParameterName'
+                self._add(entry, 'parametername', what, 'give it one')
             self._check_standard(entry)
             self._check_limits(entry)
             self._check_mappable(entry)
@@ -233,10 +236,6 @@ class _Linter:
                 f'sub-index 0 is {count}, but the highest sub-index is {highest}',
                 f'write DefaultValue={highest}',
             )
-
-    def _check_name(self, entry: ObjectEntry) -> None:
-        if not entry.name:
-            self._add(entry, 'parametername', 'the object has no ParameterName', 'give it one')
 
     def _check_standard(self, entry: ObjectEntry) -> None:
         """Compare with what CiA 301 and the profile of the device define for the object."""
@@ -428,8 +427,11 @@ def check_pdo_objects(eds: Eds, findings: Findings) -> None:
         for number in direction.numbers(eds.dictionary):
             _check_identifier(eds, direction, number, findings)
             _check_mapping(eds, direction, number, findings)
-        for number in _mapping_numbers(eds, direction):
-            index, mapping = direction.communication + number - 1, direction.mapping + number - 1
+        for mapping in sorted({entry.index for entry in eds.dictionary}):
+            number = mapping - direction.mapping + 1
+            index = direction.communication + number - 1
+            if not 0 < number <= PDO_COUNT_MAX:
+                continue
             if not eds.dictionary.has_index(index):
                 findings.error(
                     Place(eds.path, key=f'[{index:04X}]'),
@@ -437,12 +439,6 @@ def check_pdo_objects(eds: Eds, findings: Findings) -> None:
                     f'no communication parameter {object_address(index)}',
                     'add it',
                 )
-
-
-def _mapping_numbers(eds: Eds, direction: Direction) -> list[int]:
-    first = direction.mapping
-    indices = {entry.index for entry in eds.dictionary}
-    return sorted(index - first + 1 for index in indices if first <= index < first + 0x200)
 
 
 def _check_identifier(eds: Eds, direction: Direction, number: int, findings: Findings) -> None:

@@ -159,7 +159,7 @@ def _opened(path: Path, head: bytes) -> tuple[str, Iterator[LoggedFrame]]:
         if head.startswith(magic):
             if reader is None:
                 raise CodecError(f'{name} is not read; {_KNOWN}')
-            return name, _read_binary(path, reader)
+            return name, _logged(reader(path), _name_of_channel)
     encoding = 'utf-16' if head.startswith((b'\xff\xfe', b'\xfe\xff')) else 'utf-8-sig'
     lines = head.decode(encoding, 'replace').splitlines()
     for line in lines:
@@ -174,12 +174,6 @@ def _opened(path: Path, head: bytes) -> tuple[str, Iterator[LoggedFrame]]:
     if not first:
         return '', iter(())  # a log of a silent bus
     raise CodecError(f'no log of a known format, it begins with {first[:60]!r}; {_KNOWN}')
-
-
-def _read_binary(
-    path: Path, reader: Callable[[Path], Iterable[can.Message]]
-) -> Iterator[LoggedFrame]:
-    yield from _logged(reader(path), _name_of_channel)
 
 
 def _closing(
@@ -211,17 +205,13 @@ def _read_asc(file: TextIO) -> Iterator[LoggedFrame]:
         yield logged._replace(frame=logged.frame._replace(timestamp=time_stamp))
 
 
+def _channel(message: can.Message) -> str:
+    return str(message.channel)
+
+
 def _name_of_channel(message: can.Message) -> str:
     """Return the number of a channel as Vector counts it, from 1; empty without one."""
     return f'{message.channel + 1}' if isinstance(message.channel, int) else ''
-
-
-def _read_trc(file: TextIO) -> Iterator[LoggedFrame]:
-    return _logged(can.TRCReader(file), lambda message: str(message.channel))
-
-
-def _read_csv(file: TextIO) -> Iterator[LoggedFrame]:
-    return _logged(can.CSVReader(file))
 
 
 def _read_savvycan(file: TextIO) -> Iterator[LoggedFrame]:
@@ -252,9 +242,13 @@ _BINARY: tuple[tuple[bytes, str, Callable[[Path], Iterable[can.Message]] | None]
 )
 _TEXT = (
     _TextFormat('Vector .asc', _pattern(r'date\s+\w+\s+\w|base\s+(?:hex|dec)\b'), _read_asc),
-    _TextFormat('PCAN .trc', _pattern(';'), _read_trc),
+    _TextFormat('PCAN .trc', _pattern(';'), lambda file: _logged(can.TRCReader(file), _channel)),
     _TextFormat('SavvyCAN csv', _pattern('Time Stamp,ID,Extended'), _read_savvycan),
-    _TextFormat('python-can csv', _pattern('timestamp,arbitration_id,'), _read_csv),
+    _TextFormat(
+        'python-can csv',
+        _pattern('timestamp,arbitration_id,'),
+        lambda file: _logged(can.CSVReader(file)),
+    ),
     _TextFormat('BUSMASTER .log', _pattern(r'\*\*\*BUSMASTER')),
     _TextFormat('candump log', LOG_LINE, read_lines),
     _TextFormat("candump's screen", SCREEN_LINE, read_screen),

@@ -191,13 +191,11 @@ class SocketBus(Bus):
         self.counters.received += len(frames)
         if self._stamps.lost != self.counters.lost:
             if not self.counters.lost:
-                _log.warning('%s', loss_text(self.name, self._granted_buffer()))
+                # the kernel doubles the size for its own bookkeeping, and returns the double
+                granted = self._receiver.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2
+                _log.warning('%s', loss_text(self.name, granted))
             self.counters.lost = self._stamps.lost
         return frames
-
-    def _granted_buffer(self) -> int:
-        # the kernel doubles the size for its own bookkeeping, and returns the double
-        return self._receiver.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2
 
     def wake(self) -> None:
         """Let a waiting :meth:`receive` return at once."""

@@ -64,8 +64,8 @@ class FrameDescriber:
         }
         self._functions: dict[int, Callable[[int, Frame], Description]] = {
             CobId.EMCY: self._emcy,
-            CobId.SDO_REQUEST: self._sdo_request,
-            CobId.SDO_RESPONSE: self._sdo_response,
+            CobId.SDO_REQUEST: self._sdo_frame,
+            CobId.SDO_RESPONSE: self._sdo_frame,
             CobId.HEARTBEAT: self._heartbeat,
         }
         if config is not None:
@@ -176,22 +176,15 @@ class FrameDescriber:
             FrameKind.HEARTBEAT, label, self.node_name(node_id), text, node_id=node_id
         )
 
-    def _sdo_request(self, node_id: int, frame: Frame) -> Description:
-        step = self._follower(node_id).request(frame.data)
-        node = self.node_name(node_id)
-        return Description(FrameKind.SDO, 'SDO >', node, step.text, step.is_abort, node_id)
-
-    def _sdo_response(self, node_id: int, frame: Frame) -> Description:
-        step = self._follower(node_id).response(frame.data)
-        node = self.node_name(node_id)
-        return Description(FrameKind.SDO, 'SDO <', node, step.text, step.is_abort, node_id)
-
-    def _follower(self, node_id: int) -> SdoFollower:
+    def _sdo_frame(self, node_id: int, frame: Frame) -> Description:
         follower = self._sdo.get(node_id)
         if follower is None:
             names = self._objects.get(node_id) or ObjectNames()
             follower = self._sdo[node_id] = SdoFollower(names)
-        return follower
+        is_request = frame.can_id & _FUNCTION_MASK == CobId.SDO_REQUEST
+        step = (follower.request if is_request else follower.response)(frame.data)
+        label, node = 'SDO >' if is_request else 'SDO <', self.node_name(node_id)
+        return Description(FrameKind.SDO, label, node, step.text, step.is_abort, node_id)
 
 
 def _lss(label: str, frame: Frame) -> Description:

@@ -73,18 +73,6 @@ def controlword_text(word: int) -> str:
     return ', '.join([f'0x{word:04X} {command}'.rstrip(), *extra])
 
 
-def _status_text(word: int) -> str:
-    return f'0x{word:04X} {drive_state(word).title}'
-
-
-def _mode_text(number: int) -> str:
-    return f'{number} {mode_title(number)}'
-
-
-def _register_text(register: int) -> str:
-    return f'0x{register:02X} {error_register_text(register)}'
-
-
 def _cob_id_text(cob_id: int) -> str:
     disabled = ' disabled' if cob_id & COB_ID_INVALID else ''
     return f'0x{cob_id & CAN_ID_MASK:03X}{disabled}'
@@ -95,17 +83,26 @@ def _mapping_text(word: int) -> str:
     return f'{object_address(index, subindex)} ({bits} bit)'
 
 
+def _mode_text(number: int) -> str:
+    return f'{number} {mode_title(number)}'
+
+
 def _hex_text(number: int) -> str:
     return f'0x{number:08X}'
 
 
+def _consumer_text(word: int) -> str:
+    entry = ConsumerHeartbeatTime.parse(word)
+    return f'node {entry.node_id}, {entry.time_ms} ms'
+
+
 _TEXTS: dict[int, Callable[[int], str]] = {
     Index.CONTROLWORD: controlword_text,
-    Index.STATUSWORD: _status_text,
+    Index.STATUSWORD: lambda word: f'0x{word:04X} {drive_state(word).title}',
     Index.MODE_OF_OPERATION: _mode_text,
     Index.MODE_OF_OPERATION_DISPLAY: _mode_text,
     Index.ERROR_CODE: error_code_text,
-    Index.ERROR_REGISTER: _register_text,
+    Index.ERROR_REGISTER: lambda bits: f'0x{bits:02X} {error_register_text(bits)}',
     Index.DEVICE_TYPE: _hex_text,
     Index.SYNC_COB_ID: _cob_id_text,
     Index.EMCY_COB_ID: _cob_id_text,
@@ -113,13 +110,9 @@ _TEXTS: dict[int, Callable[[int], str]] = {
 _RECORD_TEXTS: dict[int, Callable[[int], str]] = {
     Index.PREDEFINED_ERROR_FIELD: lambda code: error_code_text(code & 0xFFFF),
     Index.IDENTITY: _hex_text,
-    Index.CONSUMER_HEARTBEAT: lambda word: _consumer_text(ConsumerHeartbeatTime.parse(word)),
+    Index.CONSUMER_HEARTBEAT: _consumer_text,
 }
 """The same for sub-indices from 1."""
-
-
-def _consumer_text(entry: ConsumerHeartbeatTime) -> str:
-    return f'node {entry.node_id}, {entry.time_ms} ms'
 
 
 def value_text(index: int, subindex: int, value: Value) -> str:
@@ -127,16 +120,14 @@ def value_text(index: int, subindex: int, value: Value) -> str:
     if isinstance(value, bytes):
         return value.hex(' ') or 'nothing'
     if isinstance(value, str):
-        return f'"{_printable(value.rstrip(chr(0)))}"'
+        # escape what would break the line or steer the terminal; devices may send anything
+        text = value.rstrip(chr(0))
+        shown = (c if c.isprintable() else c.encode('unicode_escape').decode() for c in text)
+        return f'"{"".join(shown)}"'
     if isinstance(value, float):
         return f'{value:.7g}'
-    text = _text_of(index, subindex)
-    return text(value) if text else str(value)
-
-
-def _printable(text: str) -> str:
-    """Escape what would break the line or steer the terminal; devices may send anything."""
-    return ''.join(c if c.isprintable() else c.encode('unicode_escape').decode() for c in text)
+    words = _text_of(index, subindex)
+    return words(value) if words else str(value)
 
 
 def _text_of(index: int, subindex: int) -> Callable[[int], str] | None:
@@ -158,7 +149,9 @@ def data_text(index: int, subindex: int, data_type: DataType | None, data: bytes
 
     The type by the EDS is None when it is unknown.
     """
-    data_type = data_type or _likely_type(index, len(data))
+    if data_type is None:
+        likely = _SIGNED_TYPES if index in _SIGNED_OBJECTS else _UNSIGNED_TYPES
+        data_type = likely.get(len(data))
     if data_type is None:
         return data.hex(' ') or 'nothing'
     try:
@@ -166,8 +159,3 @@ def data_text(index: int, subindex: int, data_type: DataType | None, data: bytes
     except CodecError as error:
         return f'{data.hex(" ")} ({error})'
     return value_text(index, subindex, value)
-
-
-def _likely_type(index: int, size: int) -> DataType | None:
-    types = _SIGNED_TYPES if index in _SIGNED_OBJECTS else _UNSIGNED_TYPES
-    return types.get(size)

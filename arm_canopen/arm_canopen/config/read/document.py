@@ -160,17 +160,14 @@ class _Converter:
         if isinstance(node, yaml.MappingNode):
             return self._mapping(node, place)
         if isinstance(node, yaml.SequenceNode):
-            return self._listing(node, place)
+            items = (
+                self.convert(child, self._place(child, f'{place.key}[{number}]'))
+                for number, child in enumerate(node.value)
+            )
+            return YamlList(place, tuple(items))
         if isinstance(node, yaml.ScalarNode):
             return self._scalar(node, place)
         raise TypeError(f'unknown kind of YAML node {node!r}')
-
-    def _listing(self, node: yaml.SequenceNode, place: Place) -> YamlList:
-        items = (
-            self.convert(child, self._place(child, f'{place.key}[{number}]'))
-            for number, child in enumerate(node.value)
-        )
-        return YamlList(place, tuple(items))
 
     def _scalar(self, node: yaml.ScalarNode, place: Place) -> Scalar:
         known = {TAG_PREFIX + kind.value: kind for kind in ScalarKind}
@@ -249,17 +246,13 @@ def reindent(
             result.append((key, value))
         elif isinstance(above[1], yaml.MappingNode) and above[1].tag == SLIPPED_TAG:
             above[1].value.append((key, value))
-        elif _is_empty(above[1]):
+        elif isinstance(above[1], yaml.ScalarNode) and above[1].value == '':
             report(above[0])
             slipped = yaml.MappingNode(SLIPPED_TAG, [(key, value)], key.start_mark)
             result[-1] = (above[0], slipped)
         else:
             result.append((key, value))
     return result
-
-
-def _is_empty(node: yaml.Node) -> bool:
-    return isinstance(node, yaml.ScalarNode) and node.value == ''
 
 
 def _key_text(key: yaml.ScalarNode) -> str:
