@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, MISSING
 import importlib.util
 from operator import attrgetter
 from pathlib import Path
@@ -33,7 +32,6 @@ from arm_canopen.config import (
     Identity,
     load_bus,
     load_eds,
-    MasterConfig,
     NodeConfig,
     PdoConfig,
     SdoWrite,
@@ -43,7 +41,6 @@ from arm_canopen.config.model.drive import RecoveryPolicy
 from arm_canopen.config.read.document import Item, Scalar, ScalarKind, YamlMap
 from arm_canopen.config.resolve.eds_files import DEFAULT_DRIVE
 from arm_canopen.config.resolve.layout import merge_device
-from arm_canopen.config.sections import DeviceSettings, MasterSettings
 from arm_canopen.standard import CAN_ID_MASK, DataType
 
 PACKAGE = Path(__file__).parents[1]
@@ -103,22 +100,6 @@ def test_keys_of_the_master(tmp_path: Path, piece: str, attribute: str, value: o
     """Each key fills its attribute, times in seconds."""
     master = load_text(tmp_path, added('master', piece)).master
     assert attrgetter(attribute)(master) == value
-
-
-@pytest.mark.parametrize(
-    ('settings', 'model'), [(DeviceSettings, NodeConfig), (MasterSettings, MasterConfig)]
-)
-def test_a_default_has_one_value(settings: Any, model: Any) -> None:
-    """A device that is built by a program has the defaults of one that bus.yml names."""
-    read = {field.name: field.default for field in fields(settings)}
-    built = {field.name: field.default for field in fields(model)}
-    same = {
-        name
-        for name in read.keys() & built.keys()
-        if read[name] not in (None, '') and built[name] is not MISSING
-    }
-    assert len(same) > 5
-    assert {name: read[name] for name in same} == {name: built[name] for name in same}
 
 
 def test_supervision_of_heartbeats(tmp_path: Path) -> None:

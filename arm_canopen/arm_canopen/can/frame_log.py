@@ -159,7 +159,7 @@ def _opened(path: Path, head: bytes) -> tuple[str, Iterator[LoggedFrame]]:
         if head.startswith(magic):
             if reader is None:
                 raise CodecError(f'{name} is not read; {_KNOWN}')
-            return name, _logged(reader(path), _name_of_channel)
+            return name, _read_binary(path, reader)
     encoding = 'utf-16' if head.startswith((b'\xff\xfe', b'\xfe\xff')) else 'utf-8-sig'
     lines = head.decode(encoding, 'replace').splitlines()
     for line in lines:
@@ -174,6 +174,13 @@ def _opened(path: Path, head: bytes) -> tuple[str, Iterator[LoggedFrame]]:
     if not first:
         return '', iter(())  # a log of a silent bus
     raise CodecError(f'no log of a known format, it begins with {first[:60]!r}; {_KNOWN}')
+
+
+def _read_binary(
+    path: Path, reader: Callable[[Path], Iterable[can.Message]]
+) -> Iterator[LoggedFrame]:
+    """Open a log when its first frame is read, so that its format has a name by then."""
+    yield from _logged(reader(path), _name_of_channel)
 
 
 def _closing(

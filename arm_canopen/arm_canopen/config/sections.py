@@ -6,7 +6,10 @@ Names, units and defaults are those of ros2_canopen and of Lely's dcfgen, so tha
 be read unchanged. Where a default differs, ``why`` says the reason. Our own are
 ``scale_acc_to_dev``, ``scale_acc_from_dev``, ``scale_eff_to_dev``, ``scale_from_factor_group``,
 ``target_timeout_ms``, ``recovery``, ``quirks``, ``timeout_ms`` of an entry of ``sdo`` and
-``time_period_ms`` of the master. The keys of a drive are those of :class:`.model.DriveConfig`.
+``time_period_ms`` of the master.
+
+A key that fills a field of the model is declared there, by ``MasterConfig``, ``NodeConfig`` and
+``DriveConfig``; the sections here have those that other sections or the EDS have a say in.
 
 A field has a value for a key that is absent: the default of the model where that has the field,
 and None where other sections or the EDS decide.
@@ -15,22 +18,15 @@ and None where other sections or the EDS decide.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from ..standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
-from ..standard.dictionary import ObjectDictionary
-from ..standard.lss import BIT_RATES_KBIT
 from .keys import Key, key, keys_of, Kind, Use
-from .model.bus import ANY_DEVICE, MasterConfig, NodeConfig
+from .model.bus import MasterConfig, NodeConfig, RETRY_FACTOR, U16_MAX, U32_MAX
 from .model.drive import DriveConfig
-from .units import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS
+from .units import HUNDRED_MICROSECONDS, MILLISECONDS
 
-U8_MAX, U16_MAX, U32_MAX = 0xFF, 0xFFFF, 0xFFFF_FFFF
-MASTER = MasterConfig(node_id=0)
-DEVICE = NodeConfig('', 0, '', eds=Path(), dictionary=ObjectDictionary(()))
-"""Master and device without keys."""
-BITRATES = dict.fromkeys(BIT_RATES_KBIT, 'kbit/s')
+U8_MAX = 0xFF
 NO_DICTIONARY = 'the master has no object dictionary of its own'
 
 
@@ -52,13 +48,23 @@ def _retry_factor(default: int | None) -> Any:  # noqa: ANN401
     )
 
 
+def _own_identity(subindex: int) -> Any:  # noqa: ANN401
+    return key(
+        0,
+        f'0x1018:{subindex:02} of the master; for `canopen dcf` only',
+        (0, U32_MAX),
+        use=Use.UNUSED,
+        why=NO_DICTIONARY,
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class Options:
     """Section ``options``."""
 
     dcf_path: str = key('', 'folder of the EDS files; `@BUS_CONFIG_PATH@` is that of the bus.yml')
     heartbeat_multiplier: float = _multiplier(3.0)
-    retry_factor: int = _retry_factor(DEVICE.retry_factor)
+    retry_factor: int = _retry_factor(RETRY_FACTOR)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,77 +80,16 @@ class _NodeSettings:
 
 @dataclass(frozen=True, slots=True)
 class MasterSettings(_NodeSettings):
-    """Section ``master``; fields as in :class:`.model.MasterConfig`."""
+    """Section ``master``, but for the keys that :class:`.model.MasterConfig` declares."""
 
-    bitrate: int = key(
-        MASTER.bitrate,
-        'bit rate, for the bus load; the interface is set up outside',
-        unit=KILOBIT,
-        name='baudrate',
-        choices=BITRATES,
-    )
-    vendor_id: int = key(
-        ANY_DEVICE.vendor_id,
-        '0x1018:01 of the master; for `canopen dcf` only',
-        (0, U32_MAX),
-        use=Use.UNUSED,
-        why=NO_DICTIONARY,
-    )
-    product_code: int = key(
-        ANY_DEVICE.product_code,
-        '0x1018:02 of the master; for `canopen dcf` only',
-        (0, U32_MAX),
-        use=Use.UNUSED,
-        why=NO_DICTIONARY,
-    )
-    revision_number: int = key(
-        ANY_DEVICE.revision_number,
-        '0x1018:03 of the master; for `canopen dcf` only',
-        (0, U32_MAX),
-        use=Use.UNUSED,
-        why=NO_DICTIONARY,
-    )
-    serial_number: int = key(
-        ANY_DEVICE.serial_number,
-        '0x1018:04 of the master; for `canopen dcf` only',
-        (0, U32_MAX),
-        use=Use.UNUSED,
-        why=NO_DICTIONARY,
-    )
+    vendor_id: int = _own_identity(1)
+    product_code: int = _own_identity(2)
+    revision_number: int = _own_identity(3)
+    serial_number: int = _own_identity(4)
     watch_devices: bool = key(
         True, 'the master watches the heartbeats of the devices', name='heartbeat_consumer'
     )
-    heartbeat_producer: float = key(
-        MASTER.heartbeat_producer,
-        "period of the master's heartbeat, 0 for none",
-        (0, U16_MAX),
-        unit=MILLISECONDS,
-        why='by default not 0, as only this stops drives when the master dies; write 0 for none',
-    )
     heartbeat_multiplier: float | None = _multiplier(None)
-    sync_period: float = key(
-        MASTER.sync_period,
-        'period of SYNC, which is the cycle; 0 for none',
-        (500, 60_000_000),
-        unit=MICROSECONDS,
-        zero=True,
-        why='the unit is microseconds, 10 ms is 10000',
-    )
-    sync_window: float = key(
-        MASTER.sync_window,
-        'time after SYNC in which TPDOs should answer; later ones are counted',
-        (0, U32_MAX),
-        unit=MICROSECONDS,
-        kind=Kind.INTEGER,
-    )
-    sync_overflow: int = key(
-        MASTER.sync_overflow, 'highest counter in SYNC, 0 for none', (2, 240), zero=True
-    )
-    time_cob_id: int = key(
-        MASTER.time_cob_id,
-        'COB-ID of TIME; bit 30 has the master send it, each second by default',
-        (0, U32_MAX),
-    )
     time_period: float | None = key(
         None,
         'period of TIME, 0 for none',
@@ -153,55 +98,14 @@ class MasterSettings(_NodeSettings):
         name='time_period_ms',
         zero=True,
     )
-    emcy_inhibit_time: float = key(
-        MASTER.emcy_inhibit_time,
-        'for `canopen dcf` only: the master sends no EMCY',
-        (0, U16_MAX),
-        unit=HUNDRED_MICROSECONDS,
-        kind=Kind.INTEGER,
-        use=Use.UNUSED,
-        why='the master sends no EMCY',
-    )
-    nmt_inhibit_time: float = key(
-        MASTER.nmt_inhibit_time,
-        'shortest time between two NMT commands',
-        (0, U16_MAX),
-        unit=HUNDRED_MICROSECONDS,
-        kind=Kind.INTEGER,
-    )
     error_behavior: None = key(
         None, 'for `canopen dcf` only', use=Use.UNUSED, why='the master has no NMT state'
-    )
-    start: bool = key(
-        MASTER.start, 'false: SYNC and RPDOs wait for NMT start to the id of the master'
-    )
-    start_nodes: bool = key(
-        MASTER.start_nodes, 'the master starts each device when it is configured'
-    )
-    start_all_nodes: bool = key(
-        MASTER.start_all_nodes, 'the first start is one frame to all, when all are configured'
-    )
-    reset_all_nodes: bool = key(
-        MASTER.reset_all_nodes, 'the loss of a mandatory device resets all devices'
-    )
-    stop_all_nodes: bool = key(
-        MASTER.stop_all_nodes, 'the loss of a mandatory device stops all devices'
-    )
-    boot_time: float = key(
-        MASTER.boot_time,
-        'time after which missing mandatory devices are reported, 0 for never',
-        (0, U32_MAX),
-        unit=MILLISECONDS,
-        kind=Kind.INTEGER,
-    )
-    boot_timeout: float = key(
-        MASTER.boot_timeout, 'time-out of each SDO of the boot', (1, 60_000), unit=MILLISECONDS
     )
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceSettings(_NodeSettings):
-    """Section of a device; fields as in :class:`.model.NodeConfig`, None when not given."""
+    """Section of a device, but for the keys that :class:`.model.NodeConfig` declares."""
 
     dcf: str = key(
         '',
@@ -211,42 +115,17 @@ class DeviceSettings(_NodeSettings):
     )
     dcf_path: str | None = key(None, 'folder of that file, instead of that of `options`')
     polling: bool | None = key(None, 'accepted; the cycle is that of SYNC', use=Use.IGNORED)
-    poll_period: float = key(
-        DEVICE.poll_period,
-        'how often objects that no PDO carries are read; without SYNC the cycle, too',
-        (1, 60_000),
-        unit=MILLISECONDS,
-        name='period',
-    )
     non_transmit_timeout: float | None = key(None, 'accepted, not needed', use=Use.IGNORED)
-    sdo_timeout: float = key(
-        DEVICE.sdo_timeout,
-        'time-out of each SDO after the boot',
-        (1, 60_000),
-        unit=MILLISECONDS,
-        name='sdo_timeout_ms',
-    )
-    boot_timeout: float = key(
-        DEVICE.boot_timeout,
-        'how long one attempt to find the device takes',
-        (1, 600_000),
-        unit=MILLISECONDS,
-        name='boot_timeout_ms',
-    )
     diagnostics: None = key(None, 'accepted; diagnostics are always on', use=Use.IGNORED)
     enable_lazy_load: bool | None = key(None, 'accepted, not needed', use=Use.IGNORED)
     num_channels: int = key(
-        len(DEVICE.axes), 'number of axes, objects 0x800 apart', (1, 8), why='CiA 402 has 8 axes'
+        1, 'number of axes, objects 0x800 apart', (1, 8), why='CiA 402 has 8 axes'
     )
     channel_names: None = key(None, 'their names; without: `<device>_0`, `<device>_1`')
     channels: None = key(None, 'scales of single axes')
     channel: int | None = key(None, 'accepted, not needed', use=Use.IGNORED)
-    revision_number: int = key(
-        ANY_DEVICE.revision_number, 'expected 0x1018:03, 0 is not checked', (0, U32_MAX)
-    )
-    serial_number: int = key(
-        ANY_DEVICE.serial_number, 'expected 0x1018:04, 0 is not checked', (0, U32_MAX)
-    )
+    revision_number: int = key(0, 'expected 0x1018:03, 0 is not checked', (0, U32_MAX))
+    serial_number: int = key(0, 'expected 0x1018:04, 0 is not checked', (0, U32_MAX))
     heartbeat_producer: float | None = key(
         None,
         'period of its heartbeat (0x1017); without: that of the EDS',
@@ -270,22 +149,6 @@ class DeviceSettings(_NodeSettings):
     retry_factor: int | None = _retry_factor(None)
     time_cob_id: None = key(None, '0x1012, bit 31 has the device take TIME')
     error_behavior: None = key(None, '0x1029 by sub-index')
-    boot: bool = key(
-        DEVICE.boot,
-        'false: the device is taken as it is, neither reset nor configured nor started',
-    )
-    mandatory: bool = key(DEVICE.mandatory, 'no device is started before this one is configured')
-    reset_communication: bool = key(
-        DEVICE.reset_communication,
-        'false: a device that is in operation is taken over without a reset; it must not '
-        'watch the master, so write `heartbeat_consumer: false`, too: else it stops by '
-        'itself while no master is there',
-    )
-    restore_configuration: int = key(
-        DEVICE.restore_configuration,
-        'sub-index of 0x1011 by which defaults are restored before the boot',
-        (0, 127),
-    )
     software_file: str = key(
         '',
         'refused: programs are loaded with the tool of the vendor',
@@ -372,7 +235,9 @@ class _SdoKeys(_MappingKeys):
     )
 
 
-OPTION_KEYS, MASTER_KEYS, DEVICE_KEYS = map(keys_of, (Options, MasterSettings, DeviceSettings))
+OPTION_KEYS = keys_of(Options)
+MASTER_KEYS = keys_of(MasterSettings) + keys_of(MasterConfig)
+DEVICE_KEYS = keys_of(DeviceSettings) + keys_of(NodeConfig)
 TPDO_KEYS, RPDO_KEYS = keys_of(_TpdoKeys), keys_of(_RpdoKeys)
 MAPPING_KEYS, SDO_KEYS = keys_of(_MappingKeys), keys_of(_SdoKeys)
 DRIVE_KEYS = keys_of(DriveConfig)

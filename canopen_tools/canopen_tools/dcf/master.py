@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 from arm_canopen import CodecError
 from arm_canopen.config import BusConfig, MasterConfig, NodeConfig, PdoConfig
+from arm_canopen.config.model.bus import U16_MAX
 from arm_canopen.config.model.pdo_direction import Direction, RPDO, TPDO
-from arm_canopen.config.sections import U16_MAX
 from arm_canopen.config.units import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS
 from arm_canopen.standard import (
     AccessType,

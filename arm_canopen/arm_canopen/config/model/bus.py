@@ -12,11 +12,17 @@ from ...exceptions import CodecError, Problem
 from ...standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, CobId
 from ...standard.datatypes import DataType, decode, Value
 from ...standard.dictionary import object_address, ObjectDictionary
+from ...standard.lss import BIT_RATES_KBIT
 from ...standard.objects import AXIS_OFFSET, COMMANDS, Index, slow_timeout
 from ...standard.pdo import MappedObject
 from ..findings import Place
+from ..keys import key, Kind, Use
+from ..units import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS
 from .drive import DriveConfig
 from .pdo_direction import Direction, RPDO, TPDO
+
+U16_MAX, U32_MAX = 0xFFFF, 0xFFFF_FFFF
+BITRATES = dict.fromkeys(BIT_RATES_KBIT, 'kbit/s')
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,48 +54,97 @@ IDENTITY_OBJECTS = (
 ANY_DEVICE = Identity()
 
 
-HEARTBEAT_PERIOD = 0.2  # [s] not 0: by it alone devices notice that the master died
+POLL_PERIOD = 0.01  # [s]
+CYCLE_PERIOD = 0.01  # [s] without SYNC, and where no device says how often it is read
 
 
 @dataclass(frozen=True, slots=True)
 class MasterConfig:
-    """The master's own settings."""
+    """The master's own settings; each key of bus.yml fills its field, times in [s]."""
 
     node_id: int
     name: str = 'master'  # key in bus.yml; also the name of its ROS node
     driver: str = 'ros2_canopen::MasterDriver'  # driver class as bus.yml names it
     namespace: str = ''  # ROS namespace, empty for none
     remappings: dict[str, str] = field(default_factory=dict)  # ROS remappings, from name to name
-    bitrate: int = 1_000_000  # bit rate in [bit/s], for the bus load
-    sync_period: float = 0.0  # SYNC period in [s]; 0 sends none
-    # time after SYNC within which synchronous PDOs are sent in [s]; 0 for no limit
-    sync_window: float = 0.0
-    sync_overflow: int = 0  # highest SYNC counter value, 0 for a SYNC without counter
-    # 0x1012 of the master: CAN identifier of TIME, with bit 30 when it sends it
-    time_cob_id: int = 0x100
+    bitrate: int = key(
+        1_000_000,
+        'bit rate, for the bus load; the interface is set up outside',
+        unit=KILOBIT,
+        name='baudrate',
+        choices=BITRATES,
+    )
+    heartbeat_producer: float = key(
+        0.2,
+        "period of the master's heartbeat, 0 for none",
+        (0, U16_MAX),
+        unit=MILLISECONDS,
+        why='by default not 0, as only this stops drives when the master dies; write 0 for none',
+    )
+    sync_period: float = key(
+        0.0,
+        'period of SYNC, which is the cycle; 0 for none',
+        (500, 60_000_000),
+        unit=MICROSECONDS,
+        zero=True,
+        why='the unit is microseconds, 10 ms is 10000',
+    )
+    sync_window: float = key(
+        0.0,
+        'time after SYNC in which TPDOs should answer; later ones are counted',
+        (0, U32_MAX),
+        unit=MICROSECONDS,
+        kind=Kind.INTEGER,
+    )
+    sync_overflow: int = key(0, 'highest counter in SYNC, 0 for none', (2, 240), zero=True)
+    time_cob_id: int = key(
+        0x100,
+        'COB-ID of TIME; bit 30 has the master send it, each second by default',
+        (0, U32_MAX),
+    )
+    emcy_inhibit_time: float = key(
+        0.0,
+        'for `canopen dcf` only: the master sends no EMCY',
+        (0, U16_MAX),
+        unit=HUNDRED_MICROSECONDS,
+        kind=Kind.INTEGER,
+        use=Use.UNUSED,
+        why='the master sends no EMCY',
+    )
+    nmt_inhibit_time: float = key(
+        0.0,
+        'shortest time between two NMT commands',
+        (0, U16_MAX),
+        unit=HUNDRED_MICROSECONDS,
+        kind=Kind.INTEGER,
+    )
+    start: bool = key(True, 'false: SYNC and RPDOs wait for NMT start to the id of the master')
+    start_nodes: bool = key(True, 'the master starts each device when it is configured')
+    start_all_nodes: bool = key(
+        False, 'the first start is one frame to all, when all are configured'
+    )
+    reset_all_nodes: bool = key(False, 'the loss of a mandatory device resets all devices')
+    stop_all_nodes: bool = key(False, 'the loss of a mandatory device stops all devices')
+    boot_time: float = key(
+        0.0,
+        'time after which missing mandatory devices are reported, 0 for never',
+        (0, U32_MAX),
+        unit=MILLISECONDS,
+        kind=Kind.INTEGER,
+    )
+    boot_timeout: float = key(
+        2.0, 'time-out of each SDO of the boot', (1, 60_000), unit=MILLISECONDS
+    )
     time_period: float = 0.0  # period of TIME in [s]; 0 sends none
     # period of the control cycle in [s]: that of SYNC, without one the shortest ``period`` of a
     # device
-    cycle_period: float = 0.01
-    # period of the master's own heartbeat in [s]; 0 for none
-    heartbeat_producer: float = HEARTBEAT_PERIOD
+    cycle_period: float = CYCLE_PERIOD
     # how long a device that watches the master waits for its heartbeat in [s], for 0x1016; 0 when
     # there is none
     heartbeat_timeout: float = 0.0
-    # the master runs its cycle from the start; false waits for NMT start with SYNC and RPDOs
-    start: bool = True
-    start_nodes: bool = True  # the master starts devices when they are booted
-    # devices are started by one broadcast, when all mandatory ones are booted
-    start_all_nodes: bool = False
-    reset_all_nodes: bool = False  # the loss of a mandatory device resets all devices
-    stop_all_nodes: bool = False  # the loss of a mandatory device stops all devices
-    nmt_inhibit_time: float = 0.0  # shortest time between two NMT commands in [s]
-    emcy_inhibit_time: float = 0.0  # shortest time between two EMCY frames of the master in [s]
     # 0x1029 of the master by sub-index: what it does when it loses a device
     error_behavior: dict[int, int] = field(default_factory=dict)
     identity: Identity = ANY_DEVICE  # 0x1018 of the master, for the files of other tools
-    boot_time: float = 0.0  # how long mandatory devices may take to boot in [s]; 0 for no limit
-    boot_timeout: float = 2.0  # SDO timeout during boot in [s]
 
     @property
     def is_lifecycle(self) -> bool:
@@ -97,9 +152,6 @@ class MasterConfig:
         return 'Lifecycle' in self.driver
 
 
-SDO_TIMEOUT = 0.2  # [s] not the 20 ms of ros2_canopen, which many devices exceed
-BOOT_TIMEOUT = 1.0  # [s]
-POLL_PERIOD = 0.01  # [s]
 RETRY_FACTOR = 3
 
 
@@ -159,17 +211,43 @@ class NodeConfig:
     guard_time: float = 0.0  # period of node guarding in [s]; 0 for none
     life_time_factor: int = 0  # guard times after which either side takes the other for lost
     retry_factor: int = RETRY_FACTOR  # missing answers after which a guarded device counts as lost
-    # the master checks and configures the device; false leaves it alone, and it is taken as it is
-    boot: bool = True
-    mandatory: bool = False  # the network is not operational without it
-    # the device may be reset at boot; false keeps a running one alive
-    reset_communication: bool = True
-    # sub-index of 0x1011 by which defaults are restored at boot, 0 for none
-    restore_configuration: int = 0
-    sdo_timeout: float = SDO_TIMEOUT  # how long an SDO answer may take in [s]
-    boot_timeout: float = BOOT_TIMEOUT  # how long one boot attempt waits for the device in [s]
-    # how often objects that no PDO carries are read in [s] (``period`` of bus.yml)
-    poll_period: float = POLL_PERIOD
+    boot: bool = key(
+        True,
+        'false: the device is taken as it is, neither reset nor configured nor started',
+    )
+    mandatory: bool = key(False, 'no device is started before this one is configured')
+    reset_communication: bool = key(
+        True,
+        'false: a device that is in operation is taken over without a reset; it must not '
+        'watch the master, so write `heartbeat_consumer: false`, too: else it stops by '
+        'itself while no master is there',
+    )
+    restore_configuration: int = key(
+        0,
+        'sub-index of 0x1011 by which defaults are restored before the boot',
+        (0, 127),
+    )
+    sdo_timeout: float = key(
+        0.2,
+        'time-out of each SDO after the boot',
+        (1, 60_000),
+        unit=MILLISECONDS,
+        name='sdo_timeout_ms',
+    )
+    boot_timeout: float = key(
+        1.0,
+        'how long one attempt to find the device takes',
+        (1, 600_000),
+        unit=MILLISECONDS,
+        name='boot_timeout_ms',
+    )
+    poll_period: float = key(
+        POLL_PERIOD,
+        'how often objects that no PDO carries are read; without SYNC the cycle, too',
+        (1, 60_000),
+        unit=MILLISECONDS,
+        name='period',
+    )
     tpdos: tuple[PdoConfig, ...] = ()  # all TPDOs of the device, by ascending number
     rpdos: tuple[PdoConfig, ...] = ()  # all RPDOs of the device, by ascending number
     # ``time_cob_id``, ``error_behavior`` and the list ``sdo`` of bus.yml, in the order of writing

@@ -29,14 +29,16 @@ def resolve_bus(
     """Make a bus, without what is wrong, of its bus.yml and the EDS files that this names."""
     layout = lay_out(document, findings)
     options = Options(**read_section(layout.options, OPTION_KEYS, findings))
-    settings = read_master(layout.master, findings)
+    settings, config = read_master(layout.master, findings)
     beside = file.parent.absolute()
     eds_files = EdsFiles(beside if bus_config_path is None else bus_config_path, beside)
     readers = {
         name: DeviceReader(name, section, findings) for name, section in layout.devices.items()
     }
-    periods = [reader.settings.poll_period for reader in readers.values()]
-    master = build_master(layout.master, settings, options, periods, findings)
+    periods = [reader.poll_period for reader in readers.values()]
+    master = build_master(
+        layout.master, settings, config, options, findings, device_periods=periods
+    )
     nodes = [
         node
         for reader in readers.values()

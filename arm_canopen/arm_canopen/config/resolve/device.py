@@ -19,7 +19,8 @@ from ...standard.dictionary import (
 from ...standard.objects import AXIS_OFFSET, Index, is_signed
 from ...standard.pdo import SYNCHRONOUS_MAX
 from ..findings import Findings, Place
-from ..model.bus import Identity, MasterConfig, NodeConfig
+from ..keys import keys_of
+from ..model.bus import Identity, MasterConfig, NodeConfig, POLL_PERIOD
 from ..model.drive import DriveConfig
 from ..model.pdo_direction import RPDO, TPDO
 from ..model.tpdo_freshness import with_event_timer
@@ -35,6 +36,7 @@ from .master import check_namespace
 from .pdos import PdoReader
 from .sdo_list import parameter_writes, read_writes
 
+CONFIG_KEYS = keys_of(NodeConfig)
 DRIVE_PROFILE = 'Cia402'  # in the names of the drivers of drives
 DRIVE_OBJECTS = (Index.CONTROLWORD, Index.STATUSWORD)
 CYCLIC_OBJECTS = ((RPDO, Index.CONTROLWORD, 'enabled'), (TPDO, Index.STATUSWORD, 'watched'))
@@ -50,10 +52,12 @@ class DeviceReader:
         self._section = section
         self._findings = findings
         values = read_section(section, DEVICE_KEYS + DRIVE_KEYS, findings)
-        drive_values = {
-            key.field: values.pop(key.field) for key in DRIVE_KEYS if key.field in values
-        }
+        drive_values, self._values = (
+            {key.field: values.pop(key.field) for key in keys if key.field in values}
+            for keys in (DRIVE_KEYS, CONFIG_KEYS)
+        )
         drive = read_drive(section, drive_values, findings)
+        self.poll_period: float = self._values.get('poll_period', POLL_PERIOD)
         self.settings = DeviceSettings(**values)
         check_node_name(name, section.place, findings)
         check_namespace(section, self.settings.namespace, findings)
@@ -104,19 +108,13 @@ class DeviceReader:
             guard_time=self._guard_time(dictionary, producer),
             life_time_factor=life_time_factor,
             retry_factor=settings.retry_factor or options.retry_factor,
-            boot=settings.boot,
-            mandatory=settings.mandatory,
-            reset_communication=settings.reset_communication,
-            restore_configuration=settings.restore_configuration,
-            sdo_timeout=settings.sdo_timeout,
-            boot_timeout=settings.boot_timeout,
-            poll_period=settings.poll_period,
             tpdos=pdos.read(TPDO),
             rpdos=pdos.read(RPDO),
             sdo_writes=read_writes(section, dictionary, findings),
             parameter_writes=parameter_writes(eds, findings),
             axes=_placed(self._axes, dictionary),
             line=section.place.line,
+            **self._values,
         )
         if node.is_drive:
             self._check_profile(node)
@@ -221,7 +219,7 @@ class DeviceReader:
         return capable and master.heartbeat_producer > 0 and wanted is not False
 
     def _check_period(self, master: MasterConfig) -> None:
-        period = self.settings.poll_period
+        period = self.poll_period
         if 'period' in self._section.entries and master.sync_period not in (0.0, period):
             self._findings.warning(
                 self.place_of('period'),

@@ -4,33 +4,37 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, fields
+from dataclasses import replace
 import re
 
 from ...standard.cob_id import TIME_PRODUCER
 from ..findings import Findings, RefusedError
-from ..model.bus import Identity, MasterConfig
+from ..keys import keys_of
+from ..model.bus import CYCLE_PERIOD, Identity, MasterConfig, U16_MAX
 from ..read.document import YamlMap
 from ..read.scalars import integer
 from ..read.section import read_section, texts
-from ..sections import MASTER, MASTER_KEYS, MasterSettings, Options, U8_MAX, U16_MAX
+from ..sections import MASTER_KEYS, MasterSettings, Options, U8_MAX
 from ..units import MILLISECONDS
 from .drivers import check_driver
 from .sdo_list import error_behaviours
 
 NAMESPACE = re.compile(r'/?([A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?')
+CONFIG_KEYS = keys_of(MasterConfig)
 TIME_PERIOD = 1.0  # [s] when only that bit requests it
 HEARTBEAT_TIME_MAX = U16_MAX / MILLISECONDS  # [s] 0x1016 holds 16 bits
 
 
-def read_master(section: YamlMap, findings: Findings) -> MasterSettings:
-    """Read the section ``master``."""
-    settings = MasterSettings(**read_section(section, MASTER_KEYS, findings))
+def read_master(section: YamlMap, findings: Findings) -> tuple[MasterSettings, MasterConfig]:
+    """Read the section ``master``; what other sections have a say in is left as it is."""
+    values = read_section(section, MASTER_KEYS, findings)
+    own = {each.field: values.pop(each.field) for each in CONFIG_KEYS if each.field in values}
+    settings = MasterSettings(**values)
     check_namespace(section, settings.namespace, findings)
     check_driver(section, settings.driver, findings, for_master=True)
     if 'node_id' not in section.entries:
         findings.error(section.place, "no 'node_id'", "write 'node_id: 1'")
-    return settings
+    return settings, MasterConfig(node_id=settings.node_id or 0, **own)
 
 
 def check_namespace(section: YamlMap, namespace: str, findings: Findings) -> None:
@@ -46,40 +50,47 @@ def check_namespace(section: YamlMap, namespace: str, findings: Findings) -> Non
 def build_master(
     section: YamlMap,
     settings: MasterSettings,
+    config: MasterConfig,
     options: Options,
-    device_periods: list[float],
     findings: Findings,
+    *,
+    device_periods: list[float],
 ) -> MasterConfig:
-    """Build the master's configuration; periods of devices in [s] count when there is no SYNC."""
+    """Complete the master's configuration; periods of devices in [s] count without SYNC."""
     time_period = settings.time_period  # bit 30 of its COB-ID requests TIME, too
     if time_period is None:
-        time_period = TIME_PERIOD if settings.time_cob_id & TIME_PRODUCER else 0.0
-    given = asdict(settings)
-    same = {each.name: given[each.name] for each in fields(MasterConfig) if each.name in given}
-    numbers = ('vendor_id', 'product_code', 'revision_number', 'serial_number')
-    return MasterConfig(
-        **same
-        | {
-            'node_id': settings.node_id or 0,
-            'remappings': texts(section, 'remappings', findings),
-            'bitrate': round(settings.bitrate),
-            'time_cob_id': settings.time_cob_id | (TIME_PRODUCER if time_period else 0),
-            'time_period': time_period,
-            'cycle_period': settings.sync_period
-            or min(device_periods, default=MASTER.cycle_period),
-            'heartbeat_timeout': _heartbeat_timeout(section, settings, options, findings),
-            'error_behavior': _error_behaviour(section, findings),
-            'identity': Identity(0, *(given[number] for number in numbers)),
-        }
+        time_period = TIME_PERIOD if config.time_cob_id & TIME_PRODUCER else 0.0
+    return replace(
+        config,
+        driver=settings.driver,
+        namespace=settings.namespace,
+        remappings=texts(section, 'remappings', findings),
+        bitrate=round(config.bitrate),
+        time_cob_id=config.time_cob_id | (TIME_PRODUCER if time_period else 0),
+        time_period=time_period,
+        cycle_period=config.sync_period or min(device_periods, default=CYCLE_PERIOD),
+        heartbeat_timeout=_heartbeat_timeout(section, settings, config, options, findings),
+        error_behavior=_error_behaviour(section, findings),
+        identity=Identity(
+            0,
+            settings.vendor_id,
+            settings.product_code,
+            settings.revision_number,
+            settings.serial_number,
+        ),
     )
 
 
 def _heartbeat_timeout(
-    section: YamlMap, settings: MasterSettings, options: Options, findings: Findings
+    section: YamlMap,
+    settings: MasterSettings,
+    config: MasterConfig,
+    options: Options,
+    findings: Findings,
 ) -> float:
     """Return how long devices wait for the heartbeat of the master in [s]."""
     multiplier = settings.heartbeat_multiplier or options.heartbeat_multiplier
-    timeout = settings.heartbeat_producer * multiplier
+    timeout = config.heartbeat_producer * multiplier
     if timeout > HEARTBEAT_TIME_MAX:
         item = section.entries.get('heartbeat_producer')
         findings.error(
