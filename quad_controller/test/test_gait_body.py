@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 import math
 
 from hypothesis import given
@@ -153,21 +152,6 @@ def test_a_course_is_kept_within_what_the_gait_can(
             assert speed <= parameters.schedule(gait).speed + 1e-9
 
 
-@pytest.mark.parametrize('gait', [Gait.CRAWL, Gait.PACE])
-@pytest.mark.parametrize('asked', [Velocity(0.3), Velocity(y=0.15), Velocity(yaw=1.5)], ids=str)
-def test_slow_gaits_ask_for_no_more_than_the_servos_speed(gait: Gait, asked: Velocity) -> None:
-    """When it walks as fast as it ever does, no joint is faster than its servo."""
-    generator = GaitGenerator(ROBOT, GaitParameters())
-    generator.choose(gait)
-    steps = [generator.step(asked, UPRIGHT, None, 0.02).targets for _ in range(300)]
-    assert generator.clamped
-    if asked.x:
-        assert generator.goal.x == pytest.approx(GaitParameters().top_speed(gait))
-    for before, after in pairwise(steps[100:]):
-        for old, new, limits in zip(before, after, ROBOT.limits, strict=True):
-            assert abs(new - old) <= limits.velocity * 0.02
-
-
 def test_a_body_that_looks_elsewhere_keeps_its_course() -> None:
     """The yaw of the body's pose is no turn of the robot."""
     generator = GaitGenerator(ROBOT, GaitParameters())
@@ -179,16 +163,6 @@ def test_a_body_that_looks_elsewhere_keeps_its_course() -> None:
     for _ in range(101):
         expected = straight.step(Velocity(0.1), BodyPose(yaw=0.2), (0.0, 0.0, 0.2), 0.02)
     assert turned.targets == pytest.approx(expected.targets, abs=0.01)
-
-
-def test_height_lowers_the_body() -> None:
-    """A negative height bends the knees."""
-    generator = GaitGenerator(ROBOT, GaitParameters())
-    for _ in range(100):
-        step = generator.step(REST, BodyPose(z=-0.02), None, 0.02)
-    assert step.reachable
-    for foot in ROBOT.feet(step.targets):
-        assert foot[2] == pytest.approx(FEET[0][2] + 0.02)
 
 
 def test_a_firm_servo_needs_no_compensation() -> None:

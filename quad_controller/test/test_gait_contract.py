@@ -23,7 +23,7 @@ from quad_controller import (
     Velocity,
 )
 from quad_controller.attach_contract import run
-from quad_controller.policy.contract.document import document_of, flatten, read_yaml
+from quad_controller.policy.contract.document import document_of, read_yaml
 from quad_controller.policy.contract.files import read_contract_file
 from quad_controller.policy.contract.model import build_contract, RecurrentState
 from quad_controller.policy.load import LoadedPolicy
@@ -257,7 +257,8 @@ GOOD = {
 )  # fmt: skip
 def test_a_senseless_contract_is_refused(path: str, value: object, words: str) -> None:
     """With path, value, and what it should be."""
-    build_contract(document_of(GOOD, 'test'))
+    good = document_of(GOOD, 'test')
+    assert build_contract(read_yaml(good.to_yaml(), 'again')) == build_contract(good)
     values = value
     for key in reversed(path.split('.')):
         values = {key: values}
@@ -269,30 +270,40 @@ def test_a_senseless_contract_is_refused(path: str, value: object, words: str) -
     assert words in refusal.value.reason
 
 
-def test_all_that_is_open_is_named_at_once() -> None:
-    """A contract of nothing asks for everything it needs."""
+def test_a_contract_of_nothing_asks_for_everything() -> None:
+    """At once."""
     with pytest.raises(PolicyError) as refusal:
         build_contract(document_of({}, 'test'))
     for key in ('joints', 'default_positions', 'period', 'observation.terms', 'action.scale'):
         assert f'{key}: ' in refusal.value.reason
 
 
-def test_a_document_survives_yaml() -> None:
-    """Written and read again, values and their order are the same."""
-    document = document_of(GOOD, 'somewhere')
-    again = read_yaml(document.to_yaml(), 'again')
-    assert list(flatten(again.values)) == list(flatten(document.values))
-    assert build_contract(again) == build_contract(document)
-
-
-def test_a_file_of_no_tool_is_refused(tmp_path: Path) -> None:
-    """Its keys are named, and what is looked for."""
-    path = tmp_path / 'other.yaml'
-    for text, words in (('a: 1\nb: 2', 'its keys: a, b'), ('- 1', 'not a mapping'),
-                        ('a: [', 'not valid YAML')):  # fmt: skip
-        path.write_text(text)
-        with pytest.raises(PolicyError, match=words):
-            read_contract_file(path)
+@pytest.mark.parametrize(
+    ('name', 'text', 'words'),
+    [
+        ('other.yaml', 'a: 1\nb: 2', 'its keys: a, b'),
+        ('other.yaml', '- 1', 'not a mapping'),
+        ('other.yaml', 'a: [', 'not valid YAML'),
+        (
+            'config.yaml',
+            'go2: {observations: [dof_pos], joint_names: [a], joint_mapping: [7]}',
+            'config.yaml',
+        ),
+        ('config.yaml', 'go2: {observations: 5}', 'config.yaml'),
+        (
+            'env.yaml',
+            'sim: {}\ndecimation: 4\nobservations: {policy: {a: {func: b:c, history_length: x}}}',
+            'env.yaml',
+        ),
+    ],
+)
+def test_a_file_of_no_tool_or_form_is_refused(
+    tmp_path: Path, name: str, text: str, words: str
+) -> None:
+    """With the file, or what is looked for; no other error leaves."""
+    (tmp_path / name).write_text(text)
+    with pytest.raises(PolicyError, match=words):
+        read_contract_file(tmp_path / name)
 
 
 def test_a_contract_beside_the_policy_counts(tmp_path: Path) -> None:
@@ -430,24 +441,6 @@ def test_recurrent_states_of_other_sizes_are_refused(tmp_path: Path) -> None:
     assert run(arguments) == 0
     with pytest.raises(PolicyError, match=r'recurrence\.h_in'):
         load(tmp_path / 'policy.onnx')
-
-
-@pytest.mark.parametrize(
-    ('name', 'text'),
-    [
-        ('config.yaml', 'go2: {observations: [dof_pos], joint_names: [a], joint_mapping: [7]}'),
-        ('config.yaml', 'go2: {observations: 5}'),
-        (
-            'env.yaml',
-            'sim: {}\ndecimation: 4\nobservations: {policy: {a: {func: b:c, history_length: x}}}',
-        ),
-    ],
-)
-def test_values_of_another_form_are_refused(tmp_path: Path, name: str, text: str) -> None:
-    """With the file; no other error leaves."""
-    (tmp_path / name).write_text(text)
-    with pytest.raises(PolicyError, match=name):
-        read_contract_file(tmp_path / name)
 
 
 def test_a_model_is_written_whole_and_beside_its_weights(

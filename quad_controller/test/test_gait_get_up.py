@@ -63,12 +63,6 @@ def gives_up(rig: Rig) -> str:
     raise AssertionError(f'it tries for ever; {rig.log}')
 
 
-@pytest.mark.parametrize('side', Lying)
-def test_what_is_below_is_where_it_lies(side: Lying) -> None:
-    """Gravity in the body says so, as the attitude is defined in REP 103."""
-    assert lying_on(lying(side).down) is side
-
-
 angles = st.floats(-math.pi, math.pi)
 
 
@@ -331,16 +325,6 @@ def test_a_body_that_spins_is_refused() -> None:
     rig.imu = replace(lying(Lying.LEFT), angular_velocity=(0.0, 0.0, 20.0))
     rig.run(0.3)
     assert 'max_turn_rate' in rig.controller.set_mode('get_up').message
-
-
-@pytest.mark.parametrize('mode', ['lie', 'relax'])
-def test_there_is_a_way_down(mode: str) -> None:
-    """At any time, as from every other state."""
-    rig = fallen(Lying.RIGHT)
-    rig.ask('get_up')
-    rig.run(1.2)
-    rig.ask(mode)
-    rig.until(State(mode))
 
 
 sides = st.sampled_from([*Lying, None])

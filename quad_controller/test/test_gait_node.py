@@ -28,7 +28,7 @@ from node_runner import LATCHED, ParameterError
 from quad_controller import QuadControllerError, replay_policy
 from quad_controller.nodes.controller_node import ControllerNode
 from quad_description import DescriptionError, quadruped, robot_urdf
-from quad_description.rotations import about, IDENTITY, Quaternion
+from quad_description.rotations import IDENTITY, Quaternion
 from quad_gait_policies import joined, metadata, write_policy
 from quad_msgs.msg import JointCommand
 from quad_msgs.srv import LoadPolicy, SetMode
@@ -106,11 +106,6 @@ class Robot:
             'readiness',
         )
 
-    def until_logged(self, text: str) -> None:
-        """Wait for a line of the log."""
-        lines = self.process.lines
-        self.client.spin_until(lambda: any(text in line for line in lines), 20.0, text)
-
     def mode(self, mode: str) -> Any:
         """Ask for a mode."""
         return self.client.call(SetMode, 'set_mode', SetMode.Request(mode=mode))
@@ -144,29 +139,6 @@ def robot(isolation: Isolation) -> Iterator[Robot]:
         client = stack.enter_context(RosClient(isolation.domain_id))
         process.wait_for('waiting for joint_states')
         yield Robot(client, process)
-
-
-def test_a_robot_that_fell_gets_up(robot: Robot) -> None:
-    """The fault names the mode, asking for it clears it, and it ends standing."""
-    robot.begin()
-    robot.until_ready()
-    assert robot.mode('stand').success
-    robot.until_state('stand')
-    robot.orientation = about((1.0, 0.0, 0.0), -math.pi / 2)
-    robot.until_state('fault')
-    answer = robot.mode('stand')
-    assert not answer.success
-    assert 'request the mode get_up' in answer.message
-    assert robot.mode('get_up').message == 'get_up, coming from fault'
-    robot.until_state('get_up')
-    robot.until_logged('lies on its left side; turns over, try 1')
-    robot.orientation = IDENTITY
-    robot.until_state('stand')
-    robot.orientation = (1.0, 0.0, 0.0, 0.0)
-    robot.until_state('fault')
-    refused = robot.mode('get_up')
-    assert not refused.success
-    assert 'allow that by the parameter get_up_swings' in refused.message
 
 
 def test_from_lying_to_walking_and_back(robot: Robot) -> None:
