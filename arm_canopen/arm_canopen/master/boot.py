@@ -25,6 +25,7 @@ from .sdo_channel import SECOND_ANSWER_TIME
 from .startup import Startup
 from .takeover import preset_outputs, read_outputs
 
+BOOT_UP_TIME = 0.25  # [s] in which devices that were reset usually announce themselves
 STATE_TIMEOUT = 0.5  # [s] to wait for a life sign beyond the period of the heartbeat
 RESTORE_SIGNATURE = b'load'  # CiA 301, 7.5.2.14
 
@@ -94,12 +95,16 @@ class BootProcess:
         self._fault: BootFault | None = BootFault.CONFIGURATION
         self._restored = False
 
-    async def run(self, *, announced: bool, pause: float = 0.0) -> None:
+    async def run(self, *, announced: bool, pause: float = 0.0, was_reset: bool = False) -> None:
         """Boot the device after ``pause`` in [s]; return when it is operational.
 
-        One that has ``announced`` itself by its boot-up message need not be looked for.
+        One that has ``announced`` itself by its boot-up message need not be looked for; one that
+        ``was_reset`` is not asked before it could have done so, as the question would be lost.
         """
         self._startup.forget(self._node)
+        if was_reset:
+            self._enter(BootPhase.WAITING)
+            await self._scheduler.timer(BOOT_UP_TIME)
         if pause > 0.0:
             self._enter(BootPhase.WAITING, f'{pause:g} s, as it {self._node.loss}')
             await self._scheduler.timer(pause)
@@ -354,10 +359,18 @@ class BootManager:
             node.on_boot_up = partial(self._restarted, node)
             node.on_dropped_out = partial(self._dropped_out, node)
 
-    def start(self, node: RemoteNode, *, announced: bool = False, pause: float = 0.0) -> None:
+    def start(
+        self,
+        node: RemoteNode,
+        *,
+        announced: bool = False,
+        pause: float = 0.0,
+        was_reset: bool = False,
+    ) -> None:
         """Boot a device, as of :meth:`BootProcess.run`; anew if a boot is on its way."""
         self._end(node)
-        boot = self._processes[node.name].run(announced=announced, pause=pause)
+        process = self._processes[node.name]
+        boot = process.run(announced=announced, pause=pause, was_reset=was_reset)
         self._tasks[node.name] = self._scheduler.background(boot)
 
     def _dropped_out(self, node: RemoteNode, pause: float) -> None:

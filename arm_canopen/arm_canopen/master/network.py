@@ -124,10 +124,12 @@ class Network:
             self.send_nmt(NmtCommand.RESET_COMMUNICATION, ALL_NODES)
         for node, reset in zip(nodes, resets, strict=True):
             if all(resets) or not reset:
-                self._boots.start(node)
+                self._boots.start(node, was_reset=reset)
                 continue
             sent = self.send_nmt(NmtCommand.RESET_COMMUNICATION, node.config.node_id)
-            sent.when_done(lambda _, node=node: self._boots.start(node))  # type: ignore[misc]
+            sent.when_done(
+                lambda _, node=node: self._boots.start(node, was_reset=True)  # type: ignore[misc]
+            )
 
     def receive(self, frame: Frame) -> None:
         """Take a frame from the bus."""

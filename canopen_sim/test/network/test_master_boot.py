@@ -152,7 +152,7 @@ def test_the_whole_configuration_in_its_order() -> None:
 
 @pytest.mark.parametrize('running', [True, False], ids=['in operation', 'at the start'])
 def test_a_device_that_restarts_gets_no_abort(*, running: bool) -> None:
-    """It knows nothing of a transfer from before, and other tools list an abort as a failure."""
+    """Nor a question before its boot-up: other tools list either as a failure of the device."""
     scene = Scene()
     if running:
         scene.boot()
@@ -162,9 +162,15 @@ def test_a_device_that_restarts_gets_no_abort(*, running: bool) -> None:
         scene.device.answers = True
         scene.device.restart(scene.net.now)
     else:
+        scene.device.answers = scene.device.announces = False
         scene.net.start()
+        scene.run(0.1)  # of its reset
+        scene.device.answers = scene.device.announces = True
+        scene.device.restart(scene.net.now)
     scene.net.run_until(lambda: scene.node.online)
-    assert not [data for data in scene.net.frames(0x600 + NODE_ID) if data[0] == ABORT]
+    questions, answers = (scene.net.frames(base + NODE_ID) for base in (0x600, 0x580))
+    assert not [data for data in questions if data[0] == ABORT]
+    assert len(questions) == len(answers) + running  # none is lost in the reset
 
 
 def test_nothing_is_written_before_pre_operational_and_after_start() -> None:

@@ -546,7 +546,7 @@ def test_a_time_out_that_begins_with_a_frame_counts_from_it() -> None:
     """A request sent in answer to a frame has its whole time, however long ago the last look."""
     net = network('a')
     net.boot()
-    net.run(0.1)  # until nothing else waits
+    net.run(0.3)  # until nothing else waits
     node = net.network.nodes['a']
     begin = net.network.scheduler.now
     node.image.tpdos[0].listener = lambda entry: promises.append(
