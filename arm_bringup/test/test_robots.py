@@ -7,7 +7,6 @@ from __future__ import annotations
 import math
 import os
 from pathlib import Path
-import runpy
 
 import pytest
 
@@ -95,10 +94,3 @@ def test_the_mode_of_streams_is_the_one_that_bus_yml_asks_for() -> None:
         name: stream_mode_service(read_bus(find_robot(name, ROBOTS))) for name in ('panda', 'prbt')
     }
     assert services == {'panda': 'cyclic_position_mode', 'prbt': 'interpolated_position_mode'}
-
-
-def test_the_dcf_of_the_prbt_is_made_of_the_same_eds() -> None:
-    """Nobody edits it by hand: arm_bringup/tools/make_prbt_dcf.py writes it."""
-    tool = runpy.run_path(str(ROBOTS.parent / 'tools' / 'make_prbt_dcf.py'))
-    eds = ROBOTS.parents[1] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
-    assert (ROBOTS / 'prbt' / 'prbt_0_1.dcf').read_text() == tool['derive'](eds.read_text())

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import configparser
-import importlib.util
 from pathlib import Path
 import shutil
 from typing import Any
@@ -21,7 +20,6 @@ from canopen_sim.drive.objects import DriveObjects
 from canopen_sim.objects.object_store import Integer, ObjectStore
 
 TWO_AXES = EDS.with_name('cia402_two_axes.eds')
-TOOL = EDS.parents[1] / 'tools' / 'make_two_axes.py'
 FILES = pytest.mark.parametrize('path', [EDS, TWO_AXES], ids=lambda path: path.stem)
 DEVICE_INFO = [
     'VendorName',
@@ -125,16 +123,6 @@ def test_file_is_ascii_with_short_lines(path: Path) -> None:
     """CiA 306-1 allows ASCII and 255 characters to a line."""
     text = path.read_bytes().decode('ascii')
     assert max(map(len, text.splitlines())) <= 255
-
-
-def test_two_axes_are_made_from_the_single_drive() -> None:
-    """The file of two axes is what its tool makes of the present file of one."""
-    spec = importlib.util.spec_from_file_location('make_two_axes', TOOL)
-    assert spec is not None
-    assert spec.loader is not None
-    tool = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(tool)
-    assert tool.two_axes(EDS.read_text('ascii')) == TWO_AXES.read_text('ascii')
 
 
 def test_second_axis_mirrors_the_first() -> None:

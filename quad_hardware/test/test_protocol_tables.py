@@ -1,11 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The tables: payloads survive, ranges hold, motors and slots agree, the page is up to date."""
+"""The tables: payloads survive, ranges hold, motors and slots agree."""
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -33,7 +32,6 @@ from quad_hardware.protocol import (
     V1,
     V2,
 )
-from quad_hardware.protocol.page import protocol_page
 from quad_state_frames import read_state, state_frame
 
 ROWS = [*V1.functions.values(), *V2.functions.values()]
@@ -162,11 +160,3 @@ def test_a_long_write_runs_through_the_registers() -> None:
 def test_a_firmware_names_the_model(firmware: str, model: Model | None) -> None:
     """The first letters decide; a rider is no quadruped."""
     assert model_of_firmware(firmware) is model
-
-
-def test_the_protocol_page_is_up_to_date() -> None:
-    """PROTOCOL.md is what the tables say."""
-    page = Path(__file__).parents[1] / 'PROTOCOL.md'
-    assert page.read_text(encoding='utf-8') == protocol_page(), (
-        'write it anew: ros2 run quad_hardware protocol > PROTOCOL.md'
-    )

@@ -8,12 +8,14 @@ import atexit
 from collections.abc import Callable
 import re
 import signal
+import subprocess
+import sys
 import threading
 
 import pytest
 from small_processes import program, service_manager, TIMEOUT
 
-from process_supervisor import console, LineWriter, Outcome, Shutdown, supervise
+from process_supervisor import console, join_in_time, LineWriter, Outcome, Shutdown, supervise
 
 Say = Callable[[str], None]
 GivenUp = Callable[[], bool]
@@ -171,3 +173,37 @@ def test_without_readiness_there_is_no_shutdown(
     outcome = supervise(specs, shutdown=shutdown)
     assert outcome.exit_code == 0
     assert 'never\n' not in capsys.readouterr().out
+
+
+PROGRAM = """
+import sys, threading
+from process_supervisor import console
+console.ENDING_TIMEOUT = 0.1
+def hang():
+    threading.Event().wait()
+thread = threading.Thread(target=hang, name='enabling', daemon=True)
+thread.start()
+print(console.join_in_time(thread))
+sys.exit(0)
+"""
+
+
+def test_a_thread_that_has_ended_is_nothing_to_talk_about() -> None:
+    """The program goes on."""
+    thread = threading.Thread(target=lambda: None, daemon=True)
+    thread.start()
+    assert not join_in_time(thread)
+
+
+def test_a_program_ends_without_a_thread_that_hangs() -> None:
+    """It says what that is doing; the exit code is 1, whatever the program would have said."""
+    ended = subprocess.run(
+        [sys.executable, '-c', PROGRAM],
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT,
+        check=False,
+    )
+    assert ended.returncode == 1, ended.stderr
+    assert ended.stdout.startswith("the thread 'enabling' did not end within 0.1 s:\n")
+    assert 'in hang' in ended.stdout

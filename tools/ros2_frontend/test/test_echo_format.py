@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import pytest
 from sensor_msgs.msg import JointState
 
+from ros2_frontend.cli.errors import FrontendError
 from ros2_frontend.verbs.topic_echo import echo, print_lost, printer
 
 INFO = {'source_timestamp': 11, 'received_timestamp': 12, 'publication_sequence_number': 3}
@@ -35,11 +36,13 @@ def printed(capsys: pytest.CaptureFixture[str], *options: str) -> str:
         ('--field header.frame_id', 'base\n---\n'),
         ('--field header.stamp', 'sec: 7\nnanosec: 0\n---\n'),
         ('--field position.[1]', '-1.0\n---\n'),
+        ('--field position[-1]', '-1.0\n---\n'),
+        ('--field .header.stamp.sec.', '7\n---\n'),
         ('--csv', '7,0,base,one,two,0.5,-1.0,,\n'),
         ('--csv -i', '11,12,3,7,0,base,one,two,0.5,-1.0,,\n'),
         ('--flow-style --field header', '{stamp: {sec: 7, nanosec: 0}, frame_id: base}\n---\n'),
         ('--no-str --field header.stamp', 'sec: 7\nnanosec: 0\n---\n'),
-        ('--filter False', ''),
+        ('--filter m.position[1]>0', ''),
         ('--field name --filter len(m)==2', "['one', 'two']\n---\n"),
     ],
 )
@@ -63,6 +66,29 @@ def test_forms(capsys: pytest.CaptureFixture[str], options: str, expected: str) 
 def test_parts(capsys: pytest.CaptureFixture[str], options: str, part: str) -> None:
     """What an option leaves out or adds."""
     assert part in printed(capsys, *options.split())
+
+
+@pytest.mark.parametrize(
+    ('options', 'problem'),
+    [
+        (
+            '--field nam',
+            "Invalid field 'nam': 'JointState' object has no attribute 'nam'\nIt has: header",
+        ),
+        ('--field header.zzz', "'Header' object has no attribute 'zzz'\nIt has: stamp, frame_id"),
+        ('--field name.[5]', 'Invalid field .* index out of range'),
+        ('--field header.[0]', "'Header' object is not subscriptable"),
+        ('--field ...', 'Invalid field value'),
+        ('--filter m.+', r"Invalid filter 'm\.\+'"),
+        ('--filter m.nothing', r"Filter 'm.nothing' failed: .*no attribute"),
+    ],
+)
+def test_a_path_or_filter_that_fails_says_how(
+    capsys: pytest.CaptureFixture[str], options: str, problem: str
+) -> None:
+    """It says how far it went and what is there."""
+    with pytest.raises(FrontendError, match=problem):
+        printed(capsys, *options.split())
 
 
 def test_lost_messages(capsys: pytest.CaptureFixture[str]) -> None:

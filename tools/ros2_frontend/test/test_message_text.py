@@ -4,25 +4,22 @@
 
 from __future__ import annotations
 
-from geometry_msgs.msg import Point, Point32, Polygon, PoseWithCovariance, Twist
+import sys
+from typing import Any
+
+from geometry_msgs.msg import Point, Point32, Polygon, PoseWithCovariance, Vector3
+from hypothesis import example, given
+from hypothesis import strategies as st
 import pytest
 from rcl_interfaces.msg import ParameterValue
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Byte, ByteMultiArray, Char, Empty, String
+import yaml
 
 from ros2_frontend.messages.document import Abbreviation, to_csv, to_document, to_yaml
+from ros2_frontend.names import Message
 
-TWIST = """\
-linear:
-  x: 1.0
-  y: 0.0
-  z: 0.0
-angular:
-  x: 0.0
-  y: 0.0
-  z: 0.5
-"""
 JOINTS = """\
 header:
   stamp:
@@ -38,6 +35,38 @@ position:
 velocity: []
 effort: []
 """
+FIELDS = st.from_regex(r'[a-z][a-z0-9_]{0,5}', fullmatch=True) | st.sampled_from(['y', 'on', 'no'])
+TEXTS = st.text(max_size=12) | st.sampled_from(
+    ['', ' ', 'No', '1', '1e3', '1:30', '~', '- a', '/tf']
+)
+SCALARS = st.one_of(TEXTS, st.booleans(), st.integers(-(2**63), 2**64 - 1), st.floats())
+DOCUMENTS = st.dictionaries(
+    FIELDS,
+    st.recursive(
+        SCALARS,
+        lambda inner: st.lists(inner, max_size=3) | st.dictionaries(FIELDS, inner, max_size=3),
+        max_leaves=8,
+    ),
+    max_size=4,
+)
+
+
+@pytest.mark.slow
+@given(DOCUMENTS, st.booleans())
+@example({'a': [[[], {}], [{'b': [1.0]}]]}, False)
+@example({'a': {'b': '\x85'}}, False)
+@example({'on': 1e22, 'b': -1e-07, 'c': float('-inf')}, False)
+def test_yaml_is_that_of_rosidl_runtime_py(document: dict[str, Any], flow_style: bool) -> None:
+    """PyYAML with its settings, whatever dumper is used here."""
+    text: str = yaml.dump(
+        document,
+        Dumper=yaml.SafeDumper,
+        allow_unicode=True,
+        width=sys.maxsize,
+        default_flow_style=flow_style,
+        sort_keys=False,
+    )
+    assert to_yaml(document, flow_style) == text
 
 
 def joints() -> JointState:
@@ -47,41 +76,32 @@ def joints() -> JointState:
     return message
 
 
-def test_nested_messages_are_indented() -> None:
-    """Fields in the order of their definition, two spaces a level."""
-    message = Twist()
-    message.linear.x, message.angular.z = 1.0, 0.5
-    assert to_yaml(to_document(message)) == TWIST
+@pytest.mark.parametrize(
+    ('message', 'text'),
+    [
+        (joints(), JOINTS),
+        (Vector3(z=0.5), 'x: 0.0\ny: 0.0\nz: 0.5\n'),
+        (Polygon(points=[Point32(x=1.0)]), 'points:\n- x: 1.0\n  y: 0.0\n  z: 0.0\n'),
+        (Byte(data=b'A'), 'data: A\n'),  # the text of the same code point, as rosidl_runtime_py
+        (
+            ByteMultiArray(data=[b'a', b'\xff']),
+            'layout:\n  dim: []\n  data_offset: 0\ndata:\n- a\n- ÿ\n',
+        ),
+        (Empty(), '{}\n'),
+    ],
+)
+def test_a_message_as_yaml(message: Message, text: str) -> None:
+    """Fields in the order of their definition, two spaces a level, dashes below their field."""
+    assert to_yaml(to_document(message)) == text
 
 
-def test_arrays_are_blocks_below_their_field() -> None:
-    """An array's dashes stand under the field's name; an empty one is `[]`."""
-    assert to_yaml(to_document(joints())) == JOINTS
-
-
-def test_fixed_arrays_are_plain_numbers() -> None:
-    """A numpy array gives Python floats."""
+def test_numbers_of_arrays_are_those_of_python() -> None:
+    """No kind of array loses its element type, and numpy's is left behind."""
     document = to_document(PoseWithCovariance())
     assert document['covariance'] == [0.0] * 36
     assert {type(value) for value in document['covariance']} == {float}
-
-
-def test_arrays_of_messages_are_lists_of_documents() -> None:
-    """An array of points."""
-    polygon = Polygon(points=[Point32(x=1.0)])
-    assert to_yaml(to_document(polygon)) == 'points:\n- x: 1.0\n  y: 0.0\n  z: 0.0\n'
-
-
-def test_bytes_are_texts_of_the_same_code_points() -> None:
-    """A byte 0x41 is shown as A, as rosidl_runtime_py does."""
-    assert to_document(Byte(data=b'A')) == {'data': 'A'}
-    assert to_document(ByteMultiArray(data=[b'\x00', b'\xff']))['data'] == ['\x00', '\xff']
-
-
-def test_a_message_without_fields() -> None:
-    """An empty message is an empty mapping."""
-    assert to_yaml(to_document(Empty())) == '{}\n'
-    assert to_csv(Empty()) == ''
+    value = to_document(ParameterValue(bool_array_value=[True, False], integer_array_value=[1]))
+    assert (value['bool_array_value'], value['integer_array_value']) == ([True, False], [1])
 
 
 @pytest.mark.parametrize(
@@ -119,6 +139,7 @@ def test_csv_is_one_line_depth_first() -> None:
     assert to_csv(joints()) == '0,0,base,one,two,0.5,-1.0,,'
     assert to_csv(Point(x=1.0)) == '1.0,0.0,0.0'
     assert to_csv(Char(data=65)) == '65'
+    assert to_csv(Empty()) == ''
     assert to_csv(Byte(data=b'A')) == "b'A'"
 
 
@@ -128,11 +149,3 @@ def test_csv_abbreviates_like_yaml() -> None:
     cut = Abbreviation(no_arrays=True, no_texts=True)
     assert to_csv(String(data='abc'), cut) == '<string length: <3>>'
     assert '<sequence type: double, length: 2>' in to_csv(joints(), cut)
-
-
-def test_bool_arrays_stay_bools() -> None:
-    """No kind of array loses its element type."""
-    value = ParameterValue(bool_array_value=[True, False], integer_array_value=[1])
-    document = to_document(value)
-    assert document['bool_array_value'] == [True, False]
-    assert document['integer_array_value'] == [1]
