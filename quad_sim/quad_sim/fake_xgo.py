@@ -13,14 +13,12 @@ import signal
 import sys
 from types import FrameType
 
-from process_supervisor import ServiceManager
+from process_supervisor import ServiceManager, split_ros_arguments
 
 from .exceptions import SimulationError
 from .line.pseudo_terminal import PseudoTerminal
 from .line.server import Server
 from .options import build, parse_arguments
-
-_ROS_BEGIN, _ROS_END = '--ros-args', '--'
 
 
 def run(argv: Sequence[str] | None = None) -> int:
@@ -39,7 +37,7 @@ def run(argv: Sequence[str] | None = None) -> int:
                 else:
                     from .fake_xgo_node import serve_with_ros
 
-                    serve_with_ros(server, simulation, ros, report_ready)
+                    serve_with_ros(server, simulation, ['--ros-args', *ros], report_ready)
             server.close()
     except SimulationError as error:
         sys.stderr.write(f'fake_xgo: {error}\n')
@@ -50,23 +48,6 @@ def run(argv: Sequence[str] | None = None) -> int:
 def main() -> None:
     """Entry point."""
     sys.exit(run())
-
-
-def split_ros_arguments(argv: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return our own arguments and those for ROS, without importing ROS."""
-    own: list[str] = []
-    ros: list[str] = []
-    in_ros = False
-    for word in argv:
-        if word == _ROS_BEGIN:
-            in_ros = True
-        if in_ros:
-            ros.append(word)
-        else:
-            own.append(word)
-        if in_ros and word == _ROS_END:
-            in_ros = False
-    return own, ros
 
 
 @contextmanager

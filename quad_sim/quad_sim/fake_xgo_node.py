@@ -9,17 +9,15 @@ from concurrent.futures import TimeoutError as NotDoneError
 import gc
 import math
 import sys
-import threading
 
 from geometry_msgs.msg import Vector3
 from nav_msgs.msg import Odometry
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
-from rclpy.utilities import ok, try_shutdown
+from rclpy.utilities import try_shutdown
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
-from node_runner import init_ros, make_executor
+from node_runner import init_ros, spin_beside
 from quad_description import FEET
 from quad_description.rotations import Vector
 from quad_msgs.msg import FootContacts
@@ -137,45 +135,28 @@ def serve_with_ros(
     ros_arguments: Sequence[str],
     report_ready: Callable[[], None],
 ) -> None:
-    """Run the robot in a thread and its node in this one, until one of them ends.
+    """Run the robot in a thread and its node in this one, until the robot is stopped.
 
     Args:
-        server: The loop in which the robot lives.
+        server: The loop in which the robot lives; the caller's signal handlers end it.
 
     Raises:
         SimulationError: What ended the robot.
     """
-    # the caller has signal handlers that end the server
     init_ros(ros_arguments)
-    ended: list[BaseException] = []
-    thread = threading.Thread(target=_live, args=(server, ended), name='fake_xgo')
-    executor = make_executor()
     node = FakeXgoNode(server, simulation)
-    executor.add_node(node)
     sys.setswitchinterval(SWITCH_INTERVAL)
     gc.freeze()  # what is there now is there to stay, and need not be looked through
-    thread.start()
-    report_ready()
+
+    def live() -> None:
+        report_ready()
+        server.run()
+
     try:
-        while ok() and thread.is_alive():
-            executor.spin_once(timeout_sec=0.2)
-    except ExternalShutdownException:
-        pass
+        spin_beside(live, [node], server.stopping, 'fake_xgo')
     finally:
-        server.stop()
-        thread.join()
-        executor.shutdown()
         node.destroy_node()
         try_shutdown()
-    if ended:
-        raise ended[0]
-
-
-def _live(server: Server, ended: list[BaseException]) -> None:
-    try:
-        server.run()
-    except Exception as error:  # noqa: BLE001  reported by the thread that can
-        ended.append(error)
 
 
 def _vector(message: Vector3) -> Vector:

@@ -94,10 +94,10 @@ def build(options: argparse.Namespace) -> Simulation:
         SetupError: An option has no sense.
         SimulationError: MuJoCo is not installed.
     """
-    if not 0.0 <= options.battery <= 100.0:
-        raise SetupError(f'--battery {options.battery}: give 0 to 100 percent')
-    if not 0.0 <= options.command_gap < 1.0:
-        raise SetupError(f'--command-gap {options.command_gap}: give 0 to 1 seconds')
+    for name, most, unit in (('battery', 100, 'percent'), ('command_gap', 1, 'seconds')):
+        value = getattr(options, name)
+        if not 0.0 <= value <= most:
+            raise SetupError(f'--{name.replace("_", "-")} {value}: give 0 to {most} {unit}')
     if len(options.firmware) > 10 or not options.firmware.isascii():
         raise SetupError(f'--firmware {options.firmware!r}: give up to 10 ASCII characters')
     faults = FaultPlan(parse_fault(text) for text in options.fault)
@@ -161,11 +161,10 @@ def parse_mount(text: str) -> tuple[int, Mount]:
     motor, _, rest = text.partition('=')
     sign, _, offset = rest.partition(',')
     try:
-        return int(motor), Mount(int(sign), float(offset or '0'))
-    except SetupError:
-        raise
+        numbers = int(motor), int(sign), float(offset or '0')
     except ValueError:
         raise SetupError(f'--mount {text!r}: give ID=SIGN,DEGREES, such as 12=-1,4.5') from None
+    return numbers[0], Mount(*numbers[1:])
 
 
 def _choose_speeds(name: str, v1_baud: int) -> Mapping[int, Protocol]:

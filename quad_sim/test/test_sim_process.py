@@ -25,7 +25,7 @@ from std_srvs.srv import Trigger
 
 from quad_hardware.protocol import Code, Frame, Kind
 from quad_msgs.srv import InjectFault, Push
-from quad_sim.fake_xgo import run, split_ros_arguments
+from quad_sim.fake_xgo import run
 from quad_state_frames import read_state
 
 pytestmark = pytest.mark.slow
@@ -160,13 +160,6 @@ def test_a_link_to_something_else_is_left_alone(tmp_path: Path) -> None:
     link.symlink_to('/dev/ttyUSB99')
     assert run(['--no-ros', '--physics', 'none', '--link', str(link)]) == 2
     assert str(link.readlink()) == '/dev/ttyUSB99'
-
-
-def test_ros_arguments_are_kept_apart() -> None:
-    """What stands between --ros-args and -- is for ROS."""
-    own, ros = split_ros_arguments(['--arm', '--ros-args', '-r', '__ns:=/dog', '--', '--no-ros'])
-    assert own == ['--arm', '--no-ros']
-    assert ros == ['--ros-args', '-r', '__ns:=/dog', '--']
 
 
 @pytest.fixture

@@ -34,7 +34,7 @@ from .nodes import (
     write_parameters,
 )
 from .readiness import ServiceManager
-from .ros_options import add_namespace, parse_with_ros, RosOptions
+from .ros_options import add_namespace, parse_with_ros, RosOptions, split_ros_arguments
 from .runner import Runner
 from .spec import ProcessSpec, StopStep
 from .supervision import Notice, Outcome, Phase, Severity, Supervision
@@ -78,6 +78,7 @@ __all__ = [
     'parse_with_ros',
     'ros_domain',
     'severity_of',
+    'split_ros_arguments',
     'state_publisher',
     'supervise',
     'view_process',

@@ -114,7 +114,7 @@ def parse_with_ros(
     Returns:
         What the parser found, and the options of the nodes.
     """
-    own, ros = _split(argv)
+    own, ros = split_ros_arguments(argv)
     arguments = parser.parse_args(own)
     try:
         return arguments, _options(arguments.namespace or '', ros)
@@ -122,7 +122,8 @@ def parse_with_ros(
         parser.error(str(error))
 
 
-def _split(argv: Sequence[str]) -> tuple[list[str], list[str]]:
+def split_ros_arguments(argv: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return a program's own words, and those between ``--ros-args`` and ``--``."""
     own: list[str] = []
     ros: list[str] = []
     current = own

@@ -9,7 +9,6 @@ every step of each costs two messages. Here a step of all costs two messages for
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from enum import Enum
 from functools import partial
 from itertools import pairwise
 import math
@@ -36,12 +35,6 @@ Seed = int | list[int | None] | None
 JOIN_TIME = 5.0  # [s] until a process that was asked to end is ended
 
 
-class _Order(Enum):
-    STEP = 'step'
-    RESET = 'reset'
-    CALL = 'call'
-
-
 class _Arrays(NamedTuple):
     """What all processes see; one row for each environment."""
 
@@ -63,14 +56,10 @@ def _memory(count: int, observation: int, action: int) -> _Memory:
 
 def _arrays(memory: _Memory) -> _Arrays:
     """Return views of the memory."""
-    count, (observations, actions, rewards, terminated, truncated) = memory
-    return _Arrays(
-        np.frombuffer(observations, np.float32).reshape(count, -1),
-        np.frombuffer(actions, np.float32).reshape(count, -1),
-        np.frombuffer(rewards, np.float32),
-        np.frombuffer(terminated, np.bool_),
-        np.frombuffer(truncated, np.bool_),
-    )
+    count, parts = memory
+    kinds = (np.float32, np.float32, np.float32, np.bool_, np.bool_)
+    views: list[NDArray[Any]] = list(map(np.frombuffer, parts, kinds))
+    return _Arrays(views[0].reshape(count, -1), views[1].reshape(count, -1), *views[2:])
 
 
 class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
@@ -131,7 +120,7 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         """
         seeds = seed if isinstance(seed, list) else self._seeds(seed)
         for worker in self._workers:
-            worker.order(_Order.RESET, [seeds[index] for index in worker.indices], options)
+            worker.order('reset', [seeds[index] for index in worker.indices], options)
         infos = self._infos(self._answers())
         return self._arrays.observations.copy(), infos
 
@@ -146,7 +135,7 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         arrays = self._arrays
         arrays.actions[:] = actions
         for worker in self._workers:
-            worker.order(_Order.STEP)
+            worker.order('step')
         infos = self._infos(self._answers())
         return (
             arrays.observations.copy(),
@@ -159,7 +148,7 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
     def call(self, name: str, *arguments: Any, **keywords: Any) -> tuple[Any, ...]:  # noqa: ANN401
         """Call a method of each of them; return what they return."""
         for worker in self._workers:
-            worker.order(_Order.CALL, name, arguments, keywords)
+            worker.order('call', name, arguments, keywords)
         return tuple(answer for _, answer in self._answers())
 
     def close_extras(self, **_keywords: Any) -> None:  # noqa: ANN401
@@ -209,7 +198,7 @@ class _Worker:
         self._process.start()
         theirs.close()
 
-    def order(self, order: _Order, *arguments: object) -> None:
+    def order(self, order: str, *arguments: object) -> None:
         """Ask for something; the answer is to be fetched."""
         try:
             self._pipe.send((order, arguments))
@@ -238,68 +227,52 @@ class _Worker:
 def _serve(pipe: Connection, make: Callable[[], Env], memory: _Memory, indices: range) -> None:
     """Do what is asked for until the other end of the pipe is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one that started it ends it
-    arrays = _arrays(memory)
-    envs: list[Env] = []
+    batch = _Batch(_arrays(memory), indices)
     try:
-        envs += [make() for _ in indices]
+        batch.envs += [make() for _ in indices]
         pipe.send([])
         while True:
             order, arguments = pipe.recv()
-            pipe.send(_DO[order](arrays, indices, envs, *arguments))
+            pipe.send(getattr(batch, order)(*arguments))
     except (EOFError, BrokenPipeError, ConnectionResetError):
         pass
     except Exception as error:  # noqa: BLE001  # whatever it is, the other side has to know
         pipe.send(f'{type(error).__name__}: {error}')
-    for env in envs:
+    for env in batch.envs:
         env.close()
 
 
-def _step(arrays: _Arrays, indices: range, envs: list[Env]) -> Answer:
-    answers = []
-    for index, env in zip(indices, envs, strict=True):
-        observation, reward, fallen, over, info = env.step(arrays.actions[index])
-        if fallen or over:
-            info = {'final_obs': observation, 'final_info': info}
-            observation, begun = env.reset()
-            info |= begun
-        arrays.observations[index] = observation
-        arrays.rewards[index] = reward
-        arrays.terminated[index], arrays.truncated[index] = fallen, over
-        if info:
+class _Batch:
+    """The environments of a process."""
+
+    def __init__(self, arrays: _Arrays, indices: range) -> None:
+        self._arrays, self._indices = arrays, indices
+        self.envs: list[Env] = []
+
+    def step(self) -> Answer:
+        answers, arrays = [], self._arrays
+        for index, env in zip(self._indices, self.envs, strict=True):
+            observation, reward, fallen, over, info = env.step(arrays.actions[index])
+            if fallen or over:
+                info = {'final_obs': observation, 'final_info': info}
+                observation, begun = env.reset()
+                info |= begun
+            arrays.observations[index] = observation
+            arrays.rewards[index] = reward
+            arrays.terminated[index], arrays.truncated[index] = fallen, over
+            if info:
+                answers.append((index, info))
+        return answers
+
+    def reset(self, seeds: list[int | None], options: dict[str, Any] | None) -> Answer:
+        answers = []
+        for index, env, seed in zip(self._indices, self.envs, seeds, strict=True):
+            self._arrays.observations[index], info = env.reset(seed=seed, options=options)
             answers.append((index, info))
-    return answers
+        return answers
 
-
-def _reset(
-    arrays: _Arrays,
-    indices: range,
-    envs: list[Env],
-    seeds: list[int | None],
-    options: dict[str, Any] | None,
-) -> Answer:
-    answers = []
-    for index, env, seed in zip(indices, envs, seeds, strict=True):
-        arrays.observations[index], info = env.reset(seed=seed, options=options)
-        answers.append((index, info))
-    return answers
-
-
-def _call(
-    _arrays: _Arrays,
-    indices: range,
-    envs: list[Env],
-    name: str,
-    arguments: tuple[Any, ...],
-    keywords: dict[str, Any],
-) -> Answer:
-    return [
-        (index, env.get_wrapper_attr(name)(*arguments, **keywords))
-        for index, env in zip(indices, envs, strict=True)
-    ]
-
-
-_DO: dict[_Order, Callable[..., Answer]] = {
-    _Order.STEP: _step,
-    _Order.RESET: _reset,
-    _Order.CALL: _call,
-}
+    def call(self, name: str, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> Answer:
+        return [
+            (index, env.get_wrapper_attr(name)(*arguments, **keywords))
+            for index, env in zip(self._indices, self.envs, strict=True)
+        ]

@@ -41,7 +41,8 @@ class Server:
 
     Attributes:
         truth: Where the robot was last; may be read from any thread.
-        unread: Bytes for the host that nobody has read.
+        unread: Bytes for the host that were not read.
+        stopping: Ends :meth:`run` when it is set.
     """
 
     def __init__(
@@ -61,7 +62,7 @@ class Server:
         self._actions: deque[tuple[Future[object], Callable[[], object]]] = deque()
         self._wake_read, self._wake_write = os.pipe()
         os.set_blocking(self._wake_read, False)
-        self._stop = threading.Event()
+        self.stopping = threading.Event()
         self._start = time.monotonic()
         self.unread = 0
         self._watch = watch
@@ -74,7 +75,7 @@ class Server:
             SimulationError: The physics blew up, or the port could not be made again.
         """
         self._start = time.monotonic()
-        while not self._stop.is_set():
+        while not self.stopping.is_set():
             self._turn()
             wait = min(max(self._line.next_event - self.now, 0.0), IDLE_PERIOD)
             watched: list[int | PseudoTerminal] = [self._wake_read]
@@ -86,7 +87,7 @@ class Server:
 
     def stop(self) -> None:
         """End :meth:`run`; from any thread, also from a signal handler."""
-        self._stop.set()
+        self.stopping.set()
         self._wake()
 
     def close(self) -> None:
