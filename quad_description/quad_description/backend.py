@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING
 from .state import RobotState
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
     from typing_extensions import Self
 
 
@@ -42,12 +40,7 @@ class Backend(ABC):
         """Use it in a with statement."""
         return self
 
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         """Close it."""
         self.close()
 

@@ -25,8 +25,6 @@ from quad_msgs.msg import FootContacts, JointCommand
 from quad_pty_peer import Behaviour, PtyPeer
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
     from typing_extensions import Self
 
 TIMEOUT = 20.0  # [s]
@@ -171,12 +169,7 @@ class Rig(ABC):
         """Use it in a with statement."""
         return self
 
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         """End everything."""
         self._stack.close()
 

@@ -38,8 +38,6 @@ from quad_hardware.protocol import (
 from quad_state_frames import state_frame
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
     from typing_extensions import Self
 
 PUSH_PERIOD = 0.02  # [s]
@@ -265,11 +263,6 @@ class PtyPeer:
         self.plug()
         return self
 
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         """Unplug it."""
         self.unplug()

@@ -29,14 +29,14 @@ from quad_description.rotations import (
     yaw_of,
 )
 from quad_hardware import CommandError
-from quad_hardware.calibration.imu import find_mounting, Readings, Stance
+from quad_hardware.calibration.imu import find_mounting, Stance
 from quad_hardware.calibration.main import run_calibrate
 from quad_hardware.calibration.parameter_file import imu_parameters, read_parameters
 from quad_hardware.calibration.robot import ImuReading
 from quad_hardware.estimation import Estimator, EstimatorSettings, ImuMounting
 from quad_hardware.estimation.filters import STANDARD_GRAVITY
 from quad_hardware.joints import JointMap, servo_of
-from quad_hardware.protocol import LEG_MOTORS, V1
+from quad_hardware.protocol import LEG_MOTORS, Protocol, V1, V2
 from quad_hardware.report import Report
 from quad_pty_peer import PtyPeer
 
@@ -267,42 +267,20 @@ def test_a_robot_that_was_not_watched_turning_proves_no_gyro() -> None:
         find_mounting(readings)
 
 
-def test_a_person_proves_the_gyro_over_the_serial_line(tmp_path: Path) -> None:
-    """In protocol v1, which has one: its signs are in the file, and that they are proven."""
-    output, bodies = tmp_path / 'found.yaml', held(ImuMounting())
-    with PtyPeer(tmp_path / 'port', V1) as peer:
+@pytest.mark.parametrize('protocol', [V2, V1], ids=lambda protocol: protocol.name)
+def test_a_person_finds_it_and_the_file_has_it(tmp_path: Path, protocol: Protocol) -> None:
+    """By the dialogue, over the serial line; protocol v1 has a gyro, whose signs are proven."""
+    output, readings = tmp_path / 'found.yaml', held(YAWED if protocol is V2 else ImuMounting())
+    with PtyPeer(tmp_path / 'port', protocol) as peer:
         peer.behaviour.gyro = (1.0, -1.0, 1.0)
 
         def hold(stance: Stance) -> Callable[[], None]:
             def move() -> None:
-                acceleration = bodies[stance].acceleration
+                attitude, acceleration = readings[stance].attitude, readings[stance].acceleration
                 assert acceleration is not None
-                peer.turn_to(bodies[stance].attitude, acceleration)
-
-            return move
-
-        script = Script(*((hold(stance), '') for stance in Stance))
-        command = ['imu', '--port', str(peer.link), '--output', str(output)]
-        assert run_calibrate(command, script) == 0, script.said
-    found = read_parameters(output)['imu']
-    assert isinstance(found, dict)
-    assert found['rate_signs'] == [1.0, -1.0, 1.0]
-    assert found['rates_checked'] is True
-
-
-def test_a_person_finds_it_and_the_file_has_it(tmp_path: Path) -> None:
-    """By the dialogue, over the serial line: the parameters of hardware_node, and checked."""
-    output = tmp_path / 'found.yaml'
-    readings: Readings = held(YAWED)
-    with PtyPeer(tmp_path / 'port') as peer:
-
-        def hold(stance: Stance) -> Callable[[], None]:
-            def move() -> None:
-                reading = readings[stance]
-                assert reading.acceleration is not None
-                peer.behaviour = replace(
-                    peer.behaviour, attitude=reading.attitude, acceleration=reading.acceleration
-                )
+                if protocol is V1:
+                    peer.turn_to(attitude, acceleration)
+                peer.behaviour.attitude, peer.behaviour.acceleration = attitude, acceleration
 
             return move
 
@@ -312,7 +290,10 @@ def test_a_person_finds_it_and_the_file_has_it(tmp_path: Path) -> None:
         assert peer.torque
         assert peer.commands == []
     found = read_parameters(output)['imu']
-    assert found == imu_parameters(find_mounting(readings))['imu']
     assert isinstance(found, dict)
     assert found['mounting_checked'] is True
-    assert 'rates_checked' not in found  # protocol v2 reports no gyro
+    if protocol is V2:  # reports no gyro
+        assert found == imu_parameters(find_mounting(readings))['imu']
+        assert 'rates_checked' not in found
+    else:
+        assert (found['rate_signs'], found['rates_checked']) == ([1.0, -1.0, 1.0], True)

@@ -23,7 +23,7 @@ from quad_hardware.doctor.machine_checks import (
     check_port,
     port_users,
 )
-from quad_hardware.link import latency_timer, SerialPort
+from quad_hardware.link import latency_timer
 from quad_hardware.protocol import V1
 from quad_pty_peer import PtyPeer
 
@@ -187,9 +187,3 @@ def test_a_port_that_may_not_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyP
         finding = found(check_port(str(peer.link)), 'permission')
     assert finding.severity is Severity.ERROR
     assert 'usermod -aG dialout' in finding.remedy
-
-
-def test_a_second_user_of_a_port_is_refused(tmp_path: Path) -> None:
-    """By the port itself."""
-    with PtyPeer(tmp_path / 'port') as peer, SerialPort(str(peer.link), 115200):
-        assert 'another program' in str(found(check_port(str(peer.link)), 'robot'))

@@ -13,7 +13,6 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from isolation import Isolation, reserve
-from processes import executable, RunningProcess
 import pytest
 from rclpy.qos import ReliabilityPolicy
 from std_srvs.srv import SetBool
@@ -143,30 +142,6 @@ def test_silence_holds_the_servos(rig: NodeRig) -> None:
     assert rig.largest_step() <= LARGEST_STEP + 0.01
 
 
-def test_no_command_goes_out_while_no_report_can_be(rig: NodeRig) -> None:
-    """A servo that reads 250 degrees: an error that says so, no jump, and it recovers."""
-    rig.peer.angles[11] = 250.0
-    rig.wait_for_status('serial link', DiagnosticStatus.ERROR, 'motor 11 at 250 deg')
-    rig.peer.commands.clear()
-    rig.command([0.4, 1.4, -1.0] * 4)
-    rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'every report is refused')
-    assert rig.peer.commands == []
-    rig.peer.angles[11] = 20.0
-    rig.wait_for_status('serial link', DiagnosticStatus.OK, 'reports arrive')
-    rig.stream(POSE, 0.2)
-    assert abs(rig.peer.commands[0][11] - 20.0) <= LARGEST_STEP
-    assert rig.largest_step() <= LARGEST_STEP + 0.01
-
-
-@pytest.mark.parametrize('garbage', [250.0, math.nan])
-def test_an_arm_that_is_not_there_disturbs_nothing(rig: NodeRig, garbage: float) -> None:
-    """Whatever its slots report, the legs are published, and follow."""
-    rig.peer.angles[54] = garbage
-    rig.stream(POSE, 0.8)
-    assert list(rig.receive('/joint_states', 10).position) == pytest.approx(POSE, abs=0.01)
-    rig.wait_for_status('serial link', DiagnosticStatus.OK, 'reports arrive')
-
-
 def test_commands_that_break_off_in_motion_end_in_a_safe_posture(rig: NodeRig) -> None:
     """The legs fold softly and diagnostics is in error, until somebody commands again."""
     rig.swing(7)
@@ -193,19 +168,6 @@ def test_commands_that_end_at_rest_leave_the_posture(rig: NodeRig) -> None:
     count = len(rig.peer.commands)
     rig.receive('/joint_states', 50)
     assert len(rig.peer.commands) == count
-
-
-def test_a_leg_that_is_held_in_the_air_comes_down_with_the_end_of_commands(rig: NodeRig) -> None:
-    """As when a controller in fault held there, and was ended."""
-    rig.stream([0.0, 0.9, -0.3, *POSE[3:]], 1.5)
-    status = rig.wait_for_status('joint commands', DiagnosticStatus.ERROR, 'lies down')
-    assert 'in the air' in status.message
-    lying = [math.degrees(angle) for angle in pose_positions(Pose.LIE).values()]
-    rig.client.spin_until(
-        lambda: [rig.peer.angles[m] for m in LEGS_ORDER] == pytest.approx(lying, abs=0.1),
-        TIMEOUT,
-        'lying pose',
-    )
 
 
 def test_a_node_that_ends_in_motion_folds_the_legs_first(
@@ -334,18 +296,3 @@ def test_torque_comes_back_where_the_arm_is(
         rig.client.spin_until(lambda: rig.peer.torque, TIMEOUT, 'torque on')
         targets = {motor: angle for angles in rig.peer.commands for motor, angle in angles.items()}
     assert targets == dict.fromkeys(reported, pytest.approx(20.0, abs=0.6))
-
-
-def test_a_stop_is_clean(rig: NodeRig) -> None:
-    """SIGINT ends it with 0, and the port is free for the next program."""
-    rig.restart()
-
-
-def test_a_wrong_parameter_ends_the_node(isolation: Isolation) -> None:
-    """With exit code 1, and the message names the value and the remedy."""
-    node = executable('quad_hardware', 'hardware_node')
-    arguments = [node, '--ros-args', '-p', 'protokoll:=old']
-    with RunningProcess(arguments, isolation.env) as process:
-        assert process.wait() == 1
-        assert "did you mean 'protocol'" in process.output
-        assert 'Traceback' not in process.output

@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import math
+import sys
+import threading
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -164,3 +166,23 @@ def test_from_beyond_its_limits_a_servo_only_comes_back() -> None:
         command = limiter.step([0.3, *HOME[1:]], found, tick * 0.02)
     assert command.targets[0] == 0.3
     assert command.outside == ()
+
+
+def test_a_lost_robot_may_be_reported_in_the_midst_of_a_command() -> None:
+    """The driver's thread ends the stream while the node's takes a command of it."""
+    limiter, done, place = CommandLimiter(JOINTS), threading.Event(), [0.5] * 12
+
+    def lose() -> None:
+        while not done.is_set():
+            limiter.reset()
+
+    thread, before = threading.Thread(target=lose), sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    thread.start()
+    try:
+        for step in range(5_000):
+            assert len(limiter.step(place, place, 0.02 * step).targets) == len(place)
+    finally:
+        done.set()
+        thread.join()
+        sys.setswitchinterval(before)

@@ -115,12 +115,6 @@ def test_every_target_fits_into_a_frame(
                 dialect.command(angles)
 
 
-def test_a_usual_servo_keeps_its_limits() -> None:
-    """Of every joint of the URDF."""
-    servos = [servo_of(joint) for joint in ARM]
-    assert list(JointMap(servos).servos) == servos
-
-
 @pytest.mark.parametrize(
     ('change', 'reason'),
     [

@@ -417,3 +417,36 @@ def test_a_driver_stops_while_it_looks(tmp_path: Path) -> None:
     wait_for(lambda: 'no such device' in driver.status().detail, 'reason')
     driver.stop()
     assert changes[-1] is LinkState.STOPPED
+
+
+def test_a_change_of_torque_that_is_not_sent_is_reported(tmp_path: Path) -> None:
+    """It was accepted, and then the conversation broke off: the change of the link says so.
+
+    Nobody knows how much of it has left: the servos count as let go until they are to hold.
+    """
+    changes: list[tuple[LinkState, str]] = []
+    accepted: list[bool] = []
+
+    def fail_once(_: Report) -> str:
+        if not accepted and driver.status().state is LinkState.RUNNING:
+            accepted.append(driver.torque(on=False))
+            raise RuntimeError
+        return ''
+
+    found_again = threading.Event()
+
+    def note(state: LinkState, detail: str) -> None:
+        changes.append((state, detail))
+        if accepted and state is LinkState.RUNNING:
+            found_again.set()
+
+    with PtyPeer(tmp_path / 'port') as peer:
+        driver = Driver(LinkOptions(str(peer.link)), fail_once, note)
+        driver.start()
+        assert found_again.wait(15.0), changes
+        driver.stop()
+        assert accepted == [True]
+        assert peer.torque
+        assert driver.limp
+    (failure,) = [detail for state, detail in changes if state is LinkState.FAILED]
+    assert 'torque' in failure

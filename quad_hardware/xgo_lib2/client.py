@@ -32,8 +32,6 @@ from .errors import XgoError, XgoNotSupportedError, XgoTimeoutError
 from .feedback import DeviceState, SendStateParser
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
     from typing_extensions import Self
 
 TIMEOUT = 0.5  # [s] for an answer
@@ -182,12 +180,7 @@ class XgoDog:
         """Use it in a with statement."""
         return self
 
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         """Close the port."""
         self.close()
 

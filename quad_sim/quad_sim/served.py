@@ -19,7 +19,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-from types import TracebackType
 from typing import Any, cast, TYPE_CHECKING
 
 from quad_description import Pose, pose_positions, robot_urdf
@@ -81,12 +80,7 @@ class ServedRobot:
             raise
         return self
 
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         """End the process."""
         self._pipe.close()  # which it takes as the end
         try:

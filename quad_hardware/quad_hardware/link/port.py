@@ -19,8 +19,6 @@ import serial
 from ..exceptions import LinkError
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
     from typing_extensions import Self
 
 SYSFS = Path('/sys/class/tty')
@@ -154,12 +152,7 @@ class SerialPort:
         """Use it in a with statement."""
         return self
 
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         """Close the port."""
         self.close()
 

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 import sys
@@ -34,8 +33,7 @@ from ..exceptions import HardwareError, RecordingError
 from ..link import LinkOptions, LinkState
 from ..recording import Entry, read_serial_log
 from ..replayed_robot import ReplayedRobot
-from ..serial_robot import RobotSettings
-from .parameters import declare_deviations, declare_frames, declare_robot, Deviations, Frames
+from .parameters import declare_deviations, declare_frames, declare_robot
 from .robot_topics import log_link, RobotTopics, WARN_PERIOD
 
 RECORDED = 'hardware_node'  # whose topics these are
@@ -44,7 +42,7 @@ WATCH_PERIOD = 0.5  # [s] between two looks for a hardware_node
 RATES = (0.01, 100.0)
 HELP = """\
 Publish what hardware_node had published while a log of its serial line was recorded; nothing is
-written to a port, and nobody commands the robot of a log.
+written to a port, and the robot of a log takes no commands.
 
 usage: ros2 run quad_hardware replay --ros-args -p log:=FILE [-p NAME:=VALUE ...]
 
@@ -64,48 +62,53 @@ robot_description, preset, arm, joints.*, imu.*, odometry.*, odom_frame, publish
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Parameters:
-    """Parameters of the program."""
-
-    log: Path  # the log
-    rate: float  # how many seconds of the log go by in one
-    start: float  # where it begins, in [s] after the first entry
-    loop: bool  # begin again at the end
-    robot: RobotSettings  # which robot it is
-    frames: Frames  # names of the frames
-    deviations: Deviations  # published with the IMU
-    diagnostics_period: float  # time between two /diagnostics messages in [s]
-
-
 class Replay:
     """The node of a log that is replayed."""
 
-    def __init__(self, node: Node, parameters: Parameters) -> None:
-        """Build it.
+    def __init__(self, node: Node) -> None:
+        """Read the parameters.
 
         Raises:
-            CommandError: The legs of the URDF cannot be read.
+            ParameterError: One is misspelt, of another kind or out of its range.
+            HardwareError: There is no log, or parameters do not fit the robot.
         """
         self._refusal: Exception | None = None
-        self._node, self._parameters = node, parameters
+        self._node = node
+        read = ParameterReader(node)
+        log = read.text('log', '', 'file of a black box, or of serial_log of hardware_node')
+        self._log = Path(log).expanduser()
+        rate = read.number('rate', 1.0, RATES, 'how many seconds of the log go by in one')
+        start = read.number('start', 0.0, (0.0, 1e6), 'where it begins, after the first entry [s]')
+        self._loop = read.flag('loop', 'begin again at the end', default=False)
+        calibration = read.text(
+            'calibration', '', 'YAML file that quad_hardware calibrate has made'
+        )
+        if calibration:
+            give_defaults(node, dict(_calibrated(Path(calibration).expanduser())))
         self._robot = ReplayedRobot(
-            parameters.robot,
+            declare_robot(read, LinkOptions(log)),
             on_state=self._publish,
             on_change=self._log_change,
             on_refusal=self._log_refusal,
         )
+        frames, deviations = declare_frames(read), declare_deviations(read)
+        self._diagnostics_period = read.number(
+            'diagnostics_period', 1.0, (0.05, 60.0), 'time between two /diagnostics messages [s]'
+        )
+        refuse_misspelt(node)
+        if not log:
+            raise RecordingError('give a log: --ros-args -p log:=FILE')
+        if not self._log.is_file():
+            raise RecordingError(f'{self._log}: there is no such file')
         self._player: LogPlayer[Entry] = LogPlayer(
             self._robot,
-            partial(_timed_entries, parameters.log),
-            name=str(parameters.log),
-            rate=parameters.rate,
-            start=parameters.start,
+            partial(_timed_entries, self._log),
+            name=str(self._log),
+            rate=rate,
+            start=start,
         )
         self._player.on_tick = self._tick
-        self._topics = RobotTopics(
-            node, self._robot, parameters.frames, parameters.deviations, self._player.steady
-        )
+        self._topics = RobotTopics(node, self._robot, frames, deviations, self._player.steady)
         self._diagnostics_due = 0.0
 
     def play(self, stop: threading.Event) -> None:
@@ -125,8 +128,9 @@ class Replay:
 
     def _run(self, stop: threading.Event) -> None:
         notify_ready()
-        self._player.play(stop, loop=self._parameters.loop)
-        self._node.get_logger().info(f'{self._parameters.log.name}: end of the log')
+        self._node.get_logger().info(f'replay of {self._log}')
+        self._player.play(stop, loop=self._loop)
+        self._node.get_logger().info(f'{self._log.name}: end of the log')
 
     def _look_for_robot(self, stop: threading.Event) -> None:
         if found := other_nodes(self._node, _published_by(self._node), _own(self._node)):
@@ -150,10 +154,10 @@ class Replay:
     def _tick(self) -> None:
         now = time.monotonic()
         if now >= self._diagnostics_due:
-            self._diagnostics_due = now + self._parameters.diagnostics_period
-            log = str(self._parameters.log)
+            self._diagnostics_due = now + self._diagnostics_period
+            log = str(self._log)
             self._topics.publish_diagnostics(
-                RECORDED, self._parameters.log.name, lambda subject: '' if subject else log
+                RECORDED, self._log.name, lambda subject: '' if subject else log
             )
 
 
@@ -166,15 +170,12 @@ def _serve(stop: threading.Event) -> None:
     node = Node('replay')
     with destroyed_if_refused(node):
         log_as(node)
-        parameters = _declare(node)
+        replay = Replay(node)
         if found := discover_other_nodes(node, _published_by(node), _own(node), stop):
             raise _refusal(found)
     try:
-        if stop.is_set():
-            return
-        replay = Replay(node, parameters)
-        node.get_logger().info(f'replay of {parameters.log}')
-        replay.play(stop)
+        if not stop.is_set():
+            replay.play(stop)
     finally:
         node.destroy_node()
 
@@ -198,29 +199,6 @@ def _refusal(found: list[str]) -> RecordingError:
         f'{found[0]} runs already, so topics would have messages of both: end it, or replay into '
         'a namespace of its own by -r __ns:=/replay'
     )
-
-
-def _declare(node: Node) -> Parameters:
-    read = ParameterReader(node)
-    log = read.text('log', '', 'file of a black box, or of serial_log of hardware_node')
-    rate = read.number('rate', 1.0, RATES, 'how many seconds of the log go by in one')
-    start = read.number('start', 0.0, (0.0, 1e6), 'where it begins, after the first entry [s]')
-    loop = read.flag('loop', 'begin again at the end', default=False)
-    calibration = read.text('calibration', '', 'YAML file that quad_hardware calibrate has made')
-    if calibration:
-        give_defaults(node, dict(_calibrated(Path(calibration).expanduser())))
-    robot = declare_robot(read, LinkOptions(log))
-    frames, deviations = declare_frames(read), declare_deviations(read)
-    period = read.number(
-        'diagnostics_period', 1.0, (0.05, 60.0), 'time between two /diagnostics messages [s]'
-    )
-    refuse_misspelt(node)
-    if not log:
-        raise RecordingError('give a log: --ros-args -p log:=FILE')
-    path = Path(log).expanduser()
-    if not path.is_file():
-        raise RecordingError(f'{path}: there is no such file')
-    return Parameters(path, rate, start, loop, robot, frames, deviations, period)
 
 
 def _calibrated(path: Path) -> Iterator[tuple[str, object]]:

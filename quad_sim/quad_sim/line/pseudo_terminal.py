@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING
 from ..exceptions import SetupError
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
     from typing_extensions import Self
 
 CHUNK = 4096  # [B]
@@ -122,12 +120,7 @@ class PseudoTerminal:
         """Use it in a with statement."""
         return self
 
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         """Take the device and the link away."""
         self.close()
 
