@@ -6,7 +6,7 @@
 - ``resolve``: which value counts, and the model that comes of it.
 - ``model``: typed values in SI units, their checks, and the boot plan.
 
-``sections`` and ``model.drive`` declare each key of bus.yml, once.
+``model`` and ``sections`` declare each key of bus.yml, once.
 
 ``load_bus`` goes all three for a bus, ``load_eds`` reads one device description. Both collect
 everything that is wrong and raise one ``ConfigError`` whose problems name file, line, key and
