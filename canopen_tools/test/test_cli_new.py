@@ -111,24 +111,6 @@ def ones() -> tuple[Row, ...]:
     )
 
 
-def test_velocity_is_in_the_units_of_the_drive(tmp_path: Path) -> None:
-    """Which its EDS may say by 0x6096; torque turns with the position."""
-    rows = [
-        Row(0x6096, 0, 'Highest sub-index', 5, 'const', '2'),
-        Row(0x6096, 1, 'Numerator', 7, 'rw', '60'),
-        Row(0x6096, 2, 'Divisor', 7, 'rw', '1000'),
-    ]
-    drive = written(tmp_path, 'drive.eds', [*SAMPLE, *rows])
-    bus_yml = tmp_path / 'bus.yml'
-    new = ['new', f'arm={drive}@5', '--turn', 'arm=-1000', '--mode', 'arm=1']
-    assert main([*new, '--output', str(bus_yml)]) == 0
-    (node,) = load_bus(bus_yml).nodes
-    axis = node.axes[0]
-    assert axis.scale_pos_to_dev == pytest.approx(-1000.0 / TURN)
-    assert axis.scale_vel_to_dev == pytest.approx(-60.0 / TURN)
-    assert (axis.scale_eff_to_dev, axis.position_mode) == (-1.0, OperationMode.PROFILE_POSITION)
-
-
 @pytest.mark.parametrize(
     ('units', 'velocity'),
     [
@@ -170,6 +152,7 @@ RPM, TENTHS, DEGREES, METRES, COUNTS = (
     Row(0x60A9, 0, 'SI unit velocity', 7, 'rw', value)
     for value in ('0x00B44700', '0xFFB44700', '0x00410300', '0x00010300', '0x00B50300')
 )
+RPM_PER_S = Row(0x60AA, 0, 'SI unit acceleration', 7, 'rw', '0xFFC00300')
 FACTOR = (
     Row(0x6096, 0, 'Highest sub-index', 5, 'const', '2'),
     Row(0x6096, 1, 'Numerator', 7, 'rw', '60'),
@@ -182,7 +165,7 @@ A_TURN = 628_318.5  # [inc] by the factor group of the sample
     ('rows', 'options', 'velocity', 'words'),
     [
         # the factor group says what the joint is in increments, and a turn is one of the joint
-        ([RPM], ['--turn', f'arm=-{A_TURN}'], -60 / TURN, '1 turns/min'),
+        ([RPM, RPM_PER_S], ['--turn', f'arm=-{A_TURN}'], -60 / TURN, '1 turns/min'),
         # somebody else says it, and what turns so fast
         ([RPM], ['--turn', 'arm=1000', '--rpm', 'arm=26'], 26 * 60 / TURN, '# rpm, 26 turns'),
         ([TENTHS], ['--turn', 'arm=1000', '--rpm', 'arm=26'], 26 * 600 / TURN, '0.1 turns/min by'),
@@ -192,6 +175,8 @@ A_TURN = 628_318.5  # [inc] by the factor group of the sample
         # 0x6096 that agrees, and 0x60A9 that is overruled
         ([RPM, *FACTOR], ['--turn', 'arm=4096', '--rpm', 'arm=1'], 60 / TURN, '# rpm, 1 turns'),
         ([COUNTS], ['--turn', 'arm=1000', '--rpm', 'arm=2'], 120 / TURN, 'has 1 increments/s'),
+        # 0x6096 alone; torque turns with the position
+        (FACTOR, ['--turn', 'arm=-4096', '--mode', 'arm=1'], -60 / TURN, 'by 0x6096 of the EDS'),
     ],
 )
 def test_velocity_is_in_the_unit_that_the_eds_names(
@@ -203,8 +188,12 @@ def test_velocity_is_in_the_unit_that_the_eds_names(
     (node,) = load_bus(bus_yml).nodes
     assert node.drive.scale_vel_to_dev == pytest.approx(velocity)
     assert node.drive.scale_vel_from_dev == pytest.approx(1 / velocity)
+    assert node.drive.scale_eff_to_dev == math.copysign(1.0, node.drive.scale_pos_to_dev)
     (line,) = re.findall('scale_vel_to_dev.*', bus_yml.read_text())
     assert words in line
+    if RPM_PER_S in rows:  # 0.1 rpm/s beside rpm: ten times the scale of velocities
+        assert node.drive.scale_acc_to_dev == pytest.approx(-600 / TURN)
+        assert 'by 0x60A9, 0x60AA of the EDS' in bus_yml.read_text()
 
 
 def test_an_epos4_is_asked_for_its_gear(
@@ -232,18 +221,6 @@ def test_what_the_master_reads_from_the_drive_is_not_written_out(tmp_path: Path,
     assert 'scale_vel_to_dev' not in text
     assert '# velocity units per second' in text
     assert 'scale_acc_to_dev' in text
-
-
-RPM_PER_S = Row(0x60AA, 0, 'SI unit acceleration', 7, 'rw', '0xFFC00300')
-
-
-def test_accelerations_have_the_unit_that_the_eds_names(tmp_path: Path) -> None:
-    """0.1 rpm/s beside rpm: ten times the scale of velocities."""
-    eds, bus_yml = written(tmp_path, 'drive.eds', [*SAMPLE, RPM, RPM_PER_S]), tmp_path / 'bus.yml'
-    assert main(['new', f'arm={eds}@5', '--turn', f'arm={A_TURN}', '--output', str(bus_yml)]) == 0
-    (node,) = load_bus(bus_yml).nodes
-    assert node.drive.scale_acc_to_dev == pytest.approx(600 / TURN)
-    assert 'by 0x60A9, 0x60AA of the EDS' in bus_yml.read_text()
 
 
 def test_the_target_is_that_of_the_mode(tmp_path: Path) -> None:

@@ -57,43 +57,6 @@ def test_fast_scan_is_not_misled_by_slow_devices(data: st.DataObject) -> None:
     assert network.run(network.master.fast_scan()) == FIRST
 
 
-def test_a_device_gets_its_id_and_boots() -> None:
-    """From nothing to a boot-up message: scan, set, store, let go."""
-    network = LssNetwork([FIRST])
-    master = network.master
-    assert network.run(master.has_unconfigured())
-    assert network.run(master.fast_scan()) == FIRST
-    assert network.run(master.inquire_node_id()) == 255
-    network.run(master.set_node_id(17))
-    network.run(master.set_bit_rate(500_000))
-    network.run(master.store())
-    assert network.received == []
-    master.switch_all(LssState.WAITING)
-    assert not network.run(master.has_unconfigured())
-    assert [frame.can_id for frame in network.received] == [0x711]
-    assert network.host.devices[0].node_id == 17
-
-
-def test_devices_are_selected_by_their_address() -> None:
-    """Of two devices with ids of their own, the one that is meant answers."""
-    network = LssNetwork([FIRST, SECOND], [5, 6])
-    network.run(network.master.select(SECOND))
-    assert network.run(network.master.inquire_node_id()) == 6
-    assert network.run(network.master.inquire_address()) == SECOND
-    with pytest.raises(LssError, match='no device has the LSS address 0x00000555 0x00001234'):
-        network.run(network.master.select(FIRST._replace(serial=1)))
-
-
-def test_several_devices_in_configuration_are_noticed() -> None:
-    """One node id must not be given to two devices."""
-    network = LssNetwork([FIRST, SECOND])
-    network.master.switch_all(LssState.CONFIGURATION)
-    with pytest.raises(LssError, match='node id 17: 2 devices answer; select one'):
-        network.run(network.master.set_node_id(17))
-    with pytest.raises(LssError, match='2 devices answer'):
-        network.run(network.master.inquire_address())
-
-
 def test_refusals_are_reported() -> None:
     """What no device can take is refused before it is sent, what this one cannot by its code."""
     network = LssNetwork([FIRST])
@@ -156,13 +119,6 @@ def test_frames_that_are_no_answer_are_passed_over() -> None:
         master.receive(frame)
     scheduler.advance(1.0)
     assert task.result() is False
-
-
-def test_the_switch_of_the_bit_rate_has_its_delay() -> None:
-    """In milliseconds, little-endian."""
-    sent: list[Frame] = []
-    LssMaster(Scheduler(), sent.append).activate_bit_rate(0.5)
-    assert sent == [Frame(0x7E5, bytes.fromhex('15F4010000000000'))]
 
 
 @pytest.mark.parametrize(
