@@ -25,9 +25,13 @@ def read(folder: Path, text: str | bytes) -> Eds:
 
 def test_a_careful_file_is_read_without_warnings(tmp_path: Path) -> None:
     """Every object is there with type, access, default, limits and mapping; nothing is odd."""
-    eds = read(tmp_path, eds_text())
+    text = eds_text()
+    eds = read(tmp_path, text)
     assert not eds.warnings
     assert len(eds.dictionary) == len(DRIVE_ROWS)
+    statusword = eds.dictionary.get(0x6041)
+    assert statusword is not None
+    assert text.splitlines()[statusword.line - 1] == '[6041]'
     for row in DRIVE_ROWS:
         entry = eds.dictionary.get(row.index, row.subindex)
         assert entry is not None
@@ -39,23 +43,13 @@ def test_a_careful_file_is_read_without_warnings(tmp_path: Path) -> None:
         assert entry.high_limit == (float(row.high) if row.high else None)
 
 
-def test_line_numbers_are_those_of_the_sections(tmp_path: Path) -> None:
-    """An entry knows the line of its section, for messages."""
-    text = eds_text()
-    eds = read(tmp_path, text)
-    entry = eds.dictionary.get(0x6041)
-    assert entry is not None
-    assert text.splitlines()[entry.line - 1] == '[6041]'
-
-
 def test_defaults_with_the_node_id(tmp_path: Path) -> None:
     """``$NODEID`` sums stay open until the node id is known."""
     eds = read(tmp_path, eds_text())
-    entry = eds.dictionary.get(0x1800, 1)
+    entry, resolved = eds.dictionary.get(0x1800, 1), eds.dictionary.for_node(5).get(0x1800, 1)
     assert entry is not None
-    assert entry.node_relative
-    resolved = eds.dictionary.for_node(5).get(0x1800, 1)
     assert resolved is not None
+    assert entry.node_relative
     assert resolved.default == 0x185
 
 
@@ -270,18 +264,13 @@ def test_dummy_usage(tmp_path: Path) -> None:
 def test_files_that_are_no_eds_are_refused(
     tmp_path: Path, content: bytes | None, message: str
 ) -> None:
-    """A missing, empty or binary file is one ConfigError with the path and a remedy."""
+    """A missing, empty or binary file or a folder is one error with the path and a remedy."""
     path = tmp_path / 'x.eds'
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(ConfigError, match=message) as caught:
-        load_eds(path)
-    (problem,) = caught.value.problems
-    assert problem.file == path
-    assert problem.remedy
-
-
-def test_a_folder_is_no_eds(tmp_path: Path) -> None:
-    """Naming a folder is refused like a missing file."""
-    with pytest.raises(ConfigError, match='no such file'):
-        load_eds(tmp_path)
+    for each in (path, tmp_path) if content is None else (path,):
+        with pytest.raises(ConfigError, match=message) as caught:
+            load_eds(each)
+        (problem,) = caught.value.problems
+        assert problem.file == each
+        assert problem.remedy
