@@ -9,10 +9,9 @@ no race. A round trip is between two processes. All of them are printed, none is
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, ExitStack, suppress
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
 import itertools
 import math
 import multiprocessing
@@ -21,6 +20,7 @@ import os
 from pathlib import Path
 import statistics
 from time import perf_counter, process_time
+from typing import Any
 import warnings
 
 import can
@@ -36,180 +36,149 @@ BATCH = 100  # frames before they are read; all buffers hold as many
 ROUND_TRIPS = 2000
 BURSTS = (200, 500, 1000, 2000, 5000, 10_000)
 PAYLOAD = bytes(range(8))
+REQUEST, ANSWER, END = 1, 2, 0  # identifiers of a round trip
 
 _ports = itertools.count(29000 + os.getpid() % 900)
 
 
 @dataclass
 class Peer:
-    """A bus of either library with the same calls."""
+    """An open bus of either library with the same calls."""
 
-    title: str  # what it is
-    send: Callable[[], None]  # sends one frame of eight bytes
-    drain: Callable[[], int]  # reads what is there and returns how many frames
+    send: Callable[[int], None]  # sends a frame of eight bytes with this identifier
+    receive: Callable[[float], list[int]]  # waits up to some [s], and returns identifiers
     # returns how many frames it knows to be lost, None when it cannot know
     lost: Callable[[], int | None]
 
 
-@contextmanager
-def ours(name: str) -> Iterator[Peer]:
-    """Open two of our buses on one name."""
-    frame = Frame(0x185, PAYLOAD)
-    with open_bus(name) as sender, open_bus(name) as receiver:
+@dataclass(frozen=True)
+class Candidate:
+    """A bus to be measured: one of ours by its name, or an interface of python-can."""
 
-        def drain() -> int:
-            return sum(len(frames) for frames in iter(lambda: receiver.receive(0.0), []))
+    name: str
+    options: Mapping[str, Any] = field(default_factory=dict)  # of python-can; empty for ours
 
-        title = name.partition(':')[0]
-        yield Peer(title, lambda: sender.send(frame), drain, lambda: receiver.counters.lost)
+    @property
+    def title(self) -> str:
+        """Which bus it is."""
+        return f'python-can {self.name}' if self.options else self.name.partition(':')[0]
 
+    @contextmanager
+    def opened(self) -> Iterator[Peer]:
+        """Open it once more."""
+        if not self.options:
+            with open_bus(self.name) as ours:
+                yield Peer(
+                    lambda can_id: ours.send(Frame(can_id, PAYLOAD)),
+                    lambda timeout: [frame.can_id for frame in ours.receive(timeout)],
+                    lambda: ours.counters.lost,
+                )
+            return
+        with can.Bus(interface=self.name, ignore_config=True, **self.options) as theirs:
 
-@contextmanager
-def theirs(interface: str, **options: object) -> Iterator[Peer]:
-    """Open two python-can buses of an interface."""
-    message = can.Message(arbitration_id=0x185, data=PAYLOAD, is_extended_id=False)
-    with (
-        can.Bus(interface=interface, ignore_config=True, **options) as sender,  # type: ignore[arg-type]
-        can.Bus(interface=interface, ignore_config=True, **options) as receiver,  # type: ignore[arg-type]
-    ):
+            def receive(timeout: float) -> list[int]:
+                first = theirs.recv(None if math.isinf(timeout) else timeout)
+                rest = iter(lambda: theirs.recv(0) if first else None, None)
+                return [each.arbitration_id for each in (first, *rest) if each]
 
-        def drain() -> int:
-            count = sum(1 for _ in iter(lambda: receiver.recv(0), None))
-            for _ in iter(lambda: sender.recv(0), None):  # its own echoes
-                pass
-            return count
+            def send(can_id: int) -> None:
+                message = can.Message(arbitration_id=can_id, data=PAYLOAD, is_extended_id=False)
+                theirs.send(message)
 
-        yield Peer(f'python-can {interface}', lambda: sender.send(message), drain, lambda: None)
-
-
-def multicast_options() -> dict[str, object]:
-    """Return a group of one's own in python-can's words."""
-    return {'channel': '239.74.163.77', 'port': next(_ports)}
-
-
-def multicast_name() -> str:
-    """Return a group of one's own in our words."""
-    return f'udp_multicast:239.74.163.78:{next(_ports)}'
+            yield Peer(send, receive, lambda: None)
 
 
-def candidates() -> Iterator[Callable[[], AbstractContextManager[Peer]]]:
-    """Yield what opens each bus to be compared."""
-    yield partial(ours, 'virtual:bench')
-    yield partial(theirs, 'virtual', channel='bench')
-    yield partial(ours, multicast_name())
-    yield partial(theirs, 'udp_multicast', **multicast_options())
+def multicast() -> tuple[Candidate, Candidate]:
+    """Return ours and python-can's multicast bus, each on a group of its own."""
+    ours = Candidate(f'udp_multicast:239.163.78.1:{next(_ports)}')
+    options = {'channel': '239.163.77.1', 'port': next(_ports)}
+    return ours, Candidate('udp_multicast', options)
+
+
+def candidates() -> Iterator[Candidate]:
+    """Yield each bus to be compared."""
+    yield Candidate('virtual:bench')
+    yield Candidate('virtual', {'channel': 'bench'})
+    yield from multicast()
     for name, interface in can_interfaces().items():
         if interface.is_up and name.startswith('vcan'):
-            yield partial(ours, name)
-            yield partial(theirs, 'socketcan', channel=name)
+            yield Candidate(name)
+            yield Candidate('socketcan', {'channel': name})
 
 
-def bench_cost(peer: Peer) -> tuple[float, float]:
+def drain(receiver: Peer, sender: Peer) -> int:
+    """Read what is there, echoes of the sender too; return the frames of the receiver."""
+    while sender.receive(0.0):
+        pass
+    count = 0
+    while received := receiver.receive(0.0):
+        count += len(received)
+    return count
+
+
+def bench_cost(sender: Peer, receiver: Peer) -> tuple[float, float]:
     """Return CPU time per frame to send and to receive in [us]."""
     sending = receiving = 0.0
     received = 0
     for _ in range(FRAMES // BATCH):
         start = process_time()
         for _ in range(BATCH):
-            peer.send()
+            sender.send(0x185)
         middle = process_time()
-        received += peer.drain()
+        received += drain(receiver, sender)
         receiving += process_time() - middle
         sending += middle - start
     return sending / FRAMES * 1e6, receiving / max(received, 1) * 1e6
 
 
-def bench_bursts(peer: Peer) -> list[str]:
+def bench_bursts(sender: Peer, receiver: Peer) -> list[str]:
     """Return what of each burst arrives at a late reader, and the losses that it knows of."""
     texts = []
     for burst in BURSTS:
-        peer.drain()
+        drain(receiver, sender)
         for _ in range(burst):
-            peer.send()
-        got = peer.drain()
+            sender.send(0x185)
+        got = drain(receiver, sender)
         texts.append(f'{got}' if got == burst else f'{got}!')
-    peer.send()  # the kernel reports the count with the next frame
-    peer.drain()
-    lost = peer.lost()
-    texts.append('?' if lost is None else f'{lost}')
-    return texts
+    sender.send(0x185)  # the kernel reports the count with the next frame
+    drain(receiver, sender)
+    lost = receiver.lost()
+    return [*texts, '?' if lost is None else f'{lost}']
 
 
-def echo_ours(name: str, ready: Event) -> None:
-    """Send every frame back, in a process of its own."""
-    with open_bus(name) as bus:
+def echo(candidate: Candidate, ready: Event) -> None:
+    """Answer every request, in a process of its own."""
+    with candidate.opened() as peer:
         ready.set()
-        while True:
-            for frame in bus.receive(math.inf):
-                if frame.can_id == 0:
-                    return
-                bus.send(Frame(frame.can_id + 1, frame.data))
+        received: list[int] = []
+        while END not in received:
+            received = peer.receive(math.inf)
+            for _ in range(received.count(REQUEST)):
+                peer.send(ANSWER)
 
 
-def echo_theirs(channel: str, port: int, ready: Event) -> None:
-    """Send every message back, in a process of its own."""
-    with can.Bus(interface='udp_multicast', channel=channel, port=port) as bus:
-        ready.set()
-        while (message := bus.recv()) is None or message.arbitration_id:
-            if message and message.arbitration_id == 1:
-                message.arbitration_id = 2
-                bus.send(message)
-
-
-@contextmanager
-def another(target: Callable[..., None], *arguments: object) -> Iterator[None]:
-    """Run a function in another process until the block ends."""
+def round_trips(candidate: Candidate) -> list[float]:
+    """Return times from request to answer in [us]."""
     context = multiprocessing.get_context('spawn')
     ready = context.Event()
-    process = context.Process(target=target, args=(*arguments, ready), daemon=True)
+    process = context.Process(target=echo, args=(candidate, ready), daemon=True)
     process.start()
+    times = []
     try:
-        if not ready.wait(30.0):
-            raise RuntimeError('the other process did not start')
-        yield
+        with candidate.opened() as peer:
+            if not ready.wait(30.0):
+                raise RuntimeError('the other process did not start')
+            for _ in range(ROUND_TRIPS):
+                start = perf_counter()
+                peer.send(REQUEST)
+                while (received := peer.receive(1.0)) and ANSWER not in received:
+                    pass  # its own echo
+                times.append((perf_counter() - start) * 1e6)
+            peer.send(END)
     finally:
         process.join(5.0)
         process.kill()
-
-
-def round_trips_ours() -> list[float]:
-    """Return times from frame to answer in [us]."""
-    name = multicast_name()
-    times = []
-    with open_bus(name) as bus, another(echo_ours, name):
-        for _ in range(ROUND_TRIPS):
-            start = perf_counter()
-            bus.send(Frame(1, PAYLOAD))
-            bus.receive(1.0)
-            times.append((perf_counter() - start) * 1e6)
-        bus.send(Frame(0))
     return times
-
-
-def round_trips_theirs() -> list[float]:
-    """Return times from message to answer in [us]."""
-    options = multicast_options()
-    times = []
-    with (
-        can.Bus(interface='udp_multicast', ignore_config=True, **options) as bus,  # type: ignore[arg-type]
-        another(echo_theirs, options['channel'], options['port']),
-    ):
-        for _ in range(ROUND_TRIPS):
-            start = perf_counter()
-            bus.send(can.Message(arbitration_id=1, data=PAYLOAD, is_extended_id=False))
-            while (message := bus.recv(1.0)) and message.arbitration_id != 2:
-                pass  # its own echo
-            times.append((perf_counter() - start) * 1e6)
-        bus.send(can.Message(arbitration_id=0, is_extended_id=False))
-    return times
-
-
-def cost(function: Callable[[], object], count: int = 100_000) -> float:
-    """Return the CPU time of a call in [us]."""
-    start = process_time()
-    for _ in range(count):
-        function()
-    return (process_time() - start) / count * 1e6
 
 
 def bench_pieces() -> None:
@@ -220,14 +189,17 @@ def bench_pieces() -> None:
     log = LogWriter(Path(os.devnull), 'can0', 1.7e9)
     burst = [frame] * 100
     print('\npieces                                 us')
-    for title, function in (
-        ('encode a datagram', lambda: encode(frame)),
-        ('decode a datagram', lambda: decode(datagram, 1.0)),
-        ('count a frame for the bus load', lambda: load.count(frame)),
-        ('describe a frame without bus.yml', lambda: describer.describe(frame)),
-        ('write 100 frames to a log', lambda: log.write(burst)),
+    for title, function, count in (
+        ('encode a datagram', lambda: encode(frame), 100_000),
+        ('decode a datagram', lambda: decode(datagram, 1.0), 100_000),
+        ('count a frame for the bus load', lambda: load.count(frame), 100_000),
+        ('describe a frame without bus.yml', lambda: describer.describe(frame), 100_000),
+        ('write 100 frames to a log', lambda: log.write(burst), 10_000),
     ):
-        print(f'  {title:<34} {cost(function):5.2f}')
+        start = process_time()
+        for _ in range(count):
+            function()
+        print(f'  {title:<34} {(process_time() - start) / count * 1e6:5.2f}')
 
 
 def main() -> None:
@@ -237,22 +209,21 @@ def main() -> None:
     print('CPU time per frame of 8 bytes, and what arrives of a burst (! some lost)')
     print(f'{"bus":<26} {"send us":>8} {"recv us":>8} {"frames/s":>9}   {head}    lost')
     for candidate in candidates():
-        with ExitStack() as stack:
-            try:
-                peer = stack.enter_context(candidate())
-            except (BusError, can.CanError) as error:
-                print(f'{"":<26} {error}')
-                continue
-            sending, receiving = bench_cost(peer)
-            arrived = '  '.join(f'{text:>6}' for text in bench_bursts(peer))
-            rate = 1e6 / (sending + receiving)
-            print(f'{peer.title:<26} {sending:8.2f} {receiving:8.2f} {rate:9.0f}   {arrived}')
+        try:
+            with candidate.opened() as sender, candidate.opened() as receiver:
+                sending, receiving = bench_cost(sender, receiver)
+                arrived = '  '.join(f'{text:>6}' for text in bench_bursts(sender, receiver))
+        except (BusError, can.CanError) as error:
+            print(f'{"":<26} {error}')
+            continue
+        rate = 1e6 / (sending + receiving)
+        print(f'{candidate.title:<26} {sending:8.2f} {receiving:8.2f} {rate:9.0f}   {arrived}')
     print(f'\nround trip between two processes, {ROUND_TRIPS} times   p50 us   p99 us')
-    for title, measure in (('ours', round_trips_ours), ('python-can', round_trips_theirs)):
+    for candidate in multicast():
         with suppress(can.CanError):
-            times = measure()
+            times = round_trips(candidate)
             p99 = statistics.quantiles(times, n=100)[98]
-            print(f'  udp_multicast, {title:<30} {statistics.median(times):8.0f} {p99:8.0f}')
+            print(f'  {candidate.title:<45} {statistics.median(times):8.0f} {p99:8.0f}')
     bench_pieces()
 
 
