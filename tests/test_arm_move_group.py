@@ -43,10 +43,8 @@ from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_model import frozen
-from arm_model.ros import seconds
+from arm_model.ros import apply_planning_scene, scene_change, seconds
 from arm_msgs.srv import InjectFault
-from arm_planning.ros.scene_changes import apply_object
-from arm_planning.ros.scene_snapshot import SceneSnapshot
 from node_runner import LATCHED
 
 if TYPE_CHECKING:
@@ -372,7 +370,7 @@ class Observer:
         """Check all states that have come."""
         robot = panda()
         home = robot.positions({})
-        scene = apply_object(SceneSnapshot(robot.scene), visitor, home).scene
+        scene = apply_planning_scene(robot.scene, scene_change(visitor), home)
         for state in self._states:
             places = dict(zip(state.name, state.position, strict=True))
             (measured,) = distances(scene, robot.positions(places)).tolist()

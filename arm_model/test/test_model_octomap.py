@@ -42,7 +42,7 @@ from arm_model import (
 from arm_model import CollisionObject as Thing
 from arm_model import PlanningScene as Scene
 from arm_model import Pose as Placement
-from arm_model.ros import apply_attached_object, apply_collision_object, apply_planning_scene
+from arm_model.ros import apply_planning_scene, scene_change
 from arm_model.scene.octomap import _blocks
 
 MODEL = chain('zyyp')
@@ -226,11 +226,11 @@ def test_the_name_of_the_map_is_reserved() -> None:
     """No object may have it; removing all objects keeps the map, as in MoveIt."""
     scene = with_map(MODEL.scene, octomap())
     everything = CollisionObject(operation=CollisionObject.REMOVE)
-    assert OCTOMAP_NAME in apply_collision_object(scene, everything, AT).objects
+    assert OCTOMAP_NAME in apply_planning_scene(scene, scene_change(everything), AT).objects
     thing = CollisionObject(id=OCTOMAP_NAME, operation=CollisionObject.ADD)
     thing.primitives = [SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[0.1])]
     with pytest.raises(SceneError, match='name reserved'):
-        apply_collision_object(scene, thing, AT)
+        apply_planning_scene(scene, scene_change(thing), AT)
     body = AttachedCollisionObject(link_name='link_3', object=thing)
     with pytest.raises(SceneError, match='name reserved'):
-        apply_attached_object(scene, body, AT)
+        apply_planning_scene(scene, scene_change(body), AT)

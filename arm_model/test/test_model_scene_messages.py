@@ -25,7 +25,7 @@ from shape_msgs.msg import SolidPrimitive
 
 from arm_model import Array, Box, Cone, Cylinder, Mesh, Plane, SceneError, Shape, Sphere
 from arm_model import PlanningScene as Scene
-from arm_model.ros import apply_attached_object, apply_collision_object, apply_planning_scene
+from arm_model.ros import apply_planning_scene, FrameOf, scene_change
 
 MODEL = chain('zyyp')
 AT = np.array([0.4, -0.3, 0.5, 0.1])
@@ -61,6 +61,16 @@ def attached(
     return message
 
 
+def changed(
+    scene: Scene,
+    message: CollisionObject | AttachedCollisionObject,
+    positions: Array,
+    frame_of: FrameOf | None = None,
+) -> Scene:
+    """Return a scene after a message of an object or an attached body."""
+    return apply_planning_scene(scene, scene_change(message), positions, frame_of)
+
+
 @pytest.mark.parametrize(
     ('kind', 'dimensions', 'shape'),
     [
@@ -73,7 +83,7 @@ def attached(
 def test_primitives_have_their_lengths(kind: int, dimensions: list[float], shape: Shape) -> None:
     """The height of a cylinder comes first in the message."""
     primitive = SolidPrimitive(type=kind, dimensions=dimensions)
-    scene = apply_collision_object(MODEL.scene, thing(primitive=primitive), AT)
+    scene = changed(MODEL.scene, thing(primitive=primitive), AT)
     assert [each.shape for each in scene.objects['box'].shapes] == [shape]
     assert scene.objects['box'].pose.position.tolist() == [0.5, 0.0, 0.2]
 
@@ -89,10 +99,7 @@ def test_prisms_meshes_and_planes() -> None:
     points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
     message.meshes = [MeshMessage(vertices=[Point(x=x, y=y, z=z) for x, y, z in points])]
     message.planes = [PlaneMessage(coef=[0.0, 0.0, 2.0, 0.2])]
-    shapes = [
-        each.shape
-        for each in apply_collision_object(MODEL.scene, message, AT).objects['box'].shapes
-    ]
+    shapes = [each.shape for each in changed(MODEL.scene, message, AT).objects['box'].shapes]
     prism, mesh, plane = shapes
     assert isinstance(prism, Mesh)
     assert min(map(tuple, prism.points.round(6).tolist())) == (0.0, 0.0, -0.25)
@@ -103,53 +110,47 @@ def test_prisms_meshes_and_planes() -> None:
 
 def test_a_pose_is_in_its_frame() -> None:
     """A link of the robot where the arm is, or what the caller knows; else it is refused."""
-    turned = apply_collision_object(MODEL.scene, thing(frame='link_2'), AT)
+    turned = changed(MODEL.scene, thing(frame='link_2'), AT)
     link = MODEL.scene.kinematics.link_pose('link_2', AT)
     there = link.position + link.rotation @ (0.5, 0.0, 0.2)
     assert turned.objects['box'].pose.position == pytest.approx(there)
-    known = apply_collision_object(MODEL.scene, thing(frame='camera'), AT, lambda _: link)
+    known = changed(MODEL.scene, thing(frame='camera'), AT, lambda _: link)
     assert known.objects['box'].pose.position == pytest.approx(there)
     with pytest.raises(SceneError, match="'box': no frame 'camera'; links: base"):
-        apply_collision_object(MODEL.scene, thing(frame='camera'), AT)
+        changed(MODEL.scene, thing(frame='camera'), AT)
 
 
 def test_an_object_is_moved_extended_and_removed() -> None:
     """APPEND keeps the shapes that are there, MOVE all of them, REMOVE without an id nothing."""
-    scene = apply_collision_object(MODEL.scene, thing(), AT)
-    scene = apply_collision_object(
-        scene, thing(place=(0.5, 0.0, 0.9), operation=CollisionObject.APPEND), AT
-    )
+    scene = changed(MODEL.scene, thing(), AT)
+    scene = changed(scene, thing(place=(0.5, 0.0, 0.9), operation=CollisionObject.APPEND), AT)
     first, second = scene.objects['box'].shapes
     assert second.pose.position - first.pose.position == pytest.approx([0.0, 0.0, 0.7])
-    moved = apply_collision_object(
-        scene, thing(place=(1.0, 0.0, 0.0), operation=CollisionObject.MOVE), AT
-    )
+    moved = changed(scene, thing(place=(1.0, 0.0, 0.0), operation=CollisionObject.MOVE), AT)
     assert moved.objects['box'].shapes == scene.objects['box'].shapes
     assert moved.objects['box'].pose.position.tolist() == [1.0, 0.0, 0.0]
     assert scene.objects['box'].pose.position.tolist() == [0.5, 0.0, 0.2]
-    gone = apply_collision_object(moved, thing('', operation=CollisionObject.REMOVE), AT)
+    gone = changed(moved, thing('', operation=CollisionObject.REMOVE), AT)
     assert not gone.objects
     with pytest.raises(SceneError, match="no object 'box' in the world; there are: none"):
-        apply_collision_object(gone, thing(operation=CollisionObject.REMOVE), AT)
+        changed(gone, thing(operation=CollisionObject.REMOVE), AT)
     with pytest.raises(SceneError, match="no object 'box' in the world"):
-        apply_collision_object(gone, thing(operation=CollisionObject.MOVE), AT)
+        changed(gone, thing(operation=CollisionObject.MOVE), AT)
 
 
 def test_the_pose_of_the_only_shape_is_that_of_the_object() -> None:
     """As in MoveIt, where the object's own is left out: MOVE, frames and clients count on it."""
     alone = thing(place=(0.0, 0.0, 0.0))
     alone.primitive_poses = [Pose(position=Point(x=0.5, y=0.1, z=0.3))]
-    scene = apply_collision_object(MODEL.scene, alone, AT)
+    scene = changed(MODEL.scene, alone, AT)
     (shape,) = scene.objects['box'].shapes
     assert scene.objects['box'].pose.position.tolist() == [0.5, 0.1, 0.3]
     assert shape.pose.position.tolist() == [0.0, 0.0, 0.0]
-    moved = apply_collision_object(
-        scene, thing(place=(0.5, -0.1, 0.3), operation=CollisionObject.MOVE), AT
-    )
+    moved = changed(scene, thing(place=(0.5, -0.1, 0.3), operation=CollisionObject.MOVE), AT)
     assert moved.objects['box'].pose.position.tolist() == [0.5, -0.1, 0.3]
     assert moved.objects['box'].shapes == scene.objects['box'].shapes
     alone.pose.position.x = 1.0
-    both = apply_collision_object(MODEL.scene, alone, AT).objects['box']
+    both = changed(MODEL.scene, alone, AT).objects['box']
     assert both.pose.position.tolist() == [1.0, 0.0, 0.0]
     assert both.shapes[0].pose.position.tolist() == [0.5, 0.1, 0.3]
 
@@ -161,17 +162,17 @@ def place_of(scene: Scene, name: str, positions: Array) -> Array:
 
 def test_an_object_is_taken_up_carried_and_laid_down() -> None:
     """It keeps its place when it is attached, and moves with the link."""
-    scene = apply_collision_object(MODEL.scene, thing(), AT)
-    held = apply_attached_object(scene, attached('box', 'link_4', operation=b'\0'), AT)
+    scene = changed(MODEL.scene, thing(), AT)
+    held = changed(scene, attached('box', 'link_4', operation=b'\0'), AT)
     assert not held.objects
     assert held.attached_bodies['box'].touch_links == {'link_3'}
     assert place_of(held, 'box', AT) == pytest.approx([0.5, 0.0, 0.2])
     later = AT + 0.3
-    down = apply_attached_object(held, attached('box', '', operation=b'\1'), later)
+    down = changed(held, attached('box', '', operation=b'\1'), later)
     assert place_of(down, 'box', AT) == pytest.approx(place_of(held, 'box', later))
     assert not down.attached_bodies
     with_shapes = attached('cup', 'link_4', operation=b'\0', bare=False)
-    cup = apply_attached_object(scene, with_shapes, AT)
+    cup = changed(scene, with_shapes, AT)
     assert cup.attached_bodies['cup'].object.pose.position == pytest.approx([0.5, 0.0, 0.2])
     for message, words in (
         (attached('cup', 'link_4', operation=b'\0'), 'has no shapes'),
@@ -179,7 +180,7 @@ def test_an_object_is_taken_up_carried_and_laid_down() -> None:
         (attached('cup', '', operation=b'\1'), "no attached object 'cup'"),
     ):
         with pytest.raises(SceneError, match=words):
-            apply_attached_object(scene, message, AT)
+            changed(scene, message, AT)
 
 
 def matrix(names: Sequence[str], *allowed: tuple[str, str]) -> AllowedCollisionMatrix:
@@ -259,7 +260,7 @@ def test_what_is_not_usable_is_refused(
     message.pose.orientation = Quaternion(w=1.0)
     change(message)
     with pytest.raises(SceneError, match=words):
-        apply_collision_object(MODEL.scene, message, AT)
+        changed(MODEL.scene, message, AT)
 
 
 def test_a_matrix_without_its_rows_is_refused() -> None:

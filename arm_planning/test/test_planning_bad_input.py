@@ -342,6 +342,8 @@ def test_services_of_kinematics_refuse_alike(rig: MoveGroupRig) -> None:
         ([good], {'group_name': ''}, CODE.INVALID_GROUP_NAME, 'group'),
         ([good], {'link_name': 'moon'}, CODE.INVALID_LINK_NAME, 'moon'),
         ([good], {'max_step': 0.0}, bad_goal, 'max_step'),
+        ([good], {'max_step': 1e-9}, bad_goal, 'give a greater step'),
+        ([good], {'jump_threshold': -1.0}, bad_goal, 'relative jump threshold'),
         ([], {}, bad_goal, 'no way-points'),
         ([pose_at(NAN)], {}, bad_goal, 'finite|nan'),
         ([good], {'max_velocity_scaling_factor': 2.0}, CODE.FAILURE, 'is 2'),

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from arm_model import CollisionObject, Pose, RobotModel, Sphere
-from arm_planning import PlanningError
 from arm_planning.cartesian_path import cartesian_path, JumpThresholds
 from arm_planning.ik.link_kinematics import LinkKinematics
 
@@ -113,17 +112,3 @@ def test_sliding_joints_have_a_threshold_of_their_own() -> None:
     cut = cartesian_path(model, start, [goal], 0.01, jumps=JumpThresholds(prismatic=1e-4))
     assert cut.fraction == 0.0
     assert 'j1 would jump' in cut.reason
-
-
-def test_what_is_no_path_is_refused() -> None:
-    """No way-points, no step, too many steps, a negative threshold."""
-    model, here = robot('prbt'), ready('prbt')
-    goal = moved('prbt', 0.0, 0.1, 0.0)
-    with pytest.raises(PlanningError, match='no way-points'):
-        cartesian_path(model, here, [], 0.01)
-    with pytest.raises(PlanningError, match='max_step is 0'):
-        cartesian_path(model, here, [goal], 0.0)
-    with pytest.raises(PlanningError, match='give a greater step'):
-        cartesian_path(model, here, [goal], 1e-9)
-    with pytest.raises(PlanningError, match='relative jump threshold'):
-        JumpThresholds(relative=-1.0)

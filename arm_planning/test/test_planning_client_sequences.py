@@ -55,8 +55,9 @@ from std_msgs.msg import String
 from std_srvs.srv import Empty
 
 from arm_model import combined, frozen, inverse, Pose
+from arm_model.ros import pose_of
 from arm_planning import Planner
-from arm_planning.ros.geometry import pose_message, pose_of
+from arm_planning.ros.scene_messages import pose_message
 from node_runner import LATCHED
 
 BASE = 'panda_link0'
@@ -81,6 +82,11 @@ def turned_pose(x: float, y: float, z: float, axis: tuple[float, float, float]) 
     half = math.sqrt(0.5)
     turn = Quaternion(w=half, **dict(zip('xyz', (half * each for each in axis), strict=True)))
     return PoseMessage(position=Point(x=x, y=y, z=z), orientation=turn)
+
+
+def placed(message: PoseMessage) -> Pose:
+    """Return a pose of a message."""
+    return pose_of(message.position, message.orientation, 'pose')
 
 
 def at(rig: MoveGroupRig) -> list[float]:
@@ -181,7 +187,7 @@ def test_goals_of_a_position_or_an_orientation_alone(rig: MoveGroupRig) -> None:
     assert response.error_code.val == SUCCESS, response.error_code
     end = response.trajectory.joint_trajectory.points[-1].positions
     planner = Planner(panda().model('panda_arm'))
-    wanted = pose_of(PoseMessage(orientation=back), 'wanted').rotation
+    wanted = placed(PoseMessage(orientation=back)).rotation
     assert planner.fk(frozen(end), HAND).rotation == pytest.approx(wanted, abs=2e-3)
     # a box that is turned
     goal = pose_goal(turned_pose(0.4, 0.2, 0.5, (0.0, 0.0, 1.0)), HAND, BASE)
@@ -194,7 +200,7 @@ def test_goals_of_a_position_or_an_orientation_alone(rig: MoveGroupRig) -> None:
     assert response.error_code.val == SUCCESS, response.error_code
     end = response.trajectory.joint_trajectory.points[-1].positions
     offset = Pose(np.eye(3), frozen([0.0, 0.0, 0.1]))
-    place = pose_of(region.primitive_poses[0], 'region')
+    place = placed(region.primitive_poses[0])
     inside = combined(inverse(place), combined(planner.fk(frozen(end), HAND), offset)).position
     assert (np.abs(inside) <= [0.05 + 1e-6, 0.005 + 1e-6, 0.005 + 1e-6]).all()
 
@@ -366,9 +372,9 @@ def test_goals_and_path_constraints_of_what_is_held(
         AttachedCollisionObject(link_name=HAND, object=held, touch_links=['panda_link7'])
     ]
     assert rig.apply(scene)
-    in_hand = pose_of(held.pose, 'tool')
+    in_hand = placed(held.pose)
     if name == 'tool/tip':
-        in_hand = combined(in_hand, pose_of(held.subframe_poses[0], 'tip'))
+        in_hand = combined(in_hand, placed(held.subframe_poses[0]))
 
     def place_of(joints: list[float]) -> Pose:
         where = panda().positions(dict(zip(JOINTS, joints, strict=True)))

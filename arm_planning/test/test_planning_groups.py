@@ -18,11 +18,11 @@ import pytest
 
 from arm_model import Array, AttachedBody, Box, Clearances, CollisionObject, PlacedShape, Pose
 from arm_planning import JointGoal, MotionRequest
-from arm_planning.ros.geometry import pose_message
 from arm_planning.ros.kinematic_services import KinematicServices
 from arm_planning.ros.planning import GroupPlanners
 from arm_planning.ros.robot_groups import RobotGroups
 from arm_planning.ros.scene_changes import scene_for
+from arm_planning.ros.scene_messages import pose_message
 from arm_planning.ros.scene_snapshot import SceneSnapshot
 
 ACROSS = np.pi / 2  # where right_2 holds its bar across the left arm in [rad]

@@ -15,12 +15,13 @@ import pytest
 from trajectory_msgs.msg import JointTrajectory
 
 from arm_model import Array, frozen, RobotState
+from arm_model.ros import scene_change
 from arm_planning import PlanningCode
 from arm_planning.ros.execution import Execution, INVALIDATED
 from arm_planning.ros.joint_trajectory import from_start
 from arm_planning.ros.path_watch import contact_ahead, passed_time, path_of, PathWatch
 from arm_planning.ros.robot_state import trajectory_message
-from arm_planning.ros.scene_changes import apply_object
+from arm_planning.ros.scene_changes import apply_scene
 from arm_planning.ros.scene_snapshot import SceneSnapshot
 from arm_trajectory import build_path, GoalPoint, GoalRules, TrajectoryGoal
 
@@ -49,7 +50,7 @@ def motion(kinds: str = 'va') -> JointTrajectory:
 def crate_at(share: float) -> Any:
     """Return the scene with a crate where the tip is at a share of the turn."""
     x, y, z = MODEL.kinematics.link_pose('panda_link8', frozen(READY + share * TURN)).position
-    return apply_object(EMPTY, box('crate', x, y, z, edge=0.1), places(READY)).scene
+    return apply_scene(EMPTY, scene_change(box('crate', x, y, z, edge=0.1)), places(READY)).scene
 
 
 @pytest.mark.parametrize('kinds', ['va', 'v', ''])

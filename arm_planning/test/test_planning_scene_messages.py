@@ -33,8 +33,8 @@ import pytest
 from shape_msgs.msg import SolidPrimitive
 
 from arm_model import AllowedCollisionMatrix, Clearances
-from arm_model.ros import allowed_collisions, apply_planning_scene
-from arm_planning.ros.scene_changes import apply_object, apply_scene
+from arm_model.ros import allowed_collisions, apply_planning_scene, scene_change
+from arm_planning.ros.scene_changes import apply_scene
 from arm_planning.ros.scene_messages import (
     collision_message,
     matrix_message,
@@ -59,7 +59,7 @@ def edited(message: PlanningScene, snapshot: SceneSnapshot = EMPTY) -> SceneSnap
 def with_objects(*messages: Any, snapshot: SceneSnapshot = EMPTY) -> SceneSnapshot:
     """Return a scene after messages of objects."""
     for message in messages:
-        snapshot = apply_object(snapshot, message, READY)
+        snapshot = apply_scene(snapshot, scene_change(message), READY)
     return snapshot
 
 

@@ -2,15 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The robot model in ROS: from parameters, its frames beside those of TF, scenes of messages."""
 
-from .numbers import duration_fields, seconds, xyz, xyzw
+from .numbers import duration_fields, pose_of, seconds, xyz, xyzw
 from .planning_scene import (
     allowed_collisions,
-    apply_attached_object,
-    apply_collision_object,
     apply_planning_scene,
     FrameOf,
     hull_of,
     primitive_shape,
+    scene_change,
 )
 from .robot_parameters import (
     declare_description,
@@ -29,8 +28,6 @@ __all__ = [
     'GroupModels',
     'TfListener',
     'allowed_collisions',
-    'apply_attached_object',
-    'apply_collision_object',
     'apply_planning_scene',
     'declare_description',
     'declare_groups',
@@ -39,8 +36,10 @@ __all__ = [
     'hull_of',
     'learn_static',
     'learn_transforms',
+    'pose_of',
     'primitive_shape',
     'same_robot',
+    'scene_change',
     'seconds',
     'xyz',
     'xyzw',

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Numbers of geometry_msgs and builtin_interfaces as arrays and seconds."""
+"""Messages of geometry_msgs and builtin_interfaces as arrays, poses and seconds."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, checked
+from ..exceptions import CommandError, SceneError
+from ..pose import ORIGIN, Pose, rotation_of
 
 
 def xyz(vector: Any) -> Array:  # noqa: ANN401  # Vector3 or Point; message classes have no type
@@ -19,6 +21,23 @@ def xyz(vector: Any) -> Array:  # noqa: ANN401  # Vector3 or Point; message clas
 def xyzw(quaternion: Any) -> list[float]:  # noqa: ANN401
     """Return the numbers of a quaternion."""
     return [quaternion.x, quaternion.y, quaternion.z, quaternion.w]
+
+
+def pose_of(position: Any, orientation: Any, what: str) -> Pose:  # noqa: ANN401
+    """Return a pose of a point or vector and a quaternion; one of zeros is no turn, as in MoveIt.
+
+    Args:
+        what: What the message of a refusal begins with.
+
+    Raises:
+        SceneError: A number is not finite, or the length of the quaternion is not 1.
+    """
+    quaternion = xyzw(orientation)
+    try:
+        rotation = rotation_of(quaternion) if any(quaternion) else ORIGIN.rotation
+        return Pose(rotation, checked(xyz(position), 3, 'position'))
+    except CommandError as error:
+        raise SceneError(f'{what}: {error}') from error
 
 
 def seconds(stamp: Any) -> float:  # noqa: ANN401  # Time and Duration

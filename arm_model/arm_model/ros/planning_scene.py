@@ -8,7 +8,7 @@ as in MoveIt: what a link takes up, a message may remove from the world besides.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -23,15 +23,15 @@ from shape_msgs.msg import Mesh as MeshMessage
 from shape_msgs.msg import Plane as PlaneMessage
 from shape_msgs.msg import SolidPrimitive
 
-from ..arrays import Array, checked
-from ..exceptions import CommandError, LinkNameError, ObjectNameError, SceneError
-from ..pose import combined, inverse, ORIGIN, Pose, rotation_of
+from ..arrays import Array
+from ..exceptions import LinkNameError, ObjectNameError, SceneError
+from ..pose import combined, inverse, ORIGIN, Pose
 from ..scene.allowed_collisions import AllowedCollisionMatrix
 from ..scene.objects import AttachedBody, CollisionObject
 from ..scene.octomap import OCTOMAP_NAME, octomap_shapes
 from ..scene.planning_scene import PlanningScene
 from ..scene.shapes import Box, Cone, Cylinder, Mesh, PlacedShape, Plane, Shape, Sphere
-from .numbers import xyz, xyzw
+from .numbers import pose_of, xyz, xyzw
 
 FrameOf = Callable[[str], Pose]
 """Returns the pose of a frame in the root link, or raises a SceneError where there is none."""
@@ -91,50 +91,29 @@ def apply_planning_scene(
     draft.apply_octomap(message.world.octomap)
     padding = {each.link_name: each.padding for each in message.link_padding}
     scale = {each.link_name: each.scale for each in message.link_scale}
-    return draft.scene(
-        _merged(scene, message.allowed_collision_matrix),
-        padding if is_whole else {**scene.padding, **padding},
-        scale if is_whole else {**scene.scale, **scale},
+    return scene.with_contents(
+        objects=draft.objects,
+        attached_bodies=draft.attached,
+        allowed=_merged(scene, message.allowed_collision_matrix),
+        padding=padding if is_whole else {**scene.padding, **padding},
+        scale=scale if is_whole else {**scene.scale, **scale},
     )
 
 
-def apply_collision_object(
-    scene: PlanningScene, message: ObjectMessage, positions: Array, frame_of: FrameOf | None = None
-) -> PlanningScene:
-    """Return a scene with an object added, moved, extended or removed.
+def scene_change(*things: ObjectMessage | AttachedCollisionObject) -> SceneMessage:
+    """Return a diff that adds, changes or removes objects and attached bodies, and nothing else.
 
-    Args:
-        positions: Joint positions in [rad], for frames that move with the arm.
-        frame_of: Returns frames that are no links; without it there are none.
-
-    Raises:
-        SceneError: The object is unknown, or not usable.
+    Of attached bodies, ADD without shapes takes up an object of the world, REMOVE without an id
+    lays down all bodies of the link.
     """
-    draft = _Draft.of(scene, positions, frame_of)
-    draft.apply(message)
-    return draft.scene()
-
-
-def apply_attached_object(
-    scene: PlanningScene,
-    message: AttachedCollisionObject,
-    positions: Array,
-    frame_of: FrameOf | None = None,
-) -> PlanningScene:
-    """Return a scene with an object attached to a link, or laid down in the world.
-
-    Args:
-        message: The message; ADD without shapes takes up an object of the world, REMOVE without
-            an id lays down all bodies of the link.
-        positions: Joint positions in [rad]: where the arm is then.
-        frame_of: Returns frames that are no links; without it there are none.
-
-    Raises:
-        SceneError: Link or object are unknown, or not usable.
-    """
-    draft = _Draft.of(scene, positions, frame_of)
-    draft.apply_attached(message)
-    return draft.scene()
+    change = SceneMessage(is_diff=True)
+    change.robot_state.is_diff = True
+    for each in things:
+        if isinstance(each, AttachedCollisionObject):
+            change.robot_state.attached_collision_objects.append(each)
+        else:
+            change.world.collision_objects.append(each)
+    return change
 
 
 def allowed_collisions(message: MatrixMessage) -> AllowedCollisionMatrix:
@@ -196,26 +175,6 @@ class _Draft:
     frame_of: FrameOf | None
     objects: dict[str, CollisionObject]
     attached: dict[str, AttachedBody]
-
-    @classmethod
-    def of(cls, scene: PlanningScene, positions: Array, frame_of: FrameOf | None) -> _Draft:
-        """Begin with a scene."""
-        return cls(scene, positions, frame_of, dict(scene.objects), dict(scene.attached_bodies))
-
-    def scene(
-        self,
-        allowed: AllowedCollisionMatrix | None = None,
-        padding: Mapping[str, float] | None = None,
-        scale: Mapping[str, float] | None = None,
-    ) -> PlanningScene:
-        """Return the scene that was made."""
-        return self.before.with_contents(
-            objects=self.objects,
-            attached_bodies=self.attached,
-            allowed=allowed,
-            padding=padding,
-            scale=scale,
-        )
 
     def apply_octomap(self, message: OctomapWithPose) -> None:
         """Replace the octomap as MoveIt does: without an id by none, without data it ends."""
@@ -468,10 +427,4 @@ def _is_unset(pose: Any) -> bool:  # noqa: ANN401  # message classes have no typ
 
 
 def _pose(message: Any, name: str) -> Pose:  # noqa: ANN401  # message classes have no type
-    """Return a pose; an orientation of zeros is none, as in MoveIt."""
-    quaternion = xyzw(message.orientation)
-    try:
-        rotation = rotation_of(quaternion) if any(quaternion) else ORIGIN.rotation
-        return Pose(rotation, checked(xyz(message.position), 3, 'position'))
-    except CommandError as error:
-        raise SceneError(f'object {name!r}: {error}') from error
+    return pose_of(message.position, message.orientation, f'object {name!r}')

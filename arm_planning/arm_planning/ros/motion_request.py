@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import math
 from typing import Any
 
+from geometry_msgs.msg import Point, Quaternion
 import numpy as np
 
 from arm_model import (
@@ -19,11 +20,10 @@ from arm_model import (
     PlacedShape,
     Pose,
     RobotModel,
-    SceneError,
 )
-from arm_model.ros import primitive_shape, xyz, xyzw
+from arm_model.ros import pose_of, primitive_shape, xyzw
 
-from ..exceptions import PlanningCode, PlanningError
+from ..exceptions import coded, PlanningCode, PlanningError
 from ..industrial.planner import PLANNER_IDS
 from ..moveit_config.settings import MoveItSettings, PIPELINES
 from ..planner import DEFAULT_PLANNER, FREE_MOTION, unknown_planner
@@ -40,7 +40,6 @@ from ..requests import (
     PoseGoal,
     PositionConstraint,
 )
-from .geometry import placement, pose_of
 from .scene_snapshot import SceneSnapshot
 
 OMPL, PILZ = PIPELINES
@@ -167,7 +166,8 @@ class RequestReader:
         Raises:
             PlanningError: The frame is unknown, or a number is none.
         """
-        place = pose_of(message, what, BAD_GOAL)
+        with coded(BAD_GOAL):
+            place = pose_of(message.position, message.orientation, what)
         return combined(self._snapshot.frame(frame, self._positions), place)
 
     def on_link(self, pose: Pose, frame: str) -> tuple[str, Pose]:
@@ -187,10 +187,8 @@ class RequestReader:
         """Return the link that carries a frame (empty for the tip), and the frame's pose in it."""
         if not frame:
             return self._model.tip, ORIGIN
-        try:
+        with coded(PlanningCode.INVALID_LINK_NAME, 'link_name'):
             return self._snapshot.link_of(frame)
-        except PlanningError as error:
-            raise PlanningError(PlanningCode.INVALID_LINK_NAME, f'link_name: {error}') from error
 
     def _joint_goal(self, messages: Sequence[Any]) -> JointGoal:
         ranges = self._joint_ranges(messages)
@@ -269,14 +267,13 @@ class RequestReader:
                 f'{what}: its region has {count} primitives, {len(region.primitive_poses)} poses'
                 f' and {len(region.meshes)} meshes; give it primitives, and a pose for each'
             )
-        offset = placement(xyz(message.target_point_offset), (), what, BAD_GOAL).position
+        with coded(BAD_GOAL):
+            offset = pose_of(message.target_point_offset, Quaternion(), what).position
         link, place = self._link_of(message.link_name)
         regions = []
         for primitive, pose in zip(region.primitives, region.primitive_poses, strict=True):
-            try:
+            with coded(BAD_GOAL):
                 shape = primitive_shape(primitive, what)
-            except SceneError as error:
-                raise _bad_goal(str(error)) from error
             lengths = [float(each) for each in primitive.dimensions]
             if not all(0.0 <= each < math.inf for each in lengths):
                 raise _bad_goal(f'{what}: the lengths of its region are {lengths}')
@@ -300,7 +297,8 @@ class RequestReader:
                 f'{what}: its orientation is all zeros; give a quaternion of length 1, w = 1 for'
                 ' no turn'
             )
-        pose = placement(np.zeros(3), quaternion, what, BAD_GOAL)
+        with coded(BAD_GOAL):
+            pose = pose_of(Point(), message.orientation, what)
         frame = self._snapshot.frame(message.header.frame_id, self._positions)
         rotation = frame.rotation @ pose.rotation
         if message.parameterization not in set(Parameterization):

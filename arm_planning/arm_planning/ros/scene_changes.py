@@ -8,12 +8,12 @@ of objects, and the codes of refusals.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
 from moveit_msgs.msg import CollisionObject as ObjectMessage
+import numpy as np
 from octomap_msgs.msg import OctomapWithPose
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Header
@@ -24,29 +24,28 @@ from arm_model import (
     combined,
     LinkNameError,
     ObjectNameError,
+    Places,
     PlanningScene,
     Pose,
     SceneError,
 )
-from arm_model.ros import (
-    apply_attached_object,
-    apply_collision_object,
-    apply_planning_scene,
-    FrameOf,
-    xyz,
-    xyzw,
-)
+from arm_model.ros import apply_planning_scene, hull_of, pose_of
 
-from ..exceptions import PlanningCode, PlanningError
-from .geometry import check_mesh, placement, pose_message, pose_of, volumes
+from ..exceptions import coded, PlanningCode, PlanningError
+from .scene_messages import pose_message
 from .scene_snapshot import AttachedDetails, ObjectDetails, SceneSnapshot
 
+NO_CODE = PlanningCode.FAILURE
+CODES = (
+    (LinkNameError, PlanningCode.INVALID_LINK_NAME),
+    (ObjectNameError, PlanningCode.INVALID_OBJECT_NAME),
+)
+"""Codes of refusals of the scene, as MoveIt has them; others have :data:`NO_CODE`."""
 
-def apply_scene(
-    snapshot: SceneSnapshot,
-    message: Any,  # noqa: ANN401  # message classes have no type
-    positions: Array,
-) -> SceneSnapshot:
+MIN_THICKNESS = 1e-6  # least extent of a mesh along its thinnest axis in [m] that is a volume
+
+
+def apply_scene(snapshot: SceneSnapshot, message: Any, positions: Array) -> SceneSnapshot:  # noqa: ANN401
     """Return a scene after a moveit_msgs/PlanningScene: a change, or a whole scene.
 
     Args:
@@ -55,7 +54,9 @@ def apply_scene(
     Raises:
         PlanningError: A part of it is refused.
     """
-    before = snapshot if message.is_diff else _without_settings(snapshot)
+    before = snapshot
+    if not message.is_diff:  # what a whole scene replaces besides its objects
+        before = replace(before, colors={}, fixed_frames={}, octomap=None)
     before = replace(
         before,
         name=message.name or snapshot.name,
@@ -63,59 +64,22 @@ def apply_scene(
     )
     before = replace(before, octomap=_octomap(before, message.world.octomap, positions))
     bodies = message.robot_state.attached_collision_objects
-    _check_meshes([*message.world.collision_objects, *(each.object for each in bodies)])
-    with _refused():
+    things = [*message.world.collision_objects, *(each.object for each in bodies)]
+    for each in things:
+        for mesh in each.meshes:
+            _check_mesh(mesh, f'object {each.id!r}')
+    try:
         scene = apply_planning_scene(
-            before.scene, message, positions, _frame_of(before, positions)
+            before.scene, message, positions, lambda frame: before.frame(frame, positions)
         )
+    except SceneError as error:
+        code = next((code for kind, code in CODES if isinstance(error, kind)), NO_CODE)
+        raise PlanningError(code, str(error)) from error
     colors = {
         each.id: (each.color.r, each.color.g, each.color.b, each.color.a)
         for each in message.object_colors
     }
-    after = replace(before, colors={**before.colors, **colors})
-    return _described(after, scene, message.world.collision_objects, bodies)
-
-
-def apply_object(
-    snapshot: SceneSnapshot,
-    message: Any,  # noqa: ANN401
-    positions: Array,
-) -> SceneSnapshot:
-    """Return a scene after a moveit_msgs/CollisionObject.
-
-    Args:
-        positions: Positions of all joints of the robot in [rad].
-
-    Raises:
-        PlanningError: It is refused.
-    """
-    _check_meshes([message])
-    with _refused():
-        scene = apply_collision_object(
-            snapshot.scene, message, positions, _frame_of(snapshot, positions)
-        )
-    return _described(snapshot, scene, [message], [])
-
-
-def apply_attached(
-    snapshot: SceneSnapshot,
-    message: Any,  # noqa: ANN401
-    positions: Array,
-) -> SceneSnapshot:
-    """Return a scene after a moveit_msgs/AttachedCollisionObject.
-
-    Args:
-        positions: Positions of all joints of the robot in [rad].
-
-    Raises:
-        PlanningError: It is refused.
-    """
-    _check_meshes([message.object])
-    with _refused():
-        scene = apply_attached_object(
-            snapshot.scene, message, positions, _frame_of(snapshot, positions)
-        )
-    return _described(snapshot, scene, [], [message])
+    return _described(before, scene, things, bodies, {**before.colors, **colors})
 
 
 def scene_for(snapshot: SceneSnapshot, robot_alone: PlanningScene) -> PlanningScene:
@@ -138,49 +102,29 @@ def scene_for(snapshot: SceneSnapshot, robot_alone: PlanningScene) -> PlanningSc
     )
 
 
-@contextmanager
-def _refused() -> Iterator[None]:
-    """Give refusals of the scene the code that MoveIt has for them."""
-    try:
-        yield
-    except LinkNameError as error:
-        raise PlanningError(PlanningCode.INVALID_LINK_NAME, str(error)) from error
-    except ObjectNameError as error:
-        raise PlanningError(PlanningCode.INVALID_OBJECT_NAME, str(error)) from error
-    except SceneError as error:
-        raise PlanningError(PlanningCode.FAILURE, str(error)) from error
-
-
-def _check_meshes(messages: Iterable[Any]) -> None:
-    for message in messages:
-        for mesh in message.meshes:
-            check_mesh(mesh, f'object {message.id!r}')
-
-
-def _frame_of(snapshot: SceneSnapshot, positions: Array) -> FrameOf:
-    return lambda frame: snapshot.frame(frame, positions)
-
-
 def _described(
-    before: SceneSnapshot, scene: PlanningScene, objects: Iterable[Any], bodies: Sequence[Any]
+    before: SceneSnapshot,
+    scene: PlanningScene,
+    things: Iterable[Any],
+    bodies: Iterable[Any],
+    colors: Mapping[str, tuple[float, float, float, float]],
 ) -> SceneSnapshot:
-    """Return the next version of a scene, with what messages say of objects besides."""
+    """Return a scene with what messages say of objects besides."""
     details, attached = dict(before.details), dict(before.attached_details)
-    for message in (*objects, *(body.object for body in bodies)):
+    for message in things:
         if message.primitives or message.meshes or message.planes:
             read = _details(message)
             is_more = message.operation == ObjectMessage.APPEND and message.id in details
             details[message.id] = _joined(details[message.id], read) if is_more else read
     for body in bodies:
         attached[body.object.id] = AttachedDetails(body.detach_posture, body.weight)
-    things = {*scene.objects, *scene.attached_bodies}
+    names = {*scene.objects, *scene.attached_bodies}
     return replace(
         before,
         scene=scene,
-        version=before.version + 1,
-        details={name: details.get(name, ObjectDetails()) for name in things},
+        details={name: details.get(name, ObjectDetails()) for name in names},
         attached_details={name: attached[name] for name in scene.attached_bodies},
-        colors={name: color for name, color in before.colors.items() if name in things},
+        colors={name: color for name, color in colors.items() if name in names},
     )
 
 
@@ -192,12 +136,14 @@ def _details(message: Any) -> ObjectDetails:  # noqa: ANN401
             f'{what}: {len(message.subframe_names)} names of subframes and'
             f' {len(message.subframe_poses)} poses',
         )
-    subframes = {
-        name: pose_of(each, f'subframe {name!r} of {what}')
-        for name, each in zip(message.subframe_names, message.subframe_poses, strict=True)
-    }
+    pairs = zip(message.subframe_names, message.subframe_poses, strict=True)
+    with coded():
+        subframes = {
+            name: pose_of(each.position, each.orientation, f'subframe {name!r} of {what}')
+            for name, each in pairs
+        }
     solid, whole = (
-        sum(each) for each in zip((0.0, 0.0), *map(volumes, message.meshes), strict=True)
+        sum(each) for each in zip((0.0, 0.0), *map(_volumes, message.meshes), strict=True)
     )
     fullness = solid / whole if whole else 1.0
     prisms = [None for each in message.primitives if each.type == SolidPrimitive.PRISM]
@@ -214,11 +160,6 @@ def _joined(before: ObjectDetails, added: ObjectDetails) -> ObjectDetails:
     )
 
 
-def _without_settings(snapshot: SceneSnapshot) -> SceneSnapshot:
-    """Return a scene without what a whole scene replaces besides its objects."""
-    return replace(snapshot, colors={}, fixed_frames={}, octomap=None)
-
-
 def _octomap(snapshot: SceneSnapshot, message: Any, positions: Array) -> Any:  # noqa: ANN401
     """Return the octomap after a octomap_msgs/OctomapWithPose, in the root link; None for none."""
     if not message.octomap.id:
@@ -226,18 +167,67 @@ def _octomap(snapshot: SceneSnapshot, message: Any, positions: Array) -> Any:  #
     if not message.octomap.data:
         return None
     frame = snapshot.frame(message.header.frame_id, positions)
-    place = combined(frame, pose_of(message.origin, 'origin of the octomap'))
+    origin = message.origin
+    with coded():
+        in_frame = pose_of(origin.position, origin.orientation, 'origin of the octomap')
     header = Header(frame_id=snapshot.root, stamp=message.header.stamp)
-    return OctomapWithPose(header=header, origin=pose_message(place), octomap=message.octomap)
+    return OctomapWithPose(
+        header=header, origin=pose_message(combined(frame, in_frame)), octomap=message.octomap
+    )
 
 
 def _fixed(
     snapshot: SceneSnapshot, transforms: Iterable[Any], positions: Array
 ) -> Mapping[str, Pose]:
     found = dict(snapshot.fixed_frames)
-    frame_of = _frame_of(snapshot, positions)
     for each in transforms:
         name, place = each.child_frame_id.removeprefix('/'), each.transform
-        pose = placement(xyz(place.translation), xyzw(place.rotation), f'frame {name!r}')
-        found[name] = combined(frame_of(each.header.frame_id), pose)
+        with coded():
+            pose = pose_of(place.translation, place.rotation, f'frame {name!r}')
+        found[name] = combined(snapshot.frame(each.header.frame_id, positions), pose)
     return found
+
+
+def _check_mesh(message: Any, what: str) -> None:  # noqa: ANN401
+    """Make sure that a shape_msgs/Mesh is a body.
+
+    Raises:
+        PlanningError: It has no triangle or no volume, or names a corner that there is not.
+    """
+    problem = _problem(*_arrays(message))
+    if problem:
+        raise PlanningError(PlanningCode.FAILURE, f'{what}: {problem}')
+
+
+def _volumes(message: Any) -> tuple[float, float]:  # noqa: ANN401
+    """Return the volumes of a closed shape_msgs/Mesh and of its hull; 0 for an open one."""
+    corners, triangles = _arrays(message)
+    hull = hull_of(corners.tobytes()).hull
+    corners, same = np.unique(corners, axis=0, return_inverse=True)
+    triangles = same.reshape(-1)[triangles]
+    edges = np.sort(triangles[:, [(0, 1), (1, 2), (2, 0)]].reshape(-1, 2), axis=1)
+    if (np.unique(edges, axis=0, return_counts=True)[1] % 2).any():
+        return 0.0, 0.0
+    a, b, c = (corners[triangles[:, each]] for each in range(3))
+    return abs(float((a * np.cross(b, c)).sum()) / 6.0), float(hull.computeVolume())
+
+
+def _arrays(message: Any) -> tuple[Array, Places]:  # noqa: ANN401
+    """Return corners (m, 3) in [m], and the three numbers of each triangle (n, 3)."""
+    corners = np.array([(each.x, each.y, each.z) for each in message.vertices], dtype=float)
+    triangles = np.array([each.vertex_indices for each in message.triangles], dtype=int)
+    return corners.reshape(-1, 3), triangles.reshape(-1, 3)
+
+
+def _problem(corners: Array, triangles: Places) -> str:
+    if not len(triangles) or not len(corners):
+        return f'a mesh of {len(corners)} vertices and {len(triangles)} triangles has no volume'
+    if triangles.max() >= len(corners):
+        return f'a triangle names vertex {triangles.max()}; there are {len(corners)}'
+    if not np.isfinite(corners).all():
+        return 'a vertex of a mesh is not finite'
+    centered = corners - corners.mean(axis=0)
+    _, axes = np.linalg.eigh(centered.T @ centered)
+    if np.ptp(centered @ axes, axis=0).min() < MIN_THICKNESS:
+        return 'the mesh is flat, it has no volume; use a thin box, or a plane'
+    return ''

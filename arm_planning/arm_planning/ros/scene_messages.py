@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The scene as MoveIt's messages; :class:`.SceneEdit` is the way back."""
+"""Poses, shapes and the scene as messages; :mod:`.scene_changes` is the way back."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
-from geometry_msgs.msg import Transform, TransformStamped, Vector3
+from geometry_msgs.msg import Point, Transform, TransformStamped, Vector3
+from geometry_msgs.msg import Pose as PoseMessage
 from moveit_msgs.msg import (
     AllowedCollisionEntry,
     AttachedCollisionObject,
@@ -16,29 +16,35 @@ from moveit_msgs.msg import (
     LinkScale,
     ObjectColor,
     PlanningSceneComponents,
-    PlanningSceneWorld,
 )
 from moveit_msgs.msg import AllowedCollisionMatrix as MatrixMessage
 from moveit_msgs.msg import CollisionObject as ObjectMessage
 from moveit_msgs.msg import PlanningScene as SceneMessage
 from moveit_msgs.msg import RobotState as StateMessage
+import numpy as np
 from object_recognition_msgs.msg import ObjectType
+import pinocchio as pin
+from shape_msgs.msg import Mesh as MeshMessage
+from shape_msgs.msg import MeshTriangle, SolidPrimitive
+from shape_msgs.msg import Plane as PlaneMessage
 from std_msgs.msg import ColorRGBA, Header
 
 from arm_model import (
     AllowedCollisionMatrix,
+    Array,
     Box,
+    Capsule,
     CollisionObject,
     Cone,
     Cylinder,
     Mesh,
     OCTOMAP_NAME,
+    PlacedShape,
     Plane,
     Pose,
     Sphere,
 )
 
-from .geometry import as_primitives, mesh_message, plane_message, pose_message, primitive_message
 from .scene_snapshot import ObjectDetails, SceneSnapshot
 
 ALL_COMPONENTS = (1 << 10) - 1  # all bits of moveit_msgs/PlanningSceneComponents
@@ -65,12 +71,15 @@ def scene_message(
         components: Bits of moveit_msgs/PlanningSceneComponents.
     """
     has = PlanningSceneComponents
+    objects = {name: each for name, each in snapshot.scene.objects.items() if name != OCTOMAP_NAME}
     message = SceneMessage(robot_model_name=robot_name)
     # as MoveIt: an answer with parts only is a change
     message.is_diff = message.robot_state.is_diff = components != ALL_COMPONENTS
     message.name = snapshot.name
     if components & has.TRANSFORMS:
-        message.fixed_frame_transforms = _transforms(snapshot)
+        message.fixed_frame_transforms = [
+            _transform(snapshot.root, name, pose) for name, pose in snapshot.fixed_frames.items()
+        ]
     if components & has.ROBOT_STATE:
         message.robot_state = state
         message.robot_state.is_diff = False
@@ -89,30 +98,22 @@ def scene_message(
             for link in {**scene.link_shapes, **scene.scale}
         ]
     if components & has.OBJECT_COLORS:
-        message.object_colors = _colors(snapshot.colors)
+        message.object_colors = [
+            ObjectColor(id=name, color=ColorRGBA(**dict(zip('rgba', color, strict=True))))
+            for name, color in snapshot.colors.items()
+        ]
     if components & has.WORLD_OBJECT_GEOMETRY:
-        message.world = world_message(snapshot)
-    elif components & has.WORLD_OBJECT_NAMES:
-        names = snapshot.scene.objects
         message.world.collision_objects = [
-            _identified(name, snapshot.details[name], snapshot.root)
-            for name in names
-            if name != OCTOMAP_NAME
+            object_message(each, snapshot.details[name], snapshot.root)
+            for name, each in objects.items()
+        ]
+    elif components & has.WORLD_OBJECT_NAMES:
+        message.world.collision_objects = [
+            _identified(name, snapshot.details[name], snapshot.root) for name in objects
         ]
     if components & has.OCTOMAP and snapshot.octomap is not None:
         message.world.octomap = snapshot.octomap
     return message
-
-
-def world_message(snapshot: SceneSnapshot) -> PlanningSceneWorld:
-    """Return the objects of the world as a moveit_msgs/PlanningSceneWorld."""
-    return PlanningSceneWorld(
-        collision_objects=[
-            object_message(each, snapshot.details[name], snapshot.root)
-            for name, each in snapshot.scene.objects.items()
-            if name != OCTOMAP_NAME
-        ]
-    )
 
 
 def attached_messages(snapshot: SceneSnapshot) -> Sequence[AttachedCollisionObject]:
@@ -134,17 +135,17 @@ def object_message(thing: CollisionObject, details: ObjectDetails, frame: str) -
     message = _identified(thing.name, details, frame)
     message.pose = pose_message(thing.pose)
     meshes = iter(details.meshes)
-    for placed in (part for each in thing.shapes for part in as_primitives(each)):
+    for placed in (part for each in thing.shapes for part in _as_primitives(each)):
         shape, pose = placed.shape, pose_message(placed.pose)
         match shape:
             case Mesh():
-                message.meshes.append(next(meshes, None) or mesh_message(shape))
+                message.meshes.append(next(meshes, None) or _mesh(shape))
                 message.mesh_poses.append(pose)
             case Plane():
-                message.planes.append(plane_message(shape))
+                message.planes.append(_plane(shape))
                 message.plane_poses.append(pose)
             case Box() | Sphere() | Cylinder() | Cone():
-                message.primitives.append(primitive_message(shape))
+                message.primitives.append(_primitive(shape))
                 message.primitive_poses.append(pose)
     message.subframe_names = list(details.subframes)
     message.subframe_poses = [pose_message(each) for each in details.subframes.values()]
@@ -170,25 +171,62 @@ def _identified(name: str, details: ObjectDetails, frame: str) -> ObjectMessage:
     return ObjectMessage(header=Header(frame_id=frame), id=name, type=kind)
 
 
-def _colors(colors: Mapping[str, Iterable[float]]) -> Sequence[ObjectColor]:
-    return [
-        ObjectColor(id=name, color=ColorRGBA(**dict(zip('rgba', color, strict=True))))
-        for name, color in colors.items()
-    ]
+def _transform(root: str, name: str, pose: Pose) -> TransformStamped:
+    message = TransformStamped(header=Header(frame_id=root), child_frame_id=name)
+    placed = pose_message(pose)
+    x, y, z = pose.position.tolist()
+    message.transform = Transform(translation=Vector3(x=x, y=y, z=z), rotation=placed.orientation)
+    return message
 
 
-def _transforms(snapshot: SceneSnapshot) -> Sequence[TransformStamped]:
-    return [
-        TransformStamped(
-            header=Header(frame_id=snapshot.root), child_frame_id=name, transform=_transform(pose)
-        )
-        for name, pose in snapshot.fixed_frames.items()
-    ]
+def pose_message(pose: Pose) -> PoseMessage:
+    """Return a pose as a geometry_msgs/Pose."""
+    message = PoseMessage(position=point_message(pose.position))
+    numbers = pin.Quaternion(pose.rotation).normalized().coeffs().tolist()
+    turn = message.orientation
+    turn.x, turn.y, turn.z, turn.w = numbers
+    return message
 
 
-def _transform(pose: Pose) -> Transform:
-    placed: Any = pose_message(pose)
-    place = placed.position
-    return Transform(
-        translation=Vector3(x=place.x, y=place.y, z=place.z), rotation=placed.orientation
-    )
+def point_message(position: Array) -> Point:
+    """Return a position as a geometry_msgs/Point."""
+    x, y, z = (float(number) for number in position)
+    return Point(x=x, y=y, z=z)
+
+
+def _primitive(shape: Box | Sphere | Cylinder | Cone) -> SolidPrimitive:
+    """Return a shape as a shape_msgs/SolidPrimitive."""
+    match shape:
+        case Box(x, y, z):
+            return SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[x, y, z])
+        case Sphere(radius):
+            return SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[radius])
+        case Cylinder(radius, length):
+            return SolidPrimitive(type=SolidPrimitive.CYLINDER, dimensions=[length, radius])
+        case Cone(radius, length):
+            return SolidPrimitive(type=SolidPrimitive.CONE, dimensions=[length, radius])
+
+
+def _as_primitives(placed: PlacedShape) -> Sequence[PlacedShape]:
+    """Return shapes that a message has: a capsule is a cylinder with a sphere on either end."""
+    shape, pose = placed.shape, placed.pose
+    if not isinstance(shape, Capsule):
+        return (placed,)
+    half = 0.5 * shape.length * pose.rotation[:, 2]
+    ends = (Pose(pose.rotation, pose.position + side * half) for side in (-1, 1))
+    caps = (PlacedShape(Sphere(shape.radius), end) for end in ends)
+    return (PlacedShape(Cylinder(shape.radius, shape.length), pose), *caps)
+
+
+def _plane(plane: Plane) -> PlaneMessage:
+    """Return a plane as a shape_msgs/Plane."""
+    length = float(np.linalg.norm(plane.normal))
+    return PlaneMessage(coef=[*plane.normal, -plane.offset * length])
+
+
+def _mesh(mesh: Mesh) -> MeshMessage:
+    """Return the surface of a hull as a shape_msgs/Mesh."""
+    hull = mesh.hull
+    faces = (hull.polygons(number) for number in range(hull.num_polygons))
+    triangles = [MeshTriangle(vertex_indices=[face[0], face[1], face[2]]) for face in faces]
+    return MeshMessage(triangles=triangles, vertices=[point_message(each) for each in mesh.points])

@@ -23,12 +23,13 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Empty
 
 from arm_model import Array
+from arm_model.ros import scene_change
 from node_runner import LATCHED
 
 from ..exceptions import PlanningCode, PlanningError
 from .robot_groups import RobotGroups
 from .robot_state import joints_of, state_message
-from .scene_changes import apply_attached, apply_object, apply_scene
+from .scene_changes import apply_scene
 from .scene_messages import ALL_COMPONENTS, attached_messages, collision_message, scene_message
 from .scene_snapshot import SceneSnapshot
 from .tf_frames import TfFrames
@@ -70,15 +71,13 @@ class SceneMonitor:
         self._collisions = node.create_publisher(PlanningScene, 'collision_scene', LATCHED)
         self._published = node.create_publisher(PlanningScene, 'monitored_planning_scene', LATCHED)
         node.create_subscription(JointState, 'joint_states', self._take_joints, 1)
-        for kind, topic, apply in (
-            (PlanningScene, 'planning_scene', apply_scene),
-            (CollisionObject, 'collision_object', apply_object),
-            (AttachedCollisionObject, 'attached_collision_object', apply_attached),
+        for kind, topic, as_scene in (
+            (PlanningScene, 'planning_scene', lambda scene: scene),
+            (PlanningSceneWorld, 'planning_scene_world', _world),
+            (CollisionObject, 'collision_object', scene_change),
+            (AttachedCollisionObject, 'attached_collision_object', scene_change),
         ):
-            node.create_subscription(kind, topic, self._change_by(topic, apply), DEPTH)
-        node.create_subscription(
-            PlanningSceneWorld, 'planning_scene_world', self._take_world, DEPTH
-        )
+            node.create_subscription(kind, topic, self._change_by(topic, as_scene), DEPTH)
         node.create_service(GetPlanningScene, 'get_planning_scene', self._get)
         node.create_service(ApplyPlanningScene, 'apply_planning_scene', self._apply)
         node.create_service(Empty, 'clear_octomap', self._clear_octomap)
@@ -131,10 +130,10 @@ class SceneMonitor:
         positions = self.positions(state)
         if group:
             self._check_received(self.robot.model(group).joints, state.joint_state.name)
-        snapshot = self.snapshot
-        for body in state.attached_collision_objects:
-            snapshot = apply_attached(snapshot, body, positions)
-        return snapshot, positions
+        if not state.attached_collision_objects:
+            return self.snapshot, positions
+        bodies = scene_change(*state.attached_collision_objects)
+        return apply_scene(self.snapshot, bodies, positions), positions
 
     def state(self, positions: Array | None = None) -> StateMessage:
         """Return where all joints are as a moveit_msgs/RobotState, with attached bodies."""
@@ -160,10 +159,9 @@ class SceneMonitor:
                 )
 
     def _clear_octomap(self, _request: Empty.Request, response: Empty.Response) -> Empty.Response:
-        scene = PlanningScene(is_diff=True)
-        scene.robot_state.is_diff = True
+        scene = scene_change()
         scene.world.octomap.octomap.id = NO_OCTOMAP
-        self._change('clear_octomap', apply_scene, scene)
+        self._change('clear_octomap', scene)
         return response
 
     def _take_joints(self, message: JointState) -> None:
@@ -172,27 +170,17 @@ class SceneMonitor:
             if position == position:  # noqa: PLR0124  # not NaN
                 self._places[name], self._arrivals[name] = position, now
 
-    def _take_world(self, message: PlanningSceneWorld) -> None:
-        """Replace all objects of the world, and the octomap."""
-        scene = PlanningScene(is_diff=True, world=message)
-        scene.robot_state.is_diff = True
-        remove_all = CollisionObject(operation=CollisionObject.REMOVE)
-        scene.world.collision_objects = [remove_all, *message.collision_objects]
-        if not message.octomap.octomap.data:
-            scene.world.octomap.octomap.id = NO_OCTOMAP
-        self._change('planning_scene_world', apply_scene, scene)
+    def _change_by(self, topic: str, as_scene: Any) -> Callable[[Any], None]:  # noqa: ANN401
+        def receive(message: Any) -> None:  # noqa: ANN401
+            self._change(topic, as_scene(message))
 
-    def _change_by(self, topic: str, apply: Any) -> Callable[[Any], None]:  # noqa: ANN401
-        def take(message: Any) -> None:  # noqa: ANN401
-            self._change(topic, apply, message)
+        return receive
 
-        return take
-
-    def _change(self, source: str, apply: Any, message: Any) -> bool:  # noqa: ANN401
-        """Apply a message; a refusal is logged and leaves the scene as it is."""
+    def _change(self, source: str, scene: PlanningScene) -> bool:
+        """Apply a scene; a refusal is logged and leaves the scene as it is."""
         known = self.snapshot.notes
         try:
-            self.snapshot = apply(self.snapshot, message, self.positions())
+            self.snapshot = apply_scene(self.snapshot, scene, self.positions())
         except PlanningError as error:
             self._node.get_logger().warning(f'{source} refused: {error.code.name}: {error}')
             return False
@@ -233,8 +221,19 @@ class SceneMonitor:
     def _apply(
         self, request: ApplyPlanningScene.Request, response: ApplyPlanningScene.Response
     ) -> ApplyPlanningScene.Response:
-        response.success = self._change('apply_planning_scene', apply_scene, request.scene)
+        response.success = self._change('apply_planning_scene', request.scene)
         return response
+
+
+def _world(message: PlanningSceneWorld) -> PlanningScene:
+    """Return a change that replaces all objects of the world, and the octomap."""
+    scene = scene_change(
+        CollisionObject(operation=CollisionObject.REMOVE), *message.collision_objects
+    )
+    scene.world.octomap = message.octomap
+    if not message.octomap.octomap.data:
+        scene.world.octomap.octomap.id = NO_OCTOMAP
+    return scene
 
 
 def _near(one: Array, other: Array) -> bool:

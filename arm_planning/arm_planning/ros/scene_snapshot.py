@@ -45,7 +45,6 @@ class SceneSnapshot:
     """One state of the scene; immutable."""
 
     scene: PlanningScene  # what may collide: all joints of the robot move
-    version: int = 0  # how many changes were made before
     name: str = ''  # its name
     # of objects of the world and attached ones, by name
     details: Mapping[str, ObjectDetails] = field(default_factory=dict)

@@ -16,11 +16,11 @@ from std_msgs.msg import Header
 from arm_model import Array, Clearances, combined, Contact, inverse
 
 from ..constraints import ConstraintCheck, ConstraintResult
-from ..exceptions import PlanningCode, PlanningError
+from ..exceptions import coded, PlanningCode, PlanningError
 from .background import Background, error_code
-from .geometry import point_message, pose_message
 from .motion_request import RequestReader
 from .scene_changes import scene_for
+from .scene_messages import point_message, pose_message
 from .scene_monitor import SceneMonitor
 from .scene_snapshot import SceneSnapshot
 
@@ -91,12 +91,8 @@ def fk_response(
     outer = inverse(snapshot.frame(frame, positions))
     response = GetPositionFK.Response(error_code=error_code())
     for link in request.fk_link_names:
-        try:
+        with coded(PlanningCode.INVALID_LINK_NAME, 'fk_link_names'):
             snapshot.link_of(link)
-        except PlanningError as error:
-            raise PlanningError(
-                PlanningCode.INVALID_LINK_NAME, f'fk_link_names: {error}'
-            ) from error
         pose = combined(outer, snapshot.frame(link, positions))
         header = Header(frame_id=frame, stamp=stamp)
         response.pose_stamped.append(PoseStamped(header=header, pose=pose_message(pose)))
