@@ -29,15 +29,14 @@ from .exceptions import (
 from .frame_tree import FrameTree, TRANSFORM_TIMEOUT
 from .kinematics import Kinematics
 from .limits import JointLimits, load_limits, merge_limits
-from .link_pairs import LinkPairs, sample_link_pairs
 from .model import RobotModel
 from .names import ArmNames, names_of
 from .pose import combined, inverse, ORIGIN, Pose, rotation_of, turned_twists
 from .scene.allowed_collisions import AllowedCollisionMatrix
 from .scene.clearances import Clearances, Contact, LeastClearance, Proximity
-from .scene.default_collisions import with_default_collisions
 from .scene.objects import AttachedBody, CollisionObject
 from .scene.octomap import OCTOMAP_NAME, octomap_shapes
+from .scene.pairs import LinkPairs, sample_link_pairs, with_default_collisions
 from .scene.planning_scene import PlanningScene
 from .scene.shapes import (
     Box,

@@ -29,17 +29,11 @@ class ArmError(Exception):
 
 
 class ModelError(ArmError, ValueError):
-    """Description, SRDF and limits do not make an arm.
-
-    Scenarios: a joint of the group has no acceleration limit, the group is unknown, the tip link
-    is misspelt, a pose of the SRDF is beyond a limit.
-    """
+    """Description, SRDF and limits do not make an arm."""
 
 
 class LimitsError(ModelError):
     """The limits file cannot be read, or does not have what it must.
-
-    Scenarios: a joint is missing, a speed is wider than the description's, a number is none.
 
     Attributes:
         problems: What is wrong, one sentence each.
@@ -51,34 +45,19 @@ class LimitsError(ModelError):
 
 
 class SceneError(ArmError, ValueError):
-    """An object does not fit into a planning scene.
-
-    Scenarios: a box with a negative edge, an unknown object or link, an object that is attached
-    already.
-    """
+    """An object does not fit into a planning scene."""
 
 
 class LinkNameError(SceneError):
-    """A link of a scene is unknown.
-
-    Scenarios: an object is attached to it, or is to touch it.
-    """
+    """A link of a scene is unknown."""
 
 
 class ObjectNameError(SceneError):
-    """The name of an object is unknown, empty or taken.
-
-    Scenarios: an object is moved or removed that is not there, a link has its name, it is attached
-    and added to the world, too.
-    """
+    """The name of an object is unknown, empty or taken."""
 
 
 class CommandError(ArmError, ValueError):
-    """A request is refused before anything moves.
-
-    Scenarios: a NaN, an unknown joint or link, a twist that is not six numbers, a speed override
-    of 120 %.
-    """
+    """A request is refused before anything moves."""
 
 
 @contextmanager

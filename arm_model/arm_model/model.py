@@ -23,8 +23,8 @@ from .limits import JointLimits, load_limits, merge_limits
 from .pose import Pose, turned_twists
 from .scene.allowed_collisions import AllowedCollisionMatrix
 from .scene.clearances import Clearances, LeastClearance, Proximity
-from .scene.default_collisions import with_default_collisions
 from .scene.link_shapes import link_shapes
+from .scene.pairs import with_default_collisions
 from .scene.planning_scene import PlanningScene
 
 MIN_REACH = 0.01  # reach of a group that is shorter, such as a finger that slides, in [m]

@@ -14,8 +14,9 @@ measured with ``--wheels DIR``, after ``pip install --target DIR ompl roboplan``
 - roboplan is its RRT-Connect and its own shortcuts, in C++, without timing.
 
 Times are those of the processor: other programs do not count. Lengths are by those of a long run
-(long_run.py). A path is invalid where a sampler that looks at it every milliradian, and asks
-nothing but pinocchio, finds a contact.
+of minutes (``--long-run``), which writes ``best_lengths.json``; where it finds no way, the number
+is null, and the problem does not count. A path is invalid where a sampler that looks at it every
+milliradian, and asks nothing but pinocchio, finds a contact.
 """
 
 from __future__ import annotations
@@ -41,6 +42,8 @@ from arm_bringup.description import expand_xacro
 from arm_bringup.robots import installed_robots_folder
 from arm_model import Array, Box, PlanningScene, RobotModel
 from arm_planning import JointGoal, MotionRequest, Planner, PlanningError, ValidityCheck
+from arm_planning.free.motion_check import MotionCheck
+from arm_planning.free.search import rrt_connect, shortened
 
 try:
     from ompl import base, geometric, util
@@ -56,6 +59,9 @@ TIMEOUT = 1.0  # time for one problem in [s]
 FEW = 10  # problems of each scene, unless all are asked for
 DENSE = 1e-3  # motion of a joint from one look of the sampler to the next in [rad]
 SAMPLES = 2000  # places of a timed path that are compared
+
+RUNS, SHORTCUTS = 16, 6  # how often a long run searches a way, and how often it shortens each
+LONGEST = 30.0  # time for one problem of a long run in [s]
 
 RESOLUTION = 0.01
 """Of OMPL's motion check, as a share of the space: MoveIt's longest_valid_segment_fraction."""
@@ -187,6 +193,49 @@ def touches(places: Array, scene: PlanningScene) -> bool:
     return False
 
 
+def length_of(places: Array) -> float:
+    """Return the length of the straight motions between places in [rad]."""
+    return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+
+
+def best_length(model: RobotModel, asked: Problem) -> float | None:
+    """Return the length of the shortest valid way that is found; None for none."""
+    deadline, check = time.monotonic() + LONGEST, ValidityCheck(model.limits, asked.scene)
+    draw = np.random.default_rng(asked.seed)
+    motions = MotionCheck(check, (asked.start, asked.goal))
+    found = []
+
+    def expired() -> bool:
+        return time.monotonic() > deadline
+
+    for _ in range(RUNS):
+        places = rrt_connect(
+            asked.start,
+            [asked.goal],
+            lambda: draw.uniform(model.limits.lower, model.limits.upper),
+            motions,
+            expired,
+            further=iter(()),
+        )
+        if places is None:
+            break
+        for _ in range(SHORTCUTS):
+            places = shortened(places, draw, motions, expired)
+        if check.waypoints(places) is None:
+            found.append(length_of(places))
+    return min(found, default=None)
+
+
+def long_run(count: int) -> None:
+    """Write the best lengths, after each scene."""
+    model, found = panda(), {}
+    for kind in KINDS:
+        lengths = [best_length(model, problem(model, kind, seed)) for seed in range(count)]
+        found[kind] = [None if each is None else round(each, 3) for each in lengths]
+        BEST_LENGTHS.write_text(json.dumps(found), encoding='utf-8')
+        print(kind, lengths.count(None), 'not solved', flush=True)
+
+
 PLANNERS: dict[str, Callable[[RobotModel, Problem], Planning]] = {
     'ours': ours,
     'OMPL': plain_ompl,
@@ -213,8 +262,7 @@ def measured(name: str, count: int) -> None:
             figures['times'].append(time.process_time() - began)
             if places is None:
                 continue
-            length = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
-            figures['lengths'].append(length / best[kind][seed])
+            figures['lengths'].append(length_of(places) / best[kind][seed])
             figures['invalid'].append(touches(places, asked.scene))
             if name == 'ours':
                 figures['proof'].append(proof(model, asked))
@@ -247,9 +295,13 @@ def main() -> None:
     parser.add_argument('--all', action='store_true', help=f'{PROBLEMS} problems of each scene')
     parser.add_argument('--problems', type=int, default=FEW, help='problems of each scene')
     parser.add_argument('--wheels', type=Path, help='where OMPL and roboplan are installed')
+    parser.add_argument('--long-run', action='store_true', help='write best_lengths.json')
     parser.add_argument('--planner', choices=PLANNERS, help=argparse.SUPPRESS)
     options = parser.parse_args()
     count = PROBLEMS if options.all else options.problems
+    if options.long_run:
+        long_run(PROBLEMS)
+        return
     if options.planner is not None:
         measured(options.planner, count)
         return

@@ -181,15 +181,6 @@ def test_what_no_controller_can_follow_is_refused(
     assert re.search(words, str(refused))
 
 
-def test_a_motion_is_followed(bench: Bench) -> None:
-    """It ends with the controller."""
-    bench.start()
-    assert not bench.ends
-    bench.controller.end(GoalStatus.STATUS_SUCCEEDED)
-    assert bench.ends == [(PlanningCode.SUCCESS, '')]
-    bench.start()
-
-
 def test_a_controller_that_does_not_confirm_keeps_its_joints(bench: Bench) -> None:
     """The client is answered; the joints are free when the result arrives."""
     running = bench.start()
@@ -374,37 +365,20 @@ def test_old_joint_states_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_controller_that_is_not_found_yet_is_waited_for(bench: Bench) -> None:
-    """Whoever has just started knows nobody; its time counts from when it was asked."""
-    bench.controller.is_ready = False
+    """Nor one that does not know its client, which could not cancel; its time counts from then."""
+    bench.controller.is_ready, bench.is_known = False, False
     running = bench.start()
     first = running.begin
     bench.watch()
-    assert (bench.controller.goal, bench.ends) == (None, [])
     bench.controller.is_ready = True
+    bench.watch()
+    assert (bench.controller.goal, bench.ends) == (None, [])
+    bench.is_known = True
     bench.watch()
     assert bench.controller.goal is not None
     assert running.begin > first
     bench.controller.end(GoalStatus.STATUS_SUCCEEDED)
     assert bench.ends == [(PlanningCode.SUCCESS, '')]
-
-
-def test_a_controller_that_does_not_know_its_client_yet_is_waited_for(bench: Bench) -> None:
-    """Its answers would be lost, and nobody could cancel what it does."""
-    bench.is_known = False
-    bench.start()
-    bench.watch()
-    assert bench.controller.goal is None
-    bench.is_known = True
-    bench.watch()
-    assert bench.controller.goal is not None
-
-
-def test_what_waits_for_its_controller_may_be_invalidated(bench: Bench) -> None:
-    """Nothing has moved: that is no success."""
-    bench.controller.is_ready = False
-    code = PlanningCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
-    bench.execution.stop(bench.start(), code, 'a box is in the way')
-    assert bench.ends == [(code, 'a box is in the way')]
 
 
 def test_a_controller_that_does_not_come_is_named(
@@ -422,11 +396,12 @@ def test_a_controller_that_does_not_come_is_named(
     assert bench.controller.goal is None
 
 
-def test_what_waits_for_its_controller_can_be_stopped(bench: Bench) -> None:
-    """It ends at once, and its joints are free."""
+@pytest.mark.parametrize('code', [PlanningCode.PREEMPTED, execution.INVALIDATED])
+def test_what_waits_for_its_controller_can_be_stopped(bench: Bench, code: PlanningCode) -> None:
+    """It ends at once and is no success, as nothing has moved; its joints are free."""
     bench.controller.is_ready = False
-    bench.execution.stop(bench.start())
-    assert bench.ends == [(PlanningCode.PREEMPTED, 'stopped on request')]
+    bench.execution.stop(bench.start(), code, 'a box is in the way')
+    assert bench.ends == [(code, 'a box is in the way')]
     bench.controller.is_ready = True
     bench.watch()
     assert bench.controller.goal is None

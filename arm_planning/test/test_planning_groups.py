@@ -18,9 +18,9 @@ import pytest
 
 from arm_model import Array, AttachedBody, Box, Clearances, CollisionObject, PlacedShape, Pose
 from arm_planning import JointGoal, MotionRequest
-from arm_planning.ros.kinematic_services import KinematicServices
 from arm_planning.ros.planning import GroupPlanners
 from arm_planning.ros.robot_groups import RobotGroups
+from arm_planning.ros.robot_services import RobotServices
 from arm_planning.ros.scene_changes import scene_for
 from arm_planning.ros.scene_messages import pose_message
 from arm_planning.ros.scene_snapshot import SceneSnapshot
@@ -140,7 +140,7 @@ def test_inverse_kinematics_has_the_torso_where_it_is() -> None:
     monitor: Any = SimpleNamespace(robot=robot())
     background: Any = SimpleNamespace(serve=lambda *_: None)
     node: Any = None
-    kinematics, link = KinematicServices(node, monitor, background), 'left_3_link'
+    kinematics, link = RobotServices(node, monitor, background), 'left_3_link'
     for torso in (0.4, -0.7):
         here = robot().positions({'torso': torso})
         wanted = robot().kinematics.link_pose(link, moved(here, np.array([0.3, -0.5, 0.2])))

@@ -147,23 +147,6 @@ def test_numeric_solutions_meet_the_pose(kinds: str, seed: int) -> None:
         assert (turned <= np.pi + 1e-9).all()
 
 
-@settings(max_examples=40, deadline=None)
-@given(seed=seeds)
-def test_panda_is_solved_from_anywhere(seed: int) -> None:
-    """Seven joints: a pose of random joints, from another random seed."""
-    model, inverse = robot('panda'), solver('panda')
-    pose = inverse.link.pose(drawn(model.limits, seed))
-    found = inverse.solve(pose, drawn(model.limits, seed + 1), timeout=5.0)
-    assert meets(inverse, pose, found[0], 1e-6)
-
-
-@pytest.mark.parametrize('name', ROBOTS)
-def test_the_seed_is_its_own_solution(name: str) -> None:
-    """From the joints that made it, a pose has these joints."""
-    found = solver(name).solve(solver(name).link.pose(ready(name)), ready(name))
-    assert found[0] == pytest.approx(ready(name), abs=1e-9)
-
-
 def test_several_solutions_of_a_redundant_arm() -> None:
     """As many different ones as asked for, nearest first."""
     pose, seed = solver('panda').link.pose(ready('panda')), ready('panda')

@@ -290,19 +290,6 @@ def test_a_second_goal_is_taken_when_the_first_is_refused() -> None:
         motion('prbt', MotionRequest(ready('prbt'), [far, far], 'LIN'))
 
 
-def test_the_speed_of_a_link_is_limited() -> None:
-    """max_cartesian_speed of any link holds for every kind."""
-    name, most = 'panda', 0.05
-    for kind in ('LIN', 'PTP'):
-        wanted = request(name, kind, moved(name, np.array([0.0, 0.1, 0.0])))
-        plan = motion(name, replace(wanted, max_cartesian_speed=most))
-        assert any('0.05 m/s' in note for note in plan.notes)
-        rows = plan.path.positions(np.linspace(0.0, plan.path.duration, 300))
-        ways = np.diff([tip(name).pose(row).position for row in rows], axis=0)
-        speed = np.linalg.norm(ways, axis=1).max() * 299 / plan.path.duration
-        assert speed == pytest.approx(most, rel=0.01)
-
-
 CORNERS = ((0.0, 0.12, 0.0), (0.0, 0.12, -0.12), (0.0, 0.0, -0.12))
 
 

@@ -19,9 +19,9 @@ import pytest
 from ros_client import RosClient
 
 from arm_planning import PlanningCode, PlanningError
+from arm_planning.ros.actions import MotionAction, REPLAN_ATTEMPTS, sequence, single_motion
 from arm_planning.ros.background import Background
 from arm_planning.ros.execution import Done, INVALIDATED
-from arm_planning.ros.motion_action import MotionAction, REPLAN_ATTEMPTS, sequence, single_motion
 from arm_planning.ros.planning import PlannedMotion
 
 TIMEOUT = 20.0  # [s]

@@ -14,12 +14,10 @@ import pytest
 from arm_model import ModelError
 from arm_model.ros import seconds
 from arm_planning import JointGoal
-from arm_planning.ros.joint_trajectory import check_trajectory
 from arm_planning.ros.motion_request import RequestReader
-from arm_planning.ros.path_watch import path_of
 from arm_planning.ros.robot_groups import RobotGroups
-from arm_planning.ros.robot_state import trajectory_message
 from arm_planning.ros.scene_snapshot import SceneSnapshot
+from arm_planning.ros.trajectories import check_trajectory, path_of, trajectory_message
 from arm_trajectory import Path, Segment
 
 JOINTS = panda().joints

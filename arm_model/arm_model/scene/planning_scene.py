@@ -22,8 +22,7 @@ from ..pose import combined, inverse, Pose
 from .allowed_collisions import AllowedCollisionMatrix
 from .objects import AttachedBody, CollisionObject
 from .octomap import OCTOMAP_NAME
-from .padding import check_padding, padded
-from .shapes import native, PlacedShape
+from .shapes import check_padding, native, padded, PlacedShape
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,11 +28,9 @@ from ..exceptions import PlanningError
 from ..moveit_config.known import misspelt
 from ..moveit_config.package import MoveItPackage, read_package
 from ..moveit_config.settings import of_nothing
+from ..ros.actions import ExecuteAction, MotionAction, sequence, single_motion
 from ..ros.background import Background
-from ..ros.execute_action import ExecuteAction
 from ..ros.execution import TrajectoryExecution
-from ..ros.kinematic_services import KinematicServices
-from ..ros.motion_action import MotionAction, sequence, single_motion
 from ..ros.parameters import (
     declare_controllers,
     declare_execution_limits,
@@ -43,8 +41,8 @@ from ..ros.path_watch import PathWatch
 from ..ros.planner_queries import PlannerQueries
 from ..ros.planning import PlanningThreads
 from ..ros.robot_groups import RobotGroups
+from ..ros.robot_services import RobotServices
 from ..ros.scene_monitor import SceneMonitor
-from ..ros.state_services import StateServices
 
 NAME = 'move_group'
 
@@ -113,8 +111,7 @@ class MoveGroup(Node):
         semantic.publish(String(data=description.srdf))
         monitor = SceneMonitor(self, robot, prefix)
         self._queries = Background(self, 'queries')
-        StateServices(self, monitor, self._queries)
-        KinematicServices(self, monitor, self._queries, settings)
+        RobotServices(self, monitor, self._queries, settings)
         followers = robot.kinematics.mimics
         execution = TrajectoryExecution(self, controllers, monitor.received, limits, followers)
         self._watch = Background(self, 'watch')

@@ -29,7 +29,7 @@ from node_runner import ServerMatch
 
 from ..exceptions import PlanningCode, PlanningError
 from .controllers import Controller, FOLLOW
-from .joint_trajectory import check_trajectory, from_start, part_of
+from .trajectories import check_trajectory, from_start, part_of
 
 WATCH_PERIOD = 0.05  # how often executions are looked at in [s]
 STOP_TIMEOUT = 5.0  # time in which controllers must have stopped in [s]; then they are asked again

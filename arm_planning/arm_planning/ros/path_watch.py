@@ -11,13 +11,12 @@ from typing import Any
 import numpy as np
 
 from arm_model import Array, PlanningScene
-from arm_model.ros import seconds
-from arm_trajectory import Path, PathCheck, quintics
+from arm_trajectory import Path, PathCheck
 
 from .background import as_refusal, Background
 from .execution import Execution, INVALIDATED, TrajectoryExecution
-from .joint_trajectory import part_of, ROWS
 from .scene_monitor import SceneMonitor
+from .trajectories import part_of, path_of
 
 LOOKS = 400  # places on a trajectory at which the arm is looked for
 
@@ -128,41 +127,3 @@ def passed_time(path: Path, positions: Array) -> float:
     apart = np.abs(path.positions(times) - positions).max(axis=1)
     first = int((apart <= apart.min() + AMBIGUOUS).argmax())
     return max(float(times[first]) - LATENCY, 0.0)
-
-
-def path_of(trajectory: Any) -> Path:  # noqa: ANN401
-    """Return a trajectory as joint_trajectory_controller interpolates it.
-
-    Args:
-        trajectory: A trajectory_msgs/JointTrajectory of two points or more.
-    """
-    times = np.array([seconds(each.time_from_start) for each in trajectory.points])
-    lasts = np.diff(times)
-    rows = [[getattr(each, kind) for each in trajectory.points] for kind in ROWS]
-    # velocities or accelerations that some points lack do not count
-    q, v, a = (np.array(each if all(map(len, each)) else []) for each in rows)
-    if a.shape == q.shape == v.shape:
-        pieces = quintics(lasts, q, v, a)
-    elif v.shape == q.shape:
-        pieces = _cubics(lasts, q, v)
-    else:
-        pieces = _lines(lasts, q)
-    return Path.of(lasts, pieces)
-
-
-def _cubics(lasts: Array, q: Array, v: Array) -> Array:
-    """Return coefficients as quintics() does, of points without accelerations."""
-    pieces = _lines(lasts, q)
-    t, way = lasts[:, None], np.diff(q, axis=0)
-    pieces[:, 1] = v[:-1]
-    pieces[:, 2] = (3.0 * way - (2.0 * v[:-1] + v[1:]) * t) / t**2
-    pieces[:, 3] = (-2.0 * way + (v[:-1] + v[1:]) * t) / t**3
-    return pieces
-
-
-def _lines(lasts: Array, q: Array) -> Array:
-    """Return coefficients as quintics() does, of points that are positions alone."""
-    pieces = np.zeros((len(lasts), 6, q.shape[1]))
-    pieces[:, 0] = q[:-1]
-    pieces[:, 1] = np.diff(q, axis=0) / lasts[:, None]
-    return pieces

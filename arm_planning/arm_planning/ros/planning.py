@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Motions that are planned for clients: the thread that plans, and what they see of it."""
+"""Motions that are planned for clients: the threads that plan, and what they see of it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import count
+from itertools import count, groupby, pairwise
 import time
 from typing import Any
 
@@ -24,20 +24,19 @@ from rclpy.node import Node
 from arm_model import Array, frozen, RobotModel
 from node_runner import LATCHED
 
-from ..exceptions import PlanningCode, PlanningError
+from ..exceptions import coded, PlanningCode, PlanningError
 from ..industrial.limits import CartesianLimits
-from ..industrial.sequence import SequenceItem
+from ..industrial.sequence import check_radii, SequenceItem
 from ..moveit_config.settings import MoveItSettings
 from ..planner import CANCELED, Planner
 from ..requests import MotionRequest
 from .background import Background, error_code
 from .motion_request import RequestReader
 from .robot_groups import RobotGroups
-from .robot_state import state_message, trajectory_message
 from .scene_changes import apply_scene, scene_for
 from .scene_monitor import SceneMonitor
 from .scene_snapshot import SceneSnapshot
-from .sequence_request import group_runs, GroupRun
+from .trajectories import state_message, trajectory_message
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,6 +48,15 @@ class PlannedMotion:
     trajectories: Sequence[RobotTrajectory]
     planning_time: float  # how long planning took in [s]
     notes: Sequence[str] = ()  # what a person should know, such as where it is slower than asked
+
+
+@dataclass(frozen=True, slots=True)
+class _GroupRun:
+    """Items of a sequence that follow each other and move the same group: one trajectory."""
+
+    group: str  # name of the group
+    first: int  # number of the first item
+    items: Sequence[Any]  # the moveit_msgs/MotionSequenceItem
 
 
 SEEDS = count()  # seeds of planners: a second attempt at a plan searches in another way
@@ -154,7 +162,7 @@ class PlanningThreads:
         """
         if not items:
             return lambda: PlannedMotion(StateMessage(), [], 0.0, ['no items: nothing moves'])
-        runs = group_runs(items)
+        runs = _group_runs(items)
         snapshot, positions = self._monitor.start(items[0].req.start_state, runs[0].group)
         for number, run in enumerate(runs[1:], 1):
             if run.group not in [each.group for each in runs[:number]]:
@@ -164,7 +172,7 @@ class PlanningThreads:
             snapshot, lambda: self._plan_sequence(runs, snapshot, positions, is_canceled)
         )
 
-    def _begin(self, run: GroupRun, positions: Array) -> Array:
+    def _begin(self, run: _GroupRun, positions: Array) -> Array:
         """Return all positions with those at which the first item of a group begins."""
         state = run.items[0].req.start_state
         if state.attached_collision_objects:
@@ -220,7 +228,7 @@ class PlanningThreads:
 
     def _plan_sequence(
         self,
-        runs: Sequence[GroupRun],
+        runs: Sequence[_GroupRun],
         snapshot: SceneSnapshot,
         start: Array,
         is_canceled: Callable[[], bool],
@@ -231,8 +239,7 @@ class PlanningThreads:
         notes: list[str] = []
         for run in runs:
             model, planner = planners.at(run.group, positions)
-            reader = partial(self._reader, model, snapshot, positions, is_canceled)
-            read = partial(_read_item, reader)
+            read = self._item_reader(model, snapshot, positions, is_canceled)
             items = [
                 SequenceItem(partial(read, number, item.req), item.blend_radius)
                 for number, item in enumerate(run.items, run.first)
@@ -249,21 +256,28 @@ class PlanningThreads:
             notes,
         )
 
-    def _reader(
+    def _item_reader(
         self,
         model: RobotModel,
         snapshot: SceneSnapshot,
         positions: Array,
         is_canceled: Callable[[], bool],
-        start: Array | None,
-    ) -> RequestReader:
-        """Return what reads an item that begins at a start of its group, if there is one."""
-        if is_canceled():
-            raise PlanningError(PlanningCode.PREEMPTED, CANCELED)
-        if start is not None:
-            places = dict(zip(model.joints, start.tolist(), strict=True))
-            positions = self._moved(positions, places)
-        return RequestReader(model, snapshot, positions, self._settings)
+    ) -> Callable[[int, Any, Array | None], MotionRequest]:
+        """Return what reads an item of a sequence, by its number, message and start.
+
+        The start, the end of the item before, stands for what the message leaves out.
+        """
+
+        def read(number: int, message: Any, start: Array | None) -> MotionRequest:  # noqa: ANN401
+            with coded(place=f'sequence: item {number}'):
+                if is_canceled():
+                    raise PlanningError(PlanningCode.PREEMPTED, CANCELED)
+                here = positions
+                if start is not None:
+                    here = self._moved(here, dict(zip(model.joints, start.tolist(), strict=True)))
+                return RequestReader(model, snapshot, here, self._settings).request(message)
+
+        return read
 
     def _serve_sequence(self, request: Any) -> Callable[[], Any]:  # noqa: ANN401
         work = self.prepare_sequence(request.request.items)
@@ -330,22 +344,49 @@ def _changed(
     return apply_scene(snapshot, diff, positions)
 
 
-def _read_item(
-    reader: Callable[[Array | None], RequestReader],
-    number: int,
-    message: Any,  # noqa: ANN401
-    start: Array | None,
-) -> MotionRequest:
-    """Return an item of a sequence; the end of the item before stands for what it leaves out."""
-    try:
-        return reader(start).request(message)
-    except PlanningError as error:
-        raise PlanningError(error.code, f'sequence: item {number}: {error}') from error
-
-
 def _refuse_sequence(response: Any, error: PlanningError) -> None:  # noqa: ANN401
     response.response.error_code = error_code(error.code, str(error))
 
 
 def _refuse(response: Any, error: PlanningError) -> None:  # noqa: ANN401
     response.motion_plan_response.error_code = error_code(error.code, str(error))
+
+
+def _group_runs(items: Sequence[Any]) -> list[_GroupRun]:
+    """Return the items of a moveit_msgs/MotionSequenceRequest by group, in their order.
+
+    Raises:
+        PlanningError: An item has no group, a radius is none or blends two groups, or an item that
+            is not the first of its group has a start state.
+    """
+    radii = [item.blend_radius for item in items]
+    check_radii(radii)
+    groups = [item.req.group_name for item in items]
+    for number, (item, group) in enumerate(zip(items, groups, strict=True)):
+        if not group:
+            raise PlanningError(
+                PlanningCode.INVALID_GROUP_NAME, f'sequence: item {number}: group_name is empty'
+            )
+        if group in groups[:number] and _has_state(item.req.start_state):
+            raise PlanningError(
+                PlanningCode.INVALID_ROBOT_STATE,
+                f'sequence: item {number} has a start state, and {group} is moved before it; only'
+                ' the first item of a group may have one',
+            )
+    for number, ((group, following), radius) in enumerate(
+        zip(pairwise(groups), radii, strict=False)
+    ):
+        if group != following and radius > 0.0:
+            raise PlanningError(
+                PlanningCode.INVALID_MOTION_PLAN,
+                f'sequence: item {number} has a blend radius of {radius:g} m, and the next moves'
+                f' {following} instead of {group}; give 0',
+            )
+    numbered = groupby(enumerate(items), key=lambda pair: pair[1].req.group_name)
+    runs = [(group, list(pairs)) for group, pairs in numbered]
+    return [_GroupRun(group, pairs[0][0], [item for _, item in pairs]) for group, pairs in runs]
+
+
+def _has_state(message: Any) -> bool:  # noqa: ANN401  # messages have no type
+    """Return whether a moveit_msgs/RobotState says where a robot is, or what is attached to it."""
+    return bool(message.joint_state.name or message.attached_collision_objects)

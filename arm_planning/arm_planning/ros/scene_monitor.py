@@ -28,11 +28,11 @@ from node_runner import LATCHED
 
 from ..exceptions import PlanningCode, PlanningError
 from .robot_groups import RobotGroups
-from .robot_state import joints_of, state_message
 from .scene_changes import apply_scene
 from .scene_messages import ALL_COMPONENTS, attached_messages, collision_message, scene_message
 from .scene_snapshot import SceneSnapshot
 from .tf_frames import TfFrames
+from .trajectories import joints_of, state_message
 
 DEPTH = 100  # messages of changes that may wait: each of them counts
 NO_OCTOMAP = 'OcTree'  # id of an octomap without data: it takes the place of the present one

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The actions move_action and sequence_move_group: plan, and execute unless a plan is enough."""
+"""The actions of move_group: execute_trajectory, move_action and sequence_move_group."""
 
 from __future__ import annotations
 
@@ -9,29 +9,87 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any
 
-from moveit_msgs.action import MoveGroup, MoveGroupSequence
+from moveit_msgs.action import ExecuteTrajectory, MoveGroup, MoveGroupSequence
 from moveit_msgs.msg import MoveItErrorCodes, RobotState
 from rclpy.action.server import CancelResponse
 from rclpy.node import Node
 from rclpy.timer import Timer
+from std_msgs.msg import String
 
 from node_runner.action_goals import serve_goals
 
 from ..exceptions import PlanningCode, PlanningError
 from ..planner import CANCELED
 from .background import as_refusal, Background, error_code
-from .execute_action import conclude
 from .execution import Execution, INVALIDATED, TrajectoryExecution
 from .planning import PlannedMotion, PlanningThreads, sequence_group, sequence_response
 
+STOP = 'stop'  # the event that stops everything
 REPLAN_ATTEMPTS = 5  # how often a goal that does not say so is planned anew at most, as in MoveIt
 STATE_WAITS, STATE_PERIOD = 10, 0.1
 """How often joint states that are unknown or too old are looked for again, and time between two
 looks in [s]; MoveIt waits for a second, too."""
 
-
 Prepare = Callable[[Any, bool, Callable[[], bool]], Callable[[], PlannedMotion]]
 Answer = Callable[[MoveItErrorCodes, PlannedMotion | None, bool], Any]
+
+
+class ExecuteAction:
+    """Executes trajectories that clients have planned."""
+
+    def __init__(self, node: Node, execution: TrajectoryExecution) -> None:
+        self._node, self._execution = node, execution
+        self._running: dict[bytes, Execution] = {}
+        self._outcomes: dict[bytes, tuple[PlanningCode, str]] = {}
+        self._server = serve_goals(
+            node,
+            ExecuteTrajectory,
+            'execute_trajectory',
+            start=self._start,
+            conclude=self._conclude,
+            cancel=self._cancel,
+        )
+        node.create_subscription(String, 'trajectory_execution_event', self._event, 10)
+
+    def _start(self, handle: Any) -> None:  # noqa: ANN401  # rclpy has no types here
+        key = bytes(handle.goal_id.uuid)
+
+        def done(code: PlanningCode, reason: str) -> None:
+            self._running.pop(key, None)
+            self._outcomes[key] = code, reason
+            self._server.notify_execute(handle, None)  # leads to _conclude
+
+        goal = handle.request
+        try:
+            self._running[key] = self._execution.start(
+                goal.trajectory.joint_trajectory, done, list(goal.controller_names)
+            )
+        except PlanningError as error:
+            done(error.code, str(error))
+            return
+        handle.publish_feedback(ExecuteTrajectory.Feedback(state='MONITOR'))
+
+    def _cancel(self, handle: Any) -> CancelResponse:  # noqa: ANN401
+        running = self._running.get(bytes(handle.goal_id.uuid))
+        if running is not None:
+            self._execution.stop(running, reason='canceled')
+        return CancelResponse.ACCEPT
+
+    def _conclude(self, handle: Any) -> ExecuteTrajectory.Result:  # noqa: ANN401
+        code, reason = self._outcomes.pop(bytes(handle.goal_id.uuid))
+        handle.publish_feedback(ExecuteTrajectory.Feedback(state='IDLE'))
+        if code is not PlanningCode.SUCCESS:
+            self._node.get_logger().warning(f'execute_trajectory: {code.name}: {reason}')
+        _conclude(handle, code)
+        return ExecuteTrajectory.Result(error_code=error_code(code, reason))
+
+    def _event(self, message: String) -> None:
+        if message.data == STOP:
+            self._execution.stop_all('stopped by trajectory_execution_event')
+            return
+        self._node.get_logger().warning(
+            f'trajectory_execution_event: unknown event {message.data!r}; there is {STOP!r}'
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -266,10 +324,20 @@ class MotionAction:
         self._publish(goal, 'IDLE')
         if code is not PlanningCode.SUCCESS:
             self._node.get_logger().warning(f'{self._kind.name}: {code.name}: {reason}')
-        conclude(handle, code)
+        _conclude(handle, code)
         execution = goal.execution
         is_begun = goal.begun > 1 or (execution is not None and execution.is_sent)
         return self._kind.answer(error_code(code, reason), goal.planned, is_begun)
 
     def _publish(self, goal: _Goal, state: str) -> None:
         goal.handle.publish_feedback(self._kind.action.Feedback(state=state))
+
+
+def _conclude(handle: Any, code: PlanningCode) -> None:  # noqa: ANN401
+    """Give a goal the status of an outcome, as MoveIt does."""
+    if code is PlanningCode.SUCCESS:
+        handle.succeed()
+    elif code is PlanningCode.PREEMPTED and handle.is_cancel_requested:
+        handle.canceled()
+    else:
+        handle.abort()

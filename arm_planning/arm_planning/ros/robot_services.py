@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Services of inverse kinematics: compute_ik and compute_cartesian_path."""
+"""compute_fk, check_state_validity, compute_ik and compute_cartesian_path."""
 
 from __future__ import annotations
 
@@ -8,28 +8,36 @@ from collections.abc import Callable
 from functools import lru_cache, partial
 from typing import Any
 
-from geometry_msgs.msg import PoseStamped
-from moveit_msgs.srv import GetCartesianPath, GetPositionIK
+from geometry_msgs.msg import PoseStamped, Vector3
+from moveit_msgs.msg import ConstraintEvalResult, ContactInformation
+from moveit_msgs.srv import (
+    GetCartesianPath,
+    GetPositionFK,
+    GetPositionIK,
+    GetStateValidity,
+)
 import numpy as np
 from rclpy.node import Node
+from std_msgs.msg import Header
 
-from arm_model import Array, PlanningScene, RobotModel
+from arm_model import Array, Clearances, combined, Contact, inverse, PlanningScene, RobotModel
 from arm_model.ros import seconds
 from arm_trajectory import Path
 
 from ..cartesian_path import cartesian_path, JumpThresholds
-from ..constraints import ConstraintCheck
-from ..exceptions import PlanningCode, PlanningError
+from ..constraints import ConstraintCheck, ConstraintResult
+from ..exceptions import coded, PlanningCode, PlanningError
 from ..ik.solver import DEFAULT_TIMEOUT, IkSolver
 from ..moveit_config.settings import MoveItSettings
 from ..retime import speed_limited, timed_rows
 from ..validity import ValidityCheck
 from .background import Background, error_code
 from .motion_request import RequestReader, scaling_factor
-from .robot_state import state_message, trajectory_message
 from .scene_changes import scene_for
+from .scene_messages import point_message, pose_message
 from .scene_monitor import SceneMonitor
 from .scene_snapshot import SceneSnapshot
+from .trajectories import state_message, trajectory_message
 
 CANDIDATES = 8
 """Solutions of inverse kinematics among which one that heeds constraints is looked for."""
@@ -37,8 +45,8 @@ CANDIDATES = 8
 MAX_SOLVERS = 16  # links of groups, with the joints beside them in one place, that are kept
 
 
-class KinematicServices:
-    """Answers in a thread of its own."""
+class RobotServices:
+    """Answers about states and paths of the robot, in a thread of its own."""
 
     def __init__(
         self,
@@ -50,6 +58,8 @@ class KinematicServices:
         self._node, self._monitor, self._robot = node, monitor, monitor.robot
         self._settings = settings or MoveItSettings()
         self._solver = lru_cache(maxsize=MAX_SOLVERS)(IkSolver)
+        background.serve(GetPositionFK, 'compute_fk', self._fk, _refuse)
+        background.serve(GetStateValidity, 'check_state_validity', self._validity, lambda *_: None)
         background.serve(
             GetPositionIK,
             'compute_ik',
@@ -61,6 +71,74 @@ class KinematicServices:
             'compute_cartesian_path',
             lambda asked: self._prepared(self._cartesian_path, asked, asked.start_state),
             _refuse_path,
+        )
+
+    def _fk(self, request: Any) -> Callable[[], Any]:  # noqa: ANN401  # messages have no type
+        """Prepare the poses of links, bodies and subframes in the frame that a request names."""
+        snapshot, positions = self._monitor.start(request.robot_state)
+        stamp = self._node.get_clock().now().to_msg()
+        frame = request.header.frame_id or snapshot.root
+
+        def answer() -> GetPositionFK.Response:
+            names = request.fk_link_names
+            if not names:
+                raise PlanningError(
+                    PlanningCode.INVALID_LINK_NAME, 'fk_link_names is empty; name a link'
+                )
+            outer = inverse(snapshot.frame(frame, positions))
+            response = GetPositionFK.Response(error_code=error_code(), fk_link_names=names)
+            for link in names:
+                with coded(PlanningCode.INVALID_LINK_NAME, 'fk_link_names'):
+                    snapshot.link_of(link)
+                pose = pose_message(combined(outer, snapshot.frame(link, positions)))
+                header = Header(frame_id=frame, stamp=stamp)
+                response.pose_stamped.append(PoseStamped(header=header, pose=pose))
+            return response
+
+        return answer
+
+    def _validity(self, request: Any) -> Callable[[], Any]:  # noqa: ANN401
+        group, asked = request.group_name, request.constraints
+        if group:
+            self._robot.model(group)  # or raises
+        elif any(
+            (
+                *(asked.joint_constraints, asked.position_constraints),
+                *(asked.orientation_constraints, asked.visibility_constraints),
+            )
+        ):
+            raise PlanningError(
+                PlanningCode.INVALID_GROUP_NAME,
+                f'constraints are those of a group; groups: {", ".join(self._robot.names)}',
+            )
+        snapshot, positions = self._monitor.start(request.robot_state)
+        return lambda: self._checked(group, asked, snapshot, positions)
+
+    def _checked(
+        self,
+        group: str,
+        asked: Any,  # noqa: ANN401
+        snapshot: SceneSnapshot,
+        positions: Array,
+    ) -> GetStateValidity.Response:
+        """Return the contacts of a state, and what becomes of constraints of a group."""
+        contacts = Clearances(snapshot.scene).contacts(positions)
+        results: list[ConstraintResult] = []
+        if group:
+            pairs = set(scene_for(snapshot, self._robot.model(group).scene).pairs)
+            contacts = [each for each in contacts if each.bodies in pairs]
+            model = self._robot.model_at(group, positions)
+            reader = RequestReader(model, snapshot, positions)
+            constraints = reader.constraints(asked)
+            if constraints is not None:
+                results = list(ConstraintCheck(model, constraints).results(reader.start))
+        return GetStateValidity.Response(
+            valid=not contacts and not any(each.violation for each in results),
+            contacts=[_contact(each, snapshot) for each in contacts],
+            constraint_result=[
+                ConstraintEvalResult(result=not each.violation, distance=each.distance)
+                for each in results
+            ],
         )
 
     def _prepared(self, answer: Any, request: Any, state: Any) -> Callable[[], Any]:  # noqa: ANN401
@@ -201,6 +279,30 @@ class KinematicServices:
         most, link = max(request.max_cartesian_speed, 0.0), request.cartesian_speed_limited_link
         path, _ = speed_limited(path, most, link, partial(self._solver, model))
         return path, len(rows), reason
+
+
+def _contact(contact: Contact, snapshot: SceneSnapshot) -> ContactInformation:
+    """Return a contact as a moveit_msgs/ContactInformation."""
+    first, second = contact.bodies
+    x, y, z = contact.normal.tolist()
+    return ContactInformation(
+        header=Header(frame_id=snapshot.root),
+        position=point_message(contact.position),
+        normal=Vector3(x=x, y=y, z=z),
+        depth=contact.depth,
+        contact_body_1=first,
+        body_type_1=_kind(first, snapshot),
+        contact_body_2=second,
+        body_type_2=_kind(second, snapshot),
+    )
+
+
+def _kind(body: str, snapshot: SceneSnapshot) -> int:
+    if body in snapshot.scene.objects:
+        return int(ContactInformation.WORLD_OBJECT)
+    if body in snapshot.scene.attached_bodies:
+        return int(ContactInformation.ROBOT_ATTACHED)
+    return int(ContactInformation.ROBOT_LINK)
 
 
 def _one_pose(request: Any) -> tuple[str, PoseStamped]:  # noqa: ANN401
