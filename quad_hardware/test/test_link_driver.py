@@ -18,7 +18,7 @@ from quad_hardware import LinkError
 from quad_hardware.link import Dialect, Driver, LinkOptions, LinkState, SerialPort
 from quad_hardware.link.v1_dialect import V1Dialect
 from quad_hardware.link.v2_dialect import V2Dialect
-from quad_hardware.protocol import Code, Frame, Kind, LEG_MOTORS, Protocol, V1, V2
+from quad_hardware.protocol import LEG_MOTORS, Protocol, V1, V2
 from quad_hardware.report import Report
 from quad_pty_peer import PtyPeer
 
@@ -100,13 +100,6 @@ def test_an_adapter_that_keeps_bytes_back_loses_no_frame(rig: Rig) -> None:
     status = rig.driver.status()
     assert status.parser.damaged == status.parser.skipped == 0
     assert LinkState.STALE not in [state for state, _ in rig.changes]
-
-
-def test_reports_that_nobody_reads_are_lost(tmp_path: Path) -> None:
-    """As on a serial line: the robot of these tests goes on, and can be unplugged."""
-    with PtyPeer(tmp_path / 'port') as peer, peer.link.open('r+b', buffering=0) as port:
-        port.write(Frame(Kind.WRITE, Code.FEEDBACK, b'\x01').encode(V2))
-        wait_for(lambda: peer._sequence > 150, 'more reports than a terminal keeps')
 
 
 def test_an_adapter_is_asked_to_keep_nothing_back(

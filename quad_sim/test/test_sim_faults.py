@@ -74,21 +74,6 @@ def test_a_flip_inverts_one_bit() -> None:
     assert all((a ^ b).bit_count() == 1 for a, b in zip(arrival.data, range(256), strict=True))
 
 
-def test_damage_on_the_line_costs_frames_and_repeats_itself() -> None:
-    """One percent of bytes gone: some states are lost, none is wrong, twice the same."""
-
-    def exchange() -> tuple[bytes, int]:
-        robot = VirtualRobot(*KINEMATIC, '--fault', 'drop,rate=0.01', '--seed', '3')
-        for _ in range(5):  # the frame that asks for states may be hit as well
-            robot.send(ON)
-            robot.run(0.01)
-        return robot.received, len(robot.run(2.0))
-
-    first, second = exchange(), exchange()
-    assert first == second
-    assert 2 <= first[1] < 60
-
-
 @pytest.mark.slow
 def test_silence_begins_and_ends() -> None:
     """The robot receives and moves, and sends nothing, from one time to another."""

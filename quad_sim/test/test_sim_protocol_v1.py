@@ -131,23 +131,6 @@ def test_motors_without_torque_let_go(tmp_path: Path) -> None:
         wait(lambda: servos.torque_on(31), 'leg 3 loaded')
 
 
-@pytest.mark.parametrize('zero', [127, 128])
-def test_it_walks_when_it_is_commanded_to_and_stops_at_both_zeros(
-    tmp_path: Path, zero: int
-) -> None:
-    """VX walks ahead without falling; 127 and 128 both mean standing still."""
-    with robot(tmp_path, '--start', 'stand') as (client, served):
-        client.move(0x30, 20.0)
-        wait(lambda: served.server.truth.pose.position[0] > 0.1, 'it walks ahead')
-        assert served.server.truth.pose.tilt < math.radians(8)
-        client.write(0x30, bytes([zero]))
-        walker = served.simulation.board.walker
-        wait(lambda: not walker.walking, 'it stands')
-        place = served.server.truth.pose.position
-        time.sleep(0.3)
-        assert served.server.truth.pose.position == pytest.approx(place, abs=0.01)
-
-
 def test_the_vendors_zero_is_no_creeping(tmp_path: Path) -> None:
     """A library that encodes zero as 127 commands no motion at all."""
     with robot(tmp_path, '--physics', 'none') as (client, served):
@@ -171,18 +154,6 @@ def test_a_pose_of_the_body_and_a_reset(tmp_path: Path) -> None:
         wait(lambda: degrees(client.motors())[1] > 75.0, 'it folds its legs')
 
 
-def test_garbage_between_frames_is_passed_over(tmp_path: Path) -> None:
-    """Noise, half frames and wrong checksums cost nothing but themselves."""
-    with robot(tmp_path, '--physics', 'none') as (client, _):
-        client.port.write(b'\x55\x55\x00\x99\xaa\x00')
-        assert client.firmware().startswith('L-')
-        client.port.write(bytes.fromhex('55 00 09 02 01 01 F3 00 AA'))
-        assert client.battery() == 100
-        client.port.write(bytes.fromhex('55 00 14 00 50 80 80'))
-        time.sleep(0.1)
-        assert client.battery() == 100
-
-
 def test_registers_that_cannot_be_read_are_not_answered(tmp_path: Path) -> None:
     """No frame comes back, and the next question is answered."""
     with robot(tmp_path, '--physics', 'none') as (client, _):
@@ -204,14 +175,3 @@ def test_the_board_loses_frames_that_come_too_fast(tmp_path: Path) -> None:
         assert ahead > 0
         assert aside == 0
         assert served.simulation.line.statistics.hurried == 1
-
-
-def test_bytes_take_the_time_of_the_line(tmp_path: Path) -> None:
-    """Question and answer are not faster than 115200 baud allows: 41 bytes for the IMU block."""
-    with robot(tmp_path, '--physics', 'none') as (client, _):
-        fastest = math.inf
-        for _ in range(20):
-            begin = time.monotonic()
-            client.imu()
-            fastest = min(fastest, time.monotonic() - begin)
-        assert fastest >= 41 * 10 / 115200

@@ -10,6 +10,7 @@ from pathlib import Path
 import struct
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from sim_serial import Listener, serve
 from sim_virtual import VirtualRobot
@@ -25,6 +26,7 @@ from quad_hardware.protocol import (
     V1,
     V2,
 )
+from quad_sim.board.power import Overload, OVERLOAD_TIME
 from quad_state_frames import read_state
 
 KINEMATIC = ('--physics', 'none', '--noise', 'none')
@@ -236,6 +238,18 @@ def test_heavy_load_drains_the_battery_and_warms_the_servos() -> None:
     state = last_state(robot)
     assert robot.simulation.board.battery.charge < 99.9
     assert state.temperature[slot_of(11)] > state.temperature[slot_of(13)]
+
+
+def test_a_landing_foot_is_no_overload() -> None:
+    """Moments of full torque do not count, however often they come; a servo that is held does."""
+    overload = Overload(2)
+    for _ in range(100):
+        overload.advance(np.array([1.0, 0.2]), 0.1)
+        overload.advance(np.array([0.3, 1.0]), 0.1)
+        assert not overload.lasts
+    for _ in range(round(OVERLOAD_TIME / 0.1) + 2):
+        overload.advance(np.array([1.0, 0.0]), 0.1)
+    assert overload.lasts
 
 
 def test_a_robot_of_one_protocol_is_deaf_at_the_other_speed() -> None:
