@@ -5,7 +5,7 @@
 ::
 
     DescriptionError (ValueError)     of urdf_reader: a description cannot be made or used
-    └── PresetError                   there is no such preset; lists what there is
+    └── PresetError                   unknown preset; lists the known ones
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ MODEL = Path(__file__).parent / 'model'
 
 @lru_cache(maxsize=1)
 def robot_numbers() -> dict[str, Any]:
-    """Return what robot.yaml says; one copy for everybody, nobody changes it."""
+    """Return the numbers of robot.yaml; one copy, which must not be changed."""
     with (MODEL / 'robot.yaml').open(encoding='utf-8') as file:
         numbers: dict[str, Any] = yaml.safe_load(file)
     return numbers

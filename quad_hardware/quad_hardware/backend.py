@@ -33,7 +33,7 @@ def robot_at(
 
     Args:
         protocols: What to try, in this order.
-        imu_checked: Its IMU is mounted as in the URDF, and somebody has made sure of it; a
+        imu_checked: Its IMU is mounted as in the URDF, which was checked; a
             simulated one is.
 
     Raises:

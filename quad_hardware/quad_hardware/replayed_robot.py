@@ -49,10 +49,10 @@ class ReplayedRobot(ObservedRobot):
         return replace(self._status, age=age, parser=counters[0], dialect=counters[1])
 
     def take(self, entry: Entry, now: float) -> None:
-        """Take the next entry of the log.
+        """Process the next entry of the log.
 
         Raises:
-            RecordingError: Nobody can read these bytes.
+            RecordingError: These bytes cannot be read.
         """
         self.advance(now)
         if isinstance(entry, Opened):
@@ -63,7 +63,7 @@ class ReplayedRobot(ObservedRobot):
             self._transfer(entry)
 
     def advance(self, now: float) -> None:
-        """Let time pass: the rest of a frame may not come any more."""
+        """Advance the time: the rest of a frame may not come any more."""
         self._now = now
         if self._dialect is None or not self._received.pending:
             return
@@ -115,7 +115,7 @@ class ReplayedRobot(ObservedRobot):
         self._handle(self._received.feed(transfer.data), self._dialect)
 
     def _command(self, dialect: Dialect[Any], frame: Frame) -> None:
-        """Take a frame that was sent; targets of the legs show which feet stand."""
+        """Process a frame that was sent; targets of the legs show which feet stand."""
         angles = dialect.handle_sent(frame, self._now)
         if angles.keys() >= set(LEG_MOTORS):
             self._status.commands += 1

@@ -92,7 +92,7 @@ class ObservedRobot:
         raise NotImplementedError
 
     def _report(self, report: Report) -> str:
-        """Take a report; return why it cannot be."""
+        """Process a report; return why it cannot be."""
         state = self._estimator.step(report)
         if state is None:
             self._on_refusal(self._estimator.refusal)
@@ -234,7 +234,7 @@ class SerialRobot(ObservedRobot):
         return self._commander.goes_down
 
     def set_torque(self, *, on: bool) -> bool:
-        """Let the servos go, or have them hold where they are; return whether that is sent.
+        """Switch the torque off, or on where the servos are; return whether that is sent.
 
         A stream of commands that was there before does not go on where the legs have moved.
         """
@@ -249,7 +249,7 @@ class SerialRobot(ObservedRobot):
     # -- for the black box
 
     def fault(self, subject: str, text: str) -> None:
-        """Have the black box written, where there is one; returns at once."""
+        """Report a fault to the black box, where there is one; returns at once."""
         if self.black_box is not None:
             self.black_box.fault(subject, text)
 
@@ -291,7 +291,7 @@ class SerialRobot(ObservedRobot):
         keep = self.fault if self._losses.is_lost(state) else self._note
         keep(LINK, f'{state.value}: {detail}')
         if state is not LinkState.RUNNING:
-            self.latest = None  # the robot may be moved while nobody sees it
+            self.latest = None  # the robot may be moved while it is not seen
             self._commander.lose()
         self._on_change(state, detail)
 

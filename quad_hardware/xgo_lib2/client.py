@@ -59,7 +59,7 @@ class XgoDog:
             baud: Speed [bit/s]; 0 tries 2 000 000, then 115 200.
 
         Raises:
-            XgoTimeoutError: Nobody answers.
+            XgoTimeoutError: There is no answer.
             XgoError: The port cannot be opened.
         """
         with _as_xgo_errors():
@@ -89,7 +89,7 @@ class XgoDog:
         return self._read(BATTERY)[0]
 
     def system_set_feedback(self, on: int) -> None:
-        """Have the robot push its state about 50 times a second (1), or no longer (0).
+        """Request that the robot pushes its state about 50 times a second (1), or no longer (0).
 
         Raises:
             XgoNotSupportedError: It speaks protocol v1, which is polled.

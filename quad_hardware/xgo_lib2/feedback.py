@@ -47,7 +47,7 @@ class SendStateParser:
         return self._parser.counters
 
     def feed_bytes(self, data: bytes) -> list[DeviceState]:
-        """Take bytes and return the states that they complete, the oldest first."""
+        """Parse bytes; return the states that they complete, the oldest first."""
         states = []
         for frame in self._parser.feed(data):
             if frame.kind is Kind.PUSH and frame.address == STATE.address:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What there is: functions by main and sub code, motors by feedback slot."""
+"""Functions by main and sub code, motors by feedback slot."""
 
 from __future__ import annotations
 

@@ -66,7 +66,7 @@ def _stopped_by_signals(server: Server) -> Iterator[None]:
 
 
 def _report_ready(description: str, manager: ServiceManager) -> None:
-    """Print what is simulated, and report to whoever started this process."""
+    """Print what is simulated, and report to the supervisor of this process."""
     sys.stdout.write(f'fake_xgo: {description}\n')
     sys.stdout.flush()
     manager.report('READY=1')

@@ -14,12 +14,12 @@ from quad_description import Pose, pose_positions, PRESETS, robot_urdf
 from quad_hardware.protocol import Model, Protocol, V1, V2
 
 from .board.board import Board
-from .board.servos import Mount
+from .board.servos import Mount, Plant
 from .exceptions import SetupError, SimulationError
 from .line.faults import FaultKind, FaultPlan, parse_fault, SETTINGS
 from .line.robot_line import RobotLine
 from .plant.noise import BOARD, NONE
-from .plant.plant import KinematicRobot, Plant
+from .plant.plant import KinematicRobot
 from .plant.servo import ServoModel, ServoParameters
 from .plant.terrain import Terrain
 

@@ -126,8 +126,8 @@ class ServedRobot:
 
 
 def serve() -> None:
-    """Let a robot live until the pipe is closed whose number is the first argument."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever asked ends by it, and closes the pipe
+    """Serve a robot until the pipe is closed whose number is the first argument."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends by it, and closes the pipe
     number, *argv = sys.argv[1:]
     with Connection(int(number)) as pipe:
         try:
@@ -165,7 +165,7 @@ class _Watch:
                 while True:
                     request, arguments = pipe.recv()
                     pipe.send(self._do(request, arguments))
-            except (EOFError, OSError):  # whoever asked is gone
+            except (EOFError, OSError):  # the parent is gone
                 pass
             finally:
                 self._server.stop()

@@ -115,7 +115,7 @@ class Quadruped:
         return tuple(index for index in range(len(self.names)) if index not in taken)
 
     def leg_angles(self, positions: Sequence[float]) -> list[Vector]:
-        """Take the joint positions of each leg out of those of all joints [rad]."""
+        """Return the joint positions of each leg from those of all joints [rad]."""
         return [(positions[a], positions[b], positions[c]) for a, b, c in self.leg_indices]
 
     def feet(self, positions: Sequence[float]) -> Feet:

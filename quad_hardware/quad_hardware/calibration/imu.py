@@ -37,7 +37,7 @@ MAX_OFF = math.radians(35.0)  # [rad] of a direction in which a person tilts
 MAX_LEVEL_TILT = math.radians(20.0)  # [rad]
 MAX_DISAGREEMENT = math.radians(15.0)  # [rad] between attitude and accelerometer
 TURN_WINDOW = 10  # reports over which turns are compared; their noise would count otherwise
-MAX_GAP = 0.2  # [s] between two reports; over more nobody knows how the gyro turned
+MAX_GAP = 0.2  # [s] between two reports; over more it is unknown how the gyro turned
 MIN_TURNED = math.radians(3.0)  # [rad] root of the squares of the turns about an axis
 GYRO_RATIOS = (0.4, 2.5)  # of the turn of the attitude, that the gyro has to report
 GRAVITY_TOLERANCE = 2.0  # [m/s²] of an accelerometer at rest
@@ -73,7 +73,7 @@ _ROTATIONS = tuple(
 
 
 def calibrate_imu(console: Console, robot: LimpRobot) -> ImuMounting:
-    """Have a person tilt the robot, and return how the IMU is mounted.
+    """Guide a person who tilts the robot; return how the IMU is mounted.
 
     Raises:
         CommandError: What was reported fits no mounting; the message names the stance.

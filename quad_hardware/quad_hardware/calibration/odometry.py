@@ -77,7 +77,7 @@ class Walker(GraphClient):
         return float(future.result().values[0].double_value)
 
     def walk(self, distance: float, speed: float) -> float:
-        """Walk until odometry says that a distance is done; return what it says at the end [m].
+        """Drive the robot until odometry has a distance; return the distance at the end [m].
 
         Raises:
             NoAnswerError: The robot does not walk, or /odom fell silent.
@@ -109,7 +109,7 @@ class Walker(GraphClient):
 
 
 def calibrate_odometry(console: Console, axis: str, distance: float, speed: float) -> float:
-    """Let the robot walk, ask how far it came, and return the scale that its odometry should have.
+    """Drive the robot, ask how far it came, and return the scale that its odometry should have.
 
     Raises:
         NoAnswerError: The robot does not walk.

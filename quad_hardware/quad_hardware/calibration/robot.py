@@ -73,7 +73,7 @@ class LimpRobot:
 
     @contextmanager
     def limp(self) -> Iterator[None]:
-        """Take torque away, and give it back at the end, where the servos are then.
+        """Switch the torque off, and on again at the end, where the servos are then.
 
         Raises:
             NoAnswerError: The robot does not report; the message has the reason.

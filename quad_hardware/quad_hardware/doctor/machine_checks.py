@@ -27,7 +27,7 @@ MIN_MEMORY = 300e6  # [B] below that, processes are soon ended
 
 
 def check_environment(environment: Mapping[str, str]) -> Iterator[Finding]:
-    """Look at the variables that ROS reads."""
+    """Check the variables that ROS reads."""
     if 'AMENT_PREFIX_PATH' not in environment:
         remedy = (
             'source the workspace first: `source env.sh`, or `source /opt/ros/<distro>/setup.bash`'
@@ -62,7 +62,7 @@ def _reach(domain: str, environment: Mapping[str, str]) -> Finding:
 
 
 def check_memory(meminfo: str) -> Iterator[Finding]:
-    """Look at the text of /proc/meminfo."""
+    """Check the text of /proc/meminfo."""
     rows = dict(line.split(':', 1) for line in meminfo.splitlines() if ':' in line)
     available = float(rows.get('MemAvailable', '0 kB').split()[0]) * 1024
     if available < MIN_MEMORY:
@@ -89,7 +89,7 @@ _TERMINAL = re.compile(r'^tty-index:\s*(\d+)$', re.MULTILINE)
 
 
 def check_port(path: str) -> Iterator[Finding]:
-    """Look at a port, and talk to the robot when nobody else does."""
+    """Check a port, and contact the robot when no other program has it."""
     if not Path(path).exists():
         ports = [port.device for port in list_ports.comports()]
         there = f'there are {", ".join(ports)}; ' if ports else 'no serial port was found; '

@@ -46,7 +46,7 @@ class GravityCheck:
         self._reports: deque[tuple[Quaternion, Vector]] = deque(maxlen=REPORTS)
 
     def take(self, attitude: Quaternion, acceleration: Vector | None) -> None:
-        """Take a report.
+        """Add a report.
 
         Args:
             acceleration: Specific force in the body [m/s²]; None when it is not measured.
@@ -82,7 +82,7 @@ class MedianFilter:
         self._values: deque[float] = deque(maxlen=CHARGE_REPORTS)
 
     def take(self, value: float | None, highest: float = math.inf) -> float | None:
-        """Take a value, which does not count when it is missing or beyond 0 to the highest."""
+        """Add a value, which does not count when it is missing or beyond 0 to the highest."""
         if value is not None and 0.0 <= value <= highest:
             self._values.append(value)
         return median(self._values) if self._values else None
@@ -119,7 +119,7 @@ class AttitudeRate:
         self._rate = ZERO
 
     def update(self, time: float, attitude: Quaternion) -> Vector:
-        """Take an attitude; return the rate [rad/s]. After a gap it begins at zero again."""
+        """Add an attitude; return the rate [rad/s]. After a gap it begins at zero again."""
         last, self._last = self._last, (time, attitude)
         if last is None or not 0.0 < time - last[0] <= MAX_GAP:
             self._rate = ZERO
@@ -150,7 +150,7 @@ class JointRate:
         self._rates: dict[str, float] = {}
 
     def update(self, time: float, positions: Mapping[str, float]) -> dict[str, float]:
-        """Take positions [rad]; return velocities [rad/s] of the same joints."""
+        """Add positions [rad]; return velocities [rad/s] of the same joints."""
         elapsed, last = time - self._time, self._last
         self._time, self._last = time, dict(positions)
         if last.keys() != positions.keys() or not 0.0 < elapsed <= MAX_GAP:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the IMU sits on the body, and with which signs it reports.
 
-With a wrong sign, whoever levels the body by the attitude tilts it further and further. In the
+With a wrong sign, a controller that levels the body tilts it further and further. In the
 vendor's own simulation the IMU is turned by 180 degrees about the vertical.
 """
 
@@ -21,7 +21,7 @@ from quad_description.rotations import (
     Vector,
 )
 
-UNCHECKED_DEVIATION = math.pi / 2  # [rad] of an attitude whose signs nobody has looked at
+UNCHECKED_DEVIATION = math.pi / 2  # [rad] of an attitude whose signs were not checked
 POSITIVE: Vector = (1.0, 1.0, 1.0)
 
 
@@ -35,8 +35,8 @@ class ImuMounting:
     # of the specific force along x, y and z; +9.8 upwards at rest
     acceleration_signs: Vector = POSITIVE
     rate_signs: Vector = POSITIVE  # of the angular velocity about x, y and z
-    checked: bool = False  # somebody has compared it with gravity on this robot
-    # somebody has compared the signs of the gyro with turning it by hand
+    checked: bool = False  # it was compared with gravity on this robot
+    # the signs of the gyro were compared with turning it by hand
     rates_checked: bool = False
 
     def attitude(self, reported: Vector) -> Quaternion:

@@ -89,7 +89,7 @@ class LegOdometry:
         self._keeps_heading = True
 
     def update(self, time: float, feet: Sequence[FootPose], attitude: Quaternion) -> OdometryState:
-        """Take a measurement.
+        """Add a measurement.
 
         Args:
             time: When [s].

@@ -71,7 +71,7 @@ class BoardWatch:
         self._last: Report | None = None
 
     def restarted(self, state: Report) -> bool:
-        """Take a report; return whether the board has, or may have, begun anew before it."""
+        """Add a report; return whether the board has, or may have, begun anew before it."""
         last, self._last = self._last, state
         if last is None:
             return False

@@ -37,7 +37,7 @@ class Command:
     slowed: tuple[str, ...] = ()  # joints that were asked to move faster than allowed
     # joints that were found beyond their limits and are not back yet
     outside: tuple[str, ...] = ()
-    unseen: tuple[str, ...] = ()  # joints that begin to move from a place that nobody knows
+    unseen: tuple[str, ...] = ()  # joints that begin to move from an unknown place
 
 
 class CommandLimiter:
@@ -46,8 +46,8 @@ class CommandLimiter:
     A stream of commands begins where the joints are measured to be; it ends with a pause, or
     when :meth:`reset` is called because the robot was lost. A joint that is found beyond its
     limits may stay there or come back: its range reaches to where it is, and shrinks with it. A
-    joint that is not measured is taken to be where it was sent last; before that nobody knows
-    where it is, and its servo has to go slowly.
+    joint that is not measured is taken to be where it was sent last; before that its place is
+    unknown, and its servo has to go slowly.
     """
 
     def __init__(self, joints: JointMap, settings: LimiterSettings | None = None) -> None:
@@ -75,7 +75,7 @@ class CommandLimiter:
     def step(
         self, positions: Sequence[float], measured: Sequence[float | None], now: float
     ) -> Command:
-        """Take a command.
+        """Limit a command.
 
         Args:
             positions: Targets of all joints, or of the legs only, in the order of the URDF [rad],

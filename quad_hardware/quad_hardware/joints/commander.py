@@ -71,7 +71,7 @@ class CommandLoss:
         return now - self._last_at < self.timeout
 
     def commanded(self, targets: Sequence[float], now: float) -> None:
-        """Take note of targets that were sent [rad]; whoever commands ends the way down."""
+        """Note targets that were sent [rad]; a command ends the way down."""
         if not self.is_commanded(now) and not (self.goes_down or self.hazard):
             self._began_at = now  # a pause with a foot in the air is part of a stream
         self._place = None
@@ -95,8 +95,8 @@ class CommandLoss:
         """Go down from now on, or return why not. The stream is forgotten.
 
         Args:
-            place: Where the joints are [rad]; empty when nobody knows.
-            tilt: Of the body [rad]; None when nobody knows.
+            place: Where the joints are [rad]; empty when that is unknown.
+            tilt: Of the body [rad]; None when it is unknown.
 
         Returns:
             Why the robot holds; empty when it goes down.
@@ -206,7 +206,7 @@ class JointCommander(CommandLoss):
     def take(
         self, positions: Sequence[float], place: Mapping[str, float], now: float
     ) -> Command | None:
-        """Take a command, and return what was sent for it; None for nothing.
+        """Send a command; return what was sent for it, None for nothing.
 
         Args:
             positions: Targets of the first joints, in the order of the URDF [rad], [m].
@@ -224,7 +224,7 @@ class JointCommander(CommandLoss):
 
         Args:
             place: As in :meth:`take`.
-            tilt: Of the body [rad]; None when nobody knows.
+            tilt: Of the body [rad]; None when it is unknown.
         """
         hazard = self.hazard
         if not hazard:

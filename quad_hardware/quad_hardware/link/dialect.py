@@ -23,7 +23,7 @@ from ..report import Report
 class LinkState(Enum):
     """What a driver is doing."""
 
-    CONNECTING = 'connecting'  # no port, or nobody answers
+    CONNECTING = 'connecting'  # no port, or no answer
     FAILED = 'failed'  # an error of ours ended the conversation; it begins anew
     WAITING = 'waiting'  # a robot answered and has not reported yet
     RUNNING = 'running'
@@ -120,7 +120,7 @@ class Dialect(ABC, Generic[Received]):
 
     @abstractmethod
     def torque(self, *, on: bool) -> None:
-        """Have all servos hold their place, or let go, at the next possible moment."""
+        """Switch the torque of all servos at the next possible moment."""
 
     @abstractmethod
     def cancel_pending(self) -> None:
@@ -131,7 +131,7 @@ class Dialect(ABC, Generic[Received]):
         """Return what is to be sent now."""
 
     def handle_sent(self, frame: Received, now: float) -> Mapping[int, float]:
-        """Take a frame that was sent, of a session that was recorded, in the place of step.
+        """Process a frame that was sent in a recorded session, in the place of step.
 
         Returns:
             The servo angles that it sends, by motor id [deg]; none as a rule.
@@ -140,7 +140,7 @@ class Dialect(ABC, Generic[Received]):
 
     @abstractmethod
     def handle_frame(self, frame: Received, now: float) -> Report | None:
-        """Take a frame of the robot; return the report that it completes, if any."""
+        """Process a frame of the robot; return the report that it completes, if any."""
 
 
 def vector(values: Iterable[float]) -> Vector:

@@ -90,7 +90,7 @@ class Driver:
             os.close(descriptor)
 
     def command(self, angles: Mapping[int, float]) -> bool:
-        """Have servo angles sent at once; a newer command replaces one not sent yet.
+        """Send servo angles at once; a newer command replaces one not sent yet.
 
         Args:
             angles: By motor id [deg]; all legs, and the arm where it is fitted.
@@ -108,7 +108,7 @@ class Driver:
         return accepted
 
     def torque(self, *, on: bool) -> bool:
-        """Have all servos hold their place, or let go: the robot drops then.
+        """Switch the torque of all servos; without it the robot drops.
 
         Returns:
             False when the link is not running or cannot do that, and nothing will be sent. True
@@ -183,7 +183,7 @@ class Driver:
             _log.exception('the failure could not be reported')
 
     def _converse(self) -> None:
-        """Look for the robot once, and talk with it until it is lost."""
+        """Search for the robot once, and serve it until it is lost."""
         try:
             session = open_session(self._options)
         except LinkError as error:
@@ -285,5 +285,5 @@ class Driver:
             self._status.refusal = reason
             return
         self._reported_at = now
-        # only now: whoever sends a command has a place of the robot to begin from
+        # only now: a command has a place of the robot to begin from
         self._enter(LinkState.RUNNING, 'reports arrive')

@@ -149,7 +149,7 @@ def connect(path: str, protocols: Iterable[Protocol] = PROTOCOLS, baud: int = 0)
 
     Raises:
         LinkError: The port cannot be opened or was lost.
-        NoAnswerError: Nobody answers; the message says what was tried.
+        NoAnswerError: There is no answer; the message says what was tried.
     """
     tried = []
     for protocol in protocols:
@@ -168,7 +168,7 @@ def connect(path: str, protocols: Iterable[Protocol] = PROTOCOLS, baud: int = 0)
 
 
 def silence_cause(path: str) -> str:
-    """Return what to look at where nobody answers on a port.
+    """Return what to check where there is no answer on a port.
 
     Args:
         path: Device file, or a link to one.
@@ -188,7 +188,7 @@ def read_value(
     timeout: float = ANSWER_TIME,
     attempts: int = ATTEMPTS,
 ) -> bytes | None:
-    """Ask a robot for a value; return its bytes, None when it does not answer.
+    """Read a value of a robot; return its bytes, None when it does not answer.
 
     Raises:
         LinkError: The port was lost.

@@ -42,7 +42,7 @@ def latency_timer(path: str, sysfs: Path = SYSFS) -> float | None:
 
 
 def latency_problem(path: str, latency: float | None) -> str:
-    """Say that an adapter keeps bytes back for too long, and the remedy; nothing where not.
+    """Return that an adapter keeps bytes back for too long, and the remedy; else nothing.
 
     Args:
         path: Device file, or a link to one.

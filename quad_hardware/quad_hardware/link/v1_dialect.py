@@ -38,7 +38,7 @@ MIN_LATENCY = 0.006  # [s] what is waited for the answer of a quick board
 LATENCY_DECAY = 0.98  # by which a slow answer is forgotten with each quick one
 BATTERY_PERIOD = 2.0  # [s]
 ARM_REPEAT_PERIOD = 0.5  # [s] after which an arm joint is sent again, for a frame may be lost
-_BOARDS_OWN, _FORGOTTEN = -1, -2  # speeds that nobody set, or that a restart may have undone
+_BOARDS_OWN, _FORGOTTEN = -1, -2  # speeds that were not set, or that a restart may have undone
 _IMU = V1.functions[Register.IMU]
 
 
@@ -165,7 +165,7 @@ class V1Dialect(Dialect[Frame]):
             self._arm[motor] = bytes((self._spans[motor].encode(angles[motor]),))
 
     def torque(self, *, on: bool) -> None:
-        """Have all servos hold their place, or let go, behind a pending command."""
+        """Switch the torque of all servos, behind a pending command."""
         self._forget_arm()
         self._torque = bytes((Torque.LOAD_ALL if on else Torque.UNLOAD_ALL,))
 
@@ -187,7 +187,7 @@ class V1Dialect(Dialect[Frame]):
         return Step(send, self._wake())
 
     def handle_frame(self, frame: Frame, now: float) -> Report | None:
-        """Take an answer; with the one of the IMU a report is complete."""
+        """Process an answer; with the one of the IMU a report is complete."""
         waiting = self._waiting
         if (
             waiting is None

@@ -65,7 +65,7 @@ class V2Dialect(Dialect[Frame]):
         self._pending = Frame(Kind.WRITE, Code.SERVOS, payload).encode(V2)
 
     def torque(self, *, on: bool) -> None:
-        """Have all servos hold their place, or let go, behind a pending command."""
+        """Switch the torque of all servos, behind a pending command."""
         payload = V2.functions[Code.TORQUE].pack(motor=(ALL_MOTORS,), on=(on,))
         self._torque = Frame(Kind.WRITE, Code.TORQUE, payload).encode(V2)
 
@@ -82,7 +82,7 @@ class V2Dialect(Dialect[Frame]):
         return Step(send, self._request_at)
 
     def handle_frame(self, frame: Frame, now: float) -> Report | None:
-        """Take a frame of the robot; every state frame is a report."""
+        """Process a frame of the robot; every state frame is a report."""
         if frame.kind is Kind.NACK:
             self._counters.refused += 1
         if frame.kind is not Kind.PUSH or frame.address != STATE.address:

@@ -55,7 +55,7 @@ def find_write_method(dog: object, name: str) -> WriteAngle:
     Nothing public says its name, and a wrong one would move servos in another unit or not at all.
 
     Raises:
-        LinkError: It has no method of that name; the message lists what there is.
+        LinkError: It has no method of that name; the message lists those it has.
     """
     methods = dict(inspect.getmembers(dog, callable))
     if name in methods and not name.startswith('_'):
@@ -147,7 +147,7 @@ class VendorParser:
         return replace(self._counters)
 
     def feed(self, data: bytes) -> list[object]:
-        """Take bytes and return the states that they complete."""
+        """Parse bytes; return the states that they complete."""
         self._counters.bytes += len(data)
         try:
             states = list(self._parser.feed_bytes(data))
@@ -221,7 +221,7 @@ class VendorDialect(Dialect[object]):
         return Step(b'', self._request_at)
 
     def handle_frame(self, frame: object, now: float) -> Report | None:
-        """Take a state of the vendor's parser; what it does not report is not made up.
+        """Process a state of the vendor's parser; what it does not report is not made up.
 
         Raises:
             LinkError: The state has not what is public of it.

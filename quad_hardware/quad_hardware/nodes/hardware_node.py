@@ -134,7 +134,7 @@ class HardwareNode(Node):
     def _set_torque(
         self, request: SetBool.Request, response: SetBool.Response
     ) -> SetBool.Response:
-        """Let the servos go, or have them hold where they are."""
+        """Switch the torque of the servos off, or on where they are."""
         on = bool(request.data)
         response.success = self._robot.set_torque(on=on)
         if not response.success:

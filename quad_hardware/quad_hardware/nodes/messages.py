@@ -29,7 +29,7 @@ from quad_msgs.msg import FootContacts
 from .parameters import Deviations, Frames
 
 NOT_THERE = [-1.0, *([0.0] * 8)]  # covariance of what is not measured (REP 145)
-UNUSED = 1e6  # variance of what nobody measures
+UNUSED = 1e6  # variance of what is not measured
 VELOCITY_VARIANCE = 0.03**2  # [m²/s²]
 HEIGHT_VARIANCE = 0.01**2  # [m²]
 

@@ -118,7 +118,7 @@ class Replay:
             stop: Ends it; set at the end of the log.
 
         Raises:
-            HardwareError: Somebody else publishes the same meanwhile.
+            HardwareError: Another node publishes the same meanwhile.
             PlaybackError: The log cannot be played to its end.
         """
         self._node.create_timer(WATCH_PERIOD, partial(self._look_for_robot, stop))

@@ -109,7 +109,7 @@ class RobotTopics:
             name: Name of the node that has the robot.
             port: Its serial port, or what is in the place of one.
             recording: Returns the last file of the black box, maybe of one subject.
-            commands: What became of joint commands; None where nobody knows.
+            commands: What became of joint commands; None where it is unknown.
         """
         state, status = self._robot.latest, self._robot.status()
         now = self._node.get_clock().now().to_msg()

@@ -109,13 +109,13 @@ class StreamParser:
         return len(self._buffer)
 
     def feed(self, data: bytes) -> list[Frame]:
-        """Take bytes and return the frames that they complete."""
+        """Parse bytes; return the frames that they complete."""
         self._counters.bytes += len(data)
         self._buffer += data
         return self._scan(more_comes=True)
 
     def expire(self) -> list[Frame]:
-        """Give up waiting for the rest of a frame, and look for frames behind its header.
+        """Stop waiting for the rest of a frame, and search for frames behind its header.
 
         To be called when the line was quiet for longer than a pause inside a frame can be: three
         bytes of noise may look like the start of a long frame and would hold back a short one.

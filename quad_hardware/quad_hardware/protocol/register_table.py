@@ -208,7 +208,7 @@ V1 = Protocol(
 
 
 def scatter(address: int, payload: bytes) -> Iterator[tuple[int, bytes]]:
-    """Take a write of several bytes apart into the registers that it runs through.
+    """Split a write of several bytes into the registers that it runs through.
 
     Yields:
         Register and its bytes; a register that the table lacks takes one byte.

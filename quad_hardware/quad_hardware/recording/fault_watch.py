@@ -74,7 +74,7 @@ class LossWatch:
         self._found = False
 
     def is_lost(self, state: LinkState) -> bool:
-        """Take the state that a link has entered; return whether that is a fault."""
+        """Note the state that a link has entered; return whether that is a fault."""
         was_found = self._found
         if state in _FOUND or state in {LinkState.CONNECTING, LinkState.STOPPED}:
             self._found = state in _FOUND

@@ -159,8 +159,8 @@ class SerialLogFile:
         """
         self._path = path
         self._lines: SimpleQueue[str | None] = SimpleQueue()
-        self._ended = False  # nobody takes lines out of the queue any more
-        # one offset for all: the log runs evenly also when somebody sets the clock
+        self._ended = False  # no line is taken out of the queue any more
+        # one offset for all: the log runs evenly also when the clock is set
         self._offset = time.time() - time.monotonic()
         try:
             self._file = path.open('x', buffering=1, encoding='utf-8')  # by line
@@ -173,12 +173,12 @@ class SerialLogFile:
         self._thread.start()
 
     def transfer(self, now: float, data: bytes, sent: bool) -> None:
-        """Take bytes that were read, or written."""
+        """Record bytes that were read, or written."""
         if not self._ended:
             self._lines.put(format_transfer(now + self._offset, data, sent=sent))
 
     def event(self, event: Event) -> None:
-        """Take a robot that was found, or a change of the link's state."""
+        """Record a robot that was found, or a change of the link's state."""
         if not self._ended:
             self._lines.put(format_event(event, event.time + self._offset))
 

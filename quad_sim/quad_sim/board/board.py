@@ -12,10 +12,9 @@ from quad_description import movable_joints, Pose, pose_positions
 from quad_description.rotations import Vector
 from quad_hardware.protocol import Fault, Model, MOTOR_ORDER
 
-from ..plant.plant import Plant
 from ..plant.state import Measurement
 from .power import Battery, HOT, LOW_BATTERY, Overload, ServoThermalModel, Turn
-from .servos import Mount, Servos
+from .servos import Mount, Plant, Servos
 from .walking import Walker
 
 GAIT_PERIOD = 0.02  # [s] between two sets of targets of the board's own gait
@@ -91,7 +90,7 @@ class Board:
     # -- time and power
 
     def advance(self, now: float) -> None:
-        """Let the robot live until a time [s]."""
+        """Advance the robot to a time [s]."""
         if now - self._now > MAX_LAG:
             self.lost_time += now - self._now - MAX_LAG
             self._now = now - MAX_LAG
@@ -179,7 +178,7 @@ class Board:
         return self._mode
 
     def take_servos(self) -> None:
-        """Give the servos to the host; a gait of the board ends where it is."""
+        """Hand the servos over to the host; a gait of the board ends where it is."""
         self._mode = Mode.SERVOS
         self._gait_at = math.inf
         self._turn = None
@@ -187,7 +186,7 @@ class Board:
         self.walker.marking_time = False
 
     def start_gait(self) -> None:
-        """Give the servos to the board's gait, which begins when the robot stands."""
+        """Hand the servos over to the board's gait, which begins when the robot stands."""
         if self._mode is Mode.GAIT:
             return
         self._mode = Mode.GAIT

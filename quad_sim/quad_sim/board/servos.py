@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 import math
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -18,8 +19,14 @@ from quad_description import Joint
 from quad_hardware.protocol import ANGLE_SPANS, Model, MOTOR_OF_JOINT, MOTOR_ORDER, slot_of
 
 from ..exceptions import SetupError
-from ..plant.plant import Plant
+from ..plant.plant import KinematicRobot
 from ..plant.state import Array, Measurement
+
+if TYPE_CHECKING:
+    from ..physics import Robot
+
+Plant: TypeAlias = 'KinematicRobot | Robot'
+"""What has servos: a robot in physics, which needs MuJoCo, or one that is held in the air."""
 
 GRIPPER = 51
 NO_LOAD_SPEED = 527.0  # [deg/s] 9.2 rad/s: what servo speed 255 means here; no page says it
@@ -142,7 +149,7 @@ class Servos:
         self._plant.set_torque(on, names, hold=hold)
 
     def fail(self, motor: int | None) -> None:
-        """Let a servo fail: it lets go. The one that had failed works, and holds where it is."""
+        """Make a servo fail: it lets go. The one that had failed works, and holds where it is."""
         if motor == self.failed:
             return
         repaired, self.failed = self.failed, motor

@@ -199,7 +199,7 @@ class _Worker:
         theirs.close()
 
     def order(self, order: str, *arguments: object) -> None:
-        """Ask for something; the answer is to be fetched."""
+        """Send a request; the answer is to be fetched."""
         try:
             self._pipe.send((order, arguments))
         except OSError as error:

@@ -182,7 +182,7 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         return self._observation(), sum(terms.values()), fallen, is_over and not fallen, info
 
     def vary(self, randomization: Randomization) -> None:
-        """Let other things differ from the next episode on; noise stays as it was made.
+        """Change the ranges from the next episode on; noise stays as it was made.
 
         Raises:
             SetupError: A target may come later than its step ends.

@@ -48,11 +48,11 @@ class CommandTimes:
         self._intervals: deque[float] = deque(maxlen=WINDOW)
 
     def sent(self, now: float) -> None:
-        """Take note of bytes that have arrived at the host."""
+        """Note that bytes have arrived at the host."""
         self._state_at = now
 
     def commanded(self, begin: float) -> None:
-        """Take note of the first byte of a command."""
+        """Note the first byte of a command."""
         # a second command after a state is no answer to it, nor is one that was there before it
         if self._state_at is not None and begin > self._state_at:
             self._latencies.append(begin - self._state_at)

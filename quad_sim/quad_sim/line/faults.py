@@ -112,7 +112,7 @@ def make_fault(
         duration: For how long [s].
 
     Raises:
-        SetupError: A word has no sense; the message lists what there is.
+        SetupError: A word has no sense; the message lists the known ones.
     """
     try:
         kind = FaultKind(name)
@@ -128,7 +128,7 @@ def parse_fault(text: str) -> Fault:
     """Return a fault that is written ``KIND[,name=value...]``.
 
     Raises:
-        SetupError: The text has no sense; the message lists what there is.
+        SetupError: The text has no sense; the message lists the known faults.
     """
     name, *settings = (word.strip() for word in text.split(','))
     return make_fault(name, settings)

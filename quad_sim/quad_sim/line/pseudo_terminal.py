@@ -74,7 +74,7 @@ class PseudoTerminal:
             raise SetupError(f'{self.link} cannot be made: {error.strerror}') from error
 
     def unplug(self) -> None:
-        """Take the device away: programs that have it open see a hang-up."""
+        """Remove the device: programs that have it open see a hang-up."""
         if not self.plugged:
             return
         device = self.device
@@ -94,14 +94,14 @@ class PseudoTerminal:
         return _BAUD_OF.get(termios.tcgetattr(self._master)[_OUTPUT_SPEED], 0)
 
     def read(self) -> bytes:
-        """Return what there is, without waiting."""
+        """Return the bytes that have arrived, without waiting."""
         try:
             return os.read(self._master, CHUNK)
         except BlockingIOError:
             return b''
 
     def write(self, data: bytes) -> int:
-        """Send bytes; those that nobody reads are lost, as on a wire.
+        """Send bytes; those that are not read are lost, as on a wire.
 
         Returns:
             How many were lost.
@@ -112,7 +112,7 @@ class PseudoTerminal:
             return len(data)
 
     def close(self) -> None:
-        """Take the device and the link away."""
+        """Remove the device and the link."""
         self.unplug()
         self._claim.close()
 
@@ -121,7 +121,7 @@ class PseudoTerminal:
         return self
 
     def __exit__(self, *_error: object) -> None:
-        """Take the device and the link away."""
+        """Remove the device and the link."""
         self.close()
 
 

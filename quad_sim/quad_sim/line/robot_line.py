@@ -85,14 +85,14 @@ class RobotLine:
             self._forget_partial_frames()
 
     def receive(self, data: bytes, now: float) -> None:
-        """Take bytes that the host has begun to send."""
+        """Receive bytes that the host has begun to send."""
         if self._baud not in self._by_baud:
             self.statistics.garbled += len(data)
             return
         self.to_robot.put(data, now, self._baud)
 
     def advance(self, now: float) -> bytes:
-        """Let time pass; return what has arrived at the host by then."""
+        """Advance the time; return what has arrived at the host by then."""
         self._change_faults(now)
         while (arrival := min(self.to_robot.next_arrival, self._push_time)) <= now:
             if self._push_time <= self.to_robot.next_arrival:

@@ -14,15 +14,15 @@ import threading
 import time
 from typing import TypeVar
 
+from ..board.servos import Plant
 from ..exceptions import SetupError
-from ..plant.plant import Plant
 from ..plant.state import BasePose, BaseVelocity
 from .pseudo_terminal import PseudoTerminal
 from .robot_line import RobotLine
 
 Result = TypeVar('Result')
 
-IDLE_PERIOD = 0.02  # [s] the robot lives on also while nobody talks to it
+IDLE_PERIOD = 0.02  # [s] between two turns of the loop on a silent line
 TRUTH_PERIOD = 0.02  # [s] between two looks at where it is
 
 
@@ -91,12 +91,12 @@ class Server:
         self._wake()
 
     def close(self) -> None:
-        """Give back what :meth:`stop` and :meth:`submit` need; after the end of :meth:`run`."""
+        """Release what :meth:`stop` and :meth:`submit` need; after the end of :meth:`run`."""
         os.close(self._wake_read)
         os.close(self._wake_write)
 
     def submit(self, action: Callable[[], Result]) -> Future[Result]:
-        """Have something done to the robot between two turns of the loop; from any thread."""
+        """Run an action on the robot between two turns of the loop; thread-safe."""
         future: Future[Result] = Future()
         self._actions.append((future, action))  # type: ignore[arg-type]
         self._wake()

@@ -54,7 +54,7 @@ class InertialUnit:
         self._force = self._rotation().T @ self._gravity
 
     def sample(self) -> None:
-        """Take what the accelerometer measures now into the low-pass."""
+        """Filter what the accelerometer measures now."""
         # in place: this is done 500 times a second of the simulation
         change = self._change
         np.subtract(self._accelerometer, self._force, out=change)

@@ -54,7 +54,7 @@ class Meter:
         self._torque_time = self._speed_time = 0.0
 
     def sample(self) -> None:
-        """Look at the robot."""
+        """Sample the robot."""
         robot, before = self._robot, self._pose
         passed, self._time = robot.time - self._time, robot.time
         self._pose = after = robot.base_pose

@@ -40,7 +40,7 @@ _SUNK = 0.005  # [m] ground without bumps lies below the plane, or two floors wo
 
 
 def _pass_over(_text: str) -> None:
-    """Leave a warning of MuJoCo to those who look at its counters."""
+    """Ignore a warning of MuJoCo: its counters are read."""
 
 
 def build_model(

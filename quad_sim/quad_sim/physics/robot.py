@@ -124,7 +124,7 @@ class Robot:
     # -- what may be done to it
 
     def set_targets(self, targets: Targets, duration: float | None = None) -> None:
-        """Give the servos new targets.
+        """Set new targets of the servos.
 
         Args:
             targets: By name, or all in the order of the URDF; [rad], of a gripper [m]. What lies
@@ -201,7 +201,7 @@ class Robot:
         self._data.qvel[:3] += self._heading_to_world(velocity)
 
     def step(self, duration: float) -> None:
-        """Let time pass, in whole time steps; what is left over comes with the next call.
+        """Advance the time in whole time steps; what is left over comes with the next call.
 
         Args:
             duration: [s]

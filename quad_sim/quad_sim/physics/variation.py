@@ -53,7 +53,7 @@ class VariedModel:
         self._present = AS_MADE
 
     def vary(self, data: mujoco.MjData, variation: Variation) -> None:
-        """Let the robot be as a variation says; its servos hold."""
+        """Apply a variation; the servos hold."""
         model = self._model
         model.actuator_gainprm[:] = self._gains * variation.stiffness
         model.actuator_biasprm[:] = self._biases

@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the board needs of a robot (`Plant`), and what every simulated robot is made of."""
+"""What every simulated robot is made of, and a robot without physics."""

@@ -1,11 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the simulated board needs of a robot: the one in physics, or one that has servos only."""
+"""A robot without physics: servos only, for the serial side."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Protocol
 
 import numpy as np
 
@@ -21,60 +20,6 @@ TIMESTEP = 0.002  # [s]
 SET_POINT_TIME = 0.02  # [s] of a servo from one target to the next
 GRAVITY = 9.81  # [m/s2]
 _FEET = 4
-
-
-class Plant(Protocol):
-    """A robot without its board; see :class:`quad_sim.physics.Robot` for what the methods mean."""
-
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints, in the order of all arrays."""
-
-    @property
-    def time(self) -> float:
-        """Time since the start [s]."""
-
-    @property
-    def base_pose(self) -> BasePose:
-        """Where base_link is."""
-
-    @property
-    def base_velocity(self) -> BaseVelocity:
-        """How base_link moves."""
-
-    @property
-    def foot_contacts(self) -> tuple[bool, ...]:
-        """Which feet touch the ground."""
-
-    @property
-    def joint_targets(self) -> Array:
-        """Set-points now [rad]."""
-
-    def set_targets(self, targets: Targets, duration: float | None = None) -> None:
-        """Give servos new targets [rad]."""
-
-    def set_torque(
-        self, on: bool, joints: Iterable[str] | None = None, *, hold: bool = True
-    ) -> None:
-        """Switch servos on or off."""
-
-    def torque_on(self, joint: str) -> bool:
-        """Return whether a servo holds."""
-
-    def push(self, force: Vector, duration: float = 0.1) -> None:
-        """Push the trunk [N]."""
-
-    def kick(self, velocity: Vector) -> None:
-        """Change the robot's velocity [m/s]."""
-
-    def reset(self, *, pose: Mapping[str, float] | None = None, seed: int = 0) -> None:
-        """Begin anew."""
-
-    def step(self, duration: float) -> None:
-        """Let time pass [s]."""
-
-    def measure(self) -> Measurement:
-        """Return what the sensors measure."""
 
 
 class KinematicRobot:
@@ -150,7 +95,7 @@ class KinematicRobot:
         return np.array(self._ramp.values)
 
     def set_targets(self, targets: Targets, duration: float | None = None) -> None:
-        """Give servos new targets [rad]; those without torque stay where they are.
+        """Set new targets [rad]; servos without torque stay where they are.
 
         Raises:
             TargetError: As :meth:`quad_sim.physics.Robot.set_targets`.
@@ -193,7 +138,7 @@ class KinematicRobot:
         raise SetupError('a robot without physics cannot be kicked; leave out --physics none')
 
     def step(self, duration: float) -> None:
-        """Let time pass [s]."""
+        """Advance the time [s]."""
         self._remaining_steps += duration / TIMESTEP
         count = int(self._remaining_steps + 1e-6)
         self._remaining_steps -= count

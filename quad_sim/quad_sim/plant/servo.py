@@ -43,7 +43,7 @@ class ServoParameters:
 
 
 class ServoModel(Enum):
-    """Servos that somebody measured or trained with; anything else is a ServoParameters.
+    """Servos that were measured or trained with; anything else is a ServoParameters.
 
     FIRM stands for the real servo, which the vendor does not describe: stiff enough that the
     geometric gait tracks its speed (below 8 N m/rad it loses it). VENDOR_RL is the actuator in the
