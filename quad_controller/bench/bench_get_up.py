@@ -4,16 +4,15 @@
 """How often the mode `get_up` brings a robot to its feet, by the side on which it lies.
 
 The robot is dropped with random attitude, joints and friction; its legs are held until it rests.
-Few come to rest on a side: more are dropped there until there are enough.
+Few come to rest on a side: more are dropped with each side below.
 
-    python bench_get_up.py --drops 1000 --each 200      # for figures that are steadier
+    python bench_get_up.py --drops 1000 --each 1000     # for figures that are steadier
 """
 
 from __future__ import annotations
 
 import argparse
 from collections import Counter
-from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -34,8 +33,6 @@ SETTLE_TIME = 2.0  # [s]
 LONGEST = 90.0  # [s] until it stands, or has given up
 STAND_TIME = 1.0  # [s] for which it has to stand
 MAX_TILT = 0.2  # [rad] of a robot that stands
-BATCH = 50  # drops, until it is looked how many came to rest where
-MAX_BATCHES = 100
 URDF = robot_urdf()
 MODEL = quadruped(URDF)
 
@@ -114,19 +111,6 @@ def get_up(seed: int, side: Lying | None = None, only: bool = False) -> Outcome:
     return Outcome(lay, stood, time, '; '.join(controller.status.faults) or answer.message)
 
 
-def dropped_on(pool: ProcessPoolExecutor, side: Lying, count: int) -> Iterator[Outcome]:
-    """Yield what became of robots that came to rest on a side, as many as there are to be."""
-    found = 0
-    for batch in range(MAX_BATCHES):
-        seeds = range(batch * BATCH, (batch + 1) * BATCH)
-        for outcome in pool.map(partial(get_up, side=side, only=True), seeds):
-            if outcome.lay is side and found < count:
-                found += 1
-                yield outcome
-        if found >= count:
-            return
-
-
 def report(title: str, outcomes: list[Outcome]) -> None:
     """Print how many stood, how long it took, and what became of the others."""
     stood = sorted(outcome.time for outcome in outcomes if outcome.stood)
@@ -143,7 +127,7 @@ def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--drops', type=int, default=60, help='with any attitude')
-    parser.add_argument('--each', type=int, default=10, help='that lie on each side')
+    parser.add_argument('--each', type=int, default=50, help='with each side below')
     options = parser.parse_args()
     context = multiprocessing.get_context('spawn')
     with ProcessPoolExecutor(len(os.sched_getaffinity(0)), mp_context=context) as pool:
@@ -153,7 +137,8 @@ def main() -> None:
             report(side.value, [outcome for outcome in outcomes if outcome.lay is side])
         print('dropped with that side below, those that stayed on it')
         for side in Lying:
-            report(side.value, list(dropped_on(pool, side, options.each)))
+            dropped = pool.map(partial(get_up, side=side, only=True), range(options.each))
+            report(side.value, [outcome for outcome in dropped if outcome.lay is side])
 
 
 if __name__ == '__main__':

@@ -16,9 +16,10 @@ import argparse
 
 from quad_controller.exceptions import CheckError
 from quad_controller.gait.parameters import LOW_AND_WIDE
+from quad_controller.policy.report import table_text
 from quad_controller.policy_check.arenas import AS_MADE, Conditions, TIPPING_PUSH
 from quad_controller.policy_check.course import course_for, CourseFigures
-from quad_controller.policy_check.findings import Table, text_of
+from quad_controller.policy_check.findings import Table
 from quad_controller.policy_check.trial import (
     Candidate,
     chain_duration,
@@ -74,7 +75,7 @@ def main() -> None:
     table: Table = [HEADINGS]
     table += [row(*key, each) for key, each in zip(trials, figures, strict=True)]
     print(f'off by, falls, commands without one; {len(commands)} commands of {options.duration} s')
-    print(text_of(table))
+    print(table_text(table, numbers=True))
     if options.chain_minutes:
         chain(walkers, options.chain_minutes)
 
@@ -96,7 +97,7 @@ def chain(walkers: dict[str, Candidate], minutes: float) -> None:
             table.append((*row(name, 'serial line', each), *(f'{1e3 * t:.1f}' for t in times)))
     print(f'\nover the serial line in real time, {len(commands)} commands of {duration:.1f} s')
     print('goals with real-time priority: p50 below 3 ms, jitter p99 below 2 ms')
-    print(text_of(table))
+    print(table_text(table, numbers=True))
 
 
 if __name__ == '__main__':

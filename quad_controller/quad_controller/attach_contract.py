@@ -17,6 +17,7 @@ from .policy.contract.files import read_contract_file
 from .policy.contract.mjlab import CONTRACT_KEY, read_metadata
 from .policy.contract.model import build_contract
 from .policy.network import OnnxNetwork
+from .policy.report import table_text
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -76,10 +77,7 @@ def _write(model: Path, target: Path, document: ContractDocument) -> None:
 
 def _print_table(document: ContractDocument) -> None:
     rows = [('contract', 'value', 'from'), *document.rows()]
-    widths = [max(len(row[column]) for row in rows) for column in range(2)]
-    for row in rows:
-        line = f'{row[0].ljust(widths[0])}  {row[1].ljust(min(widths[1], 60))}  {row[2]}'
-        sys.stdout.write(f'{line.rstrip()}\n')
+    sys.stdout.write(f'{table_text(rows, widest=60)}\n')
 
 
 def _parser() -> argparse.ArgumentParser:

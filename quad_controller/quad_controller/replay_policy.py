@@ -23,6 +23,7 @@ from .policy.load import find_policy, load_policy, LoadedPolicy
 from .policy.network import Floats
 from .policy.observation import observed_places
 from .policy.options import PolicyOptions
+from .policy.report import table_text
 from .policy.runner import PolicyRunner
 from .policy.statistics import ObservationStatistics, STATISTICS_KEY
 from .recording import inputs_of, PolicyRun, read_recording, Step
@@ -49,25 +50,6 @@ class TermRange:
     def leaves(self) -> bool:
         """Whether it leaves the distribution."""
         return self.outside > MAX_OUTSIDE
-
-
-@dataclass(frozen=True, slots=True)
-class Replay:
-    """What came of a recording."""
-
-    steps: int  # steps of the recording
-    asked: int  # in how many the policy was asked here
-    compared: int  # how many of them have an answer of the same file in the recording
-    action_difference: float  # largest difference of actions from the recorded ones
-    observation_difference: float  # the same of observations
-    # files that were asked in the recording and are not this one: name and SHA-256
-    others: tuple[str, ...]
-    terms: tuple[TermRange, ...]  # where each term lies
-
-    @property
-    def agrees(self) -> bool:
-        """Whether the answers are the recorded ones, as far as they can be compared."""
-        return max(self.action_difference, self.observation_difference) <= MAX_DIFFERENCE
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,51 +90,19 @@ def feed(runner: PolicyRunner, steps: Iterable[Step]) -> Iterator[Answered]:
             yield Answered(step, answer.observation[0], answer.action, synchronous)
 
 
-def replay(
-    runner: PolicyRunner,
-    contract: PolicyContract,
-    steps: list[Step],
-    reference: ObservationStatistics | None,
-) -> Replay:
-    """Feed a policy by a recording and compare.
-
-    Args:
-        reference: What it observed in training, or in another recording; None for nothing.
-
-    Raises:
-        PolicyError: The recording has nothing that the policy could see.
-    """
-    answers = list(feed(runner, steps))
-    if not answers:
-        raise PolicyError('the recording has no step with all that the policy observes')
-    rows = np.array([answer.observation for answer in answers])
-    same = [answer for answer in answers if answer.synchronous and len(answer.step['action'])]
-    asked = {
-        f'{step["policy"]} {step["policy_digest"]}'
-        for step in steps
-        if step['policy_digest'] not in {'', runner.digest}
-    }
-    return Replay(
-        len(steps),
-        len(answers),
-        len(same),
-        max((_off(each.action, each.step['action']) for each in same), default=0.0),
-        max((_off(each.observation, each.step['observation']) for each in same), default=0.0),
-        tuple(sorted(asked)),
-        tuple(_ranges(contract, rows, reference)),
-    )
-
-
 def statistics_of(runner: PolicyRunner, steps: list[Step]) -> ObservationStatistics:
     """Return what a policy would observe in a recording.
 
     Raises:
         PolicyError: It has nothing that the policy could see.
     """
-    rows = [answer.observation for answer in feed(runner, steps)]
-    if not rows:
-        raise PolicyError('the reference has no step with all that the policy observes')
-    return ObservationStatistics.of(np.array(rows))
+    return ObservationStatistics.of(_rows(list(feed(runner, steps)), 'reference'))
+
+
+def _rows(answers: list[Answered], what: str) -> Floats:
+    if not answers:
+        raise PolicyError(f'the {what} has no step with all that the policy observes')
+    return np.array([answer.observation for answer in answers])
 
 
 def _others(step: Step) -> Targets:
@@ -205,48 +155,64 @@ def run(arguments: Sequence[str]) -> int:
             recorded.period,
         )
         reference, origin = _reference(loaded, options.reference)
-        found = replay(loaded.runner, loaded.contract, steps, reference)
+        text, fine = report(loaded, steps, reference, origin)
     except (QuadControllerError, DescriptionError) as error:
         sys.stdout.write(f'{error}\n')
         return 1
-    for line in report(found, loaded, origin):
-        sys.stdout.write(f'{line}\n')
-    return 0 if found.agrees and not any(term.leaves for term in found.terms) else 1
+    sys.stdout.write(f'{text}\n')
+    return 0 if fine else 1
 
 
-def report(found: Replay, loaded: LoadedPolicy, origin: str) -> list[str]:
-    """Return what was found, for people."""
+def report(
+    loaded: LoadedPolicy,
+    steps: list[Step],
+    reference: ObservationStatistics | None,
+    origin: str,
+) -> tuple[str, bool]:
+    """Feed a policy by a recording; return what was found, and whether all is well.
+
+    Args:
+        reference: What it observed in training, or in another recording; None for nothing.
+        origin: Where that comes from, in words.
+
+    Raises:
+        PolicyError: The recording has nothing that the policy could see.
+    """
+    runner = loaded.runner
+    answers = list(feed(runner, steps))
+    terms = list(_ranges(loaded.contract, _rows(answers, 'recording'), reference))
     lines = [
-        f'policy {loaded.runner.name}, sha256 {loaded.digest}',
-        f'{found.steps} steps, asked in {found.asked}',
+        f'policy {runner.name}, sha256 {loaded.digest}',
+        f'{len(steps)} steps, asked in {len(answers)}',
     ]
-    if found.compared:
-        differs = f'NOT the same, more than {MAX_DIFFERENCE:g}'
-        verdict = 'the same' if found.agrees else differs
+    same = [each for each in answers if each.synchronous and len(each.step['action'])]
+    actions = max((_off(each.action, each.step['action']) for each in same), default=0.0)
+    seen = max((_off(each.observation, each.step['observation']) for each in same), default=0.0)
+    agrees = max(actions, seen) <= MAX_DIFFERENCE
+    if same:
+        verdict = 'the same' if agrees else f'NOT the same, more than {MAX_DIFFERENCE:g}'
         lines.append(
-            f'{found.compared} answers compared with the recorded ones: actions differ by '
-            f'{found.action_difference:.2g}, observations by {found.observation_difference:.2g}; '
-            f'{verdict}'
+            f'{len(same)} answers compared with the recorded ones: actions differ by '
+            f'{actions:.2g}, observations by {seen:.2g}; {verdict}'
         )
     else:
         lines.append('no answer of this file is in the recording: nothing to compare with')
-    lines += [f'asked in the recording: {other}' for other in found.others]
-    lines += ['', f'reference: {origin}']
-    rows = [('term', 'recorded', 'reference', 'outside', 'mean off by', '')]
-    for term in found.terms:
-        span = f'{term.least:.3g} to {term.most:.3g}'
-        if term.reference is None:
-            rows.append((term.name, span, '', '', '', ''))
-            continue
-        low, high = term.reference
-        verdict = 'LEAVES' if term.leaves else 'ok'
-        share, shift = f'{term.outside:.1%}', f'{term.shift:.1f} sigma'
-        rows.append((term.name, span, f'{low:.3g} to {high:.3g}', share, shift, verdict))
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    for row in rows:
-        cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-        lines.append('  '.join(cells).rstrip())
-    return lines
+    others = {
+        f'{step["policy"]} {step["policy_digest"]}'
+        for step in steps
+        if step['policy_digest'] not in {'', runner.digest}
+    }
+    lines += [f'asked in the recording: {other}' for other in sorted(others)]
+    table = [('term', 'recorded', 'reference', 'outside', 'mean off by', '')]
+    for term in terms:
+        span, cells = f'{term.least:.3g} to {term.most:.3g}', ('', '', '', '')
+        if term.reference is not None:
+            low, high = term.reference
+            share, shift = f'{term.outside:.1%}', f'{term.shift:.1f} sigma'
+            cells = f'{low:.3g} to {high:.3g}', share, shift, 'LEAVES' if term.leaves else 'ok'
+        table.append((term.name, span, *cells))
+    lines += ['', f'reference: {origin}', table_text(table)]
+    return '\n'.join(lines), agrees and not any(term.leaves for term in terms)
 
 
 def main() -> None:

@@ -14,17 +14,18 @@ import sys
 
 from comparison import best, compare, table
 from contract_env import (
+    contract_of,
+    GaitTeacher,
+    metadata_of,
+    PERIOD,
     TaughtEnv,
     walking_contract,
     walking_env,
-    walking_teacher,
 )
-from gait_teacher import GaitTeacher
 import numpy as np
 from policy_export import export
 from progress import Progress
 import pytest
-from trained_contract import contract_of, metadata_of, PERIOD
 
 from quad_controller import (
     Controller,
@@ -138,7 +139,7 @@ def test_what_is_trained_is_what_runs() -> None:
 def test_the_teacher_beside_the_robot_walks_it() -> None:
     """Its answers, as actions of the contract, go as commanded and do not fall."""
     practice = walking_env(NO_RANDOMIZATION)
-    env = TaughtEnv(practice, walking_teacher(practice.contract))
+    env = TaughtEnv(practice)
     robot = practice.simulation.robot
     seen, _ = env.reset(seed=1, options={'command': (0.2, 0.0, 0.0)})
     for _ in range(200):

@@ -21,6 +21,7 @@ from quad_controller.gait.parameters import LOW_AND_WIDE
 from quad_controller.gait.velocity import REST
 from quad_controller.policy.contract.model import CommandRanges, Gains
 from quad_controller.policy.gains import gain_rows, ServoResponse
+from quad_controller.policy.report import table_text
 from quad_controller.policy_check.arenas import (
     Conditions,
     PhysicsArena,
@@ -45,7 +46,6 @@ from quad_controller.policy_check.findings import (
     Findings,
     is_too_late,
     Swept,
-    text_of,
     timing_notes,
     tracking_table,
     write_csv,
@@ -327,11 +327,12 @@ def test_tables_have_a_dash_for_what_was_not_measured() -> None:
     assert tracking_table(Compared('', course(lost), course()))[1] == (
         *('forward', '+0.200 m/s', '-', '-', '+0.190', '0.010'),
     )
-    lines = text_of(figures_table(Compared('', course(), course()))).splitlines()
+    lines = table_text(figures_table(Compared('', course(), course())), numbers=True).splitlines()
     assert len({len(line) for line in lines}) == 1
     assert not any('observation' in line for line in lines)
     timed = course(replace(FAIR, timing=CommandTiming((0.002,), (0.001,))))
-    assert 'observation to command, p50 [ms]' in text_of(figures_table(Compared('', timed, timed)))
+    titles = [row[0] for row in figures_table(Compared('', timed, timed))]
+    assert 'observation to command, p50 [ms]' in titles
 
 
 @pytest.mark.slow

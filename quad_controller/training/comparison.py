@@ -12,6 +12,7 @@ from progress import Progress
 
 from quad_controller import Velocity
 from quad_controller.gait.parameters import LOW_AND_WIDE
+from quad_controller.policy.report import table_text
 from quad_controller.policy_check.arenas import AS_MADE, Conditions, TIPPING_PUSH
 from quad_controller.policy_check.course import CourseFigures, Passage
 from quad_controller.policy_check.main import run as check_policy
@@ -95,15 +96,14 @@ def best(compared: Results) -> str:
 
 def table(compared: Results) -> str:
     """Return the figures as a table for people."""
-    width = max(map(len, compared))
-    lines = [f'{"":{width}}  {"ground":28} off [m/s]  turning off [rad/s]  falls in a minute']
+    rows = [('', 'ground', 'off [m/s]', 'turning off [rad/s]', 'falls in a minute')]
     for name, grounds in compared.items():
-        lines += [
-            f'{name:{width}}  {title:28} {each.error:9.3f}  {each.mean("turning_error"):19.3f}  '
-            f'{each.falls_per_minute:17.1f}'
-            for title, each in grounds.items()
-        ]
-    return '\n'.join(lines)
+        for title, each in grounds.items():
+            turning = f'{each.mean("turning_error"):.3f}'
+            rows.append(
+                (name, title, f'{each.error:.3f}', turning, f'{each.falls_per_minute:.1f}')
+            )
+    return table_text(rows)
 
 
 def judge(folder: Path, policies: Mapping[str, Path], progress: Progress, duration: float) -> int:

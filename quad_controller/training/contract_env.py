@@ -8,41 +8,131 @@ limiter of speeds.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 import math
 from typing import Any
 
-from gait_teacher import GaitTeacher
 import gymnasium
 from gymnasium import spaces
 import numpy as np
-from trained_contract import (
-    contract_of,
-    PERIOD,
-    Values,
-    walking_values,
-)
 
-from quad_controller import PolicyOptions, Velocity
+from quad_controller import BodyPose, Gait, GaitParameters, PolicyOptions, Velocity
+from quad_controller.gait.body import feet_in_body
 from quad_controller.gait.parameters import LOW_AND_WIDE
-from quad_controller.policy.contract.model import PolicyContract, Source
+from quad_controller.gait.stepping import arc, hermite, SwingLift
+from quad_controller.policy.contract.document import document_of
+from quad_controller.policy.contract.mjlab import CONTRACT_KEY
+from quad_controller.policy.contract.model import build_contract, PolicyContract, Source
 from quad_controller.policy.network import Floats, OnnxNetwork
 from quad_controller.policy.observation import PolicyInputs
 from quad_controller.policy.runner import PolicyRunner
 from quad_controller.states.motion import StepLimiter
 from quad_description import Quadruped, quadruped, robot_urdf, Targets
-from quad_sim.env import Randomization, WalkingEnv
+from quad_description.rotations import Vector
+from quad_sim import ServoModel
+from quad_sim.env import CommandRanges, Randomization, WalkingEnv
+
+PERIOD = 0.02  # [s]
+SCALE = 0.25  # [rad] for an action of one
+PHASE_THRESHOLD = 0.02  # slower commands have no phase
+
+Values = dict[str, Any]
 
 
-def teacher_of(robot: Quadruped) -> GaitTeacher:
-    """Return the gait as the teacher of a robot."""
-    return GaitTeacher(robot, LOW_AND_WIDE)
+def contract_of(values: Values) -> PolicyContract:
+    """Return the contract that values say."""
+    return build_contract(document_of(values, 'training'))
+
+
+def metadata_of(values: Values) -> dict[str, str]:
+    """Return the metadata of a file that has its contract."""
+    return {CONTRACT_KEY: document_of(values, '').to_yaml()}
+
+
+class GaitTeacher:
+    """Answers the joint targets of a trot that has been going on at a velocity for long."""
+
+    def __init__(self, robot: Quadruped, parameters: GaitParameters) -> None:
+        """Use the trot of some parameters."""
+        self._robot, self._parameters = robot, parameters
+        self.schedule = parameters.schedule(Gait.TROT)
+        self._neutral = parameters.stance(robot, [0.0] * len(robot.names))
+        self._lift = SwingLift(robot, self._neutral, self.schedule, parameters.swing_height)
+
+    @property
+    def stand(self) -> Targets:
+        """Joint targets of a robot that stands [rad]."""
+        return self.targets(Velocity(), 0.0, (0.0, 0.0))
+
+    def targets(self, velocity: Velocity, phase: float, tilt: tuple[float, float]) -> Targets:
+        """Return the joint targets in [rad].
+
+        Args:
+            phase: Share of the period that has passed.
+            tilt: Measured roll and pitch in [rad].
+        """
+        feet = [
+            self._foot(place, offset, velocity, phase)
+            for place, offset in zip(self._neutral, self.schedule.offsets, strict=True)
+        ]
+        gain = self._parameters.level_gain
+        pose = BodyPose(roll=_bounded(-gain * tilt[0]), pitch=_bounded(-gain * tilt[1]))
+        moved = feet_in_body(feet, pose, self._robot.hip_centre)
+        return self._robot.place(self._robot.solve(moved), [0.0] * len(self._robot.names))
+
+    def _foot(self, place: Vector, offset: float, velocity: Velocity, phase: float) -> Vector:
+        schedule = self.schedule
+        over_x = velocity.x - velocity.yaw * place[1]
+        over_y = velocity.y + velocity.yaw * place[0]
+        part = math.fmod(phase + offset, 1.0)
+        if part < schedule.duty:
+            time = schedule.stance_duration * (0.5 - part / schedule.duty)
+            return place[0] + over_x * time, place[1] + over_y * time, place[2]
+        part = (part - schedule.duty) / (1.0 - schedule.duty)
+        half, duration = 0.5 * schedule.stance_duration, schedule.swing_duration
+        x, y = (
+            hermite((-half * over, -duration * over), (half * over, -duration * over), part)
+            for over in (over_x, over_y)
+        )
+        scale = min(1.0, math.hypot(over_x, over_y) / 0.03)
+        lift = self._lift.height(over_x, over_y) * scale * arc(part)
+        return place[0] + x, place[1] + y, place[2] + lift
+
+
+def _bounded(angle: float) -> float:
+    return min(max(angle, -0.2), 0.2)
 
 
 def walking_contract(robot: Quadruped, kind: str = '') -> Values:
-    """Return the contract of a policy that walks; ``kind`` says how it is made, for people."""
-    teacher = teacher_of(robot)
-    return walking_values(robot.names, teacher.stand, teacher.schedule.period, kind)
+    """Return the contract of a policy that walks, as it is written into its file.
+
+    Args:
+        kind: How the policy is made, for people.
+    """
+    teacher = GaitTeacher(robot, LOW_AND_WIDE)
+    ranges, servo = CommandRanges(), ServoModel.FIRM.parameters
+    terms = {
+        'angular_velocity': {'source': 'angular_velocity', 'frame': 'base'},
+        'gravity': {'source': 'gravity'},
+        'command': {'source': 'command'},
+        'phase': {
+            'source': 'phase',
+            'phase_period': round(teacher.schedule.period, 3),
+            'phase_threshold': PHASE_THRESHOLD,
+        },
+        'positions': {'source': 'joint_positions', 'relative': True},
+        'velocities': {'source': 'joint_velocities'},
+        'last_action': {'source': 'last_action'},
+    }
+    return {
+        'kind': kind,
+        'joints': list(robot.names),
+        'default_positions': [round(position, 3) + 0.0 for position in teacher.stand],
+        'period': PERIOD,
+        'observation': {'terms': terms},
+        'action': {'scale': SCALE},
+        'gains': {'stiffness': servo.stiffness, 'damping': servo.velocity_gain},
+        'commands': {'x': list(ranges.x), 'y': list(ranges.y), 'yaw': list(ranges.yaw)},
+    }
 
 
 class NoNetwork(OnnxNetwork):
@@ -108,17 +198,17 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
         return seen
 
 
-Teacher = Callable[[PolicyInputs, Floats], Targets]
-"""Answers joint targets [rad] for what is measured, and the observation that is made of it."""
-
-
 class TaughtEnv(gymnasium.ObservationWrapper[Floats, Floats, Floats]):
-    """With what the teacher would do behind each observation."""
+    """With what the teacher would do behind each observation, at the phase that is observed."""
 
-    def __init__(self, env: ContractEnv, teacher: Teacher) -> None:
+    def __init__(self, env: ContractEnv) -> None:
         """Wrap an environment."""
         super().__init__(env)
-        self._env, self._teacher = env, teacher
+        self._env = env
+        self._teacher = GaitTeacher(quadruped(robot_urdf()), LOW_AND_WIDE)
+        terms = env.contract.terms
+        place = [term.source for term in terms].index(Source.PHASE)
+        self._phase = sum(term.width for term in terms[:place])
         action = env.contract.action
         self._offset, self._scale = np.array(action.offset), np.array(action.scale)
         width = env.contract.width + len(action.offset)
@@ -126,27 +216,15 @@ class TaughtEnv(gymnasium.ObservationWrapper[Floats, Floats, Floats]):
 
     def observation(self, observation: Floats) -> Floats:
         """Return an observation with the action of the teacher behind it."""
-        targets = self._teacher(self._env.inputs, observation)
-        wanted = (np.array(targets) - self._offset) / self._scale
-        return np.concatenate([observation, wanted.astype(np.float32)])
-
-
-def walking_teacher(contract: PolicyContract) -> Teacher:
-    """Return the gait, at the phase that is observed."""
-    teacher = teacher_of(quadruped(robot_urdf()))
-    place = [term.source for term in contract.terms].index(Source.PHASE)
-    phase = sum(term.width for term in contract.terms[:place])
-
-    def targets(inputs: PolicyInputs, observation: Floats) -> Targets:
-        sine, cosine = observation[phase : phase + 2].tolist()
-        moves = math.hypot(sine, cosine) > 0.0
-        return teacher.targets(
-            inputs.velocity if moves else Velocity(),
+        inputs = self._env.inputs
+        sine, cosine = observation[self._phase : self._phase + 2].tolist()
+        targets = self._teacher.targets(
+            inputs.velocity if math.hypot(sine, cosine) > 0.0 else Velocity(),
             math.atan2(sine, cosine) / math.tau % 1.0,
             inputs.imu.roll_pitch_yaw[:2],
         )
-
-    return targets
+        wanted = (np.array(targets) - self._offset) / self._scale
+        return np.concatenate([observation, wanted.astype(np.float32)])
 
 
 def walking_env(randomization: Randomization) -> ContractEnv:
@@ -157,5 +235,4 @@ def walking_env(randomization: Randomization) -> ContractEnv:
 
 def taught_walking_env(randomization: Randomization) -> TaughtEnv:
     """Make an environment in which the teacher of walking is beside the robot."""
-    env = walking_env(randomization)
-    return TaughtEnv(env, walking_teacher(env.contract))
+    return TaughtEnv(walking_env(randomization))

@@ -8,7 +8,14 @@ from contextlib import closing
 from functools import partial
 from pathlib import Path
 
-from contract_env import taught_walking_env, walking_contract, walking_env
+from contract_env import (
+    metadata_of,
+    PERIOD,
+    taught_walking_env,
+    Values,
+    walking_contract,
+    walking_env,
+)
 from imitation import Imitation, Lessons
 import jax
 from networks import Actor, answer, explore, layers_of, Normaliser
@@ -17,7 +24,6 @@ from policy_export import export
 from practice import Practice, Practised
 from progress import Progress
 import skrl
-from trained_contract import metadata_of, PERIOD, Values
 
 from quad_controller.policy.statistics import ObservationStatistics, STATISTICS_KEY
 from quad_description import quadruped, robot_urdf

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -48,12 +49,24 @@ class Report:
 
     def __str__(self) -> str:
         """Return a table for people."""
-        cells = [('check', 'expected', 'found', '')]
-        cells += [(row.subject, row.expected, row.found, row.verdict.value) for row in self.rows]
-        widths = [max(len(line[column]) for line in cells) for column in range(3)]
-        return '\n'.join(
-            '  '.join(
-                [*(cell.ljust(size) for cell, size in zip(line, widths, strict=False)), line[3]]
-            )
-            for line in cells
-        )
+        rows = [('check', 'expected', 'found', '')]
+        rows += [(row.subject, row.expected, row.found, row.verdict.value) for row in self.rows]
+        return table_text(rows)
+
+
+def table_text(rows: Sequence[Sequence[str]], *, numbers: bool = False, widest: int = 1000) -> str:
+    """Return a table for people: columns stand under each other.
+
+    Args:
+        rows: Their cells; the first row has the headings.
+        numbers: All columns but the first are aligned at the right.
+        widest: A cell with more characters runs over, and moves no other line.
+    """
+    widths = [min(max(map(len, column)), widest) for column in zip(*rows, strict=True)]
+    return '\n'.join(
+        '  '.join(
+            cell.rjust(width) if numbers and column else cell.ljust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    )

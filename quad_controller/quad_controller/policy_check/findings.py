@@ -230,18 +230,6 @@ def sweep_table(swept: Swept) -> Table:
     return table
 
 
-def text_of(table: Table) -> str:
-    """Return a table for a terminal."""
-    widths = [max(len(row[column]) for row in table) for column in range(len(table[0]))]
-    return '\n'.join(
-        '  '.join(
-            cell.rjust(width) if column else cell.ljust(width)
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in table
-    )
-
-
 CSV_COLUMNS = (
     *('tried', 'walker', 'axis', 'commanded x [m/s]', 'commanded y [m/s]'),
     *('commanded yaw [rad/s]', 'went x [m/s]', 'went y [m/s]', 'went yaw [rad/s]'),

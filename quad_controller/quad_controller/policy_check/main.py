@@ -24,6 +24,7 @@ from ..gait.velocity import Velocity
 from ..policy.load import find_policy, load_policy, LoadedPolicy
 from ..policy.network import OnnxNetwork
 from ..policy.options import GravitySource, ImuFrame, PolicyOptions
+from ..policy.report import table_text
 from ..states.parameters import StateParameters
 from .course import course_for, walk
 from .findings import (
@@ -35,7 +36,6 @@ from .findings import (
     is_too_late,
     sweep_table,
     Swept,
-    text_of,
     timing_notes,
     tracking_table,
     unseen_terms,
@@ -162,7 +162,7 @@ def _try_out(options: argparse.Namespace, loaded: LoadedPolicy, found: Findings)
             pairs = [(sweep.text(value), next(figures), next(figures)) for value in sweep.values]
             swept = Swept(sweep, tuple(Compared(*pair) for pair in pairs))
             found.sweeps.append(swept)
-            _print(f'\n{text_of(sweep_table(swept))}')
+            _print(f'\n{table_text(sweep_table(swept), numbers=True)}')
         found.notes += [note for swept in found.sweeps for note in _weaker(swept)]
     if options.chain:
         duration = chain_duration(options.minutes, len(both), len(commands))
@@ -181,7 +181,8 @@ def _add_course(found: Findings, compared: Compared) -> None:
     late = list(timing_notes(compared.policy))
     found.notes += late
     _print(f'\nbeside the gait, {compared.title}')
-    _print(f'{text_of(tracking_table(compared))}\n\n{text_of(figures_table(compared))}')
+    tables = (table(compared) for table in (tracking_table, figures_table))
+    _print('\n\n'.join(table_text(each, numbers=True) for each in tables))
     if reasons and is_too_late(compared.policy, StateParameters().period):
         raise CheckError(f'{"; ".join(late)}; try again when the machine has less to do')
     found.reasons += reasons

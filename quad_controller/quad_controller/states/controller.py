@@ -94,8 +94,8 @@ class Controller:
         self._generator = GaitGenerator(robot, gait, poses.fallback_positions)
         self._generator.choose(first_gait)
         self._robot = robot
-        self._machine = StateMachine(poses, self._generator, states, policy)
         self._policies = PolicyChoice(policy, policy_refusal, dry_run=dry_run)
+        self._machine = StateMachine(poses, self._generator, states, self._policies)
         self._parameters = states
         self._commands = Commands(states.command_timeout)
         self._health = Health(len(robot.names), states)
@@ -205,7 +205,6 @@ class Controller:
         if refusal:
             return Answer(False, f'stays as it is: {refusal}')
         text = policies.choose(policy)
-        machine.set_policy(policy)
         if not moves or (policy is None and machine.state is not State.POLICY):
             return Answer(True, text)
         machine.swap(State.WALK if policy is None else State.POLICY)

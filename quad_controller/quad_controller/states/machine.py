@@ -22,12 +22,11 @@ from quad_description import Quadruped, Targets
 
 from ..exceptions import ParameterError
 from ..gait.generator import GaitGenerator
-from ..policy.runner import PolicyRunner
 from .get_up import FinalPoses, GetUp
 from .modes import GAIT_STATES, MOVING_STATES, Reaction, State
 from .motion import Blend, Hold, Motion, Walk
 from .parameters import StateParameters
-from .policy_motion import PolicyMotion
+from .policy_motion import PolicyChoice, PolicyMotion
 
 EASE_TIME = 0.7  # [s] over which a policy takes over
 
@@ -81,14 +80,14 @@ class StateMachine:
         poses: Poses,
         generator: GaitGenerator,
         parameters: StateParameters,
-        policy: PolicyRunner | None,
+        policies: PolicyChoice,
     ) -> None:
         """Start relaxed, without targets.
 
         Args:
-            policy: What POLICY follows; it cannot be entered without.
+            policies: What POLICY follows; it cannot be entered without a policy.
         """
-        self._poses, self._generator, self._policy = poses, generator, policy
+        self._poses, self._generator, self._policies = poses, generator, policies
         self._parameters = parameters
         self._walk = Walk(generator)
         self._lie_down: Blend | None = None
@@ -176,10 +175,6 @@ class StateMachine:
         self.request(State.STAND)
         self._after_standing = goal
 
-    def set_policy(self, policy: PolicyRunner | None) -> None:
-        """Follow another policy when POLICY is entered next."""
-        self._policy = policy
-
     def react(self, reaction: Reaction, last: Targets) -> None:
         """Go into FAULT, or to a stronger reaction there."""
         if self.state is State.GET_UP:
@@ -256,8 +251,8 @@ class StateMachine:
             self._lie(last)
         elif state is State.GET_UP:
             self.motion = self._get_up(last)
-        elif state is State.POLICY and self._policy is not None:
-            self.motion = PolicyMotion(self._policy, last, EASE_TIME)
+        elif state is State.POLICY and self._policies.policy is not None:
+            self.motion = PolicyMotion(self._policies.policy, last, EASE_TIME)
         elif self.motion is not self._walk:
             self._stand(last)
         self.state = state
