@@ -7,16 +7,15 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=['PyYAML>=6', 'rich>=13', './arm_canopen', './robot_primitives', './ros_runtime'],
     extras={
         'motion': [
-            'numpy>=1.26',
-            './arm_model',
-            './arm_planning',
-            './arm_servo',
-            './arm_trajectory',
+            'python3-numpy',
+            'arm_model',
+            'arm_planning',
+            'arm_servo',
+            'arm_trajectory',
         ],
-        'ros': ['./canopen_sim', './robot_viewer'],
+        'ros': ['canopen_sim', 'canopen_tools', 'robot_viewer'],
     },
     programs=[
         'bringup = arm_bringup.bringup:main',

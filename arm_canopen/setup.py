@@ -7,14 +7,6 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=[
-        'msgpack>=1.0.3',
-        'python-can>=4.3',
-        'PyYAML>=6',
-        './recording',
-        './robot_primitives',
-        './ros_runtime',
-    ],
     programs=[
         'canopen_joint_state_publisher = arm_canopen.nodes.joint_state_publisher:main',
         'master = arm_canopen.nodes.master:main',

@@ -7,9 +7,5 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=['coal>=3', 'numpy>=1.26', 'pin>=3.3', 'PyYAML>=6', './robot_primitives'],
-    extras={
-        'ros': ['./ros_runtime'],
-    },
     package_data=['panda/*'],
 )

@@ -7,17 +7,6 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=[
-        'numpy>=1.26',
-        'pin>=3.3',
-        'PyYAML>=6',
-        './arm_model',
-        './arm_trajectory',
-        './robot_primitives',
-    ],
-    extras={
-        'ros': ['./ros_runtime'],
-    },
     programs=[
         'move_group = arm_planning.nodes.move_group:main',
         'srdf = arm_planning.aliases:srdf',  # a program of arm_bringup

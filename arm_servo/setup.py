@@ -7,18 +7,8 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=[
-        'daqp>=0.5',
-        'numpy>=1.26',
-        'pin>=3.3',
-        './arm_canopen',
-        './arm_model',
-        './arm_trajectory',
-        './robot_primitives',
-        './ros_runtime',
-    ],
     extras={
-        'ros': ['./teleop'],
+        'ros': ['teleop'],
     },
     programs=[
         'motion_node = arm_servo.ros.motion_node:main',

@@ -6,6 +6,4 @@ from pathlib import Path
 import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
-runpy.run_path(str(SHARED))['setup_package'](
-    requires=['numpy>=1.26', 'ruckig>=0.19', './arm_model'],
-)
+runpy.run_path(str(SHARED))['setup_package']()

@@ -7,10 +7,6 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=['./arm_canopen'],
-    extras={
-        'ros': ['./ros_runtime'],
-    },
     programs=[
         'fake_slave = canopen_sim.nodes.fake_slave:main',
         'fake_slaves = canopen_sim.nodes.fake_slaves:main',

@@ -7,14 +7,8 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=[
-        'rich>=13',
-        './quad_controller',
-        './quad_description',
-        './ros_runtime',
-    ],
     extras={
-        'ros': ['./quad_hardware', './quad_sim', './quad_teleop', './robot_viewer'],
+        'ros': ['quad_hardware', 'quad_sim', 'quad_teleop', 'robot_viewer'],
     },
     programs=[
         'bringup = quad_bringup.bringup:main',

@@ -7,16 +7,8 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=[
-        'numpy>=1.26',
-        'onnxruntime>=1.19',
-        'PyYAML>=6.0',
-        './quad_description',
-        './recording',
-    ],
     extras={
-        'ros': ['./ros_runtime'],
-        'physics': ['./quad_hardware', './quad_sim'],
+        'physics': ['quad_hardware', 'quad_sim'],
     },
     programs=[
         'attach_contract = quad_controller.attach_contract:main',

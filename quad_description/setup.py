@@ -7,10 +7,6 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=['PyYAML>=6', 'xacro>=2', './robot_primitives'],
-    extras={
-        'ros': ['./ros_runtime'],
-    },
     programs=[
         'display = quad_description.display:main',
         'urdf = quad_description.urdf_command:main',

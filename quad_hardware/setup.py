@@ -7,14 +7,6 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=[
-        'pyserial>=3.5',
-        'PyYAML>=6',
-        './quad_description',
-        './recording',
-        './robot_primitives',
-        './ros_runtime',
-    ],
     programs=[
         'calibrate = quad_hardware.calibration.main:main',
         'doctor = quad_hardware.doctor.main:main',

@@ -7,17 +7,8 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=[
-        "mujoco-core; python_version >= '3.11'",
-        "mujoco<4; python_version < '3.11'",
-        'numpy>=1.26',
-        './quad_description',
-        './quad_hardware',
-        './robot_primitives',
-        './ros_runtime',
-    ],
     extras={
-        'env': ['gymnasium>=1.1'],
+        'env': ['python3-gymnasium-pip'],
     },
     programs=[
         'export_mjcf = quad_sim.export_mjcf:main',

@@ -7,10 +7,6 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=['./teleop', './quad_description'],
-    extras={
-        'ros': ['./ros_runtime'],
-    },
     programs=[
         'teleop_keyboard = quad_teleop.nodes.teleop_keyboard:main',
         'teleop_gamepad = quad_teleop.nodes.teleop_gamepad:main',

@@ -7,11 +7,14 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=['./robot_primitives'],
     extras={
-        'page': ['numpy', 'trimesh', 'viser', 'websockets'],
+        'page': [
+            'python3-numpy',
+            'python3-trimesh-pip',
+            'python3-viser-pip',
+            'python3-websockets',
+        ],
         'foxglove': ['foxglove-sdk>=0.30'],
-        'ros': ['./recording', './ros_runtime'],
     },
     programs=[
         'foxglove_bridge = robot_viewer.nodes.foxglove_bridge:main',

@@ -13,14 +13,37 @@ from pathlib import Path
 import sys
 import xml.etree.ElementTree as ET
 
-import setuptools
-
 CHECKOUT = Path(__file__).resolve().parents[1]
+REQUIREMENTS: Mapping[str, Sequence[str]] = {
+    'coal': ['coal>=3'],
+    'pinocchio': ['pin>=3.3'],
+    'python3-can': ['python-can>=4.3'],
+    'python3-daqp-pip': ['daqp>=0.5'],
+    'python3-evdev': ['evdev>=1.6; sys_platform == "linux"'],
+    'python3-gymnasium-pip': ['gymnasium>=1.1'],
+    'python3-mcap-pip': ['mcap>=1.6'],
+    'python3-msgpack': ['msgpack>=1.0.3'],
+    'python3-mujoco-pip': [
+        "mujoco-core; python_version >= '3.11'",
+        "mujoco<4; python_version < '3.11'",
+    ],
+    'python3-numpy': ['numpy>=1.26'],
+    'python3-onnxruntime-pip': ['onnxruntime>=1.19'],
+    'python3-rich': ['rich>=13'],
+    'python3-ruckig-pip': ['ruckig>=0.19'],
+    'python3-serial': ['pyserial>=3.5'],
+    'python3-trimesh-pip': ['trimesh'],
+    'python3-viser-pip': ['viser'],
+    'python3-websockets': ['websockets'],
+    'python3-yaml': ['PyYAML>=6'],
+    'python3-zstandard': ['zstandard>=0.21'],
+    'xacro': ['xacro>=2'],
+}
+"""What pip installs for each key of rosdep that package.xml names."""
 
 
 def setup_package(
     *,
-    requires: Sequence[str] = (),
     extras: Mapping[str, Sequence[str]] | None = None,
     programs: Sequence[str] = (),
     commands: Sequence[str] = (),
@@ -28,23 +51,32 @@ def setup_package(
     folders: Sequence[str] = (),
     entry_points: Mapping[str, Sequence[str]] | None = None,
 ) -> None:
-    """Describe the package whose package.xml is in the working directory; that has name and texts.
+    """Describe the package whose package.xml is in the working directory.
+
+    That has name, texts and dependencies: pip installs what the keys of `exec_depend` stand for,
+    those of ROS left out.
 
     Args:
-        requires: What it needs without ROS: lines of pip; `./name` is a package of this checkout.
-        extras: The same for each extra; `ros` is what its nodes need besides.
+        extras: Keys and names of packages of this checkout, or lines of pip, that are installed
+            with an extra only; `ros` is what its nodes need besides.
         programs: Entry points of `ros2 run`.
         commands: Entry points that pip installs.
         package_data: Patterns of files beside its modules.
         folders: Patterns of folders whose files are installed in its share folder.
         entry_points: Other groups.
     """
+    import setuptools
+
     manifest = ET.parse('package.xml').getroot()  # noqa: S314  # our own file
     name = manifest.findtext('name', '')
     maintainer = manifest.find('maintainer')
     # colcon runs one of these commands; pip asks for a wheel: what needs `ros2 run` is not in it
     for_ros = not {'develop', 'install'}.isdisjoint(sys.argv)
     marks = sorted(str(path) for path in Path().glob('resource/*'))
+    if not (CHECKOUT / 'libraries').is_dir():
+        raise SystemExit(f'{name}: install it from a checkout of the whole repository')
+    needed = {element.text or '' for element in manifest.iter('exec_depend')}
+    needed -= {key for keys in (extras or {}).values() for key in keys}
     tops = [path.parent.name for path in sorted(Path().glob('*/__init__.py'))]
     setuptools.setup(
         name=name,
@@ -61,10 +93,10 @@ def setup_package(
             (f'share/{name}', ['package.xml']),
             *_data_files(name, folders),
         ],
-        install_requires=[*map(_requirement, requires)],
+        install_requires=_requirements(key for key in sorted(needed) if _is_for_pip(key)),
         extras_require={
             'test': ['pytest'],  # colcon test runs pytest where it is named
-            **{extra: [*map(_requirement, lines)] for extra, lines in (extras or {}).items()},
+            **{extra: _requirements(keys) for extra, keys in (extras or {}).items()},
         },
         entry_points={
             **(entry_points or {}),
@@ -86,15 +118,23 @@ def _data_files(name: str, patterns: Iterable[str]) -> list[tuple[str, list[str]
     ]
 
 
-def _requirement(line: str) -> str:
+def _is_for_pip(key: str) -> bool:
+    return key in REQUIREMENTS or _folder(key) is not None
+
+
+def _folder(name: str) -> Path | None:
+    """Return where a Python package of this checkout is."""
+    places = (CHECKOUT / name, CHECKOUT / 'libraries' / name)
+    return next((path for path in places if (path / 'setup.py').is_file()), None)
+
+
+def _requirements(keys: Iterable[str]) -> list[str]:
     """Require a package of this checkout as it stands here, and never one of that name on PyPI.
 
-    A wheel is for the machine that built it: it names the folder. An sdist has no neighbours.
+    A wheel is for the machine that built it: it names the folder.
     """
-    if not line.startswith('./'):
-        return line
-    name = line.removeprefix('./')
-    for path in (CHECKOUT / name, CHECKOUT / 'libraries' / name):
-        if path.is_dir():
-            return f'{name} @ {path.as_uri()}'
-    raise SystemExit(f'{name} is missing: install from a checkout of the whole repository')
+    lines: list[str] = []
+    for key in keys:
+        folder = _folder(key)
+        lines += [f'{key} @ {folder.as_uri()}'] if folder else REQUIREMENTS.get(key, [key])
+    return lines

@@ -6,6 +6,4 @@ from pathlib import Path
 import runpy
 
 SHARED = Path(__file__).resolve().parents[2] / 'tools' / 'setup_package.py'
-runpy.run_path(str(SHARED))['setup_package'](
-    requires=['mcap>=1.6', 'PyYAML>=6', 'zstandard>=0.21'],
-)
+runpy.run_path(str(SHARED))['setup_package']()

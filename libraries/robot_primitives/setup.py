@@ -6,6 +6,4 @@ from pathlib import Path
 import runpy
 
 SHARED = Path(__file__).resolve().parents[2] / 'tools' / 'setup_package.py'
-runpy.run_path(str(SHARED))['setup_package'](
-    requires=['PyYAML>=6', 'xacro>=2'],
-)
+runpy.run_path(str(SHARED))['setup_package']()

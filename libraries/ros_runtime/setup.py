@@ -7,6 +7,5 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[2] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=['PyYAML>=6', 'rich>=13', './recording'],
     package_data=['*.xml'],
 )

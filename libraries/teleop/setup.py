@@ -7,10 +7,6 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[2] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=['evdev>=1.6; sys_platform == "linux"'],
-    extras={
-        'ros': ['./ros_runtime'],
-    },
     programs=[
         'show_keys = operator_input.show_input:show_keys',
         'show_gamepad = operator_input.show_input:show_gamepad',

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What setup.py of each package declares is what its modules import, and what is pinned."""
+"""What package.xml of each package declares is what its modules import, and what is pinned."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ import yaml
 
 from workspace.layout import this_checkout
 from workspace.packages import find_packages
-from workspace.rosdep import KEYS
 
 LAYOUT = this_checkout()
 PACKAGES = {
@@ -30,14 +29,14 @@ PACKAGES = {
 DISTRIBUTIONS = {'can': 'python-can', 'pinocchio': 'pin', 'serial': 'pyserial', 'yaml': 'PyYAML'}
 DISTRIBUTIONS |= {'foxglove': 'foxglove-sdk', 'mujoco': 'mujoco-core'}
 """Names on PyPI of what is imported under another one."""
-ON_PYPI = {*DISTRIBUTIONS, 'coal', 'daqp', 'evdev', 'msgpack', 'numpy', 'onnxruntime', 'psutil'}
-ON_PYPI |= {'rich', 'ruckig', 'trimesh', 'viser', 'websockets', 'xacro'}
-ON_PYPI |= {'gymnasium', 'mcap', 'zstandard'}
-ROSDEP = {**KEYS, 'numpy': 'python3-numpy'}
-"""Keys of rosdep for them."""
+REQUIREMENTS: dict[str, list[str]] = runpy.run_path(str(LAYOUT.root / 'tools/setup_package.py'))[
+    'REQUIREMENTS'
+]
+ROSDEP = {re.split('[^\\w-]', lines[0])[0]: key for key, lines in REQUIREMENTS.items()}
+"""Keys of rosdep for what is on PyPI."""
+ON_PYPI = {*DISTRIBUTIONS, *ROSDEP}
 OF_TESTS = {
     'canopen': 'canopen-pip',
-    'gymnasium': 'python3-gymnasium-pip',
     'hypothesis': 'python3-hypothesis',
     'mcap_ros2': 'mcap-ros2-support',
     'onnx': 'python3-onnx-pip',
@@ -119,19 +118,7 @@ def test_what_is_imported_is_declared(name: str, monkeypatch: pytest.MonkeyPatch
     needed = {DISTRIBUTIONS.get(each, each) for each in used & {*ON_PYPI, *PACKAGES}}
     needed |= STARTED.get(name, set())
     found = {*declared(name, monkeypatch)} - PHYSICS
-    assert not needed - found, f'add to requires or extras in {name}/setup.py'
-    assert not found - needed, f'{name} imports none of these: remove them from its setup.py'
-
-
-@pytest.mark.parametrize('name', PACKAGES)
-def test_what_pip_installs_is_declared_for_colcon_and_rosdep(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """What setup.py names package.xml names, too, but for what is optional or has no key."""
-    named = {*declared(name, monkeypatch)}
-    keys = named & PACKAGES.keys() | {ROSDEP[each] for each in named & ROSDEP.keys()}
-    missing = keys - PACKAGES[name].dependencies - OPTIONAL.get(name, set())
-    assert not missing, f'add an exec_depend to {name}/package.xml'
+    assert not needed - found, f'add to package.xml, or to extras in {name}/setup.py'
 
 
 def keys(name: str, *tags: str) -> set[str]:
@@ -196,7 +183,7 @@ def test_every_key_is_known_to_rosdep() -> None:
 def test_every_key_that_the_container_skips_is_used() -> None:
     """A key that no package names would hide one that is misspelt."""
     named = {key for name in PACKAGES for key in keys(name, 'exec_depend')}
-    assert {*KEYS.values()} <= named
+    assert REQUIREMENTS.keys() - named == {'python3-gymnasium-pip'}  # of an extra
 
 
 @pytest.mark.parametrize('name', PACKAGES)
@@ -258,7 +245,7 @@ def test_without_its_neighbours_a_package_is_not_installed(
     shutil.copy(LAYOUT.root / 'tools' / 'setup_package.py', tools)
     for name in ('setup.py', 'package.xml'):
         shutil.copy(PACKAGES['arm_trajectory'].folder / name, folder)
-    with pytest.raises(SystemExit, match='arm_model is missing: install from a checkout'):
+    with pytest.raises(SystemExit, match='arm_trajectory: install it from a checkout'):
         described(folder, monkeypatch)
 
 
