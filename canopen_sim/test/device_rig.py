@@ -218,6 +218,14 @@ class Rig:
         assert size is not None
         self.write(index, subindex, (value % (1 << 8 * size)).to_bytes(size, 'little'))
 
+    def refused(self, index: int, value: int, subindex: int = 0) -> int:
+        """Write a number; return the code with which the device refuses it, 0 for none."""
+        try:
+            self.put(index, value, subindex)
+        except RefusedError as error:
+            return error.code
+        return 0
+
     def get(self, index: int, subindex: int = 0) -> int:
         """Read a number; signed when the object is."""
         signed = self.device.store.find(index, subindex).entry.data_type.name.startswith('INT')

@@ -8,7 +8,6 @@ from device_rig import NODE_ID, RefusedError, Rig
 import pytest
 
 from arm_canopen.standard import Emergency, NmtCommand
-from canopen_sim.services.emcy_producer import register_bits
 
 EMCY = 0x080 + NODE_ID
 
@@ -41,27 +40,15 @@ def rig() -> Rig:
         (0xFF01, 0x81),
     ],
 )
-def test_register_bits(code: int, register: int) -> None:
-    """Each class of error codes sets its bit of 0x1001 beside the generic one."""
-    assert register_bits(code) == register
-
-
-def test_error_and_its_end(rig: Rig) -> None:
-    """An error is reported with code and register, and its end with code 0."""
-    rig.drive.raise_fault(0x2310)
-    assert emergencies(rig) == [(0x2310, 0x03)]
-    assert (rig.get(0x1001), rig.get(0x603F)) == (0x03, 0x2310)
+def test_error_and_its_end(rig: Rig, code: int, register: int) -> None:
+    """Once with its code and the bit of its class in 0x1001; its end has code 0."""
+    rig.drive.raise_fault(code)
+    rig.drive.raise_fault(code)
+    assert emergencies(rig) == [(code, register)]
+    assert (rig.get(0x1001), rig.get(0x603F), rig.get(0x1003)) == (register, code, 1)
     rig.command(0x80)
     assert emergencies(rig) == [(0, 0)]
     assert (rig.get(0x1001), rig.get(0x603F)) == (0, 0)
-
-
-def test_one_error_is_reported_once(rig: Rig) -> None:
-    """An error that is there already is not repeated."""
-    rig.drive.raise_fault(0x2310)
-    rig.drive.raise_fault(0x2310)
-    assert emergencies(rig) == [(0x2310, 0x03)]
-    assert rig.get(0x1003) == 1
 
 
 def test_register_shows_all_errors(rig: Rig) -> None:
@@ -74,23 +61,18 @@ def test_register_shows_all_errors(rig: Rig) -> None:
 
 
 def test_history_has_the_newest_first(rig: Rig) -> None:
-    """0x1003 keeps the last eight errors, the newest in sub-index 1; resets are none."""
+    """0x1003 keeps the last eight errors; resets are none, writing 0 erases it, not the error."""
     codes = [0xFF00 + number for number in range(10)]
     for number, code in enumerate(codes, start=1):
         rig.drive.raise_fault(code)
         assert rig.get(0x1003) == min(number, 8)
         rig.command(0x00, 0x80)
     assert [rig.get(0x1003, sub) for sub in range(1, 9)] == codes[:1:-1]
-
-
-def test_history_is_erased_by_writing_zero(rig: Rig) -> None:
-    """Writing 0 to 0x1003:00 erases the history, not the error."""
     rig.drive.raise_fault(0x2310)
     rig.put(0x1003, 0)
-    assert rig.get(0x1003) == 0
+    assert (rig.get(0x1003), rig.get(0x1001)) == (0, 0x03)
     with pytest.raises(RefusedError):
         rig.read(0x1003, 1)
-    assert rig.get(0x1001) == 0x03
 
 
 def test_inhibit_time(rig: Rig) -> None:
@@ -124,19 +106,16 @@ def test_nothing_is_sent_in_stopped(rig: Rig) -> None:
     assert emergencies(rig) == [(0x2310, 0x03)]
 
 
-def test_fault_is_reported_again_after_reset_of_communication(rig: Rig) -> None:
-    """A fault that lasts over a reset of communication is reported again."""
+@pytest.mark.parametrize(
+    ('command', 'reported'),
+    [(NmtCommand.RESET_COMMUNICATION, [(0x2310, 0x03)]), (NmtCommand.RESET_NODE, [])],
+)
+def test_a_fault_over_a_reset(
+    rig: Rig, command: NmtCommand, reported: list[tuple[int, int]]
+) -> None:
+    """One that lasts is reported again; after a reset of the node there is none."""
     rig.drive.raise_fault(0x2310)
     rig.take()
-    rig.nmt(NmtCommand.RESET_COMMUNICATION)
-    assert emergencies(rig) == [(0x2310, 0x03)]
-    assert rig.get(0x1001) == 0x03
-
-
-def test_reset_of_the_node_forgets_errors(rig: Rig) -> None:
-    """After a reset of the node there is no error, and nothing is sent of the old one."""
-    rig.drive.raise_fault(0x2310)
-    rig.take()
-    rig.nmt(NmtCommand.RESET_NODE)
-    assert emergencies(rig) == []
-    assert (rig.get(0x1001), rig.get(0x603F)) == (0, 0)
+    rig.nmt(command)
+    assert emergencies(rig) == reported
+    assert rig.get(0x1001) == (0x03 if reported else 0)

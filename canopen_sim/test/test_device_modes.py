@@ -1,21 +1,62 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Mode selection, profile velocity and homing of the simulated drive."""
+"""Modes of operation of the simulated drive: what selects them, and profiles and velocities."""
 
 from __future__ import annotations
 
-from device_rig import drive_dictionary, ENABLE, RefusedError, Rig, with_defaults
+from device_rig import (
+    drive_dictionary,
+    ENABLE,
+    QUICK_STOP,
+    RefusedError,
+    Rig,
+    SHUTDOWN,
+    SWITCH_ON,
+    with_defaults,
+)
+from hypothesis import given, settings
+from hypothesis import strategies as st
 import pytest
 
 from arm_canopen import OperationMode
 from arm_canopen.standard import AbortCode, NmtCommand
 
-REACHED = 0x400
-LIMIT = 0x800
-BIT12 = 0x1000
-BIT13 = 0x2000
-HALT = 0x100
+pytestmark = pytest.mark.slow
+
+REACHED, LIMIT, ACKNOWLEDGE, ZERO_SPEED, FOLLOWS = 0x400, 0x800, 0x1000, 0x1000, 0x1000
+HALT, NEW, IMMEDIATE, RELATIVE, BLEND = 0x100, ENABLE | 0x10, 0x20, 0x40, 0x200
+RAMP = ENABLE | 0x70
 SIMULATED = (1, 2, 3, 4, 6, 7, 8, 9, 10)
+
+
+def enabled(mode: int, *objects: tuple[int, int] | tuple[int, int, int]) -> Rig:
+    """Return a drive enabled in a mode, some objects (index, value, sub-index) written before."""
+    rig = Rig()
+    for index, value, *subindex in objects:
+        rig.put(index, value, *subindex)
+    rig.enable(mode)
+    return rig
+
+
+def offer(rig: Rig, target: int, bits: int = 0) -> int:
+    """Hand a set-point over, take the bit back; return the statusword in between."""
+    rig.put(0x607A, target)
+    rig.command(NEW | bits)
+    word = rig.statusword
+    rig.command(ENABLE | bits)
+    return word
+
+
+def arrival(rig: Rig, limit: float = 20.0) -> float:
+    """Wait for "target reached"; return how long it took in [s]."""
+    start = rig.now
+    while not rig.statusword & REACHED:
+        rig.run(0.001)
+        assert rig.now - start < limit, 'not reached'
+    return rig.now - start
+
+
+# --- selection ---
 
 
 def test_supported_modes_are_those_simulated() -> None:
@@ -33,7 +74,7 @@ def test_supported_modes_are_those_simulated() -> None:
     assert {mode for mode in OperationMode if supported & mode.support_bit} == set(SIMULATED)
 
 
-def test_mode_by_rpdo_that_is_not_simulated_is_ignored() -> None:
+def test_a_mode_that_an_rpdo_requests_in_vain_is_ignored() -> None:
     """An RPDO cannot be refused: the display keeps the present mode."""
     rig = Rig()
     rig.put(0x6060, 8)
@@ -42,44 +83,38 @@ def test_mode_by_rpdo_that_is_not_simulated_is_ignored() -> None:
     assert (rig.get(0x6060), rig.get(0x6061)) == (5, 8)
 
 
-def test_dictionary_may_leave_modes_out() -> None:
-    """A mode that 0x6502 of the dictionary does not name is refused, though it is simulated."""
-    rig = Rig(with_defaults(drive_dictionary(), {(0x6502, 0): 0x80 | 0x10}))
-    assert rig.get(0x6502) == 0x80
-    rig.put(0x6060, 8)
+def test_the_dictionary_chooses_modes() -> None:
+    """0x6502 may leave simulated modes out; a default of 0x6060 counts after each reset."""
+    rig = Rig(with_defaults(drive_dictionary(), {(0x6502, 0): 0x80 | 0x10, (0x6060, 0): 8}))
+    assert (rig.get(0x6502), rig.get(0x6061)) == (0x80, 8)
     with pytest.raises(RefusedError):
         rig.put(0x6060, 1)
-
-
-def test_mode_of_the_dictionary_is_selected_at_the_start() -> None:
-    """A default of 0x6060 counts, also again after a reset."""
-    rig = Rig(with_defaults(drive_dictionary(), {(0x6060, 0): 8}))
-    assert rig.get(0x6061) == 8
-    rig.put(0x6060, 1)
+    rig.put(0x6060, 0)
     rig.nmt(NmtCommand.RESET_NODE)
     assert rig.get(0x6061) == 8
 
 
-def test_without_a_mode_the_axis_is_held() -> None:
-    """Mode 0 enabled holds the position, whatever targets are written."""
-    rig = Rig()
-    rig.enable(0)
-    rig.put(0x607A, 500)
-    rig.put(0x60FF, 500)
-    rig.command(0x1F)
-    rig.run(1.0)
-    assert (rig.get(0x6064), rig.get(0x606C)) == (0, 0)
+def test_nothing_moves_at_a_change_of_mode() -> None:
+    """From each mode to each other: a target that stands in the dictionary is not handed over."""
+    rig = enabled(0, (0x607A, 800), (0x60C1, 700, 1))
+    rig.command(NEW)
+    for before in SIMULATED:
+        for after in (0, *SIMULATED):
+            for mode in (before, after):
+                rig.put(0x6060, mode)
+                rig.run(0.05)
+            rig.cycles(5)
+            assert (rig.get(0x6064), rig.get(0x6061)) == (0, after), before
 
 
 @pytest.mark.parametrize(
     ('mode', 'target', 'actual', 'word'),
-    [(3, 0x60FF, 0x606C, ENABLE), (9, 0x60FF, 0x606C, ENABLE), (2, 0x6042, 0x6044, ENABLE | 0x70)],
+    [(3, 0x60FF, 0x606C, ENABLE), (9, 0x60FF, 0x606C, ENABLE), (2, 0x6042, 0x6044, RAMP)],
 )
 def test_velocities_in_another_unit(mode: int, target: int, actual: int, word: int) -> None:
     """A drive that counts rpm turns that much faster, and reports what it was given."""
     rig = Rig(rate_units=(50.0, 50.0))  # 3000 increments per turn: 50 inc/s are 1 rpm
-    limits = ((0x607F, 60), (0x6080, 0), (0x6083, 40), (0x6084, 40))
-    for index, value in limits:
+    for index, value in ((0x607F, 60), (0x6080, 0), (0x6083, 40), (0x6084, 40)):
         rig.put(index, value)
     rig.enable(mode)
     rig.command(word)
@@ -90,56 +125,18 @@ def test_velocities_in_another_unit(mode: int, target: int, actual: int, word: i
     assert rig.get(actual) == 20
 
 
-def test_a_move_in_another_unit_takes_its_time() -> None:
-    """By 0x6081 and its ramps: 3000 increments at 10 rpm of 50 inc/s are more than 6 s."""
-    rig = Rig(rate_units=(50.0, 50.0))
-    for index, value in ((0x607F, 60), (0x6081, 10), (0x6083, 1000), (0x6084, 1000)):
-        rig.put(index, value)
-    rig.enable(1)
-    rig.put(0x607A, 3000)
-    rig.command(0x1F)
-    rig.run(3.0)
-    assert rig.velocity == pytest.approx(500.0)
-    assert 1400.0 < rig.position < 1500.0
-    rig.run(4.0)
-    assert rig.get(0x6064) == 3000
+# --- profile velocity (3), velocity (2), cyclic velocity (9) ---
 
 
-@pytest.mark.parametrize('before', SIMULATED)
-@pytest.mark.parametrize('after', [0, *SIMULATED])
-def test_nothing_moves_at_a_change_of_mode(before: int, after: int) -> None:
-    """At rest, without a target velocity, no change of mode moves the axis.
-
-    A position target that stands in the dictionary is none that was handed over.
-    """
-    rig = Rig()
-    rig.put(0x607A, 800)
-    rig.put(0x60C1, 700, 1)
-    rig.enable(before)
-    rig.run(0.2)
-    rig.put(0x6060, after)
-    rig.run(0.2)
-    rig.cycles(20)
-    assert rig.get(0x6064) == 0
-
-
-def velocity_rig(target: int = 0) -> Rig:
-    """Return a drive enabled in profile velocity mode."""
-    rig = Rig()
-    rig.put(0x60FF, target)
-    rig.enable(3)
-    return rig
-
-
-def test_velocity_ramps() -> None:
-    """The velocity rises by 0x6083, falls by 0x6084, and stays at its target."""
-    rig = velocity_rig()
-    rig.put(0x6083, 2000)
-    rig.put(0x6084, 4000)
+def test_velocity_ramps_and_zero_speed() -> None:
+    """The velocity rises by 0x6083, falls by 0x6084; bit 12 comes after the time of 0x6070."""
+    rig = enabled(3, (0x6083, 2000), (0x6084, 4000), (0x6070, 200))
+    rig.run(0.5)
+    assert rig.statusword & ZERO_SPEED
     rig.put(0x60FF, 1000)
     rig.run(0.25)
     assert rig.velocity == pytest.approx(500, abs=10)
-    assert not rig.statusword & REACHED
+    assert not rig.statusword & (REACHED | ZERO_SPEED)
     rig.run(1.0)
     assert rig.get(0x606C) == 1000
     assert rig.statusword & REACHED
@@ -148,42 +145,22 @@ def test_velocity_ramps() -> None:
     assert rig.velocity == pytest.approx(500, abs=10)
     rig.run(0.125 + 0.25)
     assert rig.velocity == pytest.approx(-500, abs=10)
-    rig.run(1.0)
-    assert rig.get(0x606C) == -1000
-
-
-def test_zero_speed_bit() -> None:
-    """Bit 12 says that the motor stands, after the time of 0x6070."""
-    rig = velocity_rig()
-    rig.put(0x6070, 200)
-    rig.run(0.5)
-    assert rig.statusword & BIT12
-    rig.put(0x60FF, 500)
-    rig.run(0.1)
-    assert not rig.statusword & BIT12
     rig.put(0x60FF, 0)
-    rig.run(0.15)
-    assert not rig.statusword & BIT12
     rig.run(0.3)
-    assert rig.statusword & BIT12
-
-
-def test_velocity_is_limited() -> None:
-    """0x607F caps the velocity, and the capped one counts as reached."""
-    rig = velocity_rig()
+    assert not rig.statusword & ZERO_SPEED
+    rig.run(0.2)
+    assert rig.statusword & ZERO_SPEED
     rig.put(0x607F, 400)
     rig.put(0x60FF, 1000)
     rig.run(1.0)
-    assert rig.get(0x606C) == 400
+    assert rig.get(0x606C) == 400  # the limited one counts as reached
     assert rig.statusword & REACHED
 
 
 @pytest.mark.parametrize('direction', [1, -1])
 def test_velocity_stops_at_the_software_limit(direction: int) -> None:
     """The axis brakes in time to stand at the limit, says so, and may leave it again."""
-    rig = velocity_rig()
-    rig.put(0x607D, -600, 1)
-    rig.put(0x607D, 600, 2)
+    rig = enabled(3, (0x607D, -600, 1), (0x607D, 600, 2))
     rig.put(0x60FF, 1000 * direction)
     rig.run(0.4)
     assert rig.get(0x606C) == 1000 * direction
@@ -199,7 +176,7 @@ def test_velocity_stops_at_the_software_limit(direction: int) -> None:
 
 def test_velocity_beyond_the_limit_does_not_turn_back() -> None:
     """An axis that is outside of its limits is not driven back by a velocity outwards."""
-    rig = velocity_rig(1000)
+    rig = enabled(3, (0x60FF, 1000))
     rig.run(1.0)
     rig.put(0x60FF, 0)
     rig.run(0.5)
@@ -215,9 +192,16 @@ def test_velocity_beyond_the_limit_does_not_turn_back() -> None:
 
 
 def test_halt_in_velocity_mode() -> None:
-    """Halt ramps down to a stand; without it the velocity comes back."""
-    rig = velocity_rig(800)
+    """Halt ramps down to a stand, also one that was there at enabling; then the velocity comes."""
+    rig = Rig()
+    rig.put(0x60FF, 800)
+    rig.put(0x6060, 3)
+    rig.command(SHUTDOWN, SWITCH_ON, ENABLE | HALT)
     rig.run(1.0)
+    assert rig.get(0x6064) == 0
+    rig.command(ENABLE)
+    rig.run(1.0)
+    assert rig.get(0x606C) == 800
     rig.command(ENABLE | HALT)
     rig.put(0x60FF, 900)
     rig.run(1.0)
@@ -228,88 +212,323 @@ def test_halt_in_velocity_mode() -> None:
     assert rig.get(0x606C) == 900
 
 
-def test_enabling_while_halted_moves_nothing() -> None:
-    """A velocity that waits behind halt begins when halt is over."""
-    rig = Rig()
-    rig.put(0x60FF, 500)
-    rig.put(0x6060, 3)
-    rig.command(0x06, 0x07, ENABLE | HALT)
+def test_velocity_mode_ramps_within_its_amounts() -> None:
+    """0x6042 is held within 0x6046, and 0x6048 ramps to it."""
+    rig = enabled(2, (0x6046, 200, 1), (0x6046, 900, 2), (0x6048, 500, 1))
+    rig.command(RAMP)
+    rig.put(0x6042, 2000)
     rig.run(1.0)
-    assert rig.get(0x6064) == 0
-    rig.command(ENABLE)
-    rig.run(1.0)
-    assert rig.get(0x606C) == 500
-
-
-def homing_rig(method: int, *, offset: int = 0) -> Rig:
-    """Return a drive at 300 inc that is enabled in homing mode."""
-    rig = Rig()
-    rig.enable(1)
-    rig.put(0x607A, 300)
-    rig.command(0x1F, ENABLE)
+    assert rig.velocity == pytest.approx(500, abs=5)
     rig.run(2.0)
-    rig.put(0x6098, method)
-    rig.put(0x607C, offset)
-    rig.put(0x6060, 6)
-    return rig
+    assert rig.get(0x6044) == 900
+    assert rig.statusword & (REACHED | LIMIT) == REACHED | LIMIT
+    rig.put(0x6042, 50)
+    rig.run(2.0)
+    assert rig.velocity == pytest.approx(200, abs=1)
 
 
-HOMING_STATES = REACHED | BIT12 | BIT13
+def test_velocity_mode_needs_its_ramp_bits() -> None:
+    """Without bit 6 the ramp leads to zero, without bit 5 the velocity stays as it is."""
+    rig = enabled(2)
+    for word, target, velocity in (
+        (ENABLE, 500, 0.0),
+        (RAMP, 500, 500.0),
+        (ENABLE | 0x50, 100, 500.0),
+        (ENABLE | 0x30, 100, 0.0),
+    ):
+        rig.command(word)
+        rig.put(0x6042, target)
+        rig.run(1.0)
+        assert rig.velocity == pytest.approx(velocity, abs=1.0), hex(word)
 
 
-@pytest.mark.parametrize('method', [35, 37])
-@pytest.mark.parametrize('offset', [0, 250, -250])
-def test_present_position_becomes_home(method: int, offset: int) -> None:
-    """Methods 35 and 37 give the present position the value of the home offset."""
-    rig = homing_rig(method, offset=offset)
-    assert rig.statusword & HOMING_STATES == REACHED
-    assert rig.get(0x6064) == 300
-    rig.command(0x1F)
-    assert rig.statusword & HOMING_STATES == REACHED | BIT12
-    assert (rig.get(0x6064), rig.get(0x6062), rig.get(0x60F4)) == (offset, offset, 0)
-    rig.run(1.0)
-    assert (rig.get(0x6064), rig.get(0x606C)) == (offset, 0)
+def test_cyclic_velocity_adds_its_offset_and_stops_at_a_limit() -> None:
+    """CSV takes 0x60FF plus 0x60B1 with SYNC; the last velocity holds, but not beyond 0x607D."""
+    rig = enabled(9, (0x60B1, 50))
+    for velocity in range(0, 500, 10):
+        rig.put(0x60FF, velocity)
+        rig.cycles(1)
+    rig.cycles(2)
+    assert rig.velocity == pytest.approx(540, abs=10)
+    assert rig.statusword & FOLLOWS
+    rig = enabled(9, (0x607D, -1000, 1), (0x607D, 1000, 2))
+    rig.put(0x60FF, 2000)
+    rig.run(3.0)
+    assert rig.position == pytest.approx(1000, abs=0.01)
 
 
-def test_moves_after_homing_count_from_home() -> None:
-    """After homing, targets are positions in the new coordinates."""
-    rig = homing_rig(35)
-    rig.command(0x1F, ENABLE)
-    rig.put(0x6060, 1)
-    rig.put(0x607A, 100)
-    rig.command(0x1F)
-    rig.run(1.0)
-    assert rig.get(0x6064) == 100
+# --- torque (4, 10) ---
 
 
-def test_method_zero_changes_nothing() -> None:
-    """Method 0 needs no homing: attained, and the position stays."""
-    rig = homing_rig(0)
-    rig.command(0x1F)
-    assert rig.statusword & HOMING_STATES == REACHED | BIT12
-    assert rig.get(0x6064) == 300
+def test_torques() -> None:
+    """PT reaches 0x6071 by 0x6087; CST adds 0x60B2, and 0x6072 limits the sum."""
+    rig = enabled(4, (0x6087, 1000))
+    rig.put(0x6071, 400)
+    rig.run(0.2)
+    assert rig.get(0x6074) == pytest.approx(200, abs=10)
+    assert not rig.statusword & REACHED
+    rig.run(0.3)
+    assert rig.get(0x6074) == 400
+    assert rig.statusword & REACHED
+    rig = enabled(10, (0x6072, 100), (0x60B2, 30))
+    for target, torque, limited in ((50, 80, 0), (90, 100, LIMIT)):
+        rig.put(0x6071, target)
+        rig.run(0.1)
+        assert rig.get(0x6077) == torque
+        assert rig.statusword & LIMIT == limited
 
 
-@pytest.mark.parametrize('method', [15, 31, 36, -1])
-def test_method_that_is_not_simulated(method: int) -> None:
-    """An unknown method is a homing error, not a fault; selecting the mode again clears it."""
-    rig = homing_rig(method)
-    rig.command(0x1F)
-    assert rig.statusword & HOMING_STATES == REACHED | BIT13
-    assert rig.get(0x603F) == 0
+# --- profile position (1) ---
+
+
+def test_handshake() -> None:
+    """New set-point, acknowledge, bit taken back, acknowledge gone: one move."""
+    rig = enabled(1)
+    rig.run(0.05)
+    assert rig.statusword & (ACKNOWLEDGE | REACHED) == REACHED
+    rig.put(0x607A, 500)
+    rig.run(0.05)
+    assert rig.statusword & ACKNOWLEDGE == 0
+    rig.command(NEW)
+    assert rig.statusword & (ACKNOWLEDGE | REACHED) == ACKNOWLEDGE
+    rig.run(0.05)
+    assert rig.statusword & ACKNOWLEDGE
     rig.command(ENABLE)
+    assert rig.statusword & (ACKNOWLEDGE | REACHED) == 0
+    arrival(rig)
+    assert rig.get(0x6064) == pytest.approx(500, abs=10)
+    rig.run(0.1)
+    assert (rig.get(0x6064), rig.get(0x606C)) == (500, 0)
+    assert offer(rig, 500) & ACKNOWLEDGE  # where it stands already
+    arrival(rig)
+
+
+@pytest.mark.parametrize(
+    ('words', 'arrives'),
+    [
+        ((SHUTDOWN, SWITCH_ON, ENABLE), 0),  # a target alone
+        ((SHUTDOWN, SWITCH_ON, ENABLE, NEW), 300),  # held afterwards: one set-point
+        ((SHUTDOWN, SWITCH_ON, NEW), 300),  # enables and offers in one
+        ((0x16, 0x17, NEW), 0),  # no edge: the bit was there before
+    ],
+)
+def test_a_rising_edge_of_bit_4_hands_over(words: tuple[int, ...], arrives: int) -> None:
+    """Nothing else does."""
+    rig = Rig()
     rig.put(0x6060, 1)
-    rig.put(0x6060, 6)
-    assert not rig.statusword & BIT13
+    rig.put(0x607A, 300)
+    rig.command(*words)
+    rig.run(2.0)
+    rig.put(0x607A, 900)
+    rig.run(1.0)
+    assert rig.get(0x6064) == arrives
 
 
-def test_homing_is_remembered_until_the_reset() -> None:
-    """Home stays attained through other modes; after a reset of the node it is not."""
-    rig = homing_rig(35)
-    rig.command(0x1F, ENABLE)
-    rig.put(0x6060, 8)
-    rig.put(0x6060, 6)
-    assert rig.statusword & BIT12
-    rig.nmt(NmtCommand.RESET_NODE)
-    rig.enable(6)
-    assert not rig.statusword & BIT12
+def test_the_profile_is_that_of_the_hand_over() -> None:
+    """The time of a move follows from distance, 0x6081, 0x6083 and 0x6084 as they were then."""
+    rig = enabled(1, (0x6081, 2000), (0x6083, 5000), (0x6084, 10_000), (0x6068, 0))
+    offer(rig, 3000)
+    rig.put(0x6081, 100)
+    ramps = 2000 / 5000 + 2000 / 10_000
+    best = ramps + (3000 - 0.5 * 2000 * ramps) / 2000
+    assert arrival(rig) == pytest.approx(best, abs=0.01)
+    rig.put(0x607F, 50)
+    offer(rig, 0)
+    rig.run(1.0)
+    assert rig.get(0x606C) == -50
+
+
+OFFERS: dict[str, tuple[list[tuple[int, int]], int]] = {
+    'the third has no room': ([(300, 0), (600, 0), (900, 0)], 600),
+    'immediately discards what waits': ([(500, 0), (900, 0), (100, IMMEDIATE)], 100),
+    'relative to a target that waits': ([(300, 0), (200, RELATIVE)], 500),
+    'relative back': ([(300, 0), (-50, RELATIVE)], 250),
+    'immediately': ([(2000, 0), (1500, IMMEDIATE)], 1500),
+}
+
+
+@pytest.mark.parametrize('case', OFFERS)
+def test_set_points_offered_in_a_row(case: str) -> None:
+    """Where the axis ends."""
+    offers, ends = OFFERS[case]
+    rig = enabled(1)
+    for target, bits in offers:
+        offer(rig, target, bits)
+    rig.run(5.0)
+    assert rig.get(0x6064) == ends
+
+
+def test_a_second_set_point_waits_and_begins_at_once() -> None:
+    """The acknowledge bit says so until then; two moves take exactly the sum of their times."""
+    rig = enabled(1, (0x6068, 0))
+    offer(rig, 500)
+    once = arrival(rig)
+    start = rig.now
+    offer(rig, 1000)
+    rig.run(0.1)
+    assert offer(rig, 500) & ACKNOWLEDGE
+    highest = 0
+    while rig.statusword & ACKNOWLEDGE:
+        rig.run(0.005)
+        highest = max(highest, rig.get(0x6064))
+        assert not rig.statusword & REACHED
+    assert highest >= 990
+    arrival(rig)
+    assert rig.now - start == pytest.approx(2 * once, abs=0.02)
+
+
+def test_change_immediately_does_not_stop_unless_it_turns() -> None:
+    """With bit 5 the move goes to the new target from where it is."""
+    rig = enabled(1)
+    offer(rig, 2000)
+    rig.run(0.5)
+    offer(rig, 1500, IMMEDIATE)
+    for _ in range(40):
+        rig.run(0.01)
+        assert rig.get(0x606C) > 900
+    offer(rig, 0, IMMEDIATE)
+    arrival(rig)
+    rig.run(0.1)
+    assert rig.get(0x6064) == 0
+
+
+@pytest.mark.parametrize('blend', [False, True])
+def test_blended_set_points_pass_without_a_stop(blend: bool) -> None:
+    """With bit 9 the axis goes through its target at speed, otherwise it stops there."""
+    rig = enabled(1)
+    bits = BLEND if blend else 0
+    for target in (1000, 2000):
+        offer(rig, target, bits)
+    slowest = 1e9
+    while rig.position < 1900:
+        rig.run(0.005)
+        if 500 < rig.position < 1500:
+            slowest = min(slowest, rig.velocity)
+    assert slowest > 990 if blend else slowest < 200
+    rig.run(1.0)
+    assert rig.position == pytest.approx(2000, abs=0.01)
+    assert rig.statusword & REACHED
+
+
+def test_a_set_point_has_no_room_while_a_target_is_passed() -> None:
+    """At constant velocity towards the target that it passes, the axis is not at its end."""
+    rig = enabled(1)
+    for target in (1000, 2000):
+        offer(rig, target, BLEND)
+    rig.run(0.5)
+    assert rig.velocity == pytest.approx(1000)
+    offer(rig, 0)
+    rig.run(5.0)
+    assert rig.get(0x6064) == 2000
+
+
+def test_target_reached_needs_its_time() -> None:
+    """Bit 10 comes when the motor was in the window 0x6067 for the time 0x6068."""
+    rig = enabled(1, (0x6068, 0))
+    offer(rig, 500)
+    early = arrival(rig)
+    rig.put(0x6068, 300)
+    offer(rig, 0)
+    assert arrival(rig) == pytest.approx(early + 0.3, abs=0.01)
+    rig.put(0x6081, 0)  # a move at no speed stands, and does not claim to have arrived
+    offer(rig, 1000)
+    rig.run(2.0)
+    assert rig.get(0x6064) == 0
+    assert not rig.statusword & REACHED
+
+
+@pytest.mark.parametrize(('target', 'arrives'), [(5000, 800), (-5000, -300), (700, 700)])
+def test_software_limits(target: int, arrives: int) -> None:
+    """A target beyond 0x607D leads to the limit, and bit 11 says so."""
+    rig = enabled(1, (0x607D, -300, 1), (0x607D, 800, 2))
+    offer(rig, target)
+    assert bool(rig.statusword & LIMIT) is (target != arrives)
+    rig.run(3.0)
+    assert rig.get(0x6064) == arrives
+    assert rig.statusword & REACHED
+
+
+@pytest.mark.parametrize(('option', 'time'), [(1, 0.1), (2, 0.05)])
+def test_halt_and_resume(option: int, time: float) -> None:
+    """Halt ramps down as 0x605D selects and says when it stands; then the move goes on."""
+    rig = enabled(1, (0x605D, option))
+    offer(rig, 2000)
+    rig.run(1.0)
+    rig.command(ENABLE | HALT)
+    assert not rig.statusword & REACHED
+    start = rig.now
+    while rig.velocity > 1.0:
+        rig.run(0.001)
+    assert rig.now - start == pytest.approx(time, abs=0.03)
+    rig.run(0.5)
+    stopped = rig.get(0x6064)
+    assert rig.statusword & REACHED
+    rig.run(1.0)
+    assert rig.get(0x6064) == stopped
+    rig.command(ENABLE)
+    assert not rig.statusword & REACHED
+    rig.run(2.0)
+    assert rig.get(0x6064) == 2000
+    rig.command(ENABLE | HALT)  # a set-point in it waits
+    rig.put(0x607A, 400)
+    rig.command(NEW | HALT)
+    assert rig.statusword & ACKNOWLEDGE
+    rig.run(1.0)
+    assert rig.get(0x6064) == 2000
+    rig.command(ENABLE)
+    rig.run(2.0)
+    assert rig.get(0x6064) == 400
+
+
+def test_quick_stop_drops_the_set_points() -> None:
+    """After a quick stop nothing goes on by itself."""
+    rig = enabled(1, (0x605A, 6))
+    offer(rig, 1000)
+    offer(rig, 2000)
+    rig.run(0.5)
+    rig.command(QUICK_STOP)
+    rig.run(0.5)
+    stopped = rig.get(0x6064)
+    rig.command(ENABLE)
+    assert not rig.statusword & ACKNOWLEDGE
+    rig.run(3.0)
+    assert rig.get(0x6064) == stopped
+
+
+def test_selecting_the_mode_in_motion_stops() -> None:
+    """Coming from a velocity, the mode ramps down and waits for a set-point."""
+    rig = enabled(3, (0x60FF, 500))
+    rig.run(1.0)
+    rig.put(0x6060, 1)
+    rig.run(1.0)
+    assert rig.get(0x606C) == 0
+    assert rig.statusword & REACHED
+
+
+@settings(max_examples=40)
+@given(
+    targets=st.lists(st.integers(-3000, 3000), min_size=1, max_size=4),
+    pauses=st.lists(st.floats(0.0, 1.5), min_size=4, max_size=4),
+    velocity=st.integers(500, 5000),
+    acceleration=st.integers(500, 50_000),
+    deceleration=st.integers(500, 50_000),
+)
+def test_moves_keep_their_limits_and_arrive(
+    targets: list[int], pauses: list[float], velocity: int, acceleration: int, deceleration: int
+) -> None:
+    """Whatever targets come when: speed and accelerations are kept, and the last is reached."""
+    rates = ((0x6081, velocity), (0x6083, acceleration), (0x6084, deceleration))
+    rig = enabled(1, (0x6065, 0), *rates)
+    step, fastest = 0.01, max(acceleration, deceleration)
+    last = 0.0
+    for target, pause in zip(targets, pauses, strict=False):
+        offer(rig, target, IMMEDIATE)
+        for _ in range(round(pause / step)):
+            rig.run(step)
+            now = rig.velocity
+            assert abs(now) <= velocity + 1.0
+            assert abs(now - last) <= fastest * step + 1.0
+            last = now
+    arrival(rig, limit=400.0)
+    rig.run(0.2)
+    assert rig.get(0x6064) == targets[-1]

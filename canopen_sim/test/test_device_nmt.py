@@ -16,24 +16,14 @@ START = NmtCommand.START
 BOOT_UP = [b'\x00']
 
 PATHS = {PRE: [], OP: [START], STOP: [NmtCommand.STOP]}
-TABLE = {
-    (PRE, START): OP,
-    (PRE, NmtCommand.STOP): STOP,
-    (PRE, NmtCommand.ENTER_PRE_OPERATIONAL): PRE,
-    (PRE, NmtCommand.RESET_NODE): PRE,
-    (PRE, NmtCommand.RESET_COMMUNICATION): PRE,
-    (OP, START): OP,
-    (OP, NmtCommand.STOP): STOP,
-    (OP, NmtCommand.ENTER_PRE_OPERATIONAL): PRE,
-    (OP, NmtCommand.RESET_NODE): PRE,
-    (OP, NmtCommand.RESET_COMMUNICATION): PRE,
-    (STOP, START): OP,
-    (STOP, NmtCommand.STOP): STOP,
-    (STOP, NmtCommand.ENTER_PRE_OPERATIONAL): PRE,
-    (STOP, NmtCommand.RESET_NODE): PRE,
-    (STOP, NmtCommand.RESET_COMMUNICATION): PRE,
+LEADS = {
+    START: OP,
+    NmtCommand.STOP: STOP,
+    NmtCommand.ENTER_PRE_OPERATIONAL: PRE,
+    NmtCommand.RESET_NODE: PRE,
+    NmtCommand.RESET_COMMUNICATION: PRE,
 }
-"""State, command and next state (CiA 301, figure 48)."""
+"""Next state by command, from each state (CiA 301, figure 48)."""
 
 RESETS = (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION)
 
@@ -48,14 +38,15 @@ def rig_in(state: NmtState) -> Rig:
     return rig
 
 
-@pytest.mark.parametrize('broadcast', [False, True])
-@pytest.mark.parametrize(('before', 'command'), TABLE)
-def test_every_state_and_command(before: NmtState, command: NmtCommand, broadcast: bool) -> None:
+@pytest.mark.parametrize('before', PATHS)
+@pytest.mark.parametrize('command', LEADS)
+def test_every_state_and_command(before: NmtState, command: NmtCommand) -> None:
     """Each command leads where the standard says; a reset shows in one boot-up frame."""
-    rig = rig_in(before)
-    rig.nmt(command, 0 if broadcast else None)
-    assert rig.nmt_state is TABLE[before, command]
-    assert rig.take(0x700 + NODE_ID) == (BOOT_UP if command in RESETS else [])
+    for node_id in (0, NODE_ID):
+        rig = rig_in(before)
+        rig.nmt(command, node_id)
+        assert rig.nmt_state is LEADS[command]
+        assert rig.take(0x700 + NODE_ID) == (BOOT_UP if command in RESETS else [])
 
 
 @pytest.mark.parametrize('state', PATHS)
@@ -69,12 +60,18 @@ def test_commands_to_others_are_ignored(state: NmtState) -> None:
 
 
 @pytest.mark.parametrize(
-    'data', [b'', b'\x01', b'\x01\x05\x00', b'\x03\x05', b'\xff\x05', bytes(8)]
+    'frame',
+    [
+        *(Frame(0, data) for data in (b'', b'\x01', b'\x01\x05\x00', b'\x03\x05', b'\xff\x05')),
+        Frame(0, b'\x01\x00', is_extended=True),
+        Frame(0, b'\x01\x00', is_remote=True),
+        Frame(0, b'\x01\x00', is_error=True),
+    ],
 )
-def test_what_is_no_command_is_ignored(data: bytes) -> None:
-    """Wrong lengths and unknown command specifiers change nothing."""
+def test_what_is_no_command_is_ignored(frame: Frame) -> None:
+    """Wrong lengths, unknown command specifiers and frames that are no plain data frames."""
     rig = rig_in(PRE)
-    rig.send(0, data)
+    rig.device.receive(frame, rig.now)
     assert rig.nmt_state is PRE
     assert rig.take() == []
 
@@ -91,23 +88,17 @@ def test_first_frame_is_boot_up() -> None:
     assert rig.take(0x700 + NODE_ID) == BOOT_UP
 
 
-def test_commands_during_initialisation_are_not_obeyed() -> None:
-    """Start is no command for a device that still initialises."""
+def test_commands_during_initialisation() -> None:
+    """Start is not obeyed, a reset prolongs it; there is one boot-up frame."""
     rig = Rig(boot_time=0.5)
     rig.nmt(START)
-    rig.run(1.0)
-    assert rig.nmt_state is PRE
-
-
-def test_reset_during_initialisation_starts_it_anew() -> None:
-    """A reset prolongs Initialisation; there is one boot-up frame for both."""
-    rig = Rig(boot_time=0.5)
     rig.run(0.4)
     rig.nmt(NmtCommand.RESET_NODE)
     rig.run(0.4)
     assert rig.take() == []
     rig.run(0.2)
     assert rig.take() == BOOT_UP
+    assert rig.nmt_state is PRE
 
 
 def answers_sdo(rig: Rig) -> bool:
@@ -142,22 +133,14 @@ def test_services_of_each_state() -> None:
     assert rig.take() == []
 
 
-def test_reset_node_restores_every_default() -> None:
-    """After a reset of the node all objects hold what the EDS says."""
+@pytest.mark.parametrize(('command', 'velocity'), [(RESETS[0], 1000), (RESETS[1], 77)])
+def test_a_reset_restores_defaults(command: NmtCommand, velocity: int) -> None:
+    """Of the node all objects, of communication 0x1000 to 0x1FFF only."""
     rig = rig_in(OP)
     rig.put(0x6081, 77)
     rig.put(0x1017, 500)
-    rig.nmt(NmtCommand.RESET_NODE)
-    assert (rig.get(0x6081), rig.get(0x1017)) == (1000, 0)
-
-
-def test_reset_communication_leaves_the_application_alone() -> None:
-    """A reset of communication restores 0x1000 to 0x1FFF only."""
-    rig = rig_in(OP)
-    rig.put(0x6081, 77)
-    rig.put(0x1017, 500)
-    rig.nmt(NmtCommand.RESET_COMMUNICATION)
-    assert (rig.get(0x6081), rig.get(0x1017)) == (77, 0)
+    rig.nmt(command)
+    assert (rig.get(0x6081), rig.get(0x1017)) == (velocity, 0)
 
 
 def test_reset_ends_a_transfer_and_the_heartbeat() -> None:
@@ -169,21 +152,6 @@ def test_reset_ends_a_transfer_and_the_heartbeat() -> None:
     rig.take()
     rig.run(5.0)
     assert rig.take() == []
-
-
-@pytest.mark.parametrize(
-    'frame',
-    [
-        Frame(0, b'\x01\x00', is_extended=True),
-        Frame(0, b'\x01\x00', is_remote=True),
-        Frame(0, b'\x01\x00', is_error=True),
-    ],
-)
-def test_only_plain_data_frames_are_commands(frame: Frame) -> None:
-    """Extended, remote and error frames with identifier 0 are no NMT."""
-    rig = rig_in(PRE)
-    rig.device.receive(frame, rig.now)
-    assert rig.nmt_state is PRE
 
 
 @pytest.mark.parametrize('node_id', [0, 128, -1])

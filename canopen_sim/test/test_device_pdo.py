@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from device_rig import drive_dictionary, NODE_ID, RefusedError, Rig, with_defaults
+from device_rig import drive_dictionary, NODE_ID, Rig, with_defaults
 import pytest
 
 from arm_canopen.can import Frame
@@ -132,27 +132,18 @@ def test_event_timer(rig: Rig) -> None:
 
 
 def test_inhibit_time(rig: Rig) -> None:
-    """Changes within the inhibit time are sent together at its end."""
+    """Changes within it are sent together at its end; it limits the event timer, too."""
     can_id = configure(rig, 1, [0x60410010], transmission=255, inhibit=1000)  # 100 ms
+    fast = configure(rig, 2, [0x60610008], transmission=255, inhibit=1000, event=30)
     rig.nmt(NmtCommand.START)
     start = rig.now
-    rig.take()
     rig.run(0.01)
     rig.command(0x06)
     rig.command(0x07)
-    assert rig.take(can_id) == []
-    rig.run(0.5)
-    assert rig.times(can_id) == pytest.approx([start + 0.1])
-    assert rig.take(can_id) == [b'\x33\x02']
-
-
-def test_inhibit_time_limits_the_event_timer(rig: Rig) -> None:
-    """With an event timer shorter than the inhibit time, the inhibit time counts."""
-    can_id = configure(rig, 1, [0x60410010], transmission=255, inhibit=1000, event=30)
-    rig.nmt(NmtCommand.START)
-    start = rig.now
-    rig.run(0.25)
-    assert rig.times(can_id) == pytest.approx([start, start + 0.1, start + 0.2])
+    rig.run(0.24)
+    assert rig.times(can_id) == pytest.approx([start, start + 0.1])
+    assert rig.times(fast) == pytest.approx([start, start + 0.1, start + 0.2])
+    assert rig.take(can_id) == [b'\x50\x02', b'\x33\x02']
 
 
 def test_moving_axis_is_an_event(rig: Rig) -> None:
@@ -182,14 +173,9 @@ def test_sync_start_value(rig: Rig) -> None:
         rig.send(0x080, bytes((counter,)))
         sent.append(len(rig.take(can_id)))
     assert sent == [0, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1]
-
-
-def test_sync_start_value_needs_a_counter(rig: Rig) -> None:
-    """Without a counter in SYNC the start value means nothing."""
-    can_id = configure(rig, 1, [0x60410010], transmission=1, sync_start=4)
-    rig.nmt(NmtCommand.START)
-    rig.sync()
-    assert len(rig.take(can_id)) == 1
+    other = configure(rig, 2, [0x60410010], transmission=1, sync_start=4)
+    rig.sync()  # without a counter the start value means nothing
+    assert len(rig.take(other)) == 1
 
 
 def test_sync_of_the_wrong_length_is_reported(rig: Rig) -> None:
@@ -244,37 +230,29 @@ def test_synchronous_rpdo_acts_once(rig: Rig, transmission: int) -> None:
 
 @pytest.mark.parametrize('transmission', [254, 255])
 def test_event_driven_rpdo_acts_at_once(rig: Rig, transmission: int) -> None:
-    """Types 254 and 255 act without SYNC; a longer frame is read from its start."""
-    rpdo = receive(rig, 1, [0x60600008, 0x607A0020], transmission=transmission)
+    """Without SYNC; a longer frame is read from its start, bytes of gaps are skipped (7.4.7)."""
+    mapping = [0x00060010, 0x60600008, 0x00050008, 0x607A0020]
+    rpdo = receive(rig, 1, mapping[1::2], transmission=transmission)
+    gaps = receive(rig, 2, mapping, transmission=transmission)
     rig.nmt(NmtCommand.START)
     rig.send(rpdo, b'\x08\x01\x02\x03\x04\xff\xff\xff')
-    assert (rig.get(0x6060), rig.get(0x607A)) == (8, 0x04030201)
-    assert rig.get(0x6061) == 8
+    assert (rig.get(0x6060), rig.get(0x6061), rig.get(0x607A)) == (8, 8, 0x04030201)
+    rig.send(gaps, b'\xaa\xaa\x07\xaa\x01\x00\x00\x00')
+    assert (rig.get(0x6060), rig.get(0x607A)) == (7, 1)
 
 
-def test_short_rpdo_is_reported_and_ignored(rig: Rig) -> None:
-    """A frame shorter than its mapping changes nothing: EMCY 0x8210, until one is right."""
-    rpdo = receive(rig, 1, [0x60600008, 0x607A0020])
+def test_short_rpdos_are_reported_and_ignored(rig: Rig) -> None:
+    """EMCY 0x8210 until the last one is right again; a short one changes nothing."""
+    first, second = (receive(rig, n, [0x60600008, 0x607A0020]) for n in (1, 2))
     rig.nmt(NmtCommand.START)
     rig.take()
-    rig.send(rpdo, b'\x08\x01\x02\x03')
-    rig.send(rpdo, b'')
+    for rpdo, data in ((first, b'\x08\x01\x02\x03'), (first, b''), (second, b'\x08')):
+        rig.send(rpdo, data)
     assert (rig.get(0x6060), rig.get(0x607A)) == (0, 0)
     assert rig.take(EMCY) == [bytes.fromhex('10 82 11 00 00 00 00 00')]
-    rig.send(rpdo, b'\x08\x01\x02\x03\x04')
-    assert rig.take(EMCY) == [bytes(8)]
-
-
-def test_length_error_lasts_until_all_are_right(rig: Rig) -> None:
-    """Two RPDOs with wrong lengths are one error; one of them alone does not end it."""
-    first, second = (receive(rig, n, [0x607A0020]) for n in (1, 2))
-    rig.nmt(NmtCommand.START)
-    rig.take()
-    rig.send(first, b'\x00')
-    rig.send(second, b'\x00')
-    rig.send(first, bytes(4))
-    assert len(rig.take(EMCY)) == 1
-    rig.send(second, bytes(4))
+    rig.send(first, b'\x08\x01\x02\x03\x04')
+    assert rig.take(EMCY) == []
+    rig.send(second, b'\x08\x01\x02\x03\x04')
     assert rig.take(EMCY) == [bytes(8)]
 
 
@@ -291,14 +269,6 @@ def test_rpdo_deadline(rig: Rig) -> None:
     assert rig.take(EMCY)[0][:2] == b'\x50\x82'
     rig.send(rpdo, bytes(4))
     assert rig.take(EMCY) == [bytes(8)]
-
-
-def test_gaps_in_an_rpdo(rig: Rig) -> None:
-    """Data types in the mapping stand for bytes that are skipped (CiA 301, 7.4.7)."""
-    rpdo = receive(rig, 1, [0x00060010, 0x60600008, 0x00050008, 0x607A0020])
-    rig.nmt(NmtCommand.START)
-    rig.send(rpdo, b'\xaa\xaa\x08\xaa\x01\x00\x00\x00')
-    assert (rig.get(0x6060), rig.get(0x607A)) == (8, 1)
 
 
 def test_remote_frames(rig: Rig) -> None:
@@ -335,106 +305,67 @@ def test_full_frame_of_eight_objects(rig: Rig) -> None:
     assert rig.take(can_id) == [b'\x07' * 8]
 
 
-MAPPING_REFUSALS = [
-    (0x1A00, 0x50000020, AbortCode.NO_OBJECT),
-    (0x1A00, 0x60C10520, AbortCode.NO_SUBINDEX),
-    (0x1A00, 0x60650020, AbortCode.NOT_MAPPABLE),  # PDOMapping=0
-    (0x1A00, 0x60400010, AbortCode.NOT_MAPPABLE),  # rww: only into an RPDO
-    (0x1A00, 0x10080020, AbortCode.NOT_MAPPABLE),  # a string
-    (0x1A00, 0x60410020, AbortCode.NOT_MAPPABLE),  # wrong length
-    (0x1A00, 0x00050008, AbortCode.NO_OBJECT),  # a gap, only in an RPDO
-    (0x1600, 0x60410010, AbortCode.NOT_MAPPABLE),  # ro
-    (0x1600, 0x60640020, AbortCode.NOT_MAPPABLE),
+ON_TPDO, OFF_TPDO = (0x1800, TPDO1, 1), (0x1800, DISABLED | TPDO1, 1)
+ONE_OBJECT = ((0x1A00, 0, 0), (0x1A00, 0x60410010, 1), (0x1A00, 1, 0))
+THREE_POSITIONS = ((0x1A00, 0, 0), *((0x1A00, 0x60640020, sub) for sub in (1, 2, 3)))
+RANGE, FIXED = AbortCode.VALUE_RANGE, AbortCode.UNSUPPORTED_ACCESS
+REFUSALS = [
+    # an entry that names no mappable object
+    (((0x1A00, 0, 0),), (0x1A00, 0x50000020, 1), AbortCode.NO_OBJECT),
+    (((0x1A00, 0, 0),), (0x1A00, 0x60C10520, 1), AbortCode.NO_SUBINDEX),
+    (((0x1A00, 0, 0),), (0x1A00, 0x60650020, 1), AbortCode.NOT_MAPPABLE),  # PDOMapping=0
+    (((0x1A00, 0, 0),), (0x1A00, 0x60400010, 1), AbortCode.NOT_MAPPABLE),  # rww: only an RPDO
+    (((0x1A00, 0, 0),), (0x1A00, 0x10080020, 1), AbortCode.NOT_MAPPABLE),  # a string
+    (((0x1A00, 0, 0),), (0x1A00, 0x60410020, 1), AbortCode.NOT_MAPPABLE),  # wrong length
+    (((0x1A00, 0, 0),), (0x1A00, 0x00050008, 1), AbortCode.NO_OBJECT),  # a gap, only in an RPDO
+    (((0x1600, 0, 0),), (0x1600, 0x60410010, 1), AbortCode.NOT_MAPPABLE),  # ro
+    (((0x1600, 0, 0),), (0x1600, 0x60640020, 1), AbortCode.NOT_MAPPABLE),
+    # a count over 64 bits, over 8 entries, and with an empty entry below it
+    (THREE_POSITIONS, (0x1A00, 3, 0), AbortCode.PDO_LENGTH),
+    (THREE_POSITIONS, (0x1A00, 9, 0), AbortCode.VALUE_HIGH),
+    ((*THREE_POSITIONS, (0x1A00, 0, 2)), (0x1A00, 2, 0), AbortCode.NO_OBJECT),
+    # a PDO that exists is fixed; entries also while the count is set
+    ((*ONE_OBJECT, ON_TPDO), (0x1A00, 0, 0), FIXED),
+    ((*ONE_OBJECT, ON_TPDO), (0x1A00, 0x60640020, 1), FIXED),
+    ((*ONE_OBJECT, OFF_TPDO), (0x1A00, 0x60640020, 1), FIXED),
+    ((ON_TPDO,), (0x1800, 5, 3), FIXED),  # inhibit time
+    ((ON_TPDO,), (0x1800, 5, 6), FIXED),  # SYNC start value
+    ((ON_TPDO,), (0x1800, 0x182, 1), RANGE),
+    # identifiers of other services (CiA 301, 7.3.5), and of 29 bits
+    *(
+        ((), (0x1800, can_id, 1), RANGE)
+        for can_id in (0x000, 0x07F, 0x101, 0x180, 0x581, 0x600 + NODE_ID, 0x701)
+    ),
+    ((), (0x1800, 0x2000_0000 | TPDO1, 1), RANGE),
+    ((), (0x1800, 0x800, 1), RANGE),
+    # reserved transmission types
+    *(((), (index, kind, 2), RANGE) for index in (0x1400, 0x1800) for kind in (241, 250, 251)),
+    ((), (0x1400, 252, 2), RANGE),
 ]
 
-
-@pytest.mark.parametrize(('index', 'word', 'code'), MAPPING_REFUSALS)
-def test_object_that_cannot_be_mapped(rig: Rig, index: int, word: int, code: AbortCode) -> None:
-    """An entry that names no mappable object is refused when it is written."""
-    rig.put(index, 0)
-    with pytest.raises(RefusedError) as refused:
-        rig.put(index, word, 1)
-    assert refused.value.code == code
+Write = tuple[int, int, int]
 
 
-def test_count_rules(rig: Rig) -> None:
-    """The count is refused over 64 bits, over 8 entries, and with an empty entry below it."""
-    rig.put(0x1A00, 0)
-    for subindex in range(1, 4):
-        rig.put(0x1A00, 0x60640020, subindex)
-    for count, code in ((3, AbortCode.PDO_LENGTH), (9, AbortCode.VALUE_HIGH)):
-        with pytest.raises(RefusedError) as refused:
-            rig.put(0x1A00, count)
-        assert refused.value.code == code
-    rig.put(0x1A00, 2)
-    rig.put(0x1A00, 0)
-    rig.put(0x1A00, 0, 2)
-    with pytest.raises(RefusedError) as refused:
-        rig.put(0x1A00, 2)
-    assert refused.value.code == AbortCode.NO_OBJECT
-    assert rig.get(0x1A00) == 0
+@pytest.mark.parametrize(('before', 'wrong', 'code'), REFUSALS)
+def test_refused_parameters(
+    rig: Rig, before: tuple[Write, ...], wrong: Write, code: AbortCode
+) -> None:
+    """What a PDO cannot be is refused when it is written, and the old value stays."""
+    for index, value, subindex in before:
+        rig.put(index, value, subindex)
+    index, value, subindex = wrong
+    held = rig.get(index, subindex)
+    assert rig.refused(index, value, subindex) == code
+    assert rig.get(index, subindex) == held
 
 
-def test_mapping_is_changed_only_while_disabled(rig: Rig) -> None:
-    """Count and entries of a PDO that exists are refused; entries also while the count is set."""
-    configure(rig, 1, [0x60410010], transmission=1)
-    for subindex, value in ((0, 0), (1, 0x60640020)):
-        with pytest.raises(RefusedError) as refused:
-            rig.put(0x1A00, value, subindex)
-        assert refused.value.code == AbortCode.UNSUPPORTED_ACCESS
-    rig.put(0x1800, DISABLED | TPDO1, 1)
-    with pytest.raises(RefusedError) as refused:
-        rig.put(0x1A00, 0x60640020, 1)
-    assert refused.value.code == AbortCode.UNSUPPORTED_ACCESS
-    rig.put(0x1A00, 0)
-    rig.put(0x1A00, 0x60640020, 1)
-
-
-@pytest.mark.parametrize('can_id', [0x000, 0x07F, 0x101, 0x180, 0x581, 0x600 + NODE_ID, 0x701])
-def test_restricted_identifiers_are_refused(rig: Rig, can_id: int) -> None:
-    """Identifiers of other services cannot be given to a PDO (CiA 301, 7.3.5)."""
-    with pytest.raises(RefusedError) as refused:
-        rig.put(0x1800, can_id, 1)
-    assert refused.value.code == AbortCode.VALUE_RANGE
-
-
-def test_extended_identifiers_are_refused(rig: Rig) -> None:
-    """The device has no 29-bit frames."""
-    for word in (0x2000_0000 | TPDO1, 0x800):
-        with pytest.raises(RefusedError) as refused:
-            rig.put(0x1800, word, 1)
-        assert refused.value.code == AbortCode.VALUE_RANGE
-
-
-def test_identifier_of_an_existing_pdo_is_fixed(rig: Rig) -> None:
-    """Bits 0 to 29 change only while the PDO does not exist; writing the same is allowed."""
-    rig.put(0x1800, TPDO1, 1)
-    rig.put(0x1800, TPDO1, 1)
-    rig.put(0x1800, NO_RTR | TPDO1, 1)
-    with pytest.raises(RefusedError):
-        rig.put(0x1800, 0x182, 1)
-    rig.put(0x1800, DISABLED | TPDO1, 1)
-    rig.put(0x1800, 0x182, 1)
-
-
-@pytest.mark.parametrize('transmission', [241, 250, 251])
-def test_reserved_types_are_refused(rig: Rig, transmission: int) -> None:
-    """Reserved transmission types are refused for both directions."""
-    for communication in (0x1400, 0x1800):
-        with pytest.raises(RefusedError) as refused:
-            rig.put(communication, transmission, 2)
-        assert refused.value.code == AbortCode.VALUE_RANGE
-    with pytest.raises(RefusedError):
-        rig.put(0x1400, 252, 2)
-
-
-def test_inhibit_time_of_an_existing_pdo_is_fixed(rig: Rig) -> None:
-    """Inhibit time and SYNC start value change only while the PDO does not exist."""
-    rig.put(0x1800, TPDO1, 1)
-    for subindex in (3, 6):
-        with pytest.raises(RefusedError) as refused:
-            rig.put(0x1800, 5, subindex)
-        assert refused.value.code == AbortCode.UNSUPPORTED_ACCESS
+def test_allowed_parameters(rig: Rig) -> None:
+    """The same identifier, other bits of it, and everything while the PDO does not exist."""
+    for index, value, subindex in (ON_TPDO, ON_TPDO, (0x1800, NO_RTR | TPDO1, 1), OFF_TPDO):
+        rig.put(index, value, subindex)
+    rig.put(0x1800, DISABLED | 0x182, 1)
+    for index, value, subindex in (*ONE_OBJECT, *THREE_POSITIONS, (0x1A00, 2, 0)):
+        rig.put(index, value, subindex)
 
 
 def test_changes_take_effect_at_run_time(rig: Rig) -> None:

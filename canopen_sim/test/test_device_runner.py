@@ -67,13 +67,11 @@ def test_a_device_that_stood_still_does_not_live_through_what_it_missed(
 @pytest.mark.parametrize(
     ('stalls', 'heartbeat'),
     [
-        ([WATCHED - 0.1], math.inf),
-        ([WATCHED + 0.05], math.inf),
         ([WATCHED + 0.2], math.inf),
         ([WATCHED + 0.2], 0.05),
         ([WATCHED + 0.15] * 3, math.inf),
     ],
-    ids=['shorter', 'just longer', 'longer', 'with a heartbeat', 'several'],
+    ids=['longer', 'with a heartbeat', 'several'],
 )
 def test_a_device_that_stood_still_takes_nobody_for_silent(
     stalls: list[float], heartbeat: float

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Cyclic synchronous and interpolated position modes of the simulated drive."""
+"""Cyclic synchronous and interpolated position mode: a stream of set-points with SYNC."""
 
 from __future__ import annotations
 
@@ -14,23 +14,12 @@ import pytest
 from arm_canopen import DriveState
 from arm_canopen.standard import NmtCommand
 
-REACHED = 0x400
-LIMIT = 0x800
-BIT12 = 0x1000
-HALT = 0x100
+REACHED, LIMIT, BIT12, HALT = 0x400, 0x800, 0x1000, 0x100
 PERIOD = 0.01  # [s]
-
-MODES = {8: (0x607A, 0, ENABLE), 7: (0x60C1, 1, ENABLE | 0x10)}
-"""Target object and controlword of the two modes."""
-
-
 AMPLITUDE = 4000.0  # [inc]
 OMEGA = 2.0 * math.pi * 0.2  # [rad/s]
-
-
-def sine(time: float) -> float:
-    """Return a position that begins at rest at 0."""
-    return AMPLITUDE * (1.0 - math.cos(OMEGA * time))
+MODES = {8: (0x607A, 0, ENABLE), 7: (0x60C1, 1, ENABLE | 0x10)}
+"""Target object and controlword of the two modes."""
 
 
 def streaming(mode: int, *, sync: bool = True, rpdo_type: int = 255) -> Rig:
@@ -57,6 +46,17 @@ def target(rig: Rig, position: float) -> None:
     rig.send(0x400 + rig.node_id, round(position).to_bytes(4, 'little', signed=True))
 
 
+def stream(rig: Rig, steps: range, step: int = 10, period: float = PERIOD) -> list[float]:
+    """Send a set-point and SYNC at each step; return the velocities at their ends."""
+    velocities = []
+    for number in steps:
+        target(rig, step * number)
+        rig.sync()
+        rig.run(period)
+        velocities.append(rig.velocity)
+    return velocities
+
+
 @pytest.mark.parametrize('mode', MODES)
 @pytest.mark.parametrize('rpdo_type', [0, 1, 255])
 def test_sine_is_followed(mode: int, rpdo_type: int) -> None:
@@ -64,7 +64,7 @@ def test_sine_is_followed(mode: int, rpdo_type: int) -> None:
     rig = streaming(mode, rpdo_type=rpdo_type)
     velocities = []
     for step in range(600):
-        wanted = sine(step * PERIOD)
+        wanted = AMPLITUDE * (1.0 - math.cos(OMEGA * step * PERIOD))
         target(rig, wanted)
         rig.sync()
         rig.run(PERIOD / 2)
@@ -76,18 +76,6 @@ def test_sine_is_followed(mode: int, rpdo_type: int) -> None:
     jumps = [abs(later - earlier) for earlier, later in pairwise(velocities[5:])]
     # set-points are whole increments: half a one, twice at both ends, is 200 inc/s in a period
     assert max(jumps) < AMPLITUDE * OMEGA**2 * PERIOD + 200.0
-
-
-@pytest.mark.parametrize('mode', MODES)
-def test_what_the_target_held_before_is_no_set_point(mode: int) -> None:
-    """Enabling moves nothing until a set-point is written."""
-    index, subindex, word = MODES[mode]
-    rig = Rig()
-    rig.put(index, 4000, subindex)
-    rig.enable(mode)
-    rig.command(word)
-    rig.cycles(50)
-    assert rig.get(0x6064) == 0
 
 
 @pytest.mark.parametrize('mode', MODES)
@@ -103,8 +91,8 @@ def test_without_sync_a_set_point_acts_at_once(mode: int) -> None:
     assert rig.get(0x6064) == 200
 
 
-def test_slower_set_points_than_sync() -> None:
-    """Set-points at every fifth SYNC are interpolated over 0x60C2, not over one SYNC."""
+def test_the_period_of_a_line() -> None:
+    """0x60C2 counts, unless there is a set-point for each SYNC; 0x1006 is stronger than both."""
     rig = streaming(8)
     rig.put(0x60C2, 50, 1)
     speeds = []
@@ -113,31 +101,13 @@ def test_slower_set_points_than_sync() -> None:
             target(rig, 10 * (step + 5))
         rig.sync()
         rig.run(PERIOD)
-        if step > 5:
-            speeds.append(rig.velocity)
-    assert min(speeds) > 900.0
-    assert max(speeds) < 1100.0
-
-
-def test_set_points_at_each_sync_take_its_period() -> None:
-    """With a set-point for each SYNC the measured period counts, whatever 0x60C2 says."""
-    rig = streaming(8)
-    rig.put(0x60C2, 50, 1)
-    for step in range(1, 50):
-        target(rig, 10 * step)
-        rig.sync()
-        rig.run(PERIOD)
-    assert rig.position == pytest.approx(490.0, abs=5.0)
-
-
-def test_period_of_the_dictionary_counts() -> None:
-    """0x1006 says what the period of SYNC is, instead of measuring it."""
+        speeds.append(rig.velocity)
+    assert (min(speeds[6:]), max(speeds[6:])) == pytest.approx((1000.0, 1000.0), abs=100.0)
+    stream(rig, range(45, 80))
+    assert rig.position == pytest.approx(790.0, abs=5.0)
     rig = streaming(8)
     rig.put(0x1006, 20_000)
-    for step in range(1, 20):
-        target(rig, 10 * step)
-        rig.sync()
-        rig.run(PERIOD)
+    stream(rig, range(1, 20))
     # each line is half done when the next one takes its place: it runs one set-point behind
     assert rig.position == pytest.approx(180.0, abs=6.0)
 
@@ -152,11 +122,10 @@ def test_late_syncs_do_not_shake_the_axis() -> None:
         rig.run(max(0.0, now + jitter.uniform(-0.001, 0.001) - rig.now))
         target(rig, 10 * step)
         rig.sync()
-        if step > 10:
-            speeds.append(rig.velocity)
+        speeds.append(rig.velocity)
     # a late SYNC finds the axis waiting at its set-point for a fifth of the period
-    assert min(speeds) > 300.0
-    assert max(speeds) < 1300.0
+    assert min(speeds[10:]) > 300.0
+    assert max(speeds[10:]) < 1300.0
     assert rig.position == pytest.approx(1980.0, abs=15.0)
 
 
@@ -164,44 +133,25 @@ def test_late_syncs_do_not_shake_the_axis() -> None:
 def test_pause_of_sync_is_survived(pause: float) -> None:
     """After SYNCs in a burst or a pause, the set-points are followed as before."""
     rig = streaming(8)
-
-    def stream(first: int, count: int) -> None:
-        for step in range(first, first + count):
-            target(rig, 10 * step)
-            rig.sync()
-            rig.run(PERIOD)
-
-    stream(1, 50)
+    stream(rig, range(1, 51))
     rig.run(pause)
     for _ in range(5):  # five SYNCs that were late arrive in one instant
         target(rig, 500)
         rig.sync()
-    stream(51, 50)
+    stream(rig, range(51, 101))
     assert rig.position == pytest.approx(1000.0, abs=5.0)
     assert rig.velocity == pytest.approx(1000.0, abs=20.0)
 
 
-def test_another_period_of_sync_is_noticed() -> None:
-    """A master that goes on with a SYNC five times slower is followed at that period."""
+def test_another_period_of_sync_is_noticed_and_its_loss() -> None:
+    """A SYNC five times slower is followed; when it is gone, the axis stands at its target."""
     rig = streaming(8)
     rig.cycles(20)
-    for step in range(1, 20):
-        target(rig, 50 * step)
-        rig.sync()
-        rig.run(5 * PERIOD)
+    stream(rig, range(1, 20), 50, 5 * PERIOD)
     assert rig.velocity == pytest.approx(1000.0, abs=50.0)
     assert rig.position == pytest.approx(950.0, abs=10.0)
-
-
-def test_loss_of_sync_in_motion_ends_at_the_last_set_point() -> None:
-    """When master and SYNC are gone, the axis stands at the last set-point that it took."""
-    rig = streaming(8)
-    for step in range(1, 50):
-        target(rig, 10 * step)
-        rig.sync()
-        rig.run(PERIOD)
     rig.run(1.0)
-    assert (rig.get(0x6064), rig.get(0x606C)) == (490, 0)
+    assert (rig.get(0x6064), rig.get(0x606C)) == (950, 0)
 
 
 @pytest.mark.parametrize('mode', MODES)
@@ -210,10 +160,7 @@ def test_software_limits(mode: int) -> None:
     rig = streaming(mode)
     rig.put(0x607D, -50, 1)
     rig.put(0x607D, 100, 2)
-    for step in range(30):
-        target(rig, 10 * step)
-        rig.sync()
-        rig.run(PERIOD)
+    stream(rig, range(30))
     assert rig.get(0x6064) == 100
     assert rig.statusword & LIMIT
     assert mode != 8 or not rig.statusword & BIT12
@@ -229,10 +176,7 @@ def test_halt(mode: int) -> None:
     """Halt ramps down; set-points in it are ignored, and the next one after it is obeyed."""
     word = MODES[mode][2]
     rig = streaming(mode)
-    for step in range(50):
-        target(rig, 10 * step)
-        rig.sync()
-        rig.run(PERIOD)
+    stream(rig, range(50))
     assert rig.statusword & BIT12
     rig.command(word | HALT)
     assert not rig.statusword & BIT12
@@ -260,14 +204,29 @@ def test_interpolation_needs_its_bit() -> None:
     assert rig.get(0x6064) == 0
     rig.command(ENABLE | 0x10)
     assert rig.statusword & BIT12
-    for step in range(50):
-        target(rig, 10 * step)
-        rig.sync()
-        rig.run(PERIOD)
+    stream(rig, range(50))
     rig.command(ENABLE)
     rig.run(0.5)
     assert rig.get(0x606C) == 0
     assert 480 <= rig.get(0x6064) < 600
+
+
+def test_interpolation_buffer_keeps_its_order_and_clears() -> None:
+    """Records wait in the buffer, each SYNC takes one; cleared, none is left."""
+    rig = streaming(7)
+    rig.put(0x60C4, 8, 2)
+    for position in (10, 20, 30):
+        rig.put(0x60C1, position, 1)
+    reached = []
+    for _ in range(5):
+        rig.cycles(1)
+        reached.append(round(rig.position))
+    assert rig.position == pytest.approx(30, abs=0.5)
+    assert reached == sorted(reached)
+    rig.put(0x60C1, 500, 1)
+    rig.put(0x60C4, 0, 6)
+    rig.cycles(5)
+    assert rig.position == pytest.approx(30, abs=0.5)
 
 
 def test_jump_is_a_following_error() -> None:
@@ -294,39 +253,25 @@ def test_jump_is_a_following_error() -> None:
     assert not rig.statusword & 0x2000
 
 
-def test_jump_within_the_window_is_caught_up() -> None:
-    """A jump that the motor makes good in time is no fault; bit 11 shows the limit."""
-    rig = streaming(8)
-    rig.put(0x6065, 1000)
-    rig.put(0x6066, 50)
-    target(rig, 1200)
-    rig.sync()
-    rig.run(0.02)
-    assert rig.statusword & LIMIT
-    rig.run(1.0)
-    assert rig.state is DriveState.OPERATION_ENABLED
-    assert rig.get(0x6064) == 1200
-    assert not rig.statusword & LIMIT
-
-
-@pytest.mark.parametrize('window', [0, 0xFFFF_FFFF])
-def test_following_error_can_be_switched_off(window: int) -> None:
-    """Window 0 and 0xFFFFFFFF switch the monitoring off: the motor goes as fast as it can."""
+@pytest.mark.parametrize(('window', 'jump'), [(1000, 1200), (0, 20_000), (0xFFFF_FFFF, 20_000)])
+def test_jump_that_is_caught_up(window: int, jump: int) -> None:
+    """In time, or without monitoring, the motor goes as fast as it can; bit 11 shows that."""
     rig = streaming(8)
     rig.put(0x6065, window)
-    target(rig, 20_000)
+    rig.put(0x6066, 50)
+    target(rig, jump)
     rig.sync()
-    rig.run(1.0)
+    rig.run(0.05)
     assert rig.get(0x606C) == 10_000
-    rig.run(2.0)
-    assert rig.get(0x6064) == 20_000
+    assert rig.statusword & LIMIT
+    rig.run(3.0)
+    assert rig.state is DriveState.OPERATION_ENABLED
+    assert rig.get(0x6064) == jump
+    assert not rig.statusword & LIMIT
 
 
 def test_following_error_is_shown() -> None:
     """0x60F4 is demand minus actual position, here velocity times the lag of the servo."""
     rig = streaming(8)
-    for step in range(100):
-        target(rig, 50 * step)
-        rig.sync()
-        rig.run(PERIOD)
+    stream(rig, range(100), 50)
     assert rig.get(0x60F4) == pytest.approx(5000 * 0.002, abs=2)

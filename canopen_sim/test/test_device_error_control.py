@@ -1,16 +1,25 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Heartbeats that a simulated device sends, and those that it watches."""
+"""Error control of a simulated device: heartbeats both ways, guarding and life guarding."""
 
 from __future__ import annotations
 
 from itertools import pairwise
 
-from device_rig import NODE_ID, RefusedError, Rig
+from device_rig import drive_dictionary, NODE_ID, Rig
 import pytest
 
 from arm_canopen import DriveState
-from arm_canopen.standard import AbortCode, NmtCommand, NmtState
+from arm_canopen.can import Frame
+from arm_canopen.standard import (
+    AbortCode,
+    DataType,
+    NmtCommand,
+    NmtState,
+    ObjectDictionary,
+    ObjectEntry,
+)
+from canopen_sim import Fault
 
 OWN = 0x700 + NODE_ID
 EMCY = 0x080 + NODE_ID
@@ -38,7 +47,7 @@ def rig() -> Rig:
 
 
 def test_period_is_kept(rig: Rig) -> None:
-    """Heartbeats come at exactly the period of 0x1017, the first within one period."""
+    """Heartbeats come at exactly the period of 0x1017, the first within one; 0 ends them."""
     start = rig.now
     rig.put(0x1017, 200)
     rig.run(10.0)
@@ -47,6 +56,10 @@ def test_period_is_kept(rig: Rig) -> None:
     steps = [later - earlier for earlier, later in pairwise(times)]
     assert steps == pytest.approx([0.2] * len(steps))
     assert len(times) in (49, 50)
+    rig.put(0x1017, 0)
+    rig.take()
+    rig.run(10.0)
+    assert rig.take() == []
 
 
 def test_heartbeats_of_devices_are_spread() -> None:
@@ -73,16 +86,6 @@ def test_heartbeat_carries_the_nmt_state(rig: Rig) -> None:
         assert rig.take(OWN)[-1] == bytes((state,))
 
 
-def test_period_zero_ends_it(rig: Rig) -> None:
-    """Writing 0 to 0x1017 ends the heartbeats."""
-    rig.put(0x1017, 100)
-    rig.run(1.0)
-    rig.put(0x1017, 0)
-    rig.take()
-    rig.run(10.0)
-    assert rig.take() == []
-
-
 def test_no_burst_after_a_standstill(rig: Rig) -> None:
     """A process that could not run for a while sends one heartbeat, not all that it missed."""
     rig.put(0x1017, 100)
@@ -91,59 +94,24 @@ def test_no_burst_after_a_standstill(rig: Rig) -> None:
     assert len(rig.take(OWN)) == 1
 
 
-def test_watch_begins_with_the_first_heartbeat(rig: Rig) -> None:
-    """A device that never sent a heartbeat is not lost."""
+def test_loss_is_reported_once(rig: Rig) -> None:
+    """One EMCY 0x8130, on time, of a device that has sent one; its return is an error reset."""
     watch(rig, 300)
     rig.run(10.0)
     assert rig.take() == []
-
-
-def test_loss_is_reported_once(rig: Rig) -> None:
-    """A lost heartbeat is one EMCY 0x8130; its return is an error reset."""
-    watch(rig, 300)
     for _ in range(5):
         beat(rig)
         rig.run(0.29)
     assert rig.take() == []
+    start = rig.now - 0.29
     rig.run(5.0)
+    assert rig.times(EMCY) == pytest.approx([start + 0.3])
     assert rig.take(EMCY) == [LOST]
     assert rig.get(0x1001) == 0x11
     assert rig.get(0x1003, 1) == 0x8130
     beat(rig)
     assert rig.take(EMCY) == [GONE]
     assert rig.get(0x1001) == 0
-
-
-def test_loss_is_noticed_on_time(rig: Rig) -> None:
-    """The reaction comes when the consumer time is over, neither earlier nor later."""
-    watch(rig, 300)
-    beat(rig)
-    start = rig.now
-    rig.run(1.0)
-    assert rig.times(EMCY) == pytest.approx([start + 0.3])
-
-
-@pytest.mark.parametrize(
-    ('behaviour', 'state'),
-    [(0, NmtState.PRE_OPERATIONAL), (1, NmtState.OPERATIONAL), (2, NmtState.STOPPED)],
-)
-def test_error_behaviour(rig: Rig, behaviour: int, state: NmtState) -> None:
-    """0x1029 says where an Operational device goes when the heartbeat is lost."""
-    rig.put(0x1029, behaviour, 1)
-    watch(rig, 300)
-    rig.nmt(NmtCommand.START)
-    beat(rig)
-    rig.run(1.0)
-    assert rig.nmt_state is state
-
-
-def test_error_behaviour_spares_pre_operational(rig: Rig) -> None:
-    """0x1029 concerns Operational devices only."""
-    rig.put(0x1029, 2, 1)
-    watch(rig, 300)
-    beat(rig)
-    rig.run(1.0)
-    assert rig.nmt_state is NmtState.PRE_OPERATIONAL
 
 
 @pytest.mark.parametrize(
@@ -184,22 +152,29 @@ def test_fault_of_a_lost_master_is_latched(rig: Rig) -> None:
     assert rig.take(EMCY) == [GONE]
     states.append(rig.state)
     assert states == [DriveState.FAULT, DriveState.SWITCH_ON_DISABLED]
+    beat(rig)
+    rig.run(1.0)  # without torque there is nothing to stop
+    assert rig.state is DriveState.SWITCH_ON_DISABLED
 
 
-def test_disabled_drive_has_no_fault_from_a_lost_master(rig: Rig) -> None:
-    """A drive without torque needs no reaction."""
+def test_an_error_lasts_until_the_heartbeat_is_back(rig: Rig) -> None:
+    """A fault reset of the drive before does not end it."""
     watch(rig, 300)
+    rig.enable(8)
     beat(rig)
     rig.run(1.0)
+    rig.take()
+    rig.command(0x80)
     assert rig.state is DriveState.SWITCH_ON_DISABLED
+    assert rig.take(EMCY) == []
+    beat(rig)
+    assert rig.take(EMCY) == [GONE]
 
 
 def test_two_watches_of_one_device_are_refused(rig: Rig) -> None:
     """One device cannot have two consumer times (CiA 301, 7.5.2.17)."""
     watch(rig, 300)
-    with pytest.raises(RefusedError) as refused:
-        watch(rig, 500, subindex=2)
-    assert refused.value.code == AbortCode.PARAMETER_INCOMPATIBLE
+    assert rig.refused(0x1016, MASTER << 16 | 500, 2) == AbortCode.PARAMETER_INCOMPATIBLE
     watch(rig, 500, subindex=1)
     watch(rig, 500, node_id=2, subindex=2)
 
@@ -236,3 +211,93 @@ def test_what_is_no_heartbeat_keeps_nobody_alive(rig: Rig, data: bytes) -> None:
         rig.run(0.1)
         rig.send(0x700 + MASTER, data)
     assert rig.take(EMCY) == [LOST]
+
+
+def guarded(behaviour: int = 0) -> Rig:
+    """Return a drive in Pre-operational with a life time of 0.3 s."""
+    added = (
+        (0x100C, 0, DataType.UNSIGNED16, 100),
+        (0x100D, 0, DataType.UNSIGNED8, 3),
+        (0x1029, 1, DataType.UNSIGNED8, behaviour),
+    )
+    places = [(index, subindex) for index, subindex, *_ in added]
+    entries = [entry for entry in drive_dictionary() if entry.address not in places]
+    entries += [
+        ObjectEntry(index, subindex, 'added', kind, default=value)
+        for index, subindex, kind, value in added
+    ]
+    return Rig(ObjectDictionary(entries))
+
+
+def guard(rig: Rig) -> list[int]:
+    """Request the state and return the answers."""
+    rig.take()
+    rig.device.receive(Frame(OWN, is_remote=True), rig.now)
+    return [data[0] for data in rig.take(OWN)]
+
+
+def test_guarding() -> None:
+    """Answers have the state and the other toggle bit; a device with heartbeats is not guarded."""
+    rig = guarded()
+    assert [guard(rig) for _ in range(3)] == [[0x7F], [0xFF], [0x7F]]
+    rig.nmt(NmtCommand.START)
+    assert guard(rig) == [0x85]
+    rig.nmt(NmtCommand.STOP)
+    assert guard(rig) == [0x04]
+    rig.nmt(NmtCommand.RESET_COMMUNICATION)
+    assert guard(rig) == [0x7F]
+    rig.put(0x1017, 100)
+    assert guard(rig) == []
+    rig.put(0x1017, 0)
+    assert guard(rig) == [0xFF]
+    rig.inject(Fault.HEARTBEAT_STOP, duration=1.0)
+    assert guard(rig) == []
+    rig.run(1.1)
+    assert len(guard(rig)) == 1
+    entries = [entry for entry in drive_dictionary() if entry.index not in (0x100C, 0x100D)]
+    assert guard(Rig(ObjectDictionary(entries))) == []
+
+
+@pytest.mark.parametrize('kind', ['heartbeat', 'guarding'])
+@pytest.mark.parametrize(
+    ('before', 'behaviour', 'state'),
+    [
+        (NmtState.OPERATIONAL, 0, NmtState.PRE_OPERATIONAL),
+        (NmtState.OPERATIONAL, 1, NmtState.OPERATIONAL),
+        (NmtState.OPERATIONAL, 2, NmtState.STOPPED),
+        (NmtState.PRE_OPERATIONAL, 2, NmtState.PRE_OPERATIONAL),  # concerns Operational only
+    ],
+)
+def test_a_loss_is_handled_as_0x1029_says(
+    kind: str, before: NmtState, behaviour: int, state: NmtState
+) -> None:
+    """A heartbeat, or the requests of a guard, that stay away for their time."""
+    rig = guarded(behaviour)
+    if kind == 'heartbeat':
+        watch(rig, 300)
+    if before is NmtState.OPERATIONAL:
+        rig.nmt(NmtCommand.START)
+    rig.run(5.0)
+    assert rig.times(EMCY) == []  # no master yet
+    for _ in range(5):
+        beat(rig) if kind == 'heartbeat' else guard(rig)
+        rig.run(0.29)
+    assert rig.times(EMCY) == []
+    start = rig.now - 0.29
+    rig.run(1.0)
+    assert rig.nmt_state is state
+    if state is not NmtState.STOPPED:
+        assert rig.times(EMCY) == pytest.approx([start + 0.3])
+        beat(rig) if kind == 'heartbeat' else guard(rig)
+        assert rig.get(0x1001) == 0
+
+
+def test_enabled_drive_stops_when_its_guard_is_gone() -> None:
+    """The drive faults (0x6007 = 1), as when a heartbeat is lost."""
+    rig = guarded()
+    rig.nmt(NmtCommand.START)
+    rig.enable(3)
+    guard(rig)
+    rig.run(1.0)
+    assert rig.state is DriveState.FAULT
+    assert rig.get(0x603F) == 0x8130
