@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Laws of the object dictionary and of the pre-defined COB-IDs."""
 
+from itertools import product
+
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -108,6 +110,9 @@ def test_predefined_identifiers_never_collide() -> None:
     assert len(set(identifiers)) == len(identifiers)
     assert min(identifiers) == 0x181
     assert max(identifiers) == 0x57F
+    for default, number in product((tpdo_default, rpdo_default), (0, 5)):
+        with pytest.raises(ValueError, match=f'PDO {number}'):
+            default(number, 1)
 
 
 @pytest.mark.parametrize(
@@ -136,11 +141,3 @@ def test_a_cob_id_of_another_node_id_is_that_of_the_device(
     (entry,) = ObjectDictionary([written], node_id=file_node_id).for_node(3)
     assert entry.default == cob_id
     assert entry.literal == (None if cob_id == literal else literal)
-
-
-@pytest.mark.parametrize('number', [0, 5])
-def test_other_pdos_have_no_predefined_identifier(number: int) -> None:
-    """Asking for one names the number."""
-    for default in (tpdo_default, rpdo_default):
-        with pytest.raises(ValueError, match=f'PDO {number}'):
-            default(number, 1)

@@ -110,7 +110,7 @@ def test_a_payload_is_long_enough_or_refused(
 def test_a_value_out_of_range_is_refused(
     mapping: Sequence[MappedObject], data: st.DataObject
 ) -> None:
-    """No value is cut to its length silently, on the fast path or the bit path."""
+    """No value is cut to its length silently, on either path; nor is one too many or too few."""
     integers = [place for place, mapped in enumerate(mapping) if integer_range(mapped.data_type)]
     if not integers:
         return
@@ -120,18 +120,9 @@ def test_a_value_out_of_range_is_refused(
     values[place] = data.draw(st.sampled_from((low - 1, high + 1, 0.5)))
     with pytest.raises(CodecError):
         PdoCodec(mapping).pack(values)
-
-
-@given(mapping=mappings(), values=st.lists(st.just(0), max_size=14))
-def test_the_number_of_values_must_fit(
-    mapping: Sequence[MappedObject], values: list[Number]
-) -> None:
-    """A value too many or too few is an error."""
-    if len(values) == len(mapping):
-        PdoCodec(mapping).pack(values)
-    else:
+    for wrong in ([0, *[0 for _ in mapping]], [0 for _ in mapping[1:]]):
         with pytest.raises(CodecError, match='values'):
-            PdoCodec(mapping).pack(values)
+            PdoCodec(mapping).pack(wrong)
 
 
 @given(
@@ -147,16 +138,12 @@ def test_the_mapping_word_holds_index_subindex_and_length(
     assert struct.pack('>I', word) == struct.pack('>HBB', index, subindex, FIXED_BITS[data_type])
 
 
-def test_a_mapping_of_65_bits_is_refused() -> None:
-    """64 bits fit, one more does not."""
+def test_mappings_that_cannot_be_are_refused() -> None:
+    """64 bits fit, one more does not; strings and domains have no place in a PDO."""
     eight = [MappedObject(0x2000, 0, DataType.UNSIGNED64)]
     assert PdoCodec(eight).size == 8
     with pytest.raises(CodecError, match='65'):
         PdoCodec([*eight, MappedObject(0x2001, 0, DataType.BOOLEAN)])
-
-
-def test_an_object_without_length_is_refused() -> None:
-    """Strings and domains have no place in a PDO."""
     with pytest.raises(CodecError, match='VISIBLE_STRING'):
         PdoCodec([MappedObject(0x1008, 0, DataType.VISIBLE_STRING)])
 

@@ -58,20 +58,12 @@ RESPONSES: st.SearchStrategy[Response] = st.one_of(
 )
 
 
-@given(message=REQUESTS)
-def test_a_request_survives_the_round_trip(message: Request) -> None:
-    """Every request has 8 bytes and is read as what it was."""
-    frame = message.encode()
-    assert len(frame) == 8
-    assert decode_request(frame) == message
-
-
-@given(message=RESPONSES)
-def test_a_response_survives_the_round_trip(message: Response) -> None:
-    """Every response has 8 bytes and is read as what it was."""
-    frame = message.encode()
-    assert len(frame) == 8
-    assert decode_response(frame) == message
+@given(request=REQUESTS, response=RESPONSES)
+def test_messages_survive_the_round_trip(request: Request, response: Response) -> None:
+    """Each has 8 bytes and is read as what it was."""
+    frames = request.encode(), response.encode()
+    assert (decode_request(frames[0]), decode_response(frames[1])) == (request, response)
+    assert [len(frame) for frame in frames] == [8, 8]
 
 
 @given(data=st.binary(max_size=10))
@@ -117,7 +109,7 @@ def test_an_expedited_value_is_cut_to_its_type(
     assert fitted(data_type, data) == value
 
 
-TRANSCRIPTS: tuple[tuple[Request, str], ...] = (
+TRANSCRIPTS: tuple[tuple[Request | Response, str], ...] = (
     (UploadRequest(0x1000, 0), '40 00 10 00 00 00 00 00'),
     (DownloadRequest(0x6040, 0, b'\x0f\x00', 2), '2B 40 60 00 0F 00 00 00'),
     (DownloadRequest(0x6060, 0, b'\x08', 1), '2F 60 60 00 08 00 00 00'),
@@ -129,7 +121,7 @@ TRANSCRIPTS: tuple[tuple[Request, str], ...] = (
     (UploadSegmentRequest(True), '70 00 00 00 00 00 00 00'),
     (Abort(0x1000, 0, AbortCode.NO_OBJECT), '80 00 10 00 00 00 02 06'),
 )
-ANSWERS: tuple[tuple[Response, str], ...] = (
+ANSWERS: tuple[tuple[Request | Response, str], ...] = (
     (UploadResponse(0x1000, 0, b'\x92\x01\x02\x00', 4), '43 00 10 00 92 01 02 00'),
     (UploadResponse(0x6041, 0, b'\x37\x06', 2), '4B 41 60 00 37 06 00 00'),
     (UploadResponse(0x1008, 0, None, 26), '41 08 10 00 1A 00 00 00'),
@@ -139,15 +131,9 @@ ANSWERS: tuple[tuple[Response, str], ...] = (
 )
 
 
-@pytest.mark.parametrize(('message', 'frame'), TRANSCRIPTS)
-def test_requests_are_those_of_the_standard(message: Request, frame: str) -> None:
-    """The bytes of well-known requests, as bus analysers show them."""
-    assert message.encode() == bytes.fromhex(frame)
-
-
-@pytest.mark.parametrize(('message', 'frame'), ANSWERS)
-def test_responses_are_those_of_the_standard(message: Response, frame: str) -> None:
-    """The bytes of well-known responses."""
+@pytest.mark.parametrize(('message', 'frame'), TRANSCRIPTS + ANSWERS)
+def test_messages_are_those_of_the_standard(message: Request | Response, frame: str) -> None:
+    """The bytes of well-known requests and responses, as bus analysers show them."""
     assert message.encode() == bytes.fromhex(frame)
 
 
@@ -157,17 +143,12 @@ def test_expedited_data_without_a_size_are_four_bytes() -> None:
     assert message == DownloadRequest(0x6040, 0, b'\x0f\x00\x00\x00', None)
 
 
-@pytest.mark.parametrize('data', [b'', b'12345'])
-def test_expedited_data_have_one_to_four_bytes(data: bytes) -> None:
-    """More or fewer would corrupt the command byte, so they are refused."""
-    with pytest.raises(CodecError, match='1 to 4'):
-        DownloadRequest(0x2000, 0, data, len(data)).encode()
-    with pytest.raises(CodecError, match='1 to 4'):
-        UploadResponse(0x2000, 0, data, len(data)).encode()
-
-
-def test_a_segment_has_seven_bytes_at_most() -> None:
-    """Eight do not fit beside the command byte."""
+def test_data_that_no_frame_carries_are_refused() -> None:
+    """They would corrupt the command byte: 1 to 4 bytes expedited, 7 at most in a segment."""
+    for data in (b'', b'12345'):
+        for kind in (DownloadRequest, UploadResponse):
+            with pytest.raises(CodecError, match='1 to 4'):
+                kind(0x2000, 0, data, len(data)).encode()
     with pytest.raises(CodecError, match='7 bytes'):
         Segment(False, bytes(8), True).encode()
 
