@@ -11,15 +11,15 @@ from arm_canopen.standard import DataType, MappedObject, ObjectDictionary, Objec
 
 DRIVE_OBJECTS = ObjectDictionary(
     [
-        ObjectEntry(0x1008, 0, 'Manufacturer device name', DataType.VISIBLE_STRING),
+        ObjectEntry(0x1008, 0, 'Name', DataType.VISIBLE_STRING),
         ObjectEntry(0x1014, 0, 'COB-ID EMCY', DataType.UNSIGNED32, default=0x82),
         ObjectEntry(0x1800, 1, 'COB-ID used by TPDO', DataType.UNSIGNED32),
         ObjectEntry(0x1A00, 1, '1st object', DataType.UNSIGNED32),
-        ObjectEntry(0x6040, 0, 'Controlword', DataType.UNSIGNED16),
-        ObjectEntry(0x6041, 0, 'Statusword', DataType.UNSIGNED16),
-        ObjectEntry(0x6060, 0, 'Modes of operation', DataType.INTEGER8),
-        ObjectEntry(0x6061, 0, 'Modes of operation display', DataType.INTEGER8),
-        ObjectEntry(0x6064, 0, 'Position actual value', DataType.INTEGER32),
+        ObjectEntry(0x6040, 0, 'Control', DataType.UNSIGNED16),
+        ObjectEntry(0x6041, 0, 'Status', DataType.UNSIGNED16),
+        ObjectEntry(0x6060, 0, 'Mode', DataType.INTEGER8),
+        ObjectEntry(0x6061, 0, 'Mode shown', DataType.INTEGER8),
+        ObjectEntry(0x6064, 0, 'Position', DataType.INTEGER32),
         ObjectEntry(0x6075, 0, 'Motor rated current', DataType.REAL32),
     ],
     source='drive.eds',
@@ -35,7 +35,7 @@ def _pdo(number: int, cob_id: int, *objects: tuple[int, DataType]) -> PdoConfig:
 
 
 DRIVE = NodeConfig(
-    name='panda_joint1',
+    name='joint1',
     node_id=2,
     driver='ros2_canopen::Cia402Driver',
     eds=Path('drive.eds'),

@@ -30,11 +30,7 @@ GENERIC = [
     (0x080, '', 'SYNC'),
     (0x080, '07', 'SYNC  counter 7'),
     (0x082, '0000000000000000', 'EMCY node 2  0x0000 no error (register: none)'),
-    (
-        0x082,
-        '3023010000000000',
-        'EMCY node 2  0x2330 earth leakage at output (register: generic)',
-    ),
+    (0x082, '3023010000000000', 'EMCY node 2  0x2330 earth leakage at output (register: generic)'),
     (0x082, '1081', 'EMCY node 2  an EMCY message has 8 bytes, got 2'),
     (0x100, 'fcce38000100', 'TIME  1984-01-02 01:02:03.004'),
     (0x100, '00', 'TIME  no time of day: it has 6 bytes, got 1'),
@@ -58,55 +54,35 @@ GENERIC = [
 ]
 
 NAMED = [
-    (0x000, '0102', 'NMT panda_joint1  start'),
+    (0x000, '0102', 'NMT joint1  start'),
     (0x701, '05', 'heartbeat master  operational'),
-    (0x702, '00', 'boot-up panda_joint1'),
+    (0x702, '00', 'boot-up joint1'),
     (0x703, '00', 'boot-up node 3'),
     (
         0x182,
         '371601',
-        (
-            'TPDO1 panda_joint1  Statusword=0x1637 Operation enabled  '
-            'Modes of operation display=1 Profile position'
-        ),
+        'TPDO1 joint1  Status=0x1637 Operation enabled  Mode shown=1 Profile position',
     ),
     (
         0x182,
         '37160100',
-        (
-            'TPDO1 panda_joint1  Statusword=0x1637 Operation enabled  '
-            'Modes of operation display=1 Profile position'
-        ),
+        'TPDO1 joint1  Status=0x1637 Operation enabled  Mode shown=1 Profile position',
     ),
-    (0x182, '3716', 'TPDO1 panda_joint1  PDO of 2 bytes is shorter than its mapping (3)'),
-    (0x2A5, 'f0ffffff2a', 'TPDO2 panda_joint1  Position actual value=-16  0x5FFF:00=42'),
+    (0x182, '3716', 'TPDO1 joint1  PDO of 2 bytes is shorter than its mapping (3)'),
+    (0x2A5, 'f0ffffff2a', 'TPDO2 joint1  Position=-16  0x5FFF:00=42'),
     (
         0x202,
         '1f0001',
-        (
-            'RPDO1 panda_joint1  Controlword=0x001F Enable operation, bit 4  '
-            'Modes of operation=1 Profile position'
-        ),
+        'RPDO1 joint1  Control=0x001F Enable operation, bit 4  Mode=1 Profile position',
     ),
-    (
-        0x202,
-        '0f01ff',
-        (
-            'RPDO1 panda_joint1  Controlword=0x010F Enable operation, halt  '
-            'Modes of operation=-1 Mode -1'
-        ),
-    ),
-    (
-        0x382,
-        '00',
-        'TPDO3 panda_joint1',
-    ),  # disabled in bus.yml, so its mapping is not to be trusted
+    (0x202, '0f01ff', 'RPDO1 joint1  Control=0x010F Enable operation, halt  Mode=-1 Mode -1'),
+    (0x382, '00', 'TPDO3 joint1'),  # disabled in bus.yml, so its mapping is not to be trusted
     (0x091, '', 'SYNC'),  # where the EDS of the gripper has it
     (0x0C1, '0010010000000000', 'EMCY gripper  0x1000 generic error (register: generic)'),
     (
         0x082,
         '1086010000000000',
-        'EMCY panda_joint1  0x8610 positioning control, vendor code (register: generic)',
+        'EMCY joint1  0x8610 positioning control, vendor code (register: generic)',
     ),
 ]
 
@@ -128,8 +104,8 @@ def test_a_configuration_gives_names_and_values(can_id: int, data: str, text: st
 @pytest.mark.parametrize(
     ('frame', 'text'),
     [
-        (Frame(0x702, is_remote=True), 'node guard panda_joint1  state requested'),
-        (Frame(0x182, is_remote=True), 'TPDO1 panda_joint1  requested'),
+        (Frame(0x702, is_remote=True), 'node guard joint1  state requested'),
+        (Frame(0x182, is_remote=True), 'TPDO1 joint1  requested'),
         (Frame(0x185, is_remote=True), 'TPDO1 node 5  requested'),
         (Frame(0x080, is_remote=True), 'SYNC  requested'),
         (Frame(0x182, b'\1', is_extended=True), 'unknown  29-bit identifier'),
@@ -207,7 +183,7 @@ FRAMES = {
         (['sdo, emcy'], {'sdo', 'emcy'}),
         (['^sync,^heartbeat'], {'nmt', 'emcy', 'tpdo', 'sdo', 'extended'}),
         (['heartbeat', '^node:gripper'], {'heartbeat'}),
-        (['node:panda_joint1'], {'nmt', 'emcy', 'tpdo', 'sdo', 'heartbeat'}),
+        (['node:joint1'], {'nmt', 'emcy', 'tpdo', 'sdo', 'heartbeat'}),
         (['node:9'], {'other heartbeat'}),
         (['node:nobody'], set()),
         (['182'], {'tpdo'}),
@@ -233,7 +209,7 @@ def test_a_wrong_term_lists_what_would_be_right(term: str) -> None:
         FrameFilter([term])
 
 
-SAID = Description(FrameKind.PDO, 'TPDO1', 'joint1', 'Statusword=0')
+SAID = Description(FrameKind.PDO, 'TPDO1', 'joint1', 'Status=0')
 OFFSET = 1_700_000_000.0  # [s]
 
 
@@ -258,7 +234,7 @@ def lines(style: TimeStyle, *stamps: float) -> list[str]:
 def test_time_styles(style: TimeStyle, times: list[str]) -> None:
     """Times are absolute, since the first line, since the line before, or left out."""
     texts = lines(style, 10.5, 10.75, 12.0)
-    rest = '     181  [2]  27 06                    TPDO1      joint1     Statusword=0'
+    rest = '     181  [2]  27 06                    TPDO1      joint1     Status=0'
     assert texts == [time + rest for time in times]
 
 
