@@ -125,7 +125,13 @@ def held_after_boot(
 
     Consumers are those of :func:`boot_writes`.
     """
-    writes = [*_fixed_mappings(node), *assumed_cob_ids(node), *boot_writes(bus, node, consumers)]
+    fixed = (
+        write
+        for direction, pdo in node.pdos
+        if pdo.configured and pdo.enabled and pdo.fixed_mapping
+        for write in _mapping(direction, pdo, f'{direction.name}.{pdo.number}', fixed=True)
+    )
+    writes = [*fixed, *assumed_cob_ids(node), *boot_writes(bus, node, consumers)]
     return list({write.address: write for write in writes}.values())  # the last one counts
 
 
@@ -188,7 +194,7 @@ def _writes(
         leading += 1
     for write in node.sdo_writes[:leading]:
         yield from _written(write, unless_default=True)
-    for direction, pdo in _pdos(node):
+    for direction, pdo in sorted(node.pdos, key=lambda each: each[0] is TPDO):
         if pdo.configured:
             yield from _pdo(bus, node, direction, pdo)
         elif pdo.event_time is not None:  # of a TPDO that is otherwise left as the device has it
@@ -197,12 +203,6 @@ def _writes(
                     yield parameter
     for write in node.sdo_writes[leading:]:
         yield from _written(write)
-
-
-def _pdos(node: NodeConfig) -> Iterator[tuple[Direction, PdoConfig]]:
-    for direction, pdos in ((RPDO, node.rpdos), (TPDO, node.tpdos)):
-        for pdo in pdos:
-            yield direction, pdo
 
 
 def _watch(
@@ -324,16 +324,9 @@ def _consumers_of_dcf(node: NodeConfig) -> dict[int, int]:
     }
 
 
-def _fixed_mappings(node: NodeConfig) -> Iterator[BootWrite]:
-    """Yield the mappings that a device has for good, which are not written."""
-    for direction, pdo in _pdos(node):
-        if pdo.configured and pdo.enabled and pdo.fixed_mapping:
-            yield from _mapping(direction, pdo, f'{direction.name}.{pdo.number}', fixed=True)
-
-
 def assumed_cob_ids(node: NodeConfig) -> Iterator[BootWrite]:
     """Yield the COB-IDs that the device should have by its node id, though not by its EDS."""
-    for direction, pdo in _pdos(node):
+    for direction, pdo in node.pdos:
         if pdo.assumed and pdo.enabled and not pdo.configured:
             index, key = direction.communication + pdo.number - 1, f'{direction.name}.{pdo.number}'
             data = encode(DataType.UNSIGNED32, pdo.cob_id)

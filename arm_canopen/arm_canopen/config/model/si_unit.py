@@ -23,39 +23,29 @@ SQUARED_TIMES: dict[int, tuple[float, str]] = {0x57: (1.0, 's2')}
 
 
 @dataclass(frozen=True, slots=True)
-class LengthUnit:
-    """A unit of a position."""
+class NamedUnit:
+    """A unit of a position, velocity or acceleration."""
 
-    size: float  # in [rad] or [m]
-    name: str
+    size: float  # in [rad], [m] or [inc], or per second or second squared
+    text: str  # in words
     slides: bool = False  # it is one of a joint that slides
-    # it is an increment: the size is one of these, and nobody knows how far that is
+    # it is made of increments: the size is one of these, whose length is not known
     counts: bool = False
 
 
-POSITIONS: dict[int, LengthUnit] = {
-    0x01: LengthUnit(1.0, 'm', slides=True),
-    0x10: LengthUnit(1.0, 'rad'),
-    0x41: LengthUnit(math.pi / 180.0, 'deg'),
-    0x42: LengthUnit(math.pi / 10_800.0, 'arcmin'),
-    0x43: LengthUnit(math.pi / 648_000.0, 'arcsec'),
-    0xB4: LengthUnit(2.0 * math.pi, 'turns'),
+POSITIONS: dict[int, NamedUnit] = {
+    0x01: NamedUnit(1.0, 'm', slides=True),
+    0x10: NamedUnit(1.0, 'rad'),
+    0x41: NamedUnit(math.pi / 180.0, 'deg'),
+    0x42: NamedUnit(math.pi / 10_800.0, 'arcmin'),
+    0x43: NamedUnit(math.pi / 648_000.0, 'arcsec'),
+    0xB4: NamedUnit(2.0 * math.pi, 'turns'),
 }
 """Units that say how far they are; increments (0xB5) and steps (0xAC) do not."""
-VELOCITIES = {**POSITIONS, 0xB5: LengthUnit(1.0, 'increments', counts=True)}
+VELOCITIES = {**POSITIONS, 0xB5: NamedUnit(1.0, 'increments', counts=True)}
 """Those of velocities, for which it matters that they are increments."""
-RATES = {0xC0: LengthUnit(2.0 * math.pi / 60.0, 'rpm')}
+RATES = {0xC0: NamedUnit(2.0 * math.pi / 60.0, 'rpm')}
 """Units of a velocity that an acceleration has above its unit of time."""
-
-
-@dataclass(frozen=True, slots=True)
-class NamedUnit:
-    """What one unit of a drive is."""
-
-    size: float  # in [rad], [m] or [inc], or per second
-    text: str  # in words
-    slides: bool = False  # it is one of a joint that slides
-    counts: bool = False  # it is made of increments
 
 
 RPM = NamedUnit(2.0 * math.pi / 60.0, 'rpm')
@@ -89,7 +79,7 @@ def acceleration_unit(value: int | None) -> NamedUnit | None:
 
 
 def _named(
-    value: int, units: Mapping[int, LengthUnit], seconds: float, suffix: str
+    value: int, units: Mapping[int, NamedUnit], seconds: float, suffix: str
 ) -> NamedUnit | None:
     unit = units.get((value >> 16) & 0xFF)
     if unit is None:
@@ -97,5 +87,5 @@ def _named(
     prefix = (value >> 24) & 0xFF
     exponent = prefix - 0x100 if prefix >= 0x80 else prefix
     factor = 10.0**exponent
-    size, text = factor * unit.size / seconds, f'{factor:g} {unit.name}{suffix}'
+    size, text = factor * unit.size / seconds, f'{factor:g} {unit.text}{suffix}'
     return NamedUnit(size, text, unit.slides, unit.counts)

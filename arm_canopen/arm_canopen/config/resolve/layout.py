@@ -96,19 +96,15 @@ def _new_devices(root: YamlMap, findings: Findings) -> dict[str, YamlMap]:
 def _old_devices(root: YamlMap, findings: Findings) -> dict[str, YamlMap]:
     sections: dict[str, Item] = {}
     for name, item in root.entries.items():
-        if _is_misspelt(name, item):
+        # a device has an EDS in this format, a section with a typing error has not
+        is_device = isinstance(item, YamlMap) and bool({'dcf', 'eds'} & item.entries.keys())
+        if name not in TOP_LEVEL and not is_device and _close_section(name):
             findings.error(item.place, f'unknown section {name!r}', _section_remedy(name, item))
         elif name not in TOP_LEVEL:
             sections[name] = item
     if not any(not name.startswith('.') for name in sections):
         findings.error(root.place, 'there are no devices', NODES_REMEDY)
     return _devices(YamlMap(root.place, sections), YamlMap(root.place), findings)
-
-
-def _is_misspelt(name: str, item: Item) -> bool:
-    """Distinguish a section with a typing error from a device, which has an EDS in this format."""
-    is_device = isinstance(item, YamlMap) and bool({'dcf', 'eds'} & item.entries.keys())
-    return name not in TOP_LEVEL and not is_device and bool(_close_section(name))
 
 
 def _close_section(name: str) -> list[str]:
@@ -164,7 +160,9 @@ def merge_device(defaults: YamlMap, own: YamlMap) -> YamlMap:
     merged = _merge_mappings(defaults, own)
     common, special = defaults.entries.get(SDO_LIST), own.entries.get(SDO_LIST)
     if isinstance(common, YamlList) and isinstance(special, YamlList) and special.items:
-        merged.entries[SDO_LIST] = _merge_sdo(common, special)
+        replaced = {_address(item) for item in special.items} - {None}
+        kept = tuple(item for item in common.items if _address(item) not in replaced)
+        merged.entries[SDO_LIST] = YamlList(special.place, kept + special.items)
     return merged
 
 
@@ -177,12 +175,6 @@ def _merge_mappings(below: YamlMap, above: YamlMap) -> YamlMap:
         else:
             entries[name] = item
     return YamlMap(above.place, entries)
-
-
-def _merge_sdo(common: YamlList, special: YamlList) -> YamlList:
-    replaced = {_address(item) for item in special.items} - {None}
-    kept = tuple(item for item in common.items if _address(item) not in replaced)
-    return YamlList(special.place, kept + special.items)
 
 
 def _address(item: Item) -> tuple[int, int] | None:
