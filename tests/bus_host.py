@@ -15,7 +15,7 @@ import sys
 import time
 
 from arm_canopen.can import Frame, open_bus
-from arm_canopen.can.multicast_format import encode
+from arm_canopen.can.multicast import encode
 
 PERIOD = 0.05  # [s]
 

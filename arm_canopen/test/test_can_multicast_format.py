@@ -15,7 +15,7 @@ import pytest
 from arm_canopen import CodecError
 from arm_canopen.can import Frame, STANDARD_ID_MAX
 from arm_canopen.can.adapter import from_message, to_message
-from arm_canopen.can.multicast_format import decode, encode
+from arm_canopen.can.multicast import decode, encode
 
 
 def packed(**changes: object) -> bytes:

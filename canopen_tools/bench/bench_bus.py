@@ -28,7 +28,7 @@ import can
 from arm_canopen import BusError
 from arm_canopen.can import can_interfaces, Frame, LogWriter, open_bus
 from arm_canopen.can.load import BusLoad
-from arm_canopen.can.multicast_format import decode, encode
+from arm_canopen.can.multicast import decode, encode
 from canopen_tools.monitor import FrameDescriber
 
 FRAMES = 20_000

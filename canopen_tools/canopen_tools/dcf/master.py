@@ -9,8 +9,8 @@ up in 0x2000 + n - 1, the n-th RPDO is TPDO n and comes from 0x2200 + n - 1. The
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 from arm_canopen import CodecError
 from arm_canopen.config import BusConfig, MasterConfig, NodeConfig, PdoConfig
@@ -27,16 +27,120 @@ from arm_canopen.standard import (
     Index,
     MappedObject,
     object_address,
+    ObjectCode,
     PDO_COUNT_MAX,
     SYNC_PRODUCER,
     TIME_PRODUCER,
 )
 
-from .network import network_objects
-from .text import dcf_text, DcfArray, DcfEntry, DcfObject, DcfRecord
+from ..eds_lint import LISTS, proper_list
+
+
+@dataclass(frozen=True, slots=True)
+class DcfEntry:
+    """A VAR, or a sub-index."""
+
+    name: str
+    data_type: DataType
+    access: AccessType
+    default: str = ''  # DefaultValue as it is written, empty for none
+    mappable: bool = False  # may be mapped into a PDO
+    upload_file: str = ''  # file whose content the object has, empty for none
+
+    def lines(self) -> list[str]:
+        """Return its keys."""
+        return [
+            f'ParameterName={self.name}',
+            f'ObjectType=0x{ObjectCode.VAR:X}',
+            f'DataType=0x{self.data_type:04X}',
+            f'AccessType={self.access.value}',
+            *([f'DefaultValue={self.default}'] if self.default else []),
+            f'PDOMapping={int(self.mappable)}',
+            *([f'UploadFile={self.upload_file}'] if self.upload_file else []),
+        ]
+
+
+@dataclass(frozen=True, slots=True)
+class DcfRecord:
+    """A record or array with each sub-index written out; sub-index 0 is added."""
+
+    name: str
+    parts: Sequence[DcfEntry]  # its sub-indices from 1
+    code: ObjectCode = ObjectCode.RECORD  # RECORD or ARRAY
+
+
+@dataclass(frozen=True, slots=True)
+class DcfArray:
+    """An array of equal sub-indices, abbreviated with CompactSubObj (CiA 306-1, 4.6.3.2)."""
+
+    name: str
+    data_type: DataType
+    access: AccessType
+    size: int
+    # values by sub-index where they are not the default
+    values: Mapping[int, str] = field(default_factory=dict)
+    default: str = ''  # DefaultValue of all others, empty for none
+
+
+DcfObject = DcfEntry | DcfRecord | DcfArray
+
+
+def dcf_text(head: Mapping[str, Mapping[str, str]], objects: Mapping[int, DcfObject]) -> str:
+    """Return the text of a DCF: the sections before the objects, each with its keys, and these."""
+    lines: list[str] = []
+    for title, keys in head.items():
+        lines += [f'[{title}]', *(f'{key}={value}' for key, value in keys.items()), '']
+    for title in LISTS.values():
+        lines += _list(title, sorted(i for i in objects if proper_list(i) == title))
+    for index, content in sorted(objects.items()):
+        lines += _object(index, content)
+    return '\n'.join(lines)
+
+
+def _list(title: str, indices: Iterable[int]) -> list[str]:
+    entries = [f'{n}=0x{index:04X}' for n, index in enumerate(indices, start=1)]
+    return [f'[{title}]', f'SupportedObjects={len(entries)}', *entries, '']
+
+
+def _object(index: int, content: DcfObject) -> list[str]:
+    if isinstance(content, DcfEntry):
+        return [f'[{index:04X}]', *content.lines(), '']
+    if isinstance(content, DcfArray):
+        return _array(index, content)
+    count = DcfEntry(
+        'Highest sub-index supported',
+        DataType.UNSIGNED8,
+        AccessType.CONSTANT,
+        str(len(content.parts)),
+    )
+    lines = [f'[{index:04X}]', f'ParameterName={content.name}', f'ObjectType=0x{content.code:X}']
+    lines += [f'SubNumber={len(content.parts) + 1}', '']
+    for subindex, part in enumerate((count, *content.parts)):
+        lines += [f'[{index:04X}sub{subindex:X}]', *part.lines(), '']
+    return lines
+
+
+def _array(index: int, array: DcfArray) -> list[str]:
+    lines = [
+        f'[{index:04X}]',
+        f'ParameterName={array.name}',
+        f'ObjectType=0x{ObjectCode.ARRAY:X}',
+        f'DataType=0x{array.data_type:04X}',
+        f'AccessType={array.access.value}',
+        *([f'DefaultValue={array.default}'] if array.default else []),
+        'PDOMapping=0',
+        f'CompactSubObj={array.size}',
+        '',
+    ]
+    if array.values:
+        lines += [f'[{index:04X}Value]', f'NrOfEntries={len(array.values)}']
+        lines += [f'{subindex}={value}' for subindex, value in sorted(array.values.items())]
+        lines += ['']
+    return lines
+
 
 U8, U16, U32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
-RO, RW, CONST = AccessType.READ_ONLY, AccessType.READ_WRITE, AccessType.CONSTANT
+RO, RW, WO = AccessType.READ_ONLY, AccessType.READ_WRITE, AccessType.WRITE_ONLY
 DUMMY_TYPES = (*range(0x01, 0x08), 0x10, *range(0x12, 0x17), *range(0x18, 0x1C))
 """Integer types, which a PDO may have as gaps."""
 
@@ -260,3 +364,78 @@ def _remote(
     yield side.remote_number + position, DcfEntry(f'{title} number and node-ID', U32, RW, whose)
     words = [f'0x{mapped.word:08X}' for mapped in pdo.mapping]
     yield side.remote_mapping + position, _mapping(f'{title} mapping parameter', words)
+
+
+NODES = 127
+
+IS_MASTER, START_ALL, NO_OWN_START = 0x01, 0x02, 0x04
+NO_START, RESET_ALL, STOP_ALL = 0x08, 0x10, 0x40
+"""Bits of 0x1F80, NMT start-up (CiA 302-2, 7.2)."""
+IS_SLAVE, BOOT, MANDATORY, KEEP_ALIVE, RESTORE = 0x01, 0x04, 0x08, 0x10, 0x80
+"""Bits of 0x1F81, slave assignment (CiA 302-2, 7.3); bits 8 to 15 are the retry factor, 16 to 31
+the guard time."""
+
+
+def network_objects(
+    config: BusConfig, upload_files: Mapping[int, str]
+) -> Iterator[tuple[int, DcfObject]]:
+    """Yield the objects by index; upload_files has the paths of concise DCFs by node id."""
+    nodes = config.nodes
+    if upload_files:
+        yield 0x1F22, _files('Concise DCF', upload_files)
+    yield 0x1F25, DcfArray('Configuration request', U8, WO, NODES)
+    yield 0x1F55, DcfArray('Expected software identification', U32, RW, NODES)
+    yield 0x1F80, DcfEntry('NMT start-up', U32, RW, f'0x{_start_up(config.master):08X}')
+    assignment = {node.node_id: f'0x{_assignment(node):08X}' for node in nodes}
+    yield 0x1F81, DcfArray('NMT slave assignment', U32, RW, NODES, assignment)
+    yield 0x1F82, DcfArray('Request NMT', U8, RW, NODES)
+    for index, name, attribute in (
+        (0x1F84, 'Device type identification', 'device_type'),
+        (0x1F85, 'Vendor identification', 'vendor_id'),
+        (0x1F86, 'Product code', 'product_code'),
+    ):
+        values = {node.node_id: getattr(node.identity, attribute) for node in nodes}
+        texts = {node_id: f'0x{value:08X}' for node_id, value in values.items() if value}
+        yield index, DcfArray(name, U32, RW, NODES, texts)
+    # master.bin has the values of these two
+    yield 0x1F87, DcfArray('Revision number', U32, RW, NODES)
+    yield 0x1F88, DcfArray('Serial number', U32, RW, NODES)
+    boot_time = str(round(config.master.boot_time * MILLISECONDS))
+    yield 0x1F89, DcfEntry('Boot time', U32, RW, boot_time)
+    restored = {
+        node.node_id: f'0x{node.restore_configuration:02X}'
+        for node in nodes
+        if node.restore_configuration
+    }
+    yield 0x1F8A, DcfArray('Restore configuration', U8, RW, NODES, restored)
+
+
+def _files(name: str, paths: Mapping[int, str]) -> DcfRecord:
+    parts = [
+        DcfEntry(f'Node-ID {node_id}', DataType.DOMAIN, RO, upload_file=paths.get(node_id, ''))
+        for node_id in range(1, NODES + 1)
+    ]
+    return DcfRecord(name, parts, ObjectCode.ARRAY)
+
+
+def _start_up(master: MasterConfig) -> int:
+    return (
+        IS_MASTER
+        | START_ALL * master.start_all_nodes
+        | NO_OWN_START * (not master.start)
+        | NO_START * (not master.start_nodes)
+        | RESET_ALL * master.reset_all_nodes
+        | STOP_ALL * master.stop_all_nodes
+    )
+
+
+def _assignment(node: NodeConfig) -> int:
+    return (
+        IS_SLAVE
+        | BOOT * node.boot
+        | MANDATORY * node.mandatory
+        | KEEP_ALIVE * (not node.reset_communication)
+        | RESTORE * bool(node.restore_configuration)
+        | node.retry_factor << 8
+        | round(node.guard_time * MILLISECONDS) << 16
+    )
