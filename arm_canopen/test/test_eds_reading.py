@@ -1,18 +1,40 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Reading EDS and DCF files: what careful ones say, and what sloppy ones must not break."""
+"""EDS and DCF files: careful and sloppy ones, their values as text, and another reader."""
 
+import math
 from pathlib import Path
 import re
+import struct
 import textwrap
 
+import canopen
 from config_samples import DRIVE_ROWS, eds_text
+from hypothesis import example, given
+from hypothesis import strategies as st
 import pytest
 
-from arm_canopen import ConfigError
+from arm_canopen import CodecError, ConfigError
 from arm_canopen.config import Eds, load_eds
-from arm_canopen.standard import AccessType, DataType
-from arm_canopen.standard.datatypes import Value
+from arm_canopen.config.read.eds_values import (
+    BYTE_TYPES,
+    bytes_from_text,
+    EdsValue,
+    parse_integer,
+    parse_value,
+    text_from_bytes,
+)
+from arm_canopen.standard import (
+    AccessType,
+    byte_length,
+    DataType,
+    integer_range,
+    ObjectEntry,
+    REAL_FORMATS,
+    SIGNED_BITS,
+    UNSIGNED_BITS,
+)
+from arm_canopen.standard.datatypes import decode, encode, Value
 
 
 def read(folder: Path, text: str | bytes) -> Eds:
@@ -274,3 +296,286 @@ def test_files_that_are_no_eds_are_refused(
         (problem,) = caught.value.problems
         assert problem.file == each
         assert problem.remedy
+
+
+INTEGERS = [*SIGNED_BITS, *UNSIGNED_BITS]
+
+
+@pytest.mark.parametrize(
+    ('text', 'value'),
+    [
+        ('0', 0),
+        ('001', 1),
+        ('010', 10),  # decimal: vendors pad, nobody means octal
+        ('42', 42),
+        ('-3', -3),
+        ('+7', 7),
+        ('0x1A', 26),
+        ('0X1a', 26),
+        ('-0x10', -16),
+        ('0x6040 ; controlword', 0x6040),
+    ],
+)
+def test_whole_numbers(text: str, value: int) -> None:
+    """Decimal with or without padding, hexadecimal in any case, with a comment behind."""
+    assert parse_integer(text) == value
+
+
+@pytest.mark.parametrize('text', ['', 'abc', '0x', '1.5', '1_000', '1 2', '--1', '9' * 50, '٣'])
+def test_what_is_no_number_is_refused(text: str) -> None:
+    """Nothing is guessed; the message shows the text."""
+    with pytest.raises(ValueError, match='not a whole number'):
+        parse_integer(text)
+
+
+@given(data_type=st.sampled_from(INTEGERS), data=st.data())
+def test_every_integer_is_read_in_both_notations(data_type: DataType, data: st.DataObject) -> None:
+    """Decimal and two's complement in hexadecimal mean the same value."""
+    low, high = integer_range(data_type) or (0, 0)
+    value = data.draw(st.integers(low, high))
+    pattern = value % (high - low + 1)
+    assert parse_value(data_type, str(value)) == EdsValue(value)
+    assert parse_value(data_type, f'0x{pattern:X}') == EdsValue(value)
+
+
+@pytest.mark.parametrize(
+    ('text', 'expected'),
+    [
+        ('$NODEID+0x180', EdsValue(0x180, node_relative=True)),
+        ('$nodeid + 0x180', EdsValue(0x180, node_relative=True)),
+        ('0x200+$NODEID', EdsValue(0x200, node_relative=True)),
+        ('$NODEID', EdsValue(0, node_relative=True)),
+        ('$NODEID+0x80000000+0x280', EdsValue(0x8000_0280, node_relative=True)),
+        ('$NODEID+384 ; TPDO 1', EdsValue(384, node_relative=True)),
+    ],
+)
+def test_sums_with_the_node_id(text: str, expected: EdsValue) -> None:
+    """The node id stands on either side, in any case, with any blanks."""
+    assert parse_value(DataType.UNSIGNED32, text) == expected
+
+
+@pytest.mark.parametrize(
+    ('data_type', 'text', 'message'),
+    [
+        (DataType.UNSIGNED8, '256', 'does not fit UNSIGNED8'),
+        (DataType.UNSIGNED8, '-1', 'does not fit UNSIGNED8'),
+        (DataType.INTEGER8, '256', 'does not fit INTEGER8'),
+        (DataType.INTEGER8, '-129', 'does not fit INTEGER8'),
+        (DataType.UNSIGNED32, '$NODEID+$NODEID', 'more than once'),
+        (DataType.UNSIGNED32, '$NODEID-1', 'not a whole number'),
+        (DataType.UNSIGNED32, '1+2', 'not a whole number'),
+        (DataType.REAL32, 'much', 'could not convert'),
+        (DataType.REAL32, '0x1FFFFFFFF', 'does not fit REAL32'),
+        (DataType.OCTET_STRING, 'zz', 'non-hexadecimal'),
+        (DataType.TIME_OF_DAY, '-1', 'does not fit TIME_OF_DAY'),
+    ],
+)
+def test_values_that_do_not_fit_are_refused(data_type: DataType, text: str, message: str) -> None:
+    """The reason names the text or the type."""
+    with pytest.raises(ValueError, match=message):
+        parse_value(data_type, text)
+
+
+@pytest.mark.parametrize(
+    ('data_type', 'text', 'value'),
+    [
+        (DataType.BOOLEAN, '1', 1),
+        (DataType.BOOLEAN, 'TRUE', True),
+        (DataType.BOOLEAN, 'false', False),
+        (DataType.VISIBLE_STRING, 'Drive; rev. 2', 'Drive; rev. 2'),
+        (DataType.OCTET_STRING, '0A 1B2c', b'\x0a\x1b\x2c'),
+        (DataType.UNICODE_STRING, '00410042', 'AB'),
+        (DataType.UNICODE_STRING, 'plain', 'plain'),
+        (DataType.TIME_DIFFERENCE, '1', b'\x01\0\0\0\0\0'),
+        (DataType.REAL32, '1.5 ; gain', 1.5),
+        (DataType.REAL64, '-2e-3', -0.002),
+    ],
+)
+def test_other_types(data_type: DataType, text: str, value: Value) -> None:
+    """Booleans, strings, octets, times and reals, as files write them."""
+    assert parse_value(data_type, text) == EdsValue(value)
+
+
+@given(value=st.floats(width=32))
+def test_hexadecimal_reals_are_bits(value: float) -> None:
+    """A real in hexadecimal gives the bits of the number (CiA 306-1)."""
+    (bits,) = struct.unpack('<I', struct.pack('<f', value))
+    parsed = parse_value(DataType.REAL32, f'0x{bits:08X}')
+    assert parsed is not None
+    assert parsed.value == value or (math.isnan(value) and math.isnan(float(parsed.value)))
+
+
+@given(data_type=st.sampled_from(DataType))
+def test_an_empty_text_is_no_value(data_type: DataType) -> None:
+    """Empty keys are common and mean nothing."""
+    assert parse_value(data_type, '') is None
+
+
+TEXTS = st.one_of(
+    st.text(max_size=20),
+    st.text(alphabet='0123456789abcdefx$NODEIDnodeid+-.; ', max_size=20),
+    st.integers(-(2**70), 2**70).map(str),
+    st.floats().map(str),
+)
+
+
+@given(data_type=st.sampled_from(DataType), text=TEXTS)
+@example(data_type=DataType.REAL32, text='3.5e38')
+def test_any_text_is_a_value_of_the_type_or_refused(data_type: DataType, text: str) -> None:
+    """What is read can be written to the device and read back; a refusal has a reason."""
+    try:
+        parsed = parse_value(data_type, text)
+    except ValueError as error:
+        limits = integer_range(data_type) or (0, -1)
+        is_value = bool(re.fullmatch('[0-9]{1,30}', text)) and int(text) <= limits[1]
+        assert (bool(str(error)), is_value) == (True, False)  # noqa: PT017  # half of the law
+        return
+    if parsed is None:
+        assert data_type is DataType.DOMAIN or not text.partition(';')[0].strip()
+        return
+    if data_type is DataType.VISIBLE_STRING:
+        assert parsed.value == text
+        return
+    decoded = decode(data_type, encode(data_type, parsed.value))
+    if isinstance(decoded, float) and isinstance(parsed.value, float):
+        assert decoded == pytest.approx(parsed.value, rel=1e-6, nan_ok=True)
+    else:
+        assert decoded == parsed.value
+
+
+NODE_ID = 5
+SHIPPED = sorted((Path(__file__).parents[1] / 'eds').glob('*.eds'))
+
+
+@pytest.fixture(params=['sample', *(path.name for path in SHIPPED)])
+def eds_path(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    """Give the sample, then every EDS that the package ships."""
+    name = str(request.param)
+    if name != 'sample':
+        return SHIPPED[0].parent / name
+    path = tmp_path / 'sample.eds'
+    path.write_text(eds_text(), encoding='utf-8')
+    return path
+
+
+def peer_entries(path: Path) -> dict[tuple[int, int], object]:
+    """Read a file with the canopen package."""
+    peer = canopen.objectdictionary.import_od(str(path), NODE_ID)
+    entries: dict[tuple[int, int], object] = {}
+    for index, item in peer.items():
+        if isinstance(item, canopen.objectdictionary.ODVariable):
+            entries[index, 0] = item
+        else:
+            entries.update({(index, subindex): part for subindex, part in item.subindices.items()})
+    return entries
+
+
+def test_both_readers_agree(eds_path: Path) -> None:
+    """Both find the same objects with the same types, access, defaults and limits."""
+    eds = load_eds(eds_path)
+    assert not eds.warnings
+    ours = {entry.address: entry for entry in eds.dictionary.for_node(NODE_ID)}
+    theirs = {
+        address: entry
+        for address, entry in peer_entries(eds_path).items()
+        if address[0] >= 0x1000  # [DummyUsage] becomes objects there
+    }
+    assert ours.keys() == theirs.keys()
+    for address, entry in ours.items():
+        assert describe(entry) == describe_peer(theirs[address]), entry
+
+
+def describe(entry: ObjectEntry) -> tuple[object, ...]:
+    """List what is compared."""
+    is_real = entry.data_type in REAL_FORMATS  # whose limits the peer reads as integers only
+    return (
+        entry.name,
+        entry.data_type.value,
+        entry.access.value,
+        entry.pdo_mappable,
+        entry.default,
+        None if is_real else entry.low_limit,
+        None if is_real else entry.high_limit,
+    )
+
+
+def describe_peer(entry: object) -> tuple[object, ...]:
+    """List the same of the peer's entry."""
+    is_real = getattr(entry, 'data_type', 0) in [kind.value for kind in REAL_FORMATS]
+    default = getattr(entry, 'default', None)
+    return (
+        getattr(entry, 'name', None),
+        getattr(entry, 'data_type', None),
+        getattr(entry, 'access_type', None),
+        getattr(entry, 'pdo_mappable', None),
+        None if default in ('', b'') else default,
+        None if is_real else getattr(entry, 'min', None),
+        None if is_real else getattr(entry, 'max', None),
+    )
+
+
+NUMBERS = [data_type for data_type in DataType if integer_range(data_type) is not None]
+
+
+@given(st.sampled_from(NUMBERS), st.data())
+def test_numbers_come_back(data_type: DataType, data: st.DataObject) -> None:
+    """Every value of every integer type, and of BOOLEAN."""
+    low, high = integer_range(data_type) or (0, 0)
+    value = data.draw(st.integers(low, high))
+    size = byte_length(data_type) or 0
+    raw = value.to_bytes(size, 'little', signed=low < 0)
+    text = text_from_bytes(data_type, raw)
+    assert bytes_from_text(data_type, text) == raw
+    if data_type is not DataType.BOOLEAN:
+        assert text == str(value)
+    if value >= 0:
+        assert bytes_from_text(data_type, f'0x{value:X}') == raw
+
+
+@given(st.sampled_from(list(REAL_FORMATS)), st.floats(width=32, allow_nan=False))
+def test_reals_come_back(data_type: DataType, value: float) -> None:
+    """Infinities and denormals too."""
+    raw = struct.pack(REAL_FORMATS[data_type], value)
+    assert bytes_from_text(data_type, text_from_bytes(data_type, raw)) == raw
+
+
+def test_nan_is_no_secret() -> None:
+    """It is shown as what it is."""
+    assert text_from_bytes(DataType.REAL32, struct.pack('<f', math.nan)) == 'nan'
+
+
+@given(st.sampled_from(sorted(BYTE_TYPES)), st.binary(min_size=6, max_size=6))
+def test_bytes_come_back(data_type: DataType, raw: bytes) -> None:
+    """As hexadecimal digits, with or without spaces."""
+    text = text_from_bytes(data_type, raw)
+    assert bytes_from_text(data_type, text) == raw
+    assert bytes_from_text(data_type, text.replace(' ', '')) == raw
+
+
+@given(st.text(st.characters(max_codepoint=255), min_size=1))
+def test_strings_come_back(text: str) -> None:
+    """Every character that a VISIBLE_STRING of a real device may have."""
+    raw = bytes_from_text(DataType.VISIBLE_STRING, text)
+    assert text_from_bytes(DataType.VISIBLE_STRING, raw) == text
+
+
+@pytest.mark.parametrize(
+    ('data_type', 'text'),
+    [
+        (DataType.UNSIGNED8, '256'),
+        (DataType.UNSIGNED8, '-1'),
+        (DataType.INTEGER16, 'fast'),
+        (DataType.INTEGER16, ''),
+        (DataType.INTEGER16, '1.5'),
+        (DataType.UNSIGNED32, '$NODEID+1'),
+        (DataType.REAL32, 'much'),
+        (DataType.DOMAIN, 'xyz'),
+        (DataType.TIME_OF_DAY, '00 01'),
+        (DataType.VISIBLE_STRING, '\u20ac'),
+    ],
+    ids=str,
+)
+def test_what_is_no_value_is_refused(data_type: DataType, text: str) -> None:
+    """The message has the text or the type."""
+    with pytest.raises(CodecError):
+        bytes_from_text(data_type, text)
