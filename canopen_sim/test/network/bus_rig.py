@@ -11,26 +11,39 @@ the bus refuse frames on request.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Coroutine, Iterable, Mapping
+from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 import logging
 import struct
 from typing import Any, Protocol
 
-from arm_canopen import BusError, CanopenMaster, Event, OperationMode, Severity
+from drive_samples import bus_config, SCALE
+
+from arm_canopen import (
+    AxisFeedback,
+    BusError,
+    CanopenMaster,
+    Event,
+    OperationMode,
+    Refusal,
+    Setpoint,
+    Severity,
+)
 from arm_canopen.can import Bus, Frame
 from arm_canopen.can.frame import checked
-from arm_canopen.config import BusConfig
+from arm_canopen.config import BusConfig, NodeConfig
 from arm_canopen.master.runner import Clock
 from arm_canopen.master.scheduler import Promise
 from arm_canopen.standard import ObjectDictionary
 from canopen_sim import Device, ServoModel
+from canopen_sim import Drive as SimulatedDrive
 
 FRAME_TIME = 0.00012  # [s] a frame of 8 bytes at 1 Mbit/s
 START = 100.0  # [s] of virtual steady time; not 0, which means "never" in places
 BOOT_TIME_MAX = 5.0  # [s]
 NEVER = float('inf')
+JOINT = 'joint1'  # the drive of tests with one drive
 
 
 class Station(Protocol):
@@ -277,6 +290,44 @@ class VirtualNetwork:
         online = all(node.online for node in self.network.nodes.values())
         return online and all(drive.view.ready for drive in self.drives.values())
 
+    def simulated(self, name: str = JOINT) -> SimulatedDrive:
+        """Return the drive of a simulated device, as it really is."""
+        drive = self.devices[name].drive
+        assert drive is not None
+        return drive
+
+    def motor(self, name: str = JOINT) -> float:
+        """Return where a motor really is in [rad]."""
+        return self.simulated(name).position / SCALE
+
+    def speed(self, name: str = JOINT) -> float:
+        """Return how fast a motor really turns in [rad/s]."""
+        return self.simulated(name).velocity / SCALE
+
+    def enable(self, mode: OperationMode, name: str = JOINT) -> None:
+        """Enable a drive and select a mode."""
+        self.do(name, 'init')
+        self.select(name, mode)
+
+    def target(self, target: float, name: str = JOINT) -> None:
+        """Command a target of a drive."""
+        self.commands[name].set_target(target)
+
+    def home(self, method: int | None = None, name: str = JOINT) -> Promise[str]:
+        """Begin to home by a method, or by that of the drive."""
+        commands = self.commands[name]
+        return commands.run('home', commands.home(method))
+
+    def keep_mode(self, mode: int) -> None:
+        """Make the first drive keep a mode of operation, whatever 0x6060 says."""
+        word = 0x200 + self._config.nodes[0].node_id
+
+        def alters(sender: str, frame: Frame) -> Frame:
+            kept = frame.data[:2] + bytes((mode,))
+            return frame._replace(data=kept) if frame.can_id == word else frame
+
+        self.wire.alters = alters
+
     def begin(self, name: str, verb: str, *, preempt: bool = False) -> Promise[str]:
         """Begin a command of a drive by the name of its coroutine, without waiting."""
         commands = self.commands[name]
@@ -380,6 +431,63 @@ class VirtualNetwork:
         for name in names:
             deadline = self.stations[name].next_deadline()
             self._due[name] = NEVER if deadline is None else deadline
+
+
+class Leader:
+    """A motion source that leads its axes while they follow, or does what a test wants.
+
+    Attributes:
+        axes: Names of its axes.
+        losses: The first refusal of each axis that it has lost.
+        pauses: It answers nothing.
+    """
+
+    def __init__(
+        self,
+        *axes: str,
+        speed: float = 1.0,
+        feed_forward: tuple[float, float] = (0.0, 0.0),
+        heeds: bool = True,
+    ) -> None:
+        """Lead ``axes``, the first drive by default.
+
+        Args:
+            *axes: Names of drives.
+            speed: Of each axis, in user units.
+            feed_forward: Velocity and effort that it announces.
+            heeds: It leads an axis only while that is followable.
+        """
+        self.axes = axes or (JOINT,)
+        self.losses: dict[str, Refusal] = {}
+        self.pauses = False
+        self._speed = speed
+        self._feed_forward = feed_forward
+        self._heeds = heeds
+        self._positions: dict[str, float] = {}
+
+    def update(
+        self, now: float, period: float, feedback: Sequence[AxisFeedback]
+    ) -> Sequence[Setpoint | None]:
+        """Go on from the set-point at which it began."""
+        return [self._lead(axis, period) for axis in feedback]
+
+    def _lead(self, axis: AxisFeedback, period: float) -> Setpoint | None:
+        if self.pauses or (self._heeds and not axis.followable):
+            return None
+        before = self._positions.get(axis.name, axis.setpoint)
+        self._positions[axis.name] = before + self._speed * period
+        return Setpoint(self._positions[axis.name], *self._feed_forward)
+
+    def released(self, axis: str, refusal: Refusal) -> None:
+        """Keep the cause."""
+        self.losses.setdefault(axis, refusal)
+
+
+def booted(*nodes: NodeConfig, **master: Any) -> VirtualNetwork:
+    """Return a booted network of devices; the keywords are fields of MasterConfig."""
+    net = VirtualNetwork(bus_config(*nodes, **master))
+    net.boot()
+    return net
 
 
 def _ignores(device: Device, frame: Frame) -> bool:

@@ -56,10 +56,9 @@ class MovingDrive:
         self.net = VirtualNetwork(bus_config(config))
         self.net.allows_defects = True
         self.net.boot()
-        self.net.do(JOINT, 'init')
-        self.net.select(JOINT, mode)
+        self.net.enable(mode)
         velocity = mode is OperationMode.PROFILE_VELOCITY
-        self.net.commands[JOINT].set_target(1.0 if velocity else 50.0)
+        self.net.target(1.0 if velocity else 50.0)
         self.net.run(0.6)
         assert self.device.velocity / SCALE == pytest.approx(1.0, rel=0.05)
         self.states = [DriveState.OPERATION_ENABLED]
@@ -69,8 +68,7 @@ class MovingDrive:
     @property
     def device(self) -> SimulatedDrive:
         """The simulated drive."""
-        drive = self.net.devices[JOINT].drive
-        assert drive is not None
+        drive = self.net.simulated()
         return drive
 
     def run(self, duration: float) -> None:

@@ -53,6 +53,8 @@ class ScriptedDevice:
         commands: NMT commands that it got.
         writes: What was written by expedited downloads, as index, sub-index and number.
         on_request: Called with each SDO request before it is answered.
+        relapses_after: Time in Operational before it falls back by itself in [s].
+        last_words: EMCY that it sends then.
     """
 
     node_id: int
@@ -69,6 +71,9 @@ class ScriptedDevice:
     on_request: Callable[[bytes], None] = lambda request: None
     guarded: bool = False
     deaf_to_reset: bool = False
+    relapses_after: float | None = None
+    last_words: bytes = b''
+    _relapse_due: float | None = None
     _toggle: int = 0
     _answers_due: list[tuple[float, bytes]] = field(default_factory=list)
     _beat_due: float | None = None
@@ -92,6 +97,8 @@ class ScriptedDevice:
             self.commands.append(frame.data[0])
             if frame.data[0] in STATES:
                 self.state = STATES[frame.data[0]]
+                if frame.data[0] == START and self.relapses_after is not None:
+                    self._relapse_due = now + self.relapses_after
             elif not self.deaf_to_reset:
                 self.restart(now)
         elif frame.can_id == 0x700 + self.node_id and frame.is_remote:
@@ -113,11 +120,16 @@ class ScriptedDevice:
             self._beat_due = now + self._period
             self.send(Frame(0x700 + self.node_id, bytes((self.state,))))
 
+        if self._relapse_due is not None and self._relapse_due <= now:
+            self._relapse_due = None
+            self.state = NmtState.PRE_OPERATIONAL
+            if self.last_words:
+                self.send(Frame(0x80 + self.node_id, self.last_words))
+
     def next_deadline(self) -> float | None:
-        """Return when it wants to send in [s]."""
-        dues = [due for due, _ in self._answers_due[:1]]
-        dues += [self._beat_due] if self._beat_due is not None else []
-        return min(dues, default=None)
+        """Return when it wants to act in [s]."""
+        dues = [*(due for due, _ in self._answers_due[:1]), self._beat_due, self._relapse_due]
+        return min((due for due in dues if due is not None), default=None)
 
     @property
     def _period(self) -> float:

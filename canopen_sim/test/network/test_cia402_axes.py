@@ -85,8 +85,7 @@ def test_the_axes_of_a_device_that_comes_back_are_braked_at_the_same_time(
     for drive in device.drives:  # which go on without their master
         device.store.find(Index.ABORT_CONNECTION_OPTION + AXIS_OFFSET * drive.number).value = 0
     for axis in (X, Y):
-        net.do(axis, 'init')
-        net.select(axis, OperationMode.PROFILE_VELOCITY)
+        net.enable(OperationMode.PROFILE_VELOCITY, axis)
         net.commands[axis].set_target(0.5)
     net.run(2.0)
     net.wire.loses = lambda sender, frame: True
@@ -105,8 +104,7 @@ def test_the_axes_of_a_device_that_comes_back_are_braked_at_the_same_time(
 def test_a_fault_stops_its_axis_and_is_said_by_name(net: VirtualNetwork) -> None:
     """The other goes on; the way back is a command for the one."""
     for axis in (X, Y):
-        net.do(axis, 'init')
-        net.select(axis, OperationMode.PROFILE_POSITION)
+        net.enable(OperationMode.PROFILE_POSITION, axis)
     net.devices['table'].drives[1].raise_fault(0x2310, net.now)
     net.run(0.5)
     assert net.drives[Y].view.state is DriveState.FAULT

@@ -58,16 +58,8 @@ def booted(config: NodeConfig | None = None) -> VirtualNetwork:
 def running_in(mode: OperationMode) -> VirtualNetwork:
     """Boot such a drive, enable it, and select a mode."""
     net = booted()
-    net.do(JOINT, 'init')
-    net.select(JOINT, mode)
+    net.enable(mode)
     return net
-
-
-def motor(net: VirtualNetwork) -> float:
-    """Return where the motor really is in [rad]."""
-    drive = net.devices[JOINT].drive
-    assert drive is not None
-    return drive.position / SCALE
 
 
 def leave_behind(net: VirtualNetwork, index: int, value: int) -> None:
@@ -108,10 +100,10 @@ def test_what_others_left_in_the_target_moves_nothing_at_enable(mode: OperationM
     net = running_in(mode)
     net.do(JOINT, 'disable')
     leave_behind(net, TARGETS[mode], 3_000)
-    begin, before = net.now, motor(net)
+    begin, before = net.now, net.motor()
     net.do(JOINT, 'enable')
     net.run(1.0)
-    assert motor(net) == pytest.approx(before, abs=1e-3)
+    assert net.motor() == pytest.approx(before, abs=1e-3)
     assert downloads(net, since=begin) == [TARGETS[mode]]
 
 
@@ -124,10 +116,10 @@ def test_what_others_left_in_the_target_moves_nothing_at_a_switch(mode: Operatio
         other = OperationMode.PROFILE_VELOCITY
     net.select(JOINT, other)
     leave_behind(net, TARGETS[mode], 3_000)
-    before = motor(net)
+    before = net.motor()
     net.select(JOINT, mode)
     net.run(1.0)
-    assert motor(net) == pytest.approx(before, abs=1e-3)
+    assert net.motor() == pytest.approx(before, abs=1e-3)
 
 
 @pytest.mark.parametrize('mode', TARGETS)
@@ -157,12 +149,12 @@ def test_the_mode_that_a_drive_stays_in_is_held_at_enable() -> None:
     net.do(JOINT, 'init')
     net.do(JOINT, 'disable')
     leave_behind(net, VELOCITY, 3_000)
-    before = motor(net)
+    before = net.motor()
     net.do(JOINT, 'enable')
     assert net.drives[JOINT].control.mode.number is OperationMode.NO_MODE
     assert net.drives[JOINT].objects.mode_display == OperationMode.PROFILE_VELOCITY
     net.run(1.0)
-    assert motor(net) == pytest.approx(before, abs=1e-3)
+    assert net.motor() == pytest.approx(before, abs=1e-3)
 
 
 def test_a_refused_holding_value_keeps_the_mode() -> None:
@@ -170,15 +162,15 @@ def test_a_refused_holding_value_keeps_the_mode() -> None:
     net = running_in(OperationMode.PROFILE_POSITION)
     leave_behind(net, VELOCITY, 3_000)
     refuse(net, VELOCITY)
-    before = motor(net)
+    before = net.motor()
     with pytest.raises(DriveError, match='0x60FF'):
         net.select(JOINT, OperationMode.PROFILE_VELOCITY)
     net.run(0.5)
     assert net.drives[JOINT].objects.mode_display == OperationMode.PROFILE_POSITION
-    assert motor(net) == pytest.approx(before, abs=1e-3)
+    assert net.motor() == pytest.approx(before, abs=1e-3)
     net.result(give(net, 0.2))
     net.run(2.0)
-    assert motor(net) == pytest.approx(0.2, abs=1e-3)
+    assert net.motor() == pytest.approx(0.2, abs=1e-3)
 
 
 # ------------------------------------------------------------------ taken means delivered
@@ -255,10 +247,10 @@ def test_a_target_that_came_too_late_for_its_answer_moves_nothing(mode: Operatio
     leave_behind(net, TARGETS[mode], 400)
     ahead.resolve(None)
     net.run(1.0)
-    assert motor(net) == pytest.approx(0.0, abs=1e-3)
+    assert net.motor() == pytest.approx(0.0, abs=1e-3)
     net.result(give(net, 0.2))
     net.run(2.0)
-    assert motor(net) > 0.1
+    assert net.motor() > 0.1
 
 
 # ------------------------------------------------------------------ refused targets
@@ -272,14 +264,14 @@ def test_a_refused_target_is_answered_with_the_reason(mode: OperationMode) -> No
     with pytest.raises(DriveError, match='present device state'):
         net.result(give(net, 0.4 if mode is not OperationMode.PROFILE_TORQUE else 100.0))
     net.run(1.0)
-    assert motor(net) == pytest.approx(0.0, abs=1e-3)
+    assert net.motor() == pytest.approx(0.0, abs=1e-3)
     accept(net)
     target = 0.3 if mode is not OperationMode.PROFILE_TORQUE else 200.0
     assert 'target' in net.result(give(net, target))
     net.run(3.0)
-    assert motor(net) > 0.05
+    assert net.motor() > 0.05
     if mode is OperationMode.PROFILE_POSITION:
-        assert motor(net) == pytest.approx(target, abs=1e-3)
+        assert net.motor() == pytest.approx(target, abs=1e-3)
 
 
 def test_a_target_that_is_not_answered_is_no_success() -> None:
@@ -290,10 +282,10 @@ def test_a_target_that_is_not_answered_is_no_success() -> None:
         net.result(give(net, 0.4))
     net.wire.loses = lambda sender, frame: False
     net.run(1.0)
-    assert motor(net) == pytest.approx(0.0, abs=1e-3)
+    assert net.motor() == pytest.approx(0.0, abs=1e-3)
     net.result(give(net, 0.3))
     net.run(2.0)
-    assert motor(net) == pytest.approx(0.3, abs=1e-3)
+    assert net.motor() == pytest.approx(0.3, abs=1e-3)
 
 
 @pytest.mark.parametrize('mode', [m for m in TARGETS if m != OperationMode.PROFILE_POSITION])
@@ -335,7 +327,7 @@ def test_the_moves_behind_a_refused_one_are_dropped() -> None:
     net.run(1.0)
     accept(net)
     net.run(2.0)
-    assert motor(net) == pytest.approx(0.0, abs=1e-3)
+    assert net.motor() == pytest.approx(0.0, abs=1e-3)
     with pytest.raises(DriveError, match='absolute position first'):
         commands.move(Move(0.1, relative=True))
 
@@ -556,6 +548,6 @@ def test_nothing_moves_that_was_not_commanded(seed: int) -> None:
         client.act()
         if not client.commanded:
             client.net.run(1.0)
-            before = motor(client.net)
+            before = client.net.motor()
             client.net.run(0.3)
-            assert motor(client.net) == pytest.approx(before, abs=1e-3), client.log
+            assert client.net.motor() == pytest.approx(before, abs=1e-3), client.log

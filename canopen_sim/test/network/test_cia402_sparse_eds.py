@@ -46,9 +46,8 @@ def test_a_simulated_drive_has_the_modes_that_its_objects_allow() -> None:
     wanted = (OperationMode.PROFILE_POSITION, OperationMode.HOMING, OperationMode.CYCLIC_TORQUE)
     assert reported
     assert all(reported & mode.support_bit for mode in wanted)
-    net.do(JOINT, 'init')
-    net.select(JOINT, OperationMode.PROFILE_POSITION)
-    net.commands[JOINT].set_target(0.3)
+    net.enable(OperationMode.PROFILE_POSITION)
+    net.target(0.3)
     net.run(5.0)
     assert net.drives[JOINT].view.position == pytest.approx(0.3, abs=1e-3)
 
@@ -86,9 +85,8 @@ def test_default_mappings_whose_lengths_have_a_flag_of_the_vendor_are_used(
     bus = load_bus(tmp_path / 'bus.yml')
     net = VirtualNetwork(bus)
     net.boot()
-    net.do(JOINT, 'init')
-    net.select(JOINT, OperationMode.PROFILE_POSITION)
-    net.commands[JOINT].set_target(0.3)
+    net.enable(OperationMode.PROFILE_POSITION)
+    net.target(0.3)
     net.run(5.0)
     assert net.drives[JOINT].view.position == pytest.approx(0.3, abs=2e-3)
     held = net.result(net.network.nodes[JOINT].sdo.read(0x1A01, 1, 1.0))
@@ -109,7 +107,7 @@ def test_a_target_without_an_rpdo_goes_by_sdo() -> None:
     net = unmapped()
     net.select(JOINT, OperationMode.PROFILE_POSITION)
     for target in (0.5, -0.2, 0.9):
-        net.commands[JOINT].set_target(target)
+        net.target(target)
         net.run(5.0)
         assert net.drives[JOINT].view.position == pytest.approx(target, abs=1e-3)
     assert net.reported(Severity.WARNING) == []
@@ -119,7 +117,7 @@ def test_a_velocity_without_an_rpdo_goes_by_sdo() -> None:
     """And so does the standstill that ends it."""
     net = unmapped()
     net.select(JOINT, OperationMode.PROFILE_VELOCITY)
-    net.commands[JOINT].set_target(0.4)
+    net.target(0.4)
     net.run(1.0)
     assert net.drives[JOINT].view.rate == pytest.approx(0.4, abs=0.02)
     net.do(JOINT, 'halt')
@@ -162,8 +160,7 @@ def test_a_drive_moves_by_the_default_dictionary() -> None:
     config = replace(drive_config('a', 2), dictionary=general.for_node(2), sdo_writes=())
     net = VirtualNetwork(bus_config(config), dictionaries={'a': drive_dictionary().for_node(2)})
     net.boot()
-    net.do('a', 'init')
-    net.select('a', OperationMode.PROFILE_POSITION)
+    net.enable(OperationMode.PROFILE_POSITION, 'a')
     net.commands['a'].set_target(0.5)
     net.run(10.0)
     assert net.drives['a'].view.position == pytest.approx(0.5, abs=1e-3)

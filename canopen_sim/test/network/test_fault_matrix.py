@@ -145,8 +145,7 @@ class Arm:
 
     def simulated(self, name: str = FAULTY) -> SimulatedDrive:
         """Return the drive of a simulated device."""
-        drive = self.net.devices[name].drive
-        assert drive is not None
+        drive = self.net.simulated(name)
         return drive
 
     def motor(self, name: str) -> float:
@@ -160,8 +159,7 @@ class Arm:
     def move(self, mode: OperationMode) -> None:
         """Set both drives in motion in a mode."""
         for name in (FAULTY, WITNESS):
-            self.net.do(name, 'init')
-            self.net.select(name, mode)
+            self.net.enable(mode, name)
         for name in (FAULTY, WITNESS):
             self.net.commands[name].set_target(target_of(mode))
         self.net.run(0.6)
@@ -579,8 +577,7 @@ def test_a_stop_is_as_short_as_the_drive_can_whatever_it_counts_in(
 
     for stop in ('halt', 'quick_stop', 'disable'):
         begin = place()
-        arm.net.do(FAULTY, 'init')
-        arm.net.select(FAULTY, mode)
+        arm.net.enable(mode, FAULTY)
         arm.net.run(0.3)
         assert place() == pytest.approx(begin, abs=2e-4)
         target = SPEED if mode in VELOCITY_MODES else begin + FAR
@@ -597,8 +594,7 @@ def test_a_stop_is_as_short_as_the_drive_can_whatever_it_counts_in(
             longest = shortest + LATE * speed
         assert 0.9 * shortest < place() - at < longest, (stop, shortest, longest)
         arm.stands(FAULTY)
-    arm.net.do(FAULTY, 'init')
-    arm.net.select(FAULTY, OperationMode.CYCLIC_POSITION)
+    arm.net.enable(OperationMode.CYCLIC_POSITION, FAULTY)
     arm.net.commands[FAULTY].set_target(0.3)
     arm.net.run(3.0)
     assert place() == pytest.approx(0.3, abs=1e-3)
@@ -621,8 +617,7 @@ def test_a_drive_outside_its_limits_is_led_back_and_stopped(side: int, stop: str
 
     def enable() -> None:
         begin = arm.motor(FAULTY)
-        arm.net.do(FAULTY, 'init')
-        arm.net.select(FAULTY, OperationMode.CYCLIC_POSITION)
+        arm.net.enable(OperationMode.CYCLIC_POSITION, FAULTY)
         arm.net.run(0.5)
         assert arm.motor(FAULTY) == pytest.approx(begin, abs=2e-4)
 
@@ -810,8 +805,7 @@ def test_a_device_that_deviates_is_driven(deviation: FaultInjection, said: str) 
     net.devices[FAULTY].faults.inject(deviation, net.now)
     net.boot()
     objects = net.network.nodes[FAULTY].objects
-    net.do(FAULTY, 'init')
-    net.select(FAULTY, OperationMode.PROFILE_POSITION)
+    net.enable(OperationMode.PROFILE_POSITION, FAULTY)
     net.commands[FAULTY].set_target(0.1)
     net.run(1.0)
     assert net.drives[FAULTY].view.position == pytest.approx(0.1, abs=0.01)

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import pairwise
 
-from bus_rig import FRAME_TIME, VirtualNetwork
+from bus_rig import booted, FRAME_TIME, VirtualNetwork
 from drive_samples import bus_config, drive_config, pdo, PERIOD, sdo_write
 import pytest
 
@@ -111,8 +111,7 @@ def test_a_device_behind_a_broken_cable_is_found_again() -> None:
 def test_a_device_without_heartbeat_is_not_watched() -> None:
     """With no producer time configured, silence is no loss."""
     config = drive_config('a', 2, heartbeat_producer=0.0, heartbeat_timeout=0.0)
-    net = VirtualNetwork(bus_config(config))
-    net.boot()
+    net = booted(config)
     net.power_off('a')
     net.run(10.0)
     assert net.network.nodes['a'].online
@@ -139,8 +138,7 @@ def test_an_emergency_comes_with_the_identifier_that_bus_yml_has_written() -> No
     """
     config = drive_config('a', 2)
     config = replace(config, sdo_writes=(*config.sdo_writes, sdo_write(0x1014, 0, 0x90)))
-    net = VirtualNetwork(bus_config(config))
-    net.boot()
+    net = booted(config)
     net.devices['a'].faults.inject(FaultInjection(Fault.OVER_TEMPERATURE), net.now)
     net.run(0.1)
     assert net.frames(0x090)
@@ -157,8 +155,7 @@ def test_a_device_gets_another_identifier_of_time() -> None:
         dictionary=ObjectDictionary([*config.dictionary, time]),
         sdo_writes=(*config.sdo_writes, sdo_write(0x1012, 0, 0x8000_0181)),
     )
-    net = VirtualNetwork(bus_config(config))
-    net.boot()
+    net = booted(config)
     assert net.devices['a'].clock.can_id == 0x181
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import itertools
 
-from bus_rig import Sent, START, VirtualNetwork
+from bus_rig import booted, Sent, START, VirtualNetwork
 from drive_samples import bus_config, drive_config
 import pytest
 
@@ -69,8 +69,7 @@ def test_devices_that_are_reset_one_by_one_boot_once() -> None:
     """The boot of a device begins when its own reset has left, not while that waits."""
     alive = drive_config('alive', 20, reset_communication=False)
     configs = [drive_config(f'joint{number}', number) for number in NODE_IDS]
-    net = VirtualNetwork(bus_config(*configs, alive, nmt_inhibit_time=0.1))
-    net.boot()
+    net = booted(*configs, alive, nmt_inhibit_time=0.1)
     for node_id in NODE_IDS:
         (reset,) = sent_at(net, NmtCommand.RESET_COMMUNICATION, node_id)
         (stopped,) = sent_at(net, NmtCommand.ENTER_PRE_OPERATIONAL, node_id)

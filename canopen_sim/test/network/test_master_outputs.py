@@ -159,8 +159,7 @@ def test_the_first_targets_of_a_drive_are_where_it_is() -> None:
     """A drive that comes back is booted, and its first RPDOs leave before its first TPDOs."""
     net = VirtualNetwork(bus_config(every_mode(drive_config('a', 2))))
     net.boot()
-    net.do('a', 'init')
-    net.select('a', OperationMode.CYCLIC_POSITION)
+    net.enable(OperationMode.CYCLIC_POSITION, 'a')
     net.commands['a'].set_target(0.3)
     net.run(3.0)
     begin = net.now

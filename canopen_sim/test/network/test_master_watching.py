@@ -8,7 +8,7 @@ from dataclasses import replace
 from datetime import datetime, timezone
 import re
 
-from bus_rig import VirtualNetwork
+from bus_rig import booted, VirtualNetwork
 from drive_samples import bus_config, drive_config, pdo, sdo_write, with_defaults
 import pytest
 
@@ -39,8 +39,7 @@ def guarded_config(**changes: object) -> NodeConfig:
 
 def test_a_device_without_heartbeat_is_guarded() -> None:
     """Every guard time; its answers keep it online and report its NMT state."""
-    net = VirtualNetwork(bus_config(guarded_config()))
-    net.boot()
+    net = booted(guarded_config())
     net.run(1.0)
     node = net.network.nodes['a']
     questions = [sent.time for sent in net.wire.log if sent.frame.is_remote]
@@ -52,8 +51,7 @@ def test_a_device_without_heartbeat_is_guarded() -> None:
 
 def test_a_guarded_device_that_does_not_answer_is_lost_and_found() -> None:
     """After the retries, with the count in words; it is booted again when it is back."""
-    net = VirtualNetwork(bus_config(guarded_config()))
-    net.boot()
+    net = booted(guarded_config())
     net.run(0.5)
     net.power_off('a')
     begin = net.now
@@ -132,8 +130,7 @@ def test_an_emergency_of_a_device_whose_eds_has_no_node_id_is_received(cob_id: i
     drive = replace(drive, dictionary=written.for_node(2))
     net = VirtualNetwork(bus_config(drive), dictionaries={'a': written})
     net.boot()
-    device = net.devices['a'].drive
-    assert device is not None
+    device = net.simulated('a')
     device.raise_fault(0x2310, net.now)
     net.run(0.1)
     assert [emcy.code for _, emcy in net.network.nodes['a'].emergencies.history] == [0x2310]
@@ -168,8 +165,7 @@ def test_the_last_emergencies_are_remembered() -> None:
 @pytest.mark.parametrize('code', [0x0000, 0x2310], ids='code before 0x{:04X}'.format)
 def test_a_flood_of_emergencies_is_reported_once_with_its_number(code: int) -> None:
     """Others are reported at once meanwhile, and the same one again when the flood was over."""
-    net = VirtualNetwork(bus_config(drive_config('a', 2)))
-    net.boot()
+    net = booted(drive_config('a', 2))
     device, node = net.devices['a'], net.network.nodes['a']
     flood = FaultInjection(Fault.EMCY_FLOOD, delay=0.002)
 
@@ -229,8 +225,7 @@ def test_a_flood_that_alternates_or_counts_is_a_flood() -> None:
 
 def test_a_pdo_of_another_length_is_reported_once() -> None:
     """With both lengths; a second one is counted only."""
-    net = VirtualNetwork(bus_config(drive_config('a', 2)))
-    net.boot()
+    net = booted(drive_config('a', 2))
     for _ in range(3):
         net.network.receive(Frame(0x182, b'\0', net.now))
     reported = [
@@ -243,8 +238,7 @@ def test_a_pdo_with_an_event_time_that_stops_is_reported() -> None:
     """The device takes no targets until it comes again."""
     config = drive_config('a', 2)
     timed = replace(pdo(3, 0x382, (0x6077, 0), transmission=255), event_time=0.02)
-    net = VirtualNetwork(bus_config(replace(config, tpdos=(*config.tpdos, timed))))
-    net.boot()
+    net = booted(replace(config, tpdos=(*config.tpdos, timed)))
     net.run(0.5)
     node = net.network.nodes['a']
     assert net.drives['a'].view.fresh
@@ -260,8 +254,7 @@ def test_a_pdo_with_an_event_time_that_stops_is_reported() -> None:
 
 def test_pdos_that_come_after_the_window_are_counted() -> None:
     """`sync_window`: what answers a SYNC too late is no answer of that moment."""
-    net = VirtualNetwork(bus_config(drive_config('a', 2), sync_window=0.0001))
-    net.boot()
+    net = booted(drive_config('a', 2), sync_window=0.0001)
     net.run(0.2)
     assert net.network.late_pdos > 10
     patient = VirtualNetwork(bus_config(drive_config('a', 2), sync_window=0.005))

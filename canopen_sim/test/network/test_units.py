@@ -1,17 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""How far 1.0 moves a drive: as with ros2_canopen, or as bus.yml says; and what moves nothing."""
+"""How far 1.0 moves a drive, and what its limits allow: as bus.yml and the drive say it now."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from bus_rig import VirtualNetwork
+from bus_rig import booted, VirtualNetwork
 from drive_samples import (
     bus_config,
     drive_config,
     drive_dictionary,
     MOTION_WRITES,
+    PERIOD,
     SCALE,
     sdo_write,
     with_defaults,
@@ -19,19 +20,16 @@ from drive_samples import (
 import pytest
 
 from arm_canopen import DriveError, OperationMode, Setpoint, Severity
-from arm_canopen.config import DriveConfig
-from arm_canopen.standard import DataType, ObjectDictionary, ObjectEntry
+from arm_canopen.config import DriveConfig, NodeConfig
 
 JOINT = 'joint1'
 
 
 def moved(scales: dict[str, float], target: float) -> VirtualNetwork:
     """Send a drive to a target in profile position mode, and wait for it."""
-    net = VirtualNetwork(bus_config(drive_config(JOINT, 2, scales=scales)))
-    net.boot()
-    net.do(JOINT, 'init')
-    net.select(JOINT, OperationMode.PROFILE_POSITION)
-    net.commands[JOINT].set_target(target)
+    net = booted(drive_config(JOINT, 2, scales=scales))
+    net.enable(OperationMode.PROFILE_POSITION)
+    net.target(target)
     net.run(8.0)
     return net
 
@@ -61,10 +59,8 @@ def test_a_position_that_would_be_rounded_to_another_one_is_refused(
 def test_a_path_leads_between_increments(scale: float) -> None:
     """A motion source is not refused somewhere on its way because increments are whole."""
     scales = {'scale_pos_to_dev': scale, 'scale_pos_from_dev': 1 / scale}
-    net = VirtualNetwork(bus_config(drive_config(JOINT, 2, scales=scales)))
-    net.boot()
-    net.do(JOINT, 'init')
-    net.select(JOINT, OperationMode.CYCLIC_POSITION)
+    net = booted(drive_config(JOINT, 2, scales=scales))
+    net.enable(OperationMode.CYCLIC_POSITION)
     net.drives[JOINT].stream(Setpoint(0.123))
 
 
@@ -72,73 +68,16 @@ def test_a_drive_with_profile_velocity_0_refuses_targets() -> None:
     """It is said at boot and at the call, until somebody writes another one."""
     config = drive_config(JOINT, 2)
     writes = (*config.sdo_writes, sdo_write(0x6081, 0, 0))
-    net = VirtualNetwork(bus_config(replace(config, sdo_writes=writes)))
-    net.boot()
+    net = booted(replace(config, sdo_writes=writes))
     assert any('0x6081' in text for text in net.reported(Severity.WARNING))
-    net.do(JOINT, 'init')
-    net.select(JOINT, OperationMode.PROFILE_POSITION)
+    net.enable(OperationMode.PROFILE_POSITION)
     with pytest.raises(DriveError, match='0x6081'):
-        net.commands[JOINT].set_target(0.5)
+        net.target(0.5)
     net.result(net.network.nodes[JOINT].objects.write_object(0x6081, 0, 10_000))
     net.run(0.5)
-    net.commands[JOINT].set_target(0.5)
+    net.target(0.5)
     net.run(5.0)
     assert net.drives[JOINT].view.position == pytest.approx(0.5, abs=1e-3)
-
-
-TENTHS = {'scale_vel_to_dev': 10 * SCALE, 'scale_vel_from_dev': 0.1 / SCALE}  # 0.1 inc/s
-TENS = {'scale_acc_to_dev': SCALE / 10, 'scale_acc_from_dev': 10 / SCALE}  # 10 inc/s^2
-
-
-@pytest.mark.parametrize(
-    ('scales', 'objects'),
-    [
-        (TENTHS | TENS, {}),
-        (TENTHS, {(0x60A9, 0): 0xFFB5_0300, (0x60AA, 0): 0x01B5_5700}),
-        (
-            TENTHS,
-            {(0x6096, 1): 10, (0x6096, 2): 1, (0x6097, 1): 1, (0x6097, 2): 100},
-        ),
-    ],
-    ids=['bus.yml', 'SI units', 'factor group'],
-)
-def test_accelerations_have_a_unit_of_their_own(
-    scales: dict[str, float], objects: dict[tuple[int, int], int]
-) -> None:
-    """A stop of 10 counts/s^2 beside velocities of 0.1 counts/s is as short as the drive can."""
-    writes = (
-        *(write for write in MOTION_WRITES if write.index == 0x60C2),
-        sdo_write(0x607F, 0, 300_000),  # 3 rad/s
-        sdo_write(0x6081, 0, 100_000),  # 1 rad/s
-        *(sdo_write(index, 0, 5_000) for index in (0x6083, 0x6084, 0x6085)),  # 5 rad/s^2
-    )
-    known = drive_dictionary().for_node(2)
-    dictionary = ObjectDictionary(
-        [
-            *with_defaults(known, objects),
-            *(
-                ObjectEntry(*address, 'Unit', DataType.UNSIGNED32, default=value)
-                for address, value in objects.items()
-                if known.get(*address) is None
-            ),
-        ]
-    )
-    config = drive_config(JOINT, 2, scales=scales, sdo_writes=writes, dictionary=dictionary)
-    units = {} if objects else {0: (0.1, 10.0)}
-    net = VirtualNetwork(bus_config(config), rate_units=units)
-    net.boot()
-    net.do(JOINT, 'init')
-    net.select(JOINT, OperationMode.CYCLIC_POSITION)
-    assert net.drives[JOINT].view.parameters.profile.deceleration == pytest.approx(5.0)
-    assert net.drives[JOINT].view.parameters.quick_stop_deceleration == pytest.approx(5.0)
-    net.commands[JOINT].set_target(20.0)
-    net.run(2.0)
-    drive = net.drives[JOINT].view
-    assert drive.velocity == pytest.approx(1.0, rel=0.02)
-    begin, at = net.now, drive.position
-    net.do(JOINT, 'halt')
-    assert net.now - begin < 0.5
-    assert drive.position - at == pytest.approx(0.1, abs=0.03)
 
 
 def test_a_factor_group_that_the_drive_does_not_have_is_said() -> None:
@@ -154,3 +93,60 @@ def test_a_factor_group_that_the_drive_does_not_have_is_said() -> None:
     net.run(3.0)
     assert not net.drives[JOINT].view.ready
     assert any('scale_from_factor_group' in text for text in net.reported(Severity.WARNING))
+
+
+pytestmark = pytest.mark.slow
+
+NODE_ID = 2
+
+
+def enabled(config: NodeConfig, mode: OperationMode) -> VirtualNetwork:
+    """Return a network with one drive that is enabled in a mode."""
+    net = booted(config)
+    net.enable(mode)
+    return net
+
+
+def test_limits_that_are_written_through_the_master_hold_at_once() -> None:
+    """0x607D and 0x6081, by whatever service: the next target keeps to them."""
+    net = enabled(drive_config(JOINT, NODE_ID), OperationMode.CYCLIC_POSITION)
+    node = net.network.nodes[JOINT]
+    net.result(node.objects.write_object(0x607D, 1, -2_000))
+    net.result(node.objects.write_object(0x607D, 2, 2_000))
+    net.result(node.sdo.write(0x6081, 0, (2_000).to_bytes(4, 'little'), 0.5))
+    net.run(0.1)
+    with pytest.raises(DriveError, match=r'software limits -0\.2 to 0\.2'):
+        net.target(0.3)
+    net.target(0.2)
+    fastest = 0.0
+    for _ in range(200):
+        net.run(PERIOD)
+        fastest = max(fastest, net.drives[JOINT].view.velocity)
+    assert fastest == pytest.approx(0.2, rel=0.05)
+
+
+def test_a_write_that_the_drive_refuses_changes_nothing() -> None:
+    """And one of an object that is no limit reads nothing from the drive."""
+    net = enabled(drive_config(JOINT, NODE_ID), OperationMode.CYCLIC_POSITION)
+    before = net.drives[JOINT].view.parameters
+    begin = net.now
+    promise = net.network.nodes[JOINT].sdo.write(0x6081, 0, b'\x01', 0.5)  # too short
+    net.run(0.2)
+    assert promise.error is not None
+    net.result(net.network.nodes[JOINT].objects.write_object(0x6067, 0, 12))
+    net.run(0.2)
+    assert net.drives[JOINT].view.parameters == before
+    assert len(net.frames(0x600 + NODE_ID, since=begin)) <= 3
+
+
+def test_limits_are_in_the_units_of_targets() -> None:
+    """Where bus.yml scales the two ways differently, what is accepted is what the drive does."""
+    writes = (*MOTION_WRITES, sdo_write(0x607D, 1, -5_000), sdo_write(0x607D, 2, 5_000))
+    scales = {'scale_pos_from_dev': 2 / SCALE, 'scale_vel_from_dev': 3 / SCALE}
+    config = drive_config(JOINT, NODE_ID, sdo_writes=writes, scales=scales)
+    net = enabled(config, OperationMode.PROFILE_POSITION)
+    reported = net.drives[JOINT].view.parameters
+    assert reported.position_limits == pytest.approx((-0.5, 0.5))
+    assert reported.profile.velocity == pytest.approx(1.0)
+    with pytest.raises(DriveError, match='software limits'):
+        net.target(0.9)

@@ -1,0 +1,805 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A halt wins over everything, and ends only with a new target; rest is seen, not believed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from enum import auto, Enum
+from functools import partial
+import math
+import struct
+
+from bus_rig import booted, JOINT, VirtualNetwork
+from drive_samples import (
+    bus_config,
+    drive_config,
+    drive_dictionary,
+    every_mode,
+    MOTION_WRITES,
+    pdo,
+    PERIOD,
+    SCALE,
+    sdo_write,
+)
+from hypothesis import given, settings, strategies
+from hypothesis import strategies as st
+import pytest
+
+from arm_canopen import DriveError, DriveState, OperationMode, Severity
+from arm_canopen.can import Frame
+from arm_canopen.cia402.drive_view import VelocityEstimate, WINDOW
+from arm_canopen.cia402.halt import UNDER_HALT_TIME
+from arm_canopen.cia402.position_modes import Move
+from arm_canopen.config import NodeConfig
+from arm_canopen.config.model.drive import RecoveryPolicy
+from arm_canopen.standard import Controlword, ObjectDictionary, Statusword
+
+pytestmark = pytest.mark.slow
+
+
+NODE_ID = 2
+
+COMMAND_PDO = 0x200 + NODE_ID
+
+STATUS_PDO = 0x180 + NODE_ID
+RESTS_AFTER = 0.7  # [s] without a motion; longer than a set-point waits under a halt
+STANDING = 0.02  # [rad/s]
+SPEEDS = [OperationMode.VELOCITY, OperationMode.PROFILE_VELOCITY, OperationMode.CYCLIC_VELOCITY]
+TORQUES = [OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE]
+ALL = [mode for mode in OperationMode if mode not in {0, OperationMode.HOMING}]
+
+
+def running_in(mode: OperationMode, **changes: object) -> VirtualNetwork:
+    """Return a network with one drive that is enabled in a mode."""
+    net = booted(every_mode(drive_config(JOINT, NODE_ID, **changes)))
+    net.enable(mode)
+    return net
+
+
+def go(net: VirtualNetwork, duration: float) -> float:
+    """Let the drive move until it has rested for a while; return its highest place in [rad].
+
+    Args:
+        net: The network.
+        duration: Longest time of the motion in [s].
+    """
+    highest, last, still = net.motor(), math.nan, 0
+    for _ in range(round(duration / PERIOD)):
+        net.run(PERIOD)
+        still = still + 1 if net.motor() == last else 0
+        if still * PERIOD > RESTS_AFTER:
+            break
+        last = net.motor()
+        highest = max(highest, last)
+    return highest
+
+
+def assert_rests(net: VirtualNetwork, duration: float = 0.5) -> None:
+    """Check that the motor stays where it is for a time in [s]."""
+    begin = net.motor()
+    net.run(duration)
+    assert net.motor() == pytest.approx(begin, abs=2e-3)
+
+
+@pytest.mark.parametrize('mode', ALL, ids=lambda mode: mode.name)
+def test_halt_brakes_and_the_next_target_goes_on(mode: OperationMode) -> None:
+    """The drive stays enabled, and holds in torque modes; nothing of the old target comes back."""
+    net = running_in(mode)
+    there, back = (0.4, -0.3) if mode in SPEEDS else (0.9, -0.3)
+    if mode in TORQUES:
+        there, back = 200.0, -200.0
+    net.target(there)
+    net.run(0.6)
+    assert net.speed() > 0.05
+    answer = net.do(JOINT, 'halt', preempt=True)
+    assert 'Operation enabled' in answer
+    assert 'halted' in answer
+    net.run(0.3)
+    assert_rests(net, 1.0)
+    net.target(back)
+    fastest = 0.0
+    for _ in range(400):
+        net.run(PERIOD)
+        fastest = max(fastest, net.speed())
+    assert fastest < 0.05, 'it went on with the old target'
+    if mode in SPEEDS:
+        assert net.speed() == pytest.approx(-0.3, rel=0.05)
+    elif mode in TORQUES:
+        assert net.speed() < -0.05
+    else:
+        assert net.motor() == pytest.approx(-0.3, abs=2e-3)
+
+
+@pytest.mark.parametrize('delay', [0.0, 0.005, 0.01, 0.02, 0.03, 0.05])
+@pytest.mark.parametrize(
+    ('mode', 'target'),
+    [
+        (OperationMode.PROFILE_POSITION, 1.0),
+        (OperationMode.PROFILE_VELOCITY, 0.3),
+        (OperationMode.CYCLIC_POSITION, 1.0),
+    ],
+)
+def test_a_halt_right_after_a_target_holds(
+    mode: OperationMode, target: float, delay: float
+) -> None:
+    """Wherever the hand-over of the target stands: it is halted, and it stays halted."""
+    net = running_in(mode)
+    net.target(target)
+    net.run(0.3)
+    net.do(JOINT, 'halt', preempt=True)
+    net.run(0.5)
+    net.target(2.0 if mode is not OperationMode.PROFILE_VELOCITY else 0.3)
+    net.run(delay)
+    assert 'halted' in net.do(JOINT, 'halt', preempt=True)
+    assert_rests(net)
+    assert net.drives[JOINT].control.halted
+    net.target(-0.2)
+    go(net, 4.0 if mode is not OperationMode.PROFILE_VELOCITY else 0.5)
+    assert not net.drives[JOINT].control.halted
+    if mode is not OperationMode.PROFILE_VELOCITY:
+        assert net.motor() == pytest.approx(-0.2, abs=2e-3)
+
+
+def test_a_halt_drops_the_moves_that_the_drive_holds() -> None:
+    """Five moves queued, two of them in the drive: the next target goes straight to its place."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    for n in range(5):
+        net.commands[JOINT].move(Move(0.5 * (n + 1), immediate=False))
+    net.run(0.4)
+    net.do(JOINT, 'halt', preempt=True)
+    rest = net.motor()
+    net.run(0.5)
+    net.target(0.0)
+    highest = rest
+    for _ in range(300):
+        net.run(PERIOD)
+        highest = max(highest, net.motor())
+    assert highest < rest + 5e-3, 'it went on with an old move'
+    assert net.motor() == pytest.approx(0.0, abs=2e-3)
+
+
+def full(net: VirtualNetwork) -> None:
+    """Have the drive move, with its buffer full."""
+    for target in (0.5, 1.0, 1.5):
+        net.commands[JOINT].move(Move(target, immediate=False))
+    net.run(0.3)
+    assert net.motor() > 0.05
+    assert net.drives[JOINT].view.statusword & Statusword.SET_POINT_ACKNOWLEDGE
+
+
+def test_an_immediate_move_does_not_wait_for_a_full_drive() -> None:
+    """What is said to go at once goes at once, and what the drive held is discarded."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    full(net)
+    assert 'at once' in net.commands[JOINT].move(Move(-0.2))
+    highest = go(net, 3.0)
+    assert highest < 0.5
+    assert net.motor() == pytest.approx(-0.2, abs=2e-3)
+    assert not net.reported(Severity.WARNING)
+
+
+def test_a_move_that_was_answered_as_failed_does_not_follow_later() -> None:
+    """A relative move behind a full drive is withdrawn with its answer, and what is behind it."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    commands = net.commands[JOINT]
+    for turn in (3.0, 6.0, 9.0):
+        commands.move(Move(turn, immediate=False))
+    failed = commands.deliver(lambda: commands.move(Move(0.5, relative=True)))
+    commands.move(Move(0.5, relative=True, immediate=False))
+    with pytest.raises(DriveError, match='withdrawn'):
+        net.result(failed)
+    assert any('withdrawn, and 1 behind it' in text for text in net.reported(Severity.WARNING))
+    assert 'to 9.1,' in commands.move(Move(0.1, relative=True))
+    go(net, 12.0)
+    assert net.motor() == pytest.approx(9.1, abs=2e-3)
+
+
+def test_a_full_drive_that_receives_nothing_gets_the_move_later() -> None:
+    """A drive that ignores set-points while its buffer is full makes its moves, then the new."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    full(net)
+    SetPoints(net, Kind.UNLESS_FULL)
+    net.commands[JOINT].move(Move(-0.2))
+    go(net, 6.0)
+    assert net.motor() == pytest.approx(-0.2, abs=2e-3)
+
+
+def test_a_queued_move_after_a_halt_goes_at_once() -> None:
+    """The halt has ended the moves before it, so there is nothing that it could wait for."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    net.target(2.0)
+    net.run(0.4)
+    net.do(JOINT, 'halt', preempt=True)
+    rest = net.motor()
+    assert 'at once' in net.commands[JOINT].move(Move(0.0, immediate=False))
+    assert 'after the moves' in net.commands[JOINT].move(Move(0.1, immediate=False))
+    highest = go(net, 4.0)
+    assert highest < rest + 5e-3
+    assert net.motor() == pytest.approx(0.1, abs=2e-3)
+
+
+def test_a_target_that_is_not_taken_does_not_end_the_halt() -> None:
+    """Without an acknowledge it stays halted but for 50 ms, and both answer and log say so."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    net.target(2.0)
+    net.run(0.4)
+    net.do(JOINT, 'halt', preempt=True)
+
+    SetPoints(net, Kind.NEVER)
+    commands, begin = net.commands[JOINT], net.motor()
+    with pytest.raises(DriveError, match='stays halted'):
+        net.result(commands.deliver(lambda: commands.set_target(0.0)))
+    net.run(0.2)
+    assert abs(net.motor() - begin) < BRAKING_MAX / 5
+    assert_rests(net, 4.0)
+    assert net.drives[JOINT].control.halted
+    assert any('stays halted' in text for text in net.reported(Severity.WARNING))
+
+
+@pytest.mark.parametrize('before', [0.3, 2.0], ids=['not known yet', 'known'])
+def test_a_drive_without_acknowledge_moves_after_a_halt(before: float) -> None:
+    """The halt ends with the new set-point, and the old one does not revive."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    SetPoints(net, Kind.NEVER_ACKNOWLEDGES)
+    net.target(5.0)
+    net.run(before)
+    net.do(JOINT, 'halt', preempt=True)
+    rest = net.motor()
+    net.target(rest - 0.2)
+    highest = go(net, 4.0)
+    assert highest < rest + 5e-3
+    assert net.motor() == pytest.approx(rest - 0.2, abs=2e-3)
+    assert not net.drives[JOINT].control.halted
+
+
+def test_a_drive_without_acknowledge_is_reported_once() -> None:
+    """It goes to every target, and queued moves wait for the one before (bit 10)."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    SetPoints(net, Kind.NEVER_ACKNOWLEDGES)
+    for target in (0.3, 0.6, 0.1):
+        net.target(target)
+        go(net, 2.5)
+        assert net.motor() == pytest.approx(target, abs=2e-3)
+    turns = [0.8, 0.2, 0.7, 0.3, 0.6]  # more than a drive keeps
+    for turn in turns:
+        net.commands[JOINT].move(Move(turn, immediate=False))
+    reached: list[float] = []
+    for _ in range(700):
+        net.run(PERIOD)
+        left = turns[len(reached) :]
+        reached += [turn for turn in left[:1] if abs(net.motor() - turn) < 3e-3]
+    assert reached == turns
+    assert net.motor() == pytest.approx(turns[-1], abs=2e-3)
+    assert len([text for text in net.reported(Severity.WARNING) if 'bit 12' in text]) == 1
+
+
+def test_relative_moves_count_from_what_the_drive_has_or_gets() -> None:
+    """An immediate one that waits is not lost by the next, and the answers are where they end."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    commands = net.commands[JOINT]
+    assert 'to 1,' in commands.move(Move(1.0))
+    assert 'to 1.5,' in commands.move(Move(0.5, relative=True))
+    go(net, 4.0)
+    assert net.motor() == pytest.approx(1.5, abs=2e-3)
+    for destination in ('1.6', '1.7', '1.8'):
+        assert f'to {destination},' in commands.move(Move(0.1, relative=True))
+    go(net, 3.0)
+    assert net.motor() == pytest.approx(1.8, abs=2e-3)
+    assert net.drives[JOINT].control.setpoint == pytest.approx(1.8)
+    commands.move(Move(0.1, relative=True))
+    commands.move(Move(0.5))
+    assert 'to 0.4,' in commands.move(Move(-0.1, relative=True))
+    go(net, 4.0)
+    assert net.motor() == pytest.approx(0.4, abs=2e-3)
+
+
+def test_a_relative_move_after_a_halt_is_refused() -> None:
+    """It would count from the target that was given up; after an absolute one it is taken."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    net.target(2.0)
+    net.run(0.5)
+    net.do(JOINT, 'halt', preempt=True)
+    with pytest.raises(DriveError, match=r'joint1: a relative move counts.*absolute'):
+        net.commands[JOINT].move(Move(0.1, relative=True))
+    assert_rests(net)
+    net.commands[JOINT].move(Move(0.5))
+    net.commands[JOINT].move(Move(0.1, relative=True))
+    go(net, 3.0)
+    assert net.motor() == pytest.approx(0.6, abs=2e-3)
+
+
+BRAKING_MAX = 0.15  # [rad] from 1 rad/s at 5 rad/s^2, with the time to see it
+
+
+@pytest.mark.parametrize(
+    ('mode', 'target', 'other'),
+    [
+        (OperationMode.PROFILE_POSITION, 3.0, OperationMode.PROFILE_VELOCITY),
+        (OperationMode.PROFILE_VELOCITY, 1.0, OperationMode.PROFILE_POSITION),
+    ],
+)
+def test_a_refused_mode_switch_does_not_let_the_old_move_go_on(
+    mode: OperationMode, target: float, other: OperationMode
+) -> None:
+    """Braked for the switch, it stays braked when the switch fails; the next target goes on."""
+    net = running_in(mode)
+    net.target(target)
+    net.run(1.0)
+    begin = net.motor()
+    net.keep_mode(mode)
+    with pytest.raises(DriveError, match='did not reach mode'):
+        net.select(JOINT, other)
+    assert net.motor() - begin < BRAKING_MAX
+    assert_rests(net, 3.0)
+    assert 'halted' in net.drives[JOINT].describe()
+    net.target(-0.5)
+    net.run(1.0)
+    assert net.drives[JOINT].view.velocity < -0.3
+
+
+def test_a_mode_that_goes_by_sdo_and_gets_lost_does_not_let_the_old_move_go_on() -> None:
+    """However long 0x6060 takes, the halt lasts until 0x6061 shows the new mode."""
+    config = drive_config(JOINT, NODE_ID)
+    controlword = pdo(1, COMMAND_PDO, (0x6040, 0))
+    net = running_in(OperationMode.PROFILE_POSITION, rpdos=(controlword, *config.rpdos[1:]))
+    net.target(3.0)
+    net.run(0.5)
+    begin, position = net.now, net.motor()
+    net.wire.loses = lambda sender, frame: (
+        frame.can_id == 0x600 + NODE_ID
+        and frame.data[1:3] == b'\x60\x60'
+        and net.now < begin + 1.5
+    )
+    net.select(JOINT, OperationMode.PROFILE_VELOCITY)
+    assert net.now > begin + 1.5
+    assert net.motor() - position < BRAKING_MAX
+    assert_rests(net)
+
+
+def test_init_in_motion_does_not_let_the_old_move_go_on() -> None:
+    """Also for a drive that does not take mode 0."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    net.target(3.0)
+    net.run(0.5)
+    begin = net.motor()
+    net.keep_mode(OperationMode.PROFILE_POSITION)
+    net.do(JOINT, 'init')
+    net.run(1.0)
+    assert net.motor() - begin < BRAKING_MAX
+    assert_rests(net)
+
+
+@pytest.mark.parametrize('cycles', range(4, 60, 4))
+def test_homing_that_is_cancelled_leaves_the_axis_at_rest(cycles: int) -> None:
+    """While it brakes the move of before, while it switches, while it homes: it stops."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    net.target(2.0)
+    net.run(0.5)
+    begin = net.motor()
+    commands = net.commands[JOINT]
+    running = net.home(17)
+    net.run(cycles * PERIOD)
+    commands.cancel('cancelled')
+    assert running.done
+    net.run(0.5)
+    assert abs(net.motor() - begin) < BRAKING_MAX
+    assert_rests(net)
+    net.run_until(lambda: net.drives[JOINT].control.accepts_targets)
+    net.target(begin)
+    go(net, 2.0)
+    assert net.drives[JOINT].view.position == pytest.approx(begin, abs=2e-3)
+
+
+def test_a_switch_that_is_cancelled_stays_halted() -> None:
+    """A stop that ends it has the drive halted in the mode of before."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    net.target(3.0)
+    net.run(0.5)
+    net.keep_mode(OperationMode.PROFILE_POSITION)
+    commands = net.commands[JOINT]
+    running = commands.run('select', commands.select_mode(OperationMode.PROFILE_VELOCITY))
+    net.run(1.0)
+    assert not running.done
+    assert 'halted' in net.do(JOINT, 'halt', preempt=True)
+    assert_rests(net)
+    assert net.drives[JOINT].control.mode.number is OperationMode.PROFILE_POSITION
+
+
+@pytest.mark.parametrize('verb', ['halt', 'quick_stop', 'disable'])
+def test_a_stop_at_any_moment_of_init_is_answered_truly(verb: str) -> None:
+    """What the answer says of the state still holds later, whenever the stop came."""
+    for millisecond in range(0, 80, 3):  # which meets the cycle of 10 ms at each of its moments
+        net = booted(drive_config(JOINT, NODE_ID))
+        net.begin(JOINT, 'init')
+        net.run(0.001 * millisecond)
+        answer = net.do(JOINT, verb, preempt=True)
+        net.run(0.1)
+        drive = net.drives[JOINT]
+        reported = 'Operation enabled' in answer
+        assert reported == (drive.view.state is DriveState.OPERATION_ENABLED), (
+            millisecond,
+            answer,
+        )
+        assert reported == (verb == 'halt' and drive.control.halted), (millisecond, answer)
+
+
+@pytest.mark.parametrize('cycles', range(16))
+def test_a_halt_in_a_mode_switch_is_answered_truly(cycles: int) -> None:
+    """Where the switch disables the drive: it stays as it is said to be, and nothing is wrong."""
+    drive = drive_config(JOINT, NODE_ID)
+    axis = replace(drive.axes[0], switching_state=DriveState.SWITCHED_ON)
+    net = running_in(OperationMode.PROFILE_VELOCITY, axes=(axis,))
+    commands = net.commands[JOINT]
+    commands.run('select', commands.select_mode(OperationMode.PROFILE_POSITION))
+    net.run(cycles * PERIOD)
+    answer = net.do(JOINT, 'halt', preempt=True)
+    net.run(0.2)
+    enabled = net.drives[JOINT].view.state is DriveState.OPERATION_ENABLED
+    assert ('Operation enabled' in answer) == enabled, answer
+    assert not net.reported(Severity.ERROR)
+
+
+@pytest.mark.parametrize('verb', ['', 'disable', 'quick_stop', 'halt', 'shutdown'])
+def test_recovery_does_not_undo_a_stop(verb: str) -> None:
+    """A drive that was commanded to stop while it was away is not enabled when it comes back."""
+    drive = drive_config(JOINT, NODE_ID)
+    axis = replace(drive.axes[0], recovery=RecoveryPolicy.AUTO)
+    net = running_in(OperationMode.CYCLIC_POSITION, axes=(axis,))
+    net.power_off(JOINT)
+    net.run(1.0)
+    if verb:
+        with pytest.raises(DriveError, match='cut its power: offline'):
+            net.do(JOINT, verb, preempt=True)
+    net.power_on(JOINT)
+    net.run(3.0)
+    enabled = net.drives[JOINT].view.state is DriveState.OPERATION_ENABLED
+    assert enabled is not bool(verb)
+
+
+OLD = 3.0  # [rad] the target that a halt gives up; the axis never gets there
+
+BRAKING = 0.1  # [rad] from the profile velocity, 1 rad/s, at 5 rad/s^2
+
+ACCURACY = 5e-3  # [rad]
+
+ANSWER_MAX = 3.5  # [s] to the answer and the end of the move
+
+ANSWERED_FOR = 0.3  # [s] without a motion after the answer
+
+HALT_OPTION = 0x605D
+
+
+class Kind(Enum):
+    """When a drive sees the edge of bit 4, and whether it raises bit 12."""
+
+    ALWAYS = auto()
+    NEVER = auto()
+    NEVER_ACKNOWLEDGES = auto()
+    UNLESS_FULL = auto()  # an edge that came while bit 12 was set is lost for good
+    AFTER_HALT = auto()  # bit 4 counts as 0 while bit 8 is set
+    EDGE_AFTER_HALT = auto()  # an edge that came under halt is lost for good
+    WORD_AFTER_HALT = auto()  # so is one in the word that ends the halt
+
+
+class SetPoints:
+    """Makes a kind of drive of the simulated one, which takes set-points at any time."""
+
+    def __init__(self, net: VirtualNetwork, kind: Kind) -> None:
+        """Alter its controlwords and statuswords from now on."""
+        self._kind = kind
+        self._offered = self._lost = self._halted = False
+        self._full = True
+        net.wire.alters = self
+
+    def __call__(self, sender: str, frame: Frame) -> Frame:
+        """Take out bit 4 where it is not seen, or bit 12."""
+        data = bytearray(frame.data)
+        if frame.can_id == STATUS_PDO:
+            self._full = bool(data[1] & Statusword.SET_POINT_ACKNOWLEDGE >> 8)
+            if self._kind is Kind.NEVER_ACKNOWLEDGES:
+                data[1] &= ~(Statusword.SET_POINT_ACKNOWLEDGE >> 8)
+        elif frame.can_id == COMMAND_PDO and self._is_lost(int.from_bytes(data[:2], 'little')):
+            data[0] &= ~int(Controlword.NEW_SET_POINT)
+        return frame._replace(data=bytes(data))
+
+    def _is_lost(self, word: int) -> bool:
+        before, self._halted = self._halted, bool(word & Controlword.HALT)
+        offered = bool(word & Controlword.NEW_SET_POINT)
+        rising, self._offered = offered and not self._offered, offered
+        blind = {
+            Kind.NEVER: True,
+            Kind.UNLESS_FULL: self._full,
+            Kind.EDGE_AFTER_HALT: self._halted,
+            Kind.WORD_AFTER_HALT: self._halted or before,
+        }.get(self._kind, False)
+        self._lost = offered and (self._lost or (rising and blind))
+        return self._lost or (self._kind is Kind.AFTER_HALT and self._halted)
+
+
+NEVER_HALTED = (Kind.NEVER, Kind.UNLESS_FULL)  # which other tests show
+
+
+def halting(kind: Kind, option: int = 1, *, leads: bool = False) -> VirtualNetwork:
+    """Return a network whose drive begins to go to a target in mode 1."""
+    writes = (*MOTION_WRITES, sdo_write(HALT_OPTION, 0, option))
+    config = drive_config(JOINT, NODE_ID, sdo_writes=writes)
+    if leads:
+        config = drive_config(JOINT, NODE_ID, sdo_writes=writes, rpdos=config.rpdos[::-1])
+    net = booted(config)
+    SetPoints(net, kind)
+    net.enable(OperationMode.PROFILE_POSITION)
+    net.target(OLD)
+    return net
+
+
+def answer(net: VirtualNetwork, target: float) -> tuple[str, float]:
+    """Command a target as ~/target does, and let the axis come to rest.
+
+    Returns:
+        The answer, empty when it was refused, and how far the axis went towards the old target,
+        beyond the way to the new one, in [rad].
+    """
+    begin = net.motor()
+    allowed = max(0.0, target - begin)
+    commands = net.commands[JOINT]
+    promise = commands.deliver(lambda: commands.set_target(target))
+    beyond, last, still = 0.0, math.nan, 0
+    for _ in range(round(ANSWER_MAX / PERIOD)):
+        net.run(PERIOD)
+        still = still + 1 if promise.done and net.motor() == last else 0
+        if still * PERIOD > ANSWERED_FOR:
+            break
+        last = net.motor()
+        beyond = max(beyond, last - begin - allowed)
+    assert promise.done
+    return ('' if promise.error is not None else str(promise.result())), beyond
+
+
+@pytest.mark.parametrize('kind', [kind for kind in Kind if kind not in NEVER_HALTED])
+@settings(max_examples=5)
+@given(
+    new=st.floats(-0.5, 0.5),
+    option=st.sampled_from([1, 2, 3, 4]),
+    under_way=st.floats(0.05, 1.5),
+    leads=st.booleans(),
+)
+def test_a_halt_ends_with_the_new_target_or_with_an_error(
+    kind: Kind, new: float, option: int, under_way: float, leads: bool
+) -> None:
+    """The axis goes to the new target and never on to the old one; else the answer says so."""
+    net = halting(kind, option, leads=leads)
+    net.run(under_way)
+    net.do(JOINT, 'halt', preempt=True)
+    for target in (new, -new):  # what was learned of the drive holds the second time, too
+        reported, beyond = answer(net, target)
+        if reported:
+            assert net.motor() == pytest.approx(target, abs=ACCURACY)
+            assert beyond < ACCURACY
+            assert not net.drives[JOINT].control.halted
+        else:
+            assert kind is Kind.WORD_AFTER_HALT
+            assert beyond < BRAKING
+            assert net.drives[JOINT].control.halted
+            assert abs(net.drives[JOINT].view.velocity) < ACCURACY
+        net.target(OLD)
+        net.run(0.5)
+        net.do(JOINT, 'halt', preempt=True)
+
+
+@pytest.mark.parametrize('verb', ['halt', 'disable', 'select'])
+def test_a_target_that_is_stopped_before_it_is_taken_is_an_error(verb: str) -> None:
+    """Whoever stops the axis meanwhile, the answer is not that it goes there."""
+    net = halting(Kind.AFTER_HALT)
+    net.run(0.5)
+    net.do(JOINT, 'halt', preempt=True)
+    net.run(0.5)
+    commands = net.commands[JOINT]
+    promise = commands.deliver(lambda: commands.set_target(0.0))
+    net.run(0.1)
+    assert not promise.done
+    if verb == 'select':
+        net.select(JOINT, OperationMode.PROFILE_VELOCITY)
+    else:
+        net.do(JOINT, verb, preempt=True)
+    begin = net.motor()
+    net.run(1.0)
+    assert isinstance(promise.error, DriveError)
+    assert net.motor() == pytest.approx(begin, abs=ACCURACY)
+
+
+def test_only_the_first_target_waits_for_an_acknowledge_under_halt() -> None:
+    """That a drive sees set-points only after a halt is learned, and no warning is due."""
+    net = halting(Kind.EDGE_AFTER_HALT)
+    commands = net.commands[JOINT]
+    waited = []
+    for target in (-0.1, 0.1):
+        net.run(0.3)
+        net.do(JOINT, 'halt', preempt=True)
+        begin = net.now
+        net.result(commands.deliver(partial(commands.set_target, target)))
+        waited.append(net.now - begin)
+    assert waited[0] > UNDER_HALT_TIME
+    assert waited[1] < 10 * PERIOD
+    assert not net.reported(Severity.WARNING)
+
+
+def without_velocity() -> NodeConfig:
+    """Return a drive whose 0x606C is neither in a PDO nor in its EDS."""
+    config = drive_config(JOINT, NODE_ID)
+    entries = (entry for entry in config.dictionary if entry.index != 0x606C)
+    position = pdo(2, 0x280 + NODE_ID, (0x6064, 0))
+    return replace(config, dictionary=ObjectDictionary(entries), tpdos=(config.tpdos[0], position))
+
+
+def with_profile_velocity(velocity_inc: int) -> NodeConfig:
+    """Return a drive with another 0x6081 in [inc/s]."""
+    writes = tuple(write for write in MOTION_WRITES if write.index != 0x6081)
+    profile = sdo_write(0x6081, 0, velocity_inc)
+    return drive_config(JOINT, NODE_ID, sdo_writes=(*writes, profile))
+
+
+def running(config: NodeConfig, mode: OperationMode, target: float) -> VirtualNetwork:
+    """Return a network with one drive that moves."""
+    dictionaries = {JOINT: drive_dictionary().for_node(NODE_ID)}
+    net = VirtualNetwork(bus_config(config), dictionaries=dictionaries)
+    net.boot()
+    net.enable(mode)
+    net.target(target)
+    net.run(0.8)
+    assert abs(net.speed()) > 0.3
+    return net
+
+
+@pytest.mark.parametrize(
+    ('config', 'mode', 'target'),
+    [
+        (without_velocity(), OperationMode.PROFILE_POSITION, 3.0),
+        (without_velocity(), OperationMode.PROFILE_VELOCITY, 0.8),
+        (with_profile_velocity(500_000), OperationMode.PROFILE_VELOCITY, 0.45),
+    ],
+    ids=['no 0x606C, PP', 'no 0x606C, PV', 'fast profile'],
+)
+def test_halt_and_switch_wait_for_the_standstill(
+    config: NodeConfig, mode: OperationMode, target: float
+) -> None:
+    """The answer comes when the motor rests, and bit 8 has braked it."""
+    net = running(config, mode, target)
+    net.do(JOINT, 'halt', preempt=True)
+    assert abs(net.speed()) <= STANDING
+    net.run(0.5)
+    net.target(-target)
+    net.run(0.8)
+    begin = net.now
+    commands = net.commands[JOINT]
+    other = (
+        OperationMode.PROFILE_POSITION
+        if mode is OperationMode.PROFILE_VELOCITY
+        else OperationMode.PROFILE_VELOCITY
+    )
+    promise = commands.run('select', commands.select_mode(other))
+    fastest = 0.0
+    while not promise.done:
+        net.run(PERIOD / 2)
+        if net.drives[JOINT].objects.mode_display == other:
+            fastest = max(fastest, abs(net.speed()))
+    assert fastest <= STANDING
+    promise.result()
+    assert any(word & Controlword.HALT for word in net.controlwords(JOINT, since=begin))
+
+
+def test_the_velocity_is_that_of_the_position_where_no_pdo_carries_it() -> None:
+    """Shown to motion sources and in /joint_states, a few cycles late."""
+    net = running(without_velocity(), OperationMode.PROFILE_VELOCITY, 0.5)
+    assert net.drives[JOINT].view.velocity == pytest.approx(0.5, rel=0.02)
+
+
+METRE = 1_000_000.0  # [inc/m]
+
+METRES = {
+    f'scale_{what}_{way}_dev': METRE if way == 'to' else 1 / METRE
+    for what in ('pos', 'vel')
+    for way in ('to', 'from')
+}
+
+
+def sliding(*writes: tuple[int, int, int]) -> VirtualNetwork:
+    """Return an enabled network with one drive that counts micrometres, and holds these values."""
+    config = drive_config(
+        JOINT,
+        NODE_ID,
+        scales=METRES,
+        sdo_writes=tuple(sdo_write(*write) for write in ((0x60C2, 1, 10), *writes)),
+    )
+    net = booted(config)
+    net.do(JOINT, 'init')
+    return net
+
+
+def test_rest_is_by_the_limits_of_the_axis() -> None:
+    """A joint in metres with 2 m/s is not at rest at 20 mm/s."""
+    ramps = ((index, 0, 2_000_000) for index in (0x6083, 0x6084, 0x6085))
+    net = sliding((0x607F, 0, 4_000_000), (0x6081, 0, 2_000_000), *ramps)
+    net.select(JOINT, OperationMode.PROFILE_VELOCITY)
+    net.target(0.018)
+    net.run(1.0)
+    drive = net.simulated()
+    assert drive.velocity / METRE == pytest.approx(0.018, rel=0.02)
+    assert not net.drives[JOINT].view.stands
+    net.do(JOINT, 'halt')
+    assert abs(drive.velocity) / METRE <= 0.004
+
+
+@pytest.mark.parametrize(
+    ('writes', 'speed_limit'),
+    [
+        ([(0x607F, 0, 200_000)], 0.02),  # a tenth of its greatest speed
+        ([(0x607F, 0, 0), (0x607D, 1, 0), (0x607D, 2, 40_000)], 0.004),  # its range in 10 s
+        ([(0x607F, 0, 10_000), (0x6081, 0, 50_000)], 0.01),  # never above its greatest speed
+    ],
+)
+def test_the_speed_of_single_targets_is_by_the_limits_of_the_axis(
+    writes: list[tuple[int, int, int]], speed_limit: float
+) -> None:
+    """Where 0x6081 does not say it; half a metre per second is none for an axis of 40 mm."""
+    ramps = ((index, 0, 1_000_000) for index in (0x6083, 0x6084))
+    net = sliding((0x6081, 0, 0), *ramps, *writes)
+    net.select(JOINT, OperationMode.CYCLIC_POSITION)
+    net.target(0.03)
+    fastest = 0.0
+    for _ in range(100):
+        net.run(PERIOD)
+        fastest = max(fastest, net.drives[JOINT].view.velocity)
+    assert fastest == pytest.approx(speed_limit, rel=0.02)
+
+
+def test_a_coarse_unit_of_velocity_hides_no_motion() -> None:
+    """2 rpm of a joint without gear are noise of 0x606C, and no rest where the position moves."""
+    rpm = 2.0 * math.pi / 60.0
+    scales = {'scale_vel_to_dev': 1.0 / rpm, 'scale_vel_from_dev': rpm}
+    writes = ((0x60C2, 1, 10), (0x6081, 0, 10), *((index, 0, 20) for index in (0x6083, 0x6084)))
+    config = drive_config(
+        JOINT, NODE_ID, scales=scales, sdo_writes=tuple(sdo_write(*write) for write in writes)
+    )
+    net = VirtualNetwork(bus_config(config), rate_units={0: (rpm * SCALE, rpm * SCALE)})
+    net.boot()
+    net.enable(OperationMode.PROFILE_VELOCITY)
+    net.target(2.0 * rpm)
+    net.run(1.0)
+    assert abs(net.speed()) == pytest.approx(2.0 * rpm, rel=0.02)
+    assert not net.drives[JOINT].view.stands
+    net.do(JOINT, 'halt')
+    assert abs(net.speed()) <= STANDING
+
+
+def test_noise_is_standstill() -> None:
+    """A slow profile and an encoder that flickers: a halt ends, and the mode can be switched."""
+    net = booted(with_profile_velocity(500))
+    net.enable(OperationMode.PROFILE_POSITION)
+    noise = [10]
+
+    def alters(sender: str, frame: Frame) -> Frame:
+        if frame.can_id != 0x280 + NODE_ID:
+            return frame
+        noise[0] = -noise[0]
+        position, velocity = struct.unpack('<ii', frame.data)
+        return frame._replace(data=struct.pack('<ii', position, velocity + noise[0]))
+
+    net.wire.alters = alters
+    net.do(JOINT, 'halt', preempt=True)
+    net.select(JOINT, OperationMode.PROFILE_VELOCITY)
+
+
+@given(
+    rate=strategies.floats(min_value=-1e6, max_value=1e6),
+    start=strategies.integers(min_value=-(2**30), max_value=2**30),
+    period=strategies.floats(min_value=1e-3, max_value=0.05),
+)
+def test_the_estimate_is_the_rate(rate: float, start: int, period: float) -> None:
+    """Whatever the cycle and the resolution, within what one increment makes in the window."""
+    estimate = VelocityEstimate()
+    for n in range(200):
+        estimate.note(n * period, round(start + rate * n * period))
+    assert estimate.rate == pytest.approx(rate, abs=2.0 / WINDOW, rel=1e-6)
+    estimate.clear()
+    assert estimate.rate == 0.0

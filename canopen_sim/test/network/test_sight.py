@@ -1,0 +1,540 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A drive that cannot be seen, or is not where its set-points are: it is stopped, once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+import re
+import struct
+
+from bus_rig import booted, Leader, VirtualNetwork
+from drive_samples import (
+    bus_config,
+    drive_config,
+    DRIVE_EDS,
+    PERIOD,
+    SCALE,
+    sdo_write,
+    with_defaults,
+)
+import pytest
+
+from arm_canopen import (
+    DriveError,
+    DriveState,
+    OperationMode,
+    RefusalCause,
+    Severity,
+)
+from arm_canopen.can import Frame
+from arm_canopen.cia402.following_watch import Following, FollowingWatch
+from arm_canopen.config import BusConfig, load_bus, NodeConfig
+from arm_canopen.config.model import Place
+from arm_canopen.config.model.boot_plan import boot_writes
+from arm_canopen.config.model.checks import check_bus
+from arm_canopen.config.model.tpdo_freshness import with_event_timer
+from arm_canopen.master.process_image import ReceivedTpdo, SyncRound
+from arm_canopen.standard import ObjectDictionary, Statusword
+from canopen_sim import Fault, FaultInjection
+
+pytestmark = pytest.mark.slow
+
+TIME_OUT = 0.5  # [s] of silence
+JOINT, NODE_ID = 'joint1', 2
+STATE_PDO, POSITION_PDO = TPDOS = (0x180 + NODE_ID, 0x280 + NODE_ID)
+STREAMED = pytest.mark.parametrize(
+    'mode',
+    [OperationMode.CYCLIC_POSITION, OperationMode.INTERPOLATED_POSITION],
+    ids=lambda m: m.name,
+)
+
+
+class Led:
+    """A drive that follows a motion source at 1 rad/s."""
+
+    def __init__(
+        self, mode: OperationMode, source: Leader, config: NodeConfig | None = None
+    ) -> None:
+        self.net = booted(config or drive_config(JOINT, NODE_ID))
+        self.net.enable(mode)
+        self.source = source
+        self.net.master.attach(source)
+        self.net.run(0.8)
+        assert self.net.speed() == pytest.approx(1.0, rel=0.05)
+
+    def lose(self, *cob_ids: int) -> None:
+        """Lose all frames of some identifiers."""
+        self.net.wire.loses = lambda sender, frame: frame.can_id in cob_ids
+
+    def velocities(self, duration: float = 2.0) -> list[float]:
+        """Let time pass in [s]; return the velocities meanwhile in [rad/s]."""
+        found = []
+        for _ in range(round(duration / PERIOD)):
+            self.net.run(PERIOD)
+            found.append(self.net.speed())
+        return found
+
+
+@pytest.mark.parametrize('lost', [TPDOS, TPDOS[:1], TPDOS[1:]], ids=['all', 'state', 'position'])
+@STREAMED
+def test_a_drive_of_which_a_tpdo_is_missing_is_taken_from_its_source(
+    mode: OperationMode, lost: Sequence[int]
+) -> None:
+    """Within the time-out it brakes on its ramp; the cause is data, and no target is taken."""
+    led = Led(mode, Leader())
+    led.lose(*lost)
+    assert min(led.velocities(TIME_OUT + 1.5)) > -0.02
+    assert led.net.speed() == pytest.approx(0.0, abs=1e-3)
+    assert led.source.losses[JOINT].cause is RefusalCause.SILENT
+    with pytest.raises(DriveError, match='TPDO'):
+        led.net.target(0.0)
+
+
+@STREAMED
+def test_a_fault_while_a_drive_cannot_be_seen_is_known_when_it_can(mode: OperationMode) -> None:
+    """Nobody takes it for enabled meanwhile, and nothing moves when the TPDOs come again."""
+    led = Led(mode, Leader())
+    led.lose(*TPDOS)
+    led.net.run(1.0)
+    led.net.simulated().raise_fault(0x2310, led.net.now)
+    led.net.run(1.0)
+    drive = led.net.drives[JOINT]
+    assert not drive.control.accepts_targets
+    assert not drive.view.fresh
+    assert drive.view.age > 1.5
+    rest = led.net.motor()
+    led.lose()
+    led.net.run(1.0)
+    assert drive.view.fresh
+    assert drive.view.state is DriveState.FAULT
+    assert led.net.motor() == pytest.approx(rest, abs=2e-3)
+
+
+@STREAMED
+def test_a_source_that_goes_on_moves_a_silent_drive_no_further(mode: OperationMode) -> None:
+    """What is granted for stopping on the path ends after a second, whatever the source does."""
+    led = Led(mode, Leader(heeds=False))
+    led.lose(*TPDOS)
+    led.net.run(TIME_OUT + 1.0 + 0.3)
+    rest = led.net.motor()
+    led.net.run(2.0)
+    assert led.net.motor() == pytest.approx(rest, abs=2 * PERIOD * 1e-2)
+
+
+@pytest.mark.parametrize('answers', [(), (0x580 + NODE_ID,)], ids=['SDO', 'no SDO'])
+@pytest.mark.parametrize('stop', ['halt', 'disable', 'quick_stop'])
+def test_a_stop_reaches_a_drive_that_cannot_be_seen(stop: str, answers: tuple[int, ...]) -> None:
+    """It is sent at once; where SDOs do not show the rest either, the answer is an error."""
+    led = Led(OperationMode.CYCLIC_POSITION, Leader())
+    led.lose(*TPDOS, *answers)
+    led.net.run(0.6)
+    if answers:
+        with pytest.raises(DriveError, match='no TPDOs for'):
+            led.net.do(JOINT, stop, preempt=True)
+    else:
+        led.net.do(JOINT, stop, preempt=True)
+        assert led.net.drives[JOINT].view.position == pytest.approx(led.net.motor(), abs=2e-3)
+    assert led.net.speed() == 0.0
+    assert (led.net.simulated().state is DriveState.OPERATION_ENABLED) is (stop == 'halt')
+
+
+def test_a_drive_that_cannot_be_seen_is_not_enabled() -> None:
+    """Neither is its old state taken for the present one."""
+    led = Led(OperationMode.CYCLIC_POSITION, Leader())
+    led.net.do(JOINT, 'disable', preempt=True)
+    led.lose(*TPDOS)
+    led.net.run(1.0)
+    with pytest.raises(DriveError, match='no TPDOs for'):
+        led.net.do(JOINT, 'enable')
+    assert led.net.simulated().state is not DriveState.OPERATION_ENABLED
+
+
+def test_feedback_is_that_of_the_sync_it_is_stamped_with() -> None:
+    """Position, velocity and effort of /joint_states come from the same TPDOs."""
+    net, reported, sent = Led(OperationMode.CYCLIC_POSITION, Leader()).net, [], []
+
+    def note(sync_time: float) -> None:
+        reported.append(net.drives[JOINT].view.position)
+        (data,) = net.frames(POSITION_PDO, since=sync_time)
+        sent.append(struct.unpack_from('<i', data)[0] / SCALE)
+
+    net.network.on_feedback = note
+    net.run(0.3)
+    assert len(reported) == pytest.approx(30, abs=1)
+    assert reported[-1] - reported[0] > 0.25  # it moves
+    assert reported == pytest.approx(sent, abs=1e-9)
+
+
+STREAMED = pytest.mark.parametrize(
+    'mode',
+    [OperationMode.CYCLIC_POSITION, OperationMode.INTERPOLATED_POSITION],
+    ids=lambda m: m.name,
+)
+
+
+def with_window(window_inc: int | None) -> NodeConfig:
+    """Return a drive with a following error window (0x6065) in [inc], or without the object."""
+    config = drive_config(JOINT, NODE_ID)
+    if window_inc is not None:
+        return replace(config, sdo_writes=(*config.sdo_writes, sdo_write(0x6065, 0, window_inc)))
+    entries = (entry for entry in config.dictionary if entry.index != 0x6065)
+    return replace(config, dictionary=ObjectDictionary(entries))
+
+
+class Loaded:
+    """A drive whose position droops below what it is commanded, while it has power."""
+
+    def __init__(self, config: NodeConfig, mode: OperationMode) -> None:
+        """Enable it without its load."""
+        self.droop_inc = 0
+        self.net = VirtualNetwork(bus_config(config))
+        self.net.wire.alters = self._droops
+        self.net.boot()
+        self.net.enable(mode)
+
+    def _droops(self, sender: str, frame: Frame) -> Frame:
+        powered = self.state in (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
+        if frame.can_id != POSITION_PDO or not powered:
+            return frame
+        position, velocity = struct.unpack('<ii', frame.data)
+        return frame._replace(data=struct.pack('<ii', position - self.droop_inc, velocity))
+
+    @property
+    def state(self) -> DriveState:
+        """State of the simulated drive."""
+        return self.net.simulated().state
+
+    @property
+    def demand(self) -> float:
+        """Where the simulated drive holds the axis in [rad]."""
+        return self.net.motor()
+
+    @property
+    def errors(self) -> list[str]:
+        """What was reported as an error."""
+        return self.net.reported(Severity.ERROR)
+
+
+@STREAMED
+@pytest.mark.parametrize('window_inc', [1000, None, 0, 0xFFFF_FFFF])
+def test_a_droop_under_load_ends_in_one_stop(window_inc: int | None, mode: OperationMode) -> None:
+    """Set-points that stand are not moved; the axis is stopped and disabled, named once."""
+    loaded = Loaded(with_window(window_inc), mode)
+    loaded.droop_inc = 1500
+    before = loaded.demand
+    loaded.net.run(10.0)
+    assert loaded.demand == pytest.approx(before, abs=1e-3)
+    assert loaded.state is DriveState.SWITCH_ON_DISABLED
+    assert len(loaded.errors) == 1, loaded.errors
+    assert 'does not follow its set-points' in loaded.errors[0]
+
+
+@STREAMED
+def test_a_droop_within_the_window_of_the_drive_is_left_alone(mode: OperationMode) -> None:
+    """0x6065 says how far it may be away; nothing creeps meanwhile."""
+    loaded = Loaded(with_window(2000), mode)
+    loaded.droop_inc = 1500
+    before = loaded.demand
+    loaded.net.run(5.0)
+    assert loaded.demand == pytest.approx(before, abs=1e-3)
+    assert loaded.state is DriveState.OPERATION_ENABLED
+    assert not loaded.errors
+    loaded.net.target(0.5)
+    loaded.net.run(3.0)
+    assert loaded.demand == pytest.approx(0.5, abs=1e-3)
+    assert not loaded.errors
+
+
+@STREAMED
+def test_an_axis_that_droops_and_is_stopped_on_its_way_creeps_once_at_most(
+    mode: OperationMode,
+) -> None:
+    """It is held where it is; the load may pull it from there once, and then it is disabled."""
+    loaded = Loaded(with_window(None), mode)
+    loaded.net.target(5.0)
+    loaded.net.run(0.5)
+    loaded.droop_inc = 1500
+    lost = {0x200 + NODE_ID, 0x300 + NODE_ID, 0x400 + NODE_ID}
+    loaded.net.wire.loses = lambda sender, frame: frame.can_id in lost
+    loaded.net.run(1.0)
+    assert len(loaded.errors) == 1
+    stood = loaded.demand
+    loaded.net.wire.loses = lambda sender, frame: False
+    loaded.net.run(5.0)
+    assert abs(loaded.demand - stood) < 0.15 + 0.01
+    assert loaded.state is DriveState.SWITCH_ON_DISABLED
+    assert len(loaded.errors) == 2
+
+
+@pytest.mark.parametrize(('duration', 'stops'), [(0.3, False), (2.0, True)])
+def test_the_following_error_of_the_drive_counts(duration: float, *, stops: bool) -> None:
+    """Bit 13 of mode 8, where it lasts; a drive may show it in passing."""
+    loaded = Loaded(with_window(None), OperationMode.CYCLIC_POSITION)
+    end = loaded.net.now + duration
+
+    def show(sender: str, frame: Frame) -> Frame:
+        if frame.can_id != STATE_PDO or loaded.net.now > end:
+            return frame
+        word, mode = struct.unpack('<Hb', frame.data)
+        return frame._replace(data=struct.pack('<Hb', word | Statusword.FOLLOWING_ERROR, mode))
+
+    loaded.net.wire.alters = show
+    loaded.net.run(3.0)
+    assert (loaded.state is DriveState.SWITCH_ON_DISABLED) is stops
+    refusal = loaded.net.drives[JOINT].control.refusal
+    assert (refusal is not None and refusal.cause is RefusalCause.NOT_ENABLED) is stops
+    assert len(loaded.errors) == stops
+
+
+def judged(
+    setpoint: Callable[[float], float], position: Callable[[float], float], duration: float = 3.0
+) -> tuple[Following, float]:
+    """Return the first verdict that is not that it follows, and when it came in [s]."""
+    watch = FollowingWatch()
+    for cycle in range(round(duration / PERIOD)):
+        now = cycle * PERIOD
+        where = setpoint(now), position(now)
+        verdict = watch.judge(now, *where, margin=0.1, window=0.1, error=False)
+        if verdict is not Following.FOLLOWS:
+            return verdict, now
+    return Following.FOLLOWS, duration
+
+
+@pytest.mark.parametrize(
+    ('setpoint', 'position', 'verdict', 'time'),
+    [
+        (lambda t: t, lambda t: 0.0, Following.LEFT_BEHIND, 0.6),
+        (lambda t: t, lambda t: 0.95 * t - 0.05, Following.FOLLOWS, 3.0),
+        (lambda t: t, lambda t: t - 0.4, Following.FOLLOWS, 3.0),
+        (lambda t: t, lambda t: t - 0.8, Following.LASTING_ERROR, 1.0),
+        (lambda t: 1.0, lambda t: 0.8, Following.LASTING_ERROR, 1.0),
+        (lambda t: 1.0, lambda t: 0.95 - 0.1 * t, Following.LASTING_ERROR, 1.5),
+        (lambda t: 1.0, lambda t: 0.85 if 1.0 < t < 1.9 else 1.0, Following.FOLLOWS, 3.0),
+        (lambda t: 1e-4 * t, lambda t: 0.3, Following.LASTING_ERROR, 1.0),
+    ],
+    ids=['stuck', 'slow', 'lag', 'far behind', 'droop', 'creep', 'transient', 'noise'],
+)
+def test_verdicts(
+    setpoint: Callable[[float], float],
+    position: Callable[[float], float],
+    verdict: Following,
+    time: float,
+) -> None:
+    """Left behind is only who stands while the set-points move; the rest must not last."""
+    found, when = judged(setpoint, position)
+    assert found is verdict
+    assert when == pytest.approx(time, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ('setpoint', 'position', 'verdict'),
+    [
+        (0.5, 0.0, Following.LEFT_BEHIND),
+        (0.5, 0.45, Following.FOLLOWS),
+        (0.0, -0.5, Following.FOLLOWS),
+    ],
+    ids=['stuck', 'followed', 'droop'],
+)
+def test_an_axis_that_was_led_on_unseen_is_judged_by_its_first_position(
+    setpoint: float, position: float, verdict: Following
+) -> None:
+    """Set-points that moved meanwhile have left it behind; a droop may pass."""
+    watch = FollowingWatch()
+    limits = {'margin': 0.1, 'window': 0.1}
+    for cycle in range(10):
+        seen = watch.judge(cycle * PERIOD, 0.0, 0.0, error=False, **limits)
+        assert seen is Following.FOLLOWS
+    watch.lose_sight()
+    watch.lose_sight()
+    assert watch.judge(1.0, setpoint, position, error=False, **limits) is verdict
+
+
+def on_change(transmission: int = 255, *, timer: bool = True) -> NodeConfig:
+    """Return a drive whose TPDOs come on change, with or without event timers in its EDS."""
+    config = drive_config(JOINT, NODE_ID)
+    entries = [
+        entry
+        for entry in config.dictionary
+        if timer or not (entry.subindex == 5 and 0x1800 <= entry.index < 0x1A00)
+    ]
+    dictionary = ObjectDictionary(entries)
+    tpdos = tuple(
+        with_event_timer(replace(tpdo, transmission=transmission), dictionary)
+        for tpdo in config.tpdos
+    )
+    return replace(config, tpdos=tpdos, dictionary=dictionary)
+
+
+@STREAMED
+def test_a_drive_whose_tpdos_stop_to_come_on_change_is_not_fresh(mode: OperationMode) -> None:
+    """It is halted on its own ramp, as one that answers SYNC; at rest it stays fresh."""
+    led = Led(mode, Leader(), on_change())
+    led.lose(*TPDOS)
+    velocities = led.velocities()
+    assert min(velocities) > -0.02  # it is not thrown back to where it was seen last
+    assert velocities[-1] == pytest.approx(0.0, abs=1e-3)
+    assert led.source.losses[JOINT].cause is RefusalCause.SILENT
+    led.lose()
+    led.net.run(3.0)
+    assert led.net.drives[JOINT].control.accepts_targets
+    assert not [text for text in led.net.reported(Severity.WARNING) if 'nobody notices' in text]
+
+
+@STREAMED
+@pytest.mark.parametrize(
+    'config', [on_change(timer=False), on_change(0)], ids=['no timer', 'type 0']
+)
+def test_an_axis_is_not_held_at_a_position_of_unknown_age(
+    config: NodeConfig, mode: OperationMode
+) -> None:
+    """Where nothing shows that it is old, the drive is stopped by its own ramp, and disabled."""
+    led = Led(mode, Leader(), config)
+    (warning,) = [text for text in led.net.reported(Severity.WARNING) if 'nobody notices' in text]
+    assert 'TPDO 1, 2' in warning
+    led.lose(*TPDOS)
+    velocities = led.velocities()
+    assert min(velocities) > -0.02
+    assert velocities[-1] == pytest.approx(0.0, abs=1e-3)
+    led.net.run(5.0)
+    assert led.net.simulated().state is DriveState.SWITCH_ON_DISABLED
+
+
+def test_a_device_that_refuses_its_event_timer_is_named() -> None:
+    """It boots, and is not taken for silent when it only rests."""
+    without = on_change(timer=False).dictionary
+    config = replace(bus_config(on_change()), locations={(JOINT,): Place()})
+    net = VirtualNetwork(config, dictionaries={JOINT: without})
+    net.boot()
+    net.run(2.0)
+    assert net.drives[JOINT].view.fresh
+    warnings = [text for text in net.reported(Severity.WARNING) if 'nobody notices' in text]
+    assert len(warnings) == 1
+    net.power_off(JOINT)
+    net.run(0.5)
+    net.power_on(JOINT)
+    net.run_until(net.all_ready)
+    assert len([text for text in net.reported() if 'nobody notices' in text]) == 1
+
+
+def test_a_timer_that_is_taken_at_the_next_boot_counts_again() -> None:
+    """The loss is noticed from then on, and a device that refuses it once more is named again."""
+    net = VirtualNetwork(replace(bus_config(on_change()), locations={(JOINT,): Place()}))
+    refused = FaultInjection(Fault.SDO_ABORT, object=(0x1800, 5), abort=0x06090030)
+    net.start()
+    for refuses in (True, False, True):
+        begin = len(net.reported(Severity.WARNING))
+        net.power_off(JOINT)
+        net.run(0.5)
+        device = net.power_on(JOINT)
+        if refuses:
+            device.faults.inject(refused, net.now)
+        net.run_until(net.all_ready)
+        reported = net.reported(Severity.WARNING)[begin:]
+        assert any('TPDO 1: nobody notices' in text for text in reported) is refuses
+        net.run(2.0)
+        assert net.drives[JOINT].view.fresh
+        net.wire.loses = lambda sender, frame: frame.can_id == 0x180 + NODE_ID
+        net.run(1.0)
+        assert net.drives[JOINT].view.fresh is refuses
+        net.wire.loses = lambda sender, frame: False
+
+
+@pytest.mark.parametrize(
+    ('timer', 'inhibit', 'expected'),
+    [(0, 0, 0.1), (50, 0, 0.05), (10_000, 0, 0.1), (10_000, 2000, 0.4), (50, 2000, 0.4)],
+)
+def test_the_timer_of_the_eds_is_no_longer_than_ours(
+    timer: int, inhibit: int, expected: float
+) -> None:
+    """A loss is noticed after 0.3 s, unless the device sends less often (0x1800:03 in 0.1 ms)."""
+    config, defaults = drive_config(JOINT, NODE_ID), {(0x1800, 5): timer, (0x1800, 3): inhibit}
+    dictionary = with_defaults(config.dictionary, defaults)
+    tpdo = replace(config.tpdos[0], transmission=255)
+    assert with_event_timer(tpdo, dictionary).event_time == pytest.approx(expected)
+
+
+def test_a_drive_in_operation_is_taken_over_and_gets_its_event_timer() -> None:
+    """Its PDOs are those of the bus.yml all the same; its loss is noticed from then on."""
+    timed = replace(on_change(), reset_communication=False)
+    untimed = tuple(replace(tpdo, event_time=None) for tpdo in timed.tpdos)
+    net = booted(replace(timed, tpdos=untimed))
+    net.do(JOINT, 'init')
+    net._config = replace(bus_config(timed), locations={(JOINT,): Place()})
+    net.replace_master()
+    net.start()
+    net.run(2.0)
+    assert net.network.nodes[JOINT].taken_over
+    assert net.drives[JOINT].view.fresh
+    net.wire.loses = lambda sender, frame: frame.can_id in TPDOS
+    net.run(1.0)
+    assert not net.drives[JOINT].view.fresh
+
+
+def bus_with(
+    tmp_path: Path, tpdos: str, sync_period: int = 10_000, *, eds: Path | str = DRIVE_EDS
+) -> BusConfig:
+    """Return the bus of a drive with these TPDOs, and a time between two SYNCs in [us]."""
+    file = tmp_path / 'bus.yml'
+    master = f'{{node_id: 1, driver: ros2_canopen::MasterDriver, sync_period: {sync_period}}}'
+    file.write_text(
+        f'master: {master}\n'
+        f'joint1:\n  node_id: 2\n  dcf: {eds}\n'
+        f'  driver: ros2_canopen::Cia402Driver\n{tpdos}'
+    )
+    return load_bus(file)
+
+
+@pytest.mark.parametrize(
+    ('keys', 'time'),
+    [
+        ('transmission: 255', 0.1),
+        ('transmission: 254, inhibit_time: 2000', 0.4),
+        ('transmission: 255, event_timer: 30', 0.03),
+        ('transmission: 255, event_timer: 0', 0.0),
+        ('transmission: 0', None),
+        ('transmission: 1', None),
+    ],
+)
+def test_the_event_timer_by_default(tmp_path: Path, keys: str, time: float | None) -> None:
+    """It is set where it is needed and nobody has chosen, and tried only."""
+    bus = bus_with(tmp_path, f'  tpdo:\n    1: {{{keys}}}\n')
+    (node,) = bus.nodes
+    assert node.tpdos[0].event_time == time
+    writes = [write for write in boot_writes(bus, node) if write.address == (0x1800, 5)]
+    assert [struct.unpack('<H', write.data)[0] / 1000 for write in writes] == (
+        [] if time is None else [time]
+    )
+    assert [write.requested for write in writes] == ['event_timer' in keys] * len(writes)
+
+
+@pytest.mark.parametrize('sync_period', [10_000, 0])
+@pytest.mark.parametrize(
+    ('keys', 'lossy', 'lossy_without_sync'),
+    [
+        ('transmission: 255', False, False),
+        ('transmission: 255, event_timer: 0', True, True),
+        ('transmission: 0', True, True),
+        ('transmission: 1', False, True),
+        ('from EDS: 252', True, True),
+        ('from EDS: 253', True, True),
+    ],
+)
+def test_check_and_boot_name_what_may_get_lost(
+    tmp_path: Path, keys: str, sync_period: int, *, lossy: bool, lossy_without_sync: bool
+) -> None:
+    """The one before anything runs, at the place of the key, the other when it does."""
+    if keys.startswith('from EDS'):
+        eds = DRIVE_EDS.read_text().split('[1800sub2]')
+        eds[1] = re.sub('DefaultValue=.*', f'DefaultValue={keys[-3:]}', eds[1], count=1)
+        (tmp_path / 'other.eds').write_text('[1800sub2]'.join(eds))
+        bus = bus_with(tmp_path, '', sync_period, eds='other.eds')
+    else:
+        bus = bus_with(tmp_path, f'  tpdo:\n    1: {{{keys}}}\n', sync_period)
+    found = [str(problem) for problem in check_bus(bus).warnings]
+    expected = lossy if sync_period else lossy_without_sync
+    assert any('when TPDO 1 gets lost' in text for text in found) is expected
+    sync = SyncRound(lambda: None, period=bus.master.sync_period)
+    assert ReceivedTpdo(bus.nodes[0].tpdos[0], sync).loss_unnoticed is expected

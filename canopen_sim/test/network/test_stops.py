@@ -1,0 +1,797 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""An axis keeps its power until it stands, whatever ends its operation and whoever comes next."""
+
+from __future__ import annotations
+
+from itertools import count
+
+from bus_rig import booted, VirtualNetwork
+from diagnostic_msgs.msg import DiagnosticStatus
+from drive_samples import (
+    bus_config,
+    drive_config,
+    MOTION_WRITES,
+    PERIOD,
+    SCALE,
+    sdo_write,
+)
+from moving_drive import JOINT, MovingDrive, NODE_ID, RAMP, STANDING
+import pytest
+
+from arm_canopen import DriveError, DriveState, EventKind, OperationMode, Severity
+from arm_canopen.can import Frame
+from arm_canopen.cia402.drive_objects import DriveObjects
+from arm_canopen.cia402.status import drive_status
+from arm_canopen.cia402.stop_all import stop_all, StopReport
+from arm_canopen.cia402.stop_sequence import SHUTDOWN_MAX
+from arm_canopen.config.model.drive import RecoveryPolicy
+from arm_canopen.library.canopen_master import leave_device
+from arm_canopen.master.remote_node import BootPhase
+from arm_canopen.nodes.diagnostics import drive_diagnostic
+from arm_canopen.standard import NmtCommand
+
+pytestmark = pytest.mark.slow
+
+QUICK_STOP_ON_LOSS = (0x6007, 0, 3)  # the drive makes a quick stop when it misses the master
+
+SLOW_DISABLE = (0x6084, 0, round(SCALE / RAMP))  # [inc/s^2]: the ramp of 0x605C = 1
+
+
+def assert_braked(moving: MovingDrive, *states: DriveState) -> None:
+    """The drive went through these states, and had power at speed."""
+    assert moving.states == [DriveState.OPERATION_ENABLED, *states]
+    assert moving.fastest < STANDING
+
+
+def test_a_drive_that_makes_a_quick_stop_by_itself_brakes_to_the_end() -> None:
+    """It is not enabled again when the cause goes away; what may have been the cause is named."""
+    moving = MovingDrive(2, QUICK_STOP_ON_LOSS)
+    moving.device.connection_lost(moving.net.now)
+    moving.run(RAMP + 1.0)
+    assert_braked(moving, DriveState.QUICK_STOP_ACTIVE, DriveState.SWITCH_ON_DISABLED)
+    assert len(moving.errors) == 1, moving.errors
+    assert 'left Operation enabled by itself' in moving.errors[0]
+    assert 'is it at a limit switch' in moving.errors[0]
+    moving.net.do(JOINT, 'enable')
+    assert moving.device.state is DriveState.OPERATION_ENABLED
+
+
+def test_a_drive_that_holds_after_its_own_quick_stop_goes_on_holding() -> None:
+    """With 0x605A = 6 a load without brake would drop; `disable` takes the power away."""
+    moving = MovingDrive(6, QUICK_STOP_ON_LOSS)
+    moving.device.connection_lost(moving.net.now)
+    moving.run(RAMP + 1.0)
+    assert_braked(moving, DriveState.QUICK_STOP_ACTIVE)
+    moving.net.do(JOINT, 'disable', preempt=True)
+    assert moving.device.state is DriveState.SWITCH_ON_DISABLED
+
+
+@pytest.mark.parametrize('verb', ['halt', 'quick_stop', 'disable', 'shutdown'])
+@pytest.mark.parametrize('first', ['disable', 'quick_stop'])
+@pytest.mark.parametrize('option', [2, 6])
+def test_a_stop_during_a_stop_takes_no_power_from_what_still_moves(
+    option: int, first: str, verb: str
+) -> None:
+    """A second person may press another button while the axis brakes."""
+    moving = MovingDrive(option, SLOW_DISABLE)
+    moving.net.begin(JOINT, first, preempt=True)
+    moving.run(3 * PERIOD)
+    second = moving.net.begin(JOINT, verb, preempt=True)
+    moving.net.run_until(lambda: second.done)
+    second.result()
+    if verb in {'disable', 'shutdown'}:
+        assert moving.device.state in {DriveState.SWITCH_ON_DISABLED, DriveState.SWITCHED_ON}
+    moving.run(RAMP + 1.0)
+    assert moving.fastest < STANDING
+    assert abs(moving.net.speed()) < STANDING
+    holds = option == 6 and first == 'quick_stop' and verb in {'halt', 'quick_stop'}
+    assert (moving.device.state is DriveState.QUICK_STOP_ACTIVE) is holds
+    assert moving.device.state is not DriveState.OPERATION_ENABLED
+
+
+def test_a_disable_lasts_as_long_as_its_ramp() -> None:
+    """1 rad/s at 0.15 rad/s^2 takes 6.7 s, longer than a change of state without ramp may."""
+    moving = MovingDrive(2, (0x6084, 0, 1_500))
+    disabling = moving.net.begin(JOINT, 'disable', preempt=True)
+    moving.run(8.0)
+    disabling.result()
+    assert_braked(moving, DriveState.SWITCHED_ON)
+
+
+def test_a_disable_whose_ramp_does_not_end_becomes_a_quick_stop() -> None:
+    """The drive brakes slower than its objects say; the power goes when it stands."""
+    moving = MovingDrive(2, SLOW_DISABLE)
+    moving.net.devices[JOINT].store.find(0x6084).value = 500
+    disabling = moving.net.begin(JOINT, 'disable', preempt=True)
+    moving.run(12.0)
+    assert 'Switch on disabled' in disabling.result()
+    assert_braked(moving, DriveState.QUICK_STOP_ACTIVE, DriveState.SWITCH_ON_DISABLED)
+
+
+@pytest.mark.parametrize('option', [2, 6])
+def test_a_new_master_waits_for_the_quick_stop_that_it_finds(option: int) -> None:
+    """The drive has begun it at the loss of the master before."""
+    moving = MovingDrive(option, QUICK_STOP_ON_LOSS, kept_alive=True)
+    moving.device.connection_lost(moving.net.now)
+    moving.net.replace_master()
+    moving.net.start()
+    moving.run(RAMP + 3.0)
+    assert_braked(moving, DriveState.QUICK_STOP_ACTIVE, DriveState.SWITCH_ON_DISABLED)
+
+
+RPDOS = {0x200 + NODE_ID, 0x300 + NODE_ID, 0x400 + NODE_ID}
+
+OPTIONS = pytest.mark.parametrize('option', [2, 6], ids=['605A=2', '605A=6'])
+
+
+def inject(
+    monkeypatch: pytest.MonkeyPatch,
+    owner: object,
+    attribute: str,
+    *,
+    times: float = float('inf'),
+) -> None:
+    """Let something fail from now on, with another text each time."""
+    original, number = getattr(owner, attribute), count()
+
+    def broken(*args: object, **settings: object) -> object:
+        failures = next(number)
+        if failures < times:
+            raise ZeroDivisionError(f'injected {failures}')
+        return original(*args, **settings)
+
+    monkeypatch.setattr(owner, attribute, broken)
+
+
+def owner_of(failing: MovingDrive, place: str) -> tuple[object, str]:
+    """Return the object and its attribute that a failure is injected into."""
+    drive = failing.net.drives[JOINT]
+    rpdo = failing.net.network.nodes[JOINT].image.rpdos[-1]
+    return {
+        'mode': (drive.control.mode, 'step'),
+        'write': (drive, 'write'),
+        'read': (drive, 'read'),
+        'controlword': (drive.objects.controlword, 'write'),
+        'RPDO': (rpdo, '_pack'),
+    }[place]
+
+
+def assert_stopped_once(failing: MovingDrive) -> None:
+    """Quick stop, rest, disable; never without power at speed, and reported once."""
+    assert failing.states == [
+        DriveState.OPERATION_ENABLED,
+        DriveState.QUICK_STOP_ACTIVE,
+        DriveState.SWITCH_ON_DISABLED,
+    ]
+    assert failing.fastest < STANDING
+    assert len(failing.errors) == 1, failing.errors
+
+
+@OPTIONS
+@pytest.mark.parametrize('times', [1, float('inf')], ids=['once', 'for ever'])
+@pytest.mark.parametrize('place', ['mode', 'write', 'controlword', 'RPDO'])
+def test_the_power_goes_when_the_axis_stands(
+    place: str, times: float, option: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever 0x605A says: it is never without power at speed, nor powered for good."""
+    failing = MovingDrive(option)
+    inject(monkeypatch, *owner_of(failing, place), times=times)
+    failing.run(RAMP + 2.0)
+    assert_stopped_once(failing)
+    unreachable = place == 'RPDO' or (place == 'controlword' and times > 1)
+    assert failing.controlwords_by_sdo == ([2, 0] if unreachable else [])
+
+
+def test_a_drive_that_cannot_be_seen_loses_its_power_at_the_deadline(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is not waited for for ever that it stands."""
+    failing = MovingDrive(6)
+    inject(monkeypatch, *owner_of(failing, 'read'))
+    failing.run(RAMP + 3.0)
+    assert failing.states[-1] is DriveState.SWITCH_ON_DISABLED
+    assert failing.fastest < STANDING
+    assert len([text for text in failing.errors if 'injected' in text]) == 1
+
+
+@OPTIONS
+def test_a_deaf_drive_is_stopped_by_sdo_and_not_enabled_by_what_comes_later(
+    option: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its RPDOs are kept back before the SDO leaves: none that gets through ends the stop."""
+    failing = MovingDrive(option)
+    lose(failing, *RPDOS)
+    inject(monkeypatch, *owner_of(failing, 'mode'), times=1)
+    failing.run(0.4)
+    assert not failing.controlwords_by_sdo
+    failing.run(0.4)
+    lose(failing)
+    failing.run(RAMP + 2.0)
+    assert failing.states[-1] is DriveState.SWITCH_ON_DISABLED
+    assert DriveState.OPERATION_ENABLED not in failing.states[1:]
+    assert failing.controlwords_by_sdo == [2, 0]
+    failing.net.do(JOINT, 'enable')
+    assert failing.device.state is DriveState.OPERATION_ENABLED
+
+
+def test_an_axis_is_stopped_whose_rpdo_is_kept_back_with_another_axis(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It would go on with the last controlword that it got; enabling it frees no RPDO."""
+    failing = MovingDrive(6)
+    other = DriveObjects(failing.net.network.nodes[JOINT])
+    other.mute_controlword()
+    failing.run(RAMP + 1.0)
+    assert failing.states[-1] is DriveState.SWITCH_ON_DISABLED
+    assert failing.fastest < STANDING
+    assert failing.controlwords_by_sdo == [2, 0]
+    assert len(failing.errors) == 1
+    with pytest.raises(DriveError, match='did not reach Operation enabled'):
+        failing.net.do(JOINT, 'enable')
+    assert other.controlword_muted, 'the RPDO carries what the other axis must not get'
+    other.unmute_controlword()
+    failing.net.do(JOINT, 'enable')
+
+
+def test_a_drive_that_is_gone_is_not_said_to_move_on() -> None:
+    """As long as its heartbeat is not overdue, it is silent: that is what is reported."""
+    failing = MovingDrive(6)
+    others = {0x180 + NODE_ID, 0x280 + NODE_ID, 0x380 + NODE_ID, 0x480 + NODE_ID, 0x580 + NODE_ID}
+    lose(failing, *others)
+    with pytest.raises(DriveError, match='no TPDOs for'):
+        failing.net.do(JOINT, 'shutdown', preempt=True)
+    assert not [text for text in failing.net.reported() if 'did not come to rest' in text]
+    (silent,) = [text for text in failing.errors if 'has sent no TPDO for' in text]
+    assert 'Check its power and cable' in silent
+
+
+def test_a_stop_by_sdo_waits_for_no_other_sdo(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither for those in the queue nor for answers that get lost."""
+    failing = MovingDrive(6)
+    lose(failing, 0x580 + NODE_ID)
+    node = failing.net.network.nodes[JOINT]
+    for _ in range(30):
+        node.sdo.read(0x1018, 1, 0.2)
+    inject(monkeypatch, *owner_of(failing, 'RPDO'))
+    failing.run(2 * PERIOD)
+    assert failing.device.state is DriveState.QUICK_STOP_ACTIVE
+    failing.run(RAMP + 0.5)
+    assert failing.states[-1] is DriveState.SWITCH_ON_DISABLED
+    assert failing.fastest < STANDING
+
+
+@pytest.mark.parametrize('verb', ['', 'shutdown'])
+def test_a_stop_whose_sdo_is_not_answered_goes_by_rpdo_again(
+    verb: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What kept its RPDO back was over at once; a shutdown ends the stop as well."""
+    failing = MovingDrive(6)
+    inject(monkeypatch, *owner_of(failing, 'controlword'), times=2)
+    lose(failing, 0x600 + NODE_ID)
+    if verb:
+        failing.net.begin(JOINT, verb, preempt=True)
+    failing.run(RAMP + 3.0)
+    assert_stopped_once(failing)
+
+
+def test_a_shutdown_begins_by_rpdo_and_says_when_the_drive_keeps_its_power(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The stop before has ended with the RPDO kept back, and no SDO is answered."""
+    failing = MovingDrive(6)
+    lose(failing, *RPDOS, 0x600 + NODE_ID)
+    inject(monkeypatch, *owner_of(failing, 'controlword'), times=2)
+    failing.run(10.0)
+    with pytest.raises(DriveError, match='joint1 is not disabled; cut its power'):
+        failing.net.do(JOINT, 'shutdown', preempt=True)
+    failing.net.drives[JOINT].objects.mute_controlword()
+    lose(failing, 0x600 + NODE_ID)
+    failing.net.do(JOINT, 'shutdown', preempt=True)
+    assert failing.device.state is DriveState.SWITCH_ON_DISABLED
+
+
+@pytest.mark.parametrize('lost', [False, True], ids=['receives', 'deaf'])
+@pytest.mark.parametrize('nmt', [NmtCommand.START, NmtCommand.ENTER_PRE_OPERATIONAL])
+def test_a_device_watches_the_master_until_its_motor_was_seen_to_stand(
+    nmt: NmtCommand, *, lost: bool
+) -> None:
+    """When the master ends, its heartbeat is the last that can stop the drive."""
+    moving = turning(6)
+    net, node = moving.net, moving.net.network.nodes[JOINT]
+    node.watch_slot = 1
+    net.network.send_nmt(nmt, NODE_ID)
+    moving.run(0.3)
+    lose(moving, *([*RPDOS, 0x600 + NODE_ID] if lost else []))
+    assert abs(net.speed()) == pytest.approx(1.0, rel=0.05)
+
+    def unwatched() -> bool:
+        requests = net.frames(0x600 + NODE_ID, since=moving.began)
+        return any(data[1:4] == b'\x16\x10\x01' for data in requests)
+
+    scheduler = net.network.scheduler
+    leaving = scheduler.spawn(leave_device(node, [net.commands[JOINT]], scheduler))
+    net.run_until(lambda: leaving.done or unwatched(), SHUTDOWN_MAX)
+    assert (abs(net.speed()) < STANDING) is unwatched() is not lost
+    assert leaving.done is lost
+    if lost:
+        with pytest.raises(DriveError, match='cut its power'):
+            leaving.result()
+
+
+def test_a_drive_that_could_not_be_stopped_is_not_said_to_be_enabled(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is still in Operation Enabled; and the next failure stops it as the first one would."""
+    failing = MovingDrive(6)
+    inject(monkeypatch, *owner_of(failing, 'controlword'), times=3)
+    lose(failing, *RPDOS, 0x600 + NODE_ID)
+    failing.run(10.0)
+    with pytest.raises(DriveError, match='could not be stopped; cut its power'):
+        failing.net.do(JOINT, 'enable')
+    lose(failing)
+    failing.net.do(JOINT, 'enable')
+    failing.net.target(50.0)
+    failing.net.run(0.6)
+    assert failing.net.speed() == pytest.approx(1.0, rel=0.05)
+    failing.states = [DriveState.OPERATION_ENABLED]
+    reported = len(failing.errors)
+    failing.net.drives[JOINT].fail(ZeroDivisionError())
+    failing.run(RAMP + 1.0)
+    assert failing.states[1:] == [DriveState.QUICK_STOP_ACTIVE, DriveState.SWITCH_ON_DISABLED]
+    assert failing.fastest < STANDING
+    assert len(failing.errors) == reported + 1
+
+
+@pytest.mark.parametrize('verb', ['', 'disable'], ids=['by itself', 'by a request'])
+def test_a_drive_that_keeps_its_power_is_stopped_as_soon_as_it_can_be(
+    verb: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither RPDO nor SDO reaches it at first: that is reported once, with the remedy."""
+    failing = MovingDrive(6)
+    inject(monkeypatch, *owner_of(failing, 'controlword'))
+    lose(failing, 0x600 + NODE_ID)
+    failing.run(20.0)
+    assert failing.states == [DriveState.OPERATION_ENABLED]
+    assert len(failing.errors) == 3, failing.errors
+    assert 'Cut its power' in failing.errors[-1]
+    lose(failing)
+    if verb:
+        failing.net.do(JOINT, verb, preempt=True)
+    else:
+        failing.run(8.0)
+    assert failing.device.state is DriveState.SWITCH_ON_DISABLED
+    assert abs(failing.net.speed()) < STANDING
+    assert failing.fastest < STANDING
+    assert len(failing.errors) == 3, failing.errors
+
+
+@pytest.mark.parametrize('cycles', range(1, 4))
+def test_a_failure_while_it_is_enabled_stays_named_until_the_next_enabling(
+    cycles: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where the drive comes to Operation Enabled by a command that was on its way."""
+    failing = MovingDrive(6)
+    failing.net.do(JOINT, 'shutdown', preempt=True)
+    enabling = failing.net.begin(JOINT, 'enable')
+    drive = failing.net.drives[JOINT]
+    failing.net.run_until(lambda: bool(drive.control._controlword & 0x8))
+    failing.net.run(PERIOD * (cycles - 1))
+    drive.fail(ZeroDivisionError('injected'))
+    failing.run(RAMP + 1.0)
+    with pytest.raises(DriveError, match='injected'):
+        enabling.result()
+    assert failing.device.state is DriveState.SWITCH_ON_DISABLED
+    assert 'injected' in drive.failure
+    assert len(failing.errors) == 1, failing.errors
+
+
+def test_nothing_enables_a_drive_while_it_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A command is refused, a stop waits for the end; then a command does."""
+    failing = MovingDrive(6)
+    inject(monkeypatch, *owner_of(failing, 'mode'), times=1)
+    failing.run(0.2)
+    for verb in ('init', 'enable', 'recover', 'home'):
+        with pytest.raises(DriveError, match='being stopped'):
+            failing.net.do(JOINT, verb)
+    status = drive_status(failing.net.drives[JOINT], failing.net.now)
+    assert drive_diagnostic('bus', status).level == DiagnosticStatus.ERROR
+    assert 'injected' in status.summary
+    failing.net.do(JOINT, 'disable', preempt=True)
+    assert failing.device.state == DriveState.SWITCH_ON_DISABLED
+    assert abs(failing.net.speed()) < STANDING
+    failing.net.do(JOINT, 'enable')
+    assert failing.net.drives[JOINT].view.state is DriveState.OPERATION_ENABLED
+    assert not drive_status(failing.net.drives[JOINT], failing.net.now).failure
+
+
+def test_what_goes_wrong_after_it_was_enabled_again_is_named_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each enabling may fail once in the log."""
+    failing = MovingDrive(2)
+    for number in (1, 2):
+        inject(monkeypatch, *owner_of(failing, 'mode'))
+        failing.run(RAMP + 1.0)
+        assert len(failing.errors) == number
+        monkeypatch.undo()
+        failing.net.do(JOINT, 'enable')
+        failing.run(0.5)
+
+
+def test_texts_with_values_do_not_flood_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither those of devices without a drive nor those of the cycle."""
+    failing = MovingDrive(2)
+    node = failing.net.network.nodes[JOINT]
+    node.on_failed.clear()
+    inject(monkeypatch, node, 'expect_answers')
+    inject(monkeypatch, failing.net.network._heartbeat, 'advance')
+    failing.run(1.0)
+    assert len(failing.errors) == 2, failing.errors
+
+
+MOVES, RESTS, HOMES, WAITS, DIES = NAMES = ('moves', 'rests', 'homes', 'waits', 'dies')
+
+
+def test_all_drives_stand_and_it_says_what_became_of_each() -> None:
+    """A move, a homing, rest, no power; one without an answer keeps no other from it."""
+    writes = (*MOTION_WRITES, sdo_write(0x6099, 1, 5_000))
+    drives = (drive_config(name, 2 + n, sdo_writes=writes) for n, name in enumerate(NAMES))
+    net = booted(*drives)
+    for name in (MOVES, RESTS, HOMES, DIES):
+        net.enable(OperationMode.PROFILE_POSITION, name)
+    homing = net.home(17, HOMES)
+    net.target(30.0, MOVES)
+    net.run(0.5)
+    net.power_off(DIES)
+    net.run(0.5)
+    assert {name for name in NAMES if name in net.devices and abs(net.speed(name))} == {
+        MOVES,
+        HOMES,
+    }
+    assert not homing.done
+    report = stop(net)
+    assert (report.stopped, report.standing) == ((MOVES, HOMES), (RESTS,))
+    assert report.unpowered == (WAITS,)
+    assert 'ended by halt' in str(homing.error)
+    assert str(report).startswith(f'NOT known to stand: {DIES} is not seen to come to rest')
+    enabled = [
+        name for name in net.devices if net.simulated(name).state is DriveState.OPERATION_ENABLED
+    ]
+    assert enabled == [MOVES, RESTS, HOMES]
+    for _ in range(200):
+        net.run(PERIOD)
+        assert all(abs(net.speed(name)) < STANDING for name in net.devices)
+    again = stop(net)
+    assert (again.stopped, again.standing) == ((), (MOVES, RESTS, HOMES))
+
+
+@pytest.mark.parametrize('nmt', [NmtCommand.ENTER_PRE_OPERATIONAL, NmtCommand.STOP])
+@pytest.mark.parametrize('lost', [(), (0x582,)], ids=['SDO', 'no SDO'])
+def test_a_device_without_pdos_is_stopped_by_sdo(nmt: NmtCommand, lost: tuple[int, ...]) -> None:
+    """Stopped it takes none before it is pre-operational; unanswered, its rest is unknown."""
+    writes = (*MOTION_WRITES, sdo_write(0x6007, 0, 0), sdo_write(0x605A, 0, 6))
+    net = booted(drive_config(MOVES, 2, sdo_writes=writes))
+    net.enable(OperationMode.PROFILE_VELOCITY, MOVES)
+    net.target(0.5, MOVES)
+    net.run(0.5)
+    net.network.send_nmt(nmt, 2)
+    net.run(0.3)
+    assert abs(net.speed(MOVES)) == pytest.approx(0.5)
+    net.wire.loses = lambda sender, frame: frame.can_id in lost
+    report = stop(net)
+    assert abs(net.speed(MOVES)) < STANDING
+    if lost:
+        assert report == StopReport((), (), (), report.failed)
+        assert report.failed[0].startswith(f'{MOVES} is not seen to come to rest; ')
+        assert 'NMT state PRE_OPERATIONAL' in report.failed[0]
+        return
+    assert report == StopReport((MOVES,), (), (), ())
+    assert net.simulated(MOVES).state is DriveState.QUICK_STOP_ACTIVE
+
+
+def test_a_second_stop_does_not_spoil_the_answer_of_the_first() -> None:
+    """Two people press it: both answers are right, and it was stopped once."""
+    net = booted(drive_config(MOVES, 2))
+    net.enable(OperationMode.PROFILE_POSITION, MOVES)
+    net.target(3.0, MOVES)
+    net.run(0.5)
+    scheduler, commands = net.network.scheduler, list(net.commands.values())
+    first = scheduler.spawn(stop_all(commands, scheduler))
+    net.run(0.02)
+    assert not first.done
+    second = scheduler.spawn(stop_all(commands, scheduler))
+    assert net.result(second).stopped == (MOVES,)
+    assert net.result(first) == StopReport((MOVES,), (), (), ())
+
+
+def test_a_quick_stop_in_progress_is_waited_for() -> None:
+    """A halt leaves it alone; the answer comes when the motor stands, and not before."""
+    moving = MovingDrive(option=6)  # stays in Quick Stop Active
+    moving.net.begin(JOINT, 'quick_stop', preempt=True)
+    moving.net.run(3 * PERIOD)
+    assert abs(moving.net.speed()) > 0.8
+    report = stop(moving.net)
+    assert abs(moving.net.speed()) < STANDING
+    assert report == StopReport((JOINT,), (), (), ())
+    assert moving.net.drives[JOINT].view.state is DriveState.QUICK_STOP_ACTIVE
+
+
+def test_the_reaction_to_a_fault_is_waited_for() -> None:
+    """It brakes by itself, under power; only then nothing moves it."""
+    moving = MovingDrive()
+    moving.device.raise_fault(0x2310, moving.net.now)
+    moving.net.run(3 * PERIOD)
+    assert moving.net.drives[JOINT].view.state is DriveState.FAULT_REACTION_ACTIVE
+    report = stop(moving.net)
+    assert abs(moving.net.speed()) < STANDING
+    assert report == StopReport((), (), (f'{JOINT} (faulted)',), ())
+    assert stop(moving.net) == report
+
+
+@pytest.mark.parametrize('begins', ['quick_stop', 'fault'])
+def test_what_does_not_come_to_rest_is_said(begins: str) -> None:
+    """A ramp that takes a minute: within some seconds the answer is that it moves."""
+    moving = MovingDrive(6, (0x6085, 0, round(SCALE / 60)))
+    if begins == 'fault':
+        moving.device.raise_fault(0x2310, moving.net.now)
+    else:
+        moving.net.begin(JOINT, 'quick_stop', preempt=True)
+    moving.net.run(3 * PERIOD)
+    report = stop(moving.net)
+    assert abs(moving.net.speed()) > 0.5
+    assert report.failed[0].startswith(f'{JOINT} is not seen to come to rest')
+    assert report == StopReport((), (), (), report.failed)
+
+
+def test_it_is_there_before_and_while_devices_boot() -> None:
+    """What is not booted yet is not known to stand, and is not enabled by what came before."""
+    net = VirtualNetwork(bus_config(drive_config(MOVES, 2), drive_config(RESTS, 3)))
+    net.start()
+    assert len(stop(net).failed) == 2
+    net.run_until(lambda: net.drives[MOVES].node.phase is BootPhase.CONFIGURING)
+    assert f'NOT known to stand: {MOVES} is not known to stand, as it was never' in str(stop(net))
+    net.run_until(net.all_ready)
+    assert stop(net) == StopReport((), (), (MOVES, RESTS), ())
+
+
+def stop(net: VirtualNetwork) -> StopReport:
+    """Stop all drives."""
+    scheduler = net.network.scheduler
+    report = net.result(scheduler.spawn(stop_all(list(net.commands.values()), scheduler)))
+    assert isinstance(report, StopReport)
+    return report
+
+
+def lose(moving: MovingDrive, *cob_ids: int) -> None:
+    """Lose all frames of some identifiers of the device from now on."""
+    moving.net.wire.loses = lambda sender, frame: frame.can_id in cob_ids
+
+
+def turning(option: int, *writes: tuple[int, int, int]) -> MovingDrive:
+    """Return a drive that turns on without set-points, whatever becomes of its master."""
+    return MovingDrive(option, (0x6007, 0, 0), *writes, mode=OperationMode.PROFILE_VELOCITY)
+
+
+def nmt_commands(moving: MovingDrive) -> list[int]:
+    """Return the NMT commands since it moved."""
+    return [data[0] for data in moving.net.frames(0x000, since=moving.began)]
+
+
+def test_a_late_heartbeat_stops_nothing_while_tpdos_come() -> None:
+    """It is reported, and the device is neither lost nor configured anew."""
+    moving = MovingDrive()
+    lose(moving, 0x700 + NODE_ID)
+    moving.run(0.45)  # of a consumer time of 0.3
+    lose(moving)
+    moving.run(1.0)
+    assert moving.states == [DriveState.OPERATION_ENABLED]
+    assert nmt_commands(moving) == []
+    assert moving.errors == []
+    assert all(event.kind is not EventKind.HEARTBEAT_LOST for event in moving.net.events)
+    late = [text for text in moving.net.reported(Severity.WARNING) if 'heartbeat lost' in text]
+    assert len(late) == 1
+    assert 'but its TPDOs come' in late[0]
+
+
+@OPTIONS
+def test_a_heartbeat_that_is_gone_brakes_the_axis_before_its_device_is_configured(
+    option: int,
+) -> None:
+    """Quick stop, rest, disable, and only then Pre-operational."""
+    moving = MovingDrive(option)
+    lose(moving, 0x700 + NODE_ID)
+    moving.run(RAMP)
+    assert nmt_commands(moving) == []
+    moving.run(RAMP)
+    assert moving.states == [
+        DriveState.OPERATION_ENABLED,
+        DriveState.QUICK_STOP_ACTIVE,
+        DriveState.SWITCH_ON_DISABLED,
+    ]
+    assert moving.fastest < STANDING
+    assert nmt_commands(moving)[:1] == [NmtCommand.ENTER_PRE_OPERATIONAL]
+    assert [text for text in moving.errors if 'stopping: heartbeat lost' in text]
+    lose(moving)
+    moving.net.run_until(moving.net.all_ready)
+    assert moving.net.drives[JOINT].failure == ''
+
+
+@pytest.mark.parametrize('policy', list(RecoveryPolicy), ids=lambda policy: policy.value)
+@pytest.mark.parametrize('returns', [RAMP / 2, 3 * RAMP], ids=['while it brakes', 'after it'])
+def test_a_drive_without_heartbeat_is_given_back_by_policy(
+    returns: float, policy: RecoveryPolicy
+) -> None:
+    """Its device is lost and booted again, also when the heartbeat comes while it brakes."""
+    moving = MovingDrive(recovery=policy)
+    lose(moving, 0x700 + NODE_ID)
+    while moving.device.state is DriveState.OPERATION_ENABLED:
+        moving.run(PERIOD)
+    moving.run(returns)
+    lose(moving)
+    moving.net.run_until(lambda: not moving.net.network.nodes[JOINT].operational)
+    moving.net.run_until(moving.net.all_ready)
+    drive = moving.net.drives[JOINT]
+    assert drive.failure == ''
+    moving.net.run(1.0)
+    assert drive.control.accepts_targets is (policy is RecoveryPolicy.AUTO)
+    assert abs(moving.net.speed()) < STANDING
+
+
+def test_a_device_that_is_commanded_away_while_it_brakes_is_left_there() -> None:
+    """Its heartbeat is back, so it is not booted, and its drive is enabled no more."""
+    moving = MovingDrive(recovery=RecoveryPolicy.AUTO)
+    net = moving.net
+    lose(moving, 0x700 + NODE_ID)
+    while moving.device.state is DriveState.OPERATION_ENABLED:
+        moving.run(PERIOD)
+    lose(moving)
+    net.network.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, NODE_ID)
+    moving.run(3.0 * RAMP)
+    assert nmt_commands(moving) == [NmtCommand.ENTER_PRE_OPERATIONAL]
+    net.network.send_nmt(NmtCommand.RESET_NODE, NODE_ID)
+    net.run(3.0)
+    assert net.all_ready()
+    assert moving.device.state is DriveState.SWITCH_ON_DISABLED
+
+
+@OPTIONS
+@pytest.mark.parametrize('begins', ['NMT', 'silence'])
+def test_an_axis_that_turns_when_its_device_starts_is_braked(begins: str, option: int) -> None:
+    """The first controlword that it gets is no 0, which would let it coast."""
+    moving = turning(option)
+    if begins == 'NMT':
+        moving.net.network.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, NODE_ID)
+        moving.run(0.5)
+        moving.net.network.send_nmt(NmtCommand.START, NODE_ID)
+    else:
+        moving.net.wire.loses = lambda sender, frame: True
+        moving.run(0.5)
+        lose(moving)
+    moving.net.run_until(lambda: not moving.net.network.nodes[JOINT].operational)
+    moving.run(RAMP + 3.0)
+    assert moving.fastest < STANDING
+    assert moving.states[1:] == [DriveState.QUICK_STOP_ACTIVE, DriveState.SWITCH_ON_DISABLED]
+    moving.net.run_until(moving.net.all_ready)
+    moving.net.do(JOINT, 'enable')
+
+
+@OPTIONS
+@pytest.mark.parametrize('receives', [True, False], ids=['receives', 'cut off'])
+def test_a_device_that_comes_back_in_motion_is_braked_before_it_is_configured(
+    option: int, *, receives: bool
+) -> None:
+    """Nothing of it arrived for a while; one that still receives was stopped meanwhile."""
+    moving = turning(option)
+    moving.net.wire.loses = lambda sender, frame: sender == JOINT or not receives
+    moving.run(0.6)
+    assert not moving.net.network.nodes[JOINT].online
+    assert (moving.device.state is DriveState.OPERATION_ENABLED) is not receives
+    lose(moving)
+    while not nmt_commands(moving):
+        moving.run(PERIOD)
+    assert abs(moving.net.speed()) < STANDING
+    assert moving.fastest < STANDING
+    moving.net.run_until(moving.net.all_ready)
+
+
+@OPTIONS
+def test_a_device_that_leaves_operational_by_itself_in_motion_is_braked_at_once(
+    option: int,
+) -> None:
+    """By SDO, not after the pause before its boot."""
+    moving = turning(option)
+    unseen = Frame(0x000, bytes((NmtCommand.ENTER_PRE_OPERATIONAL, NODE_ID)))
+    moving.net.devices[JOINT].receive(unseen, moving.net.now)
+    moving.run(0.2)
+    assert moving.device.state is DriveState.QUICK_STOP_ACTIVE
+    requests = moving.net.frames(0x600 + NODE_ID, since=moving.began)
+    assert not any(data[0] == 0x80 for data in requests), 'an abort could undo the stop'
+    moving.run(RAMP + 2.0)
+    assert moving.net.all_ready()
+    assert moving.fastest < STANDING
+    assert moving.states[1:] == [DriveState.QUICK_STOP_ACTIVE, DriveState.SWITCH_ON_DISABLED]
+
+
+@pytest.mark.parametrize('option', [2, 5, 6, 7])
+def test_a_quick_stop_at_rest_ends_where_its_option_says(option: int) -> None:
+    """With 5 to 7 the axis is held in Quick stop active, although there was nothing to brake."""
+    writes = (*MOTION_WRITES, sdo_write(0x605A, 0, option))
+    net = booted(drive_config(JOINT, NODE_ID, sdo_writes=writes))
+    net.enable(OperationMode.PROFILE_POSITION)
+    net.do(JOINT, 'quick_stop', preempt=True)
+    net.run(1.0)
+    state = DriveState.SWITCH_ON_DISABLED if option == 2 else DriveState.QUICK_STOP_ACTIVE
+    assert net.drives[JOINT].view.state is net.simulated().state is state
+
+
+def test_a_stop_without_end_is_not_waited_for_for_ever() -> None:
+    """With next to no deceleration the power goes after the longest time, and that is said."""
+    moving = MovingDrive(6, (0x6085, 0, 100))
+    net = moving.net
+    net.do(JOINT, 'shutdown', preempt=True)
+    assert net.now - moving.began <= SHUTDOWN_MAX
+    assert net.drives[JOINT].view.state is DriveState.SWITCH_ON_DISABLED
+    assert [text for text in net.reported() if 'did not come to rest' in text]
+
+
+@pytest.mark.parametrize(
+    ('mode', 'option', 'ramp', 'halted'),
+    [
+        (OperationMode.PROFILE_POSITION, 1, 0.5, False),
+        (OperationMode.PROFILE_POSITION, 6, 0.5, True),
+        (OperationMode.PROFILE_POSITION, 2, 6.7, False),  # longer than any other time-out
+        (OperationMode.PROFILE_POSITION, 6, 6.7, False),
+        (OperationMode.PROFILE_VELOCITY, 2, 0.5, True),
+        (OperationMode.PROFILE_VELOCITY, 5, 0.5, False),
+        (OperationMode.CYCLIC_POSITION, 5, 0.5, True),
+        (OperationMode.CYCLIC_POSITION, 2, 0.5, False),
+        (OperationMode.INTERPOLATED_POSITION, 1, 0.5, True),
+        (OperationMode.INTERPOLATED_POSITION, 6, 0.5, False),
+    ],
+)
+def test_shutdown_never_lets_a_moving_axis_go(
+    mode: OperationMode, option: int, ramp: float, *, halted: bool
+) -> None:
+    """Whatever 0x605A says, and also in the middle of a quick stop: rest first, then no power."""
+    ramps = ((index, 0, round(SCALE / ramp)) for index in (0x6084, 0x6085))
+    moving = MovingDrive(option, *ramps, mode=mode)
+    if halted:
+        moving.net.begin(JOINT, 'quick_stop', preempt=True)
+        moving.run(0.05)
+        assert abs(moving.net.speed()) > 0.1
+    running = moving.net.begin(JOINT, 'shutdown', preempt=True)
+    moving.run(0.9 * ramp - 0.1)
+    assert not running.done
+    moving.run(2.0)
+    running.result()
+    assert moving.states[-1] is DriveState.SWITCH_ON_DISABLED
+    assert moving.fastest < STANDING
+    assert not [text for text in moving.net.reported() if 'did not come to rest' in text]
+
+
+def test_shutdown_of_a_drive_that_is_off_or_faulted_ends_at_once() -> None:
+    """It is seen to stand without power, so nothing has to be waited for."""
+    net = booted(drive_config(JOINT, NODE_ID))
+    assert 'Switch on disabled' in net.do(JOINT, 'shutdown', timeout=0.1)
+    net.enable(OperationMode.PROFILE_POSITION)
+    net.simulated().raise_fault(0x4210, net.now)
+    net.run(0.5)
+    assert 'Fault' in net.do(JOINT, 'shutdown', timeout=0.1)
+
+
+@pytest.mark.parametrize('gone', [True, False], ids=['no power', 'moves on'])
+def test_shutdown_of_a_lost_drive_is_no_success_unless_its_rest_is_seen(*, gone: bool) -> None:
+    """A device without an answer may move; one whose heartbeat alone is lost is stopped by SDO."""
+    moving = MovingDrive(mode=OperationMode.PROFILE_VELOCITY)
+    if gone:
+        moving.net.power_off(JOINT)
+        moving.net.run(1.0)
+        with pytest.raises(DriveError, match='not disabled; cut its power: offline'):
+            moving.net.do(JOINT, 'shutdown', timeout=5.0)
+        return
+    lose(moving, 0x180 + NODE_ID, 0x280 + NODE_ID, 0x700 + NODE_ID)
+    moving.net.run(0.4)
+    assert 'Switch on disabled' in moving.net.do(JOINT, 'shutdown', timeout=5.0)
+    assert abs(moving.net.speed()) < 1e-3
+    assert moving.device.state is DriveState.SWITCH_ON_DISABLED
