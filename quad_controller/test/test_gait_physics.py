@@ -81,17 +81,6 @@ def test_short_silences_of_joint_states_do_not_let_a_soft_robot_creep_down() -> 
     assert min(heights) > heights[0] - 0.003
 
 
-def test_a_minute_of_trot() -> None:
-    """In a minute it neither falls nor turns by more than a degree."""
-    rig = PhysicsRig()
-    rig.mode('walk')
-    travel = rig.travel(60.0, Velocity(0.2))
-    assert not rig.faulted
-    assert travel.x == pytest.approx(0.2, abs=0.02)
-    assert abs(travel.yaw) * 60.0 < math.radians(1.0)
-    assert travel.tilt < LEVEL
-
-
 @pytest.mark.parametrize(('preset', 'arm'), [('mini', False), ('lite', True)])
 def test_other_builds_of_the_robot_walk_too(preset: str, arm: bool) -> None:
     """What differs is read from the URDF: limits, and an arm's weight, which stays in place."""
