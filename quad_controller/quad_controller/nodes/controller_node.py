@@ -12,7 +12,7 @@ from pathlib import Path
 import sys
 import threading
 import time
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Pose, Twist, TwistStamped
@@ -137,9 +137,13 @@ class ControllerNode(Node):
         self._arrived = {topic: threading.Event() for topic in ESTIMATES}
         if policy is not None:
             self._see_estimates(_estimates_for(policy))
-        self.create_service(SetMode, 'set_mode', self._set_mode)
-        self.create_service(Trigger, 'stop', self._take_stop)
-        self.create_service(Trigger, '~/clear_fault', self._clear_fault)
+        controller = self._controller
+        for kind, name, ask in (
+            (SetMode, 'set_mode', lambda request: controller.set_mode(request.mode)),
+            (Trigger, 'stop', lambda _: controller.stop()),
+            (Trigger, '~/clear_fault', lambda _: controller.clear_fault()),
+        ):
+            self.create_service(kind, name, partial(self._answer, name.strip('~/'), ask))
         create_deferred_service(
             self,
             LoadPolicy,
@@ -310,20 +314,13 @@ class ControllerNode(Node):
         if not answer.accepted:
             self.get_logger().warning(answer.message, throttle_duration_sec=WARN_PERIOD)
 
-    def _set_mode(self, request: SetMode.Request, response: SetMode.Response) -> SetMode.Response:
-        ask = partial(self._controller.set_mode, request.mode)
-        return self._answer(f'mode {request.mode!r}', ask, response)
-
-    def _take_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        return self._answer('stop', self._controller.stop, response)
-
-    def _clear_fault(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        return self._answer('clear_fault', self._controller.clear_fault, response)
-
-    def _answer(self, what: str, ask: Callable[[], Answer], response: Reply) -> Reply:
+    def _answer(
+        self, name: str, ask: Callable[[Any], Answer], request: object, response: Reply
+    ) -> Reply:
         with self._loop.lock:
-            answer = ask()
+            answer = ask(request)
         response.success, response.message = answer.accepted, answer.message
+        what = f'mode {request.mode!r}' if isinstance(request, SetMode.Request) else name
         self.get_logger().info(f'{what}: {answer.message}')
         return response
 
@@ -394,6 +391,7 @@ class ControllerNode(Node):
             logger.info('ready: joints and attitude are known; set_mode makes the robot move')
             notify_ready()
         for event in output.events:
+            # each place of the code has one severity (rclpy)
             if event.kind is EventKind.REPEATED:
                 logger.warning(event.text, throttle_duration_sec=WARN_PERIOD)
             elif event.kind is EventKind.WARNING:

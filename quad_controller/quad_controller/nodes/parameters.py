@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from ..gait.body import BodyLimits
 from ..gait.parameters import GaitParameters
 from ..gait.schedule import Gait
 from ..gait.servo_compensation import ServoModel
-from ..policy.options import GravitySource, ImuFrame, PolicyOptions
+from ..policy.options import PolicyOptions
 from ..settings import settings_of
 from ..states.parameters import StateParameters
 
@@ -106,12 +107,18 @@ def _robot(read: ParameterReader) -> Quadruped:
 
 
 def _read(read: ParameterReader, kind: type, prefix: str = '') -> dict[str, Any]:
-    """Declare and read all numbers of a dataclass; the period is set as a rate."""
-    return {
-        name: read.number(prefix + name, default, span, meaning)
-        for name, default, span, meaning in settings_of(kind)
-        if name != 'period'
-    }
+    """Declare and read all settings of a dataclass; the period is set as a rate."""
+    values: dict[str, Any] = {}
+    for name, default, span, meaning in settings_of(kind):
+        path = prefix + name
+        if isinstance(default, bool):
+            values[name] = read.flag(path, meaning, default=default)
+        elif isinstance(default, Enum):
+            choices = {choice.value: choice for choice in type(default)}
+            values[name] = read.choice(path, default.value, choices, meaning)
+        elif name != 'period':
+            values[name] = read.number(path, default, span, meaning)
+    return values
 
 
 def _gait(node: Node, read: ParameterReader) -> GaitParameters:
@@ -128,52 +135,14 @@ def _servo(read: ParameterReader) -> ServoModel | None:
 
 
 def _policy_options(read: ParameterReader) -> PolicyOptions:
-    default = PolicyOptions()
-    values = _read(read, PolicyOptions, 'policy_')
     contract = read.text(
         'policy_contract', '', 'YAML file with the contract of the policy, or what its file lacks'
     )
-    return PolicyOptions(
-        **values,
-        contract=Path(contract).expanduser() if contract else None,
-        imu_frame=read.choice(
-            'policy_imu_frame',
-            default.imu_frame.value,
-            {frame.value: frame for frame in ImuFrame},
-            'frame of the angular velocity; yawed: turned by 180 degrees; auto: that of the file',
-        ),
-        gravity_source=read.choice(
-            'policy_gravity_source',
-            default.gravity_source.value,
-            {source.value: source for source in GravitySource},
-            'of the direction of gravity',
-        ),
-        hold_missing=read.flag(
-            'policy_hold_missing',
-            default=False,
-            meaning='joints of the policy that the robot lacks count as being at their default',
-        ),
-    )
+    values = _read(read, PolicyOptions, 'policy_')
+    return PolicyOptions(Path(contract).expanduser() if contract else None, **values)
 
 
 def _states(read: ParameterReader) -> StateParameters:
     default = StateParameters()
-    values = _read(read, StateParameters)
     rate = read.number('loop_rate', 1.0 / default.period, (10.0, 200.0), 'steps a second [Hz]')
-    return StateParameters(
-        **values,
-        period=1.0 / rate,
-        require_imu=read.flag(
-            'require_imu', default=True, meaning='no leg moves without a known attitude'
-        ),
-        policy_fallback_walks=read.flag(
-            'policy_fallback_walks',
-            default=False,
-            meaning='the gait walks on when a policy fails, instead of standing',
-        ),
-        get_up_swings=read.flag(
-            'get_up_swings',
-            default=False,
-            meaning='the mode get_up may throw the robot off its back, at full speed',
-        ),
-    )
+    return StateParameters(period=1.0 / rate, **_read(read, StateParameters))

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..exceptions import ParameterError
-from ..settings import check_settings, setting, settings_of
+from ..settings import check_settings, setting, settings_of, switch
 from .gains import ServoResponse
 
 
@@ -41,10 +41,16 @@ class PolicyOptions:
     # file whose values count before those in the policy's own; None for none
     contract: Path | None = None
     phase_period: float = setting(0.0, 0.0, 10.0, '[s]; 0: that of the contract')
-    imu_frame: ImuFrame = ImuFrame.AUTO  # of the angular velocity
-    gravity_source: GravitySource = GravitySource.BLEND  # of the direction of gravity
-    # joints of the policy that the robot lacks count as being at their default
-    hold_missing: bool = False
+    imu_frame: ImuFrame = switch(  # noqa: RUF009  # a field
+        ImuFrame.AUTO,
+        'frame of the angular velocity; yawed: turned by 180 degrees; auto: that of the file',
+    )
+    gravity_source: GravitySource = switch(  # noqa: RUF009  # a field
+        GravitySource.BLEND, 'of the direction of gravity'
+    )
+    hold_missing: bool = switch(
+        False, 'joints of the policy that the robot lacks count as being at their default'
+    )
     soft_limits: float = setting(
         0.9, 0.1, 1.0, "share of a joint's range that its targets may use"
     )
@@ -63,9 +69,8 @@ class PolicyOptions:
 
     def to_json(self) -> str:
         """Return all that decides about observations and targets, but the contract's file."""
-        numbers = {name: getattr(self, name) for name, *_ in settings_of(self)}
-        words = {name: getattr(self, name).value for name in OPTION_WORDS}
-        return json.dumps({**numbers, **words, 'hold_missing': self.hold_missing})
+        values = {name: getattr(self, name) for name, *_ in settings_of(self)}
+        return json.dumps(values, default=lambda choice: choice.value)
 
     @classmethod
     def from_json(cls, text: str, contract: Path | None = None) -> PolicyOptions:
@@ -76,12 +81,9 @@ class PolicyOptions:
         """
         try:
             values: dict[str, Any] = json.loads(text)
-            for name in OPTION_WORDS.keys() & values.keys():
-                values[name] = OPTION_WORDS[name](values[name])
+            for name, default, *_ in settings_of(cls):
+                if name in values and isinstance(default, Enum):
+                    values[name] = type(default)(values[name])
             return cls(contract=contract, **values)
         except (ValueError, TypeError, AttributeError) as error:
             raise ParameterError(f'options of a policy {text!r}: {error}') from error
-
-
-OPTION_WORDS: dict[str, type[Enum]] = {'imu_frame': ImuFrame, 'gravity_source': GravitySource}
-"""Kind of each choice."""

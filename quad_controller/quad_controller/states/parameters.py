@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import math
 
 from ..exceptions import ParameterError
-from ..settings import check_settings, setting
+from ..settings import check_settings, setting, switch
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class StateParameters:
         0.1, 0.0, 0.9, 'charge 0 to 1 below which the robot lies down; 0: never'
     )
     battery_time: float = setting(3.0, 0.0, 60.0, 'how long it must be so [s]')
-    require_imu: bool = True  # whether the robot may move its legs only with a known attitude
+    require_imu: bool = switch(True, 'no leg moves without a known attitude')
     lie_height: float = setting(
         0.055, 0.01, 1.0, "hip axes above the feet's centres when it lies [m]"
     )
@@ -41,10 +41,12 @@ class StateParameters:
     setpoint_speed_ratio: float = setting(
         1.0, 0.05, 5.0, 'speed of set-points per speed of joints; soft servos need 2'
     )
-    # whether the gait goes on walking when a policy fails, or stands
-    policy_fallback_walks: bool = False
-    # whether the mode get_up may throw the robot off its back, at full speed
-    get_up_swings: bool = False
+    policy_fallback_walks: bool = switch(
+        False, 'the gait walks on when a policy fails, instead of standing'
+    )
+    get_up_swings: bool = switch(
+        False, 'the mode get_up may throw the robot off its back, at full speed'
+    )
 
     def __post_init__(self) -> None:
         """Refuse what makes no sense.
