@@ -56,7 +56,7 @@ def standstill(positions: Array) -> FullSpeedPath:
     coefficients = np.zeros((6, len(positions)))
     coefficients[0] = positions
     return FullSpeedPath(
-        Path.of(np.array([STANDSTILL]), coefficients[None]), 1.0 / STANDSTILL, 1.0 / STANDSTILL**2
+        Path(np.array([STANDSTILL]), coefficients[None]), 1.0 / STANDSTILL, 1.0 / STANDSTILL**2
     )
 
 
@@ -124,7 +124,7 @@ def _from_rest_to_rest(full: FullSpeedPath) -> Path:
     velocity = first * rate[:, None]
     acceleration = second * (rate**2)[:, None] + first * bend[:, None]
     lengths = np.diff(times)
-    return Path.of(lengths, quintics(lengths, q, velocity, acceleration))
+    return Path(lengths, quintics(lengths, q, velocity, acceleration))
 
 
 def _straight(line: Path, profile: tuple[Array, Array, Array, Array], lasts: Array) -> Path:
@@ -138,7 +138,7 @@ def _straight(line: Path, profile: tuple[Array, Array, Array, Array], lasts: Arr
     shares = np.stack((place, rate, bend / 2.0, jerk / 6.0), axis=1)
     coefficients[:, :4] = shares[:, :, None] * slope
     coefficients[:, 0] += base
-    return Path.of(lasts, coefficients)
+    return Path(lasts, coefficients)
 
 
 def _profile(
@@ -201,7 +201,7 @@ def timed_rows(rows: Array, limits: JointLimits) -> Path:
     velocity = np.concatenate((velocity, slopes[-1:]))
     acceleration = np.zeros_like(velocity)
     acceleration[1:-1] = 2.0 * np.diff(slopes, axis=0) / around
-    path = Path.of(lasts, quintics(lasts, rows, velocity, acceleration))
+    path = Path(lasts, quintics(lasts, rows, velocity, acceleration))
     most = float((limits.acceleration / limits.velocity).min())
     jerk = float((limits.jerk / limits.velocity).min())
     return timed(FullSpeedPath(path, most, jerk), limits)[0]
@@ -243,7 +243,7 @@ def speed_limited(
 def slower(path: Path, factor: float) -> Path:
     """Return the same path with more time everywhere."""
     powers = (factor ** -np.arange(6.0))[:, None]
-    return Path.of(path.durations * factor, path.coefficients * powers)
+    return Path(path.durations * factor, path.coefficients * powers)
 
 
 def _greatest_speed(path: Path, link: LinkKinematics) -> float:

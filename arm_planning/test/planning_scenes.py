@@ -110,8 +110,8 @@ def deepest_overlap(path: Path, scene: PlanningScene) -> float:
 
 def broken_limits(path: Path, limits: JointLimits) -> list[str]:
     """Return what exceeds a limit on a path, looked at from its values alone."""
-    segments = np.repeat(np.arange(len(path.segments)), 200)
-    shares = np.tile(np.linspace(0.0, 1.0, 200), len(path.segments))
+    segments = np.repeat(np.arange(len(path.durations)), 200)
+    shares = np.tile(np.linspace(0.0, 1.0, 200), len(path.durations))
     offsets = shares * path.durations[segments]
     positions = path.derived(0, segments, offsets)
     broken = []

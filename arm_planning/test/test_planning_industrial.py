@@ -96,8 +96,8 @@ def off(curve: Curve, link: LinkKinematics, positions: Array) -> tuple[float, fl
 def check_limits(model: RobotModel, path: Path, factor: float = 1.0) -> None:
     """Look at position, velocity, acceleration and jerk at and between all places."""
     limits = model.limits
-    numbers = np.repeat(np.arange(len(path.segments)), 7)
-    times = path.durations[numbers] * np.tile(np.linspace(0.0, 1.0, 7), len(path.segments))
+    numbers = np.repeat(np.arange(len(path.durations)), 7)
+    times = path.durations[numbers] * np.tile(np.linspace(0.0, 1.0, 7), len(path.durations))
     q, *rates = (path.derived(order, numbers, times) for order in range(4))
     assert (q >= limits.lower - 1e-6).all()
     assert (q <= limits.upper + 1e-6).all()

@@ -18,7 +18,7 @@ from arm_planning.ros.motion_request import RequestReader
 from arm_planning.ros.robot_groups import RobotGroups
 from arm_planning.ros.scene_snapshot import SceneSnapshot
 from arm_planning.ros.trajectories import check_trajectory, path_of, trajectory_message
-from arm_trajectory import Path, Segment
+from arm_trajectory import lines, Path
 
 JOINTS = panda().joints
 
@@ -50,13 +50,10 @@ def test_joints_that_are_not_given_stand_in_their_range() -> None:
 @given(st.lists(st.one_of(st.floats(1e-12, 1e-8), st.floats(1e-4, 2.0)), min_size=1, max_size=8))
 def test_points_of_a_path_have_times_that_increase(durations: list[float]) -> None:
     """A phase of a motion may be shorter than a nanosecond; the ends are where they are."""
-    starts = np.concatenate(((0.0,), np.cumsum(durations)[:-1]))
     rates = np.random.default_rng(len(durations)).uniform(-1.0, 1.0, (len(durations), 2))
-    segments, place = [], np.zeros(2)
-    for start, duration, rate in zip(starts.tolist(), durations, rates, strict=True):
-        segments.append(Segment(start, duration, np.array([place, rate, *np.zeros((4, 2))])))
-        place = place + rate * duration
-    path = Path(segments)
+    lasts = np.array(durations)
+    ways = np.cumsum(rates * lasts[:, None], axis=0)
+    path = Path(lasts, lines(lasts, np.concatenate((np.zeros((1, 2)), ways))))
     trajectory = trajectory_message(['a', 'b'], path, 'base').joint_trajectory
     check_trajectory(trajectory)
     first, last = trajectory.points[0], trajectory.points[-1]
@@ -69,7 +66,7 @@ def test_points_of_a_path_are_near_to_each_other_and_make_it() -> None:
     """Viewers show one after the other; what interpolates them with quintics has the path."""
     random = np.random.default_rng(0)
     for duration in (0.05, 0.73, 2.0):
-        path = Path([Segment(0.0, duration, random.uniform(-1.0, 1.0, (6, 3)))])
+        path = Path(np.array([duration]), random.uniform(-1.0, 1.0, (1, 6, 3)))
         trajectory = trajectory_message(['a', 'b', 'c'], path, 'base').joint_trajectory
         times = [seconds(point.time_from_start) for point in trajectory.points]
         assert np.diff(times).max() <= 0.1 + 1e-9

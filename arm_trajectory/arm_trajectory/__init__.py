@@ -23,7 +23,7 @@ from .goal import GoalPoint, GoalRules, JointTolerance, TrajectoryGoal
 from .otg import brakeable, brakeable_velocity, hard_brake, OnlineTrajectoryGenerator, Plan
 from .paths.bounds import Excess, farthest_beyond
 from .paths.goal_path import build_path
-from .paths.path import Path, quintics, Segment
+from .paths.path import cubics, lines, Path, quintics
 from .paths.path_check import PathCheck, PathContact
 from .paths.time_scaling import Demand, Timing
 
@@ -41,7 +41,6 @@ __all__ = [
     'PathCheck',
     'PathContact',
     'Plan',
-    'Segment',
     'StateMovedError',
     'TimerState',
     'Timing',
@@ -51,8 +50,10 @@ __all__ = [
     'brakeable',
     'brakeable_velocity',
     'build_path',
+    'cubics',
     'farthest_beyond',
     'hard_brake',
+    'lines',
     'merge_tolerances',
     'quintics',
 ]

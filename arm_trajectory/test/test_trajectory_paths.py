@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 from arm_model import RobotState
-from arm_trajectory import JointTolerance, merge_tolerances, Path, Timing
-from arm_trajectory.paths.path import cubic, linear, quintic
+from arm_trajectory import cubics, JointTolerance, lines, merge_tolerances, Path, Timing
 from arm_trajectory.paths.rounding import rounded
 
 pytestmark = pytest.mark.slow
@@ -26,16 +25,18 @@ def test_segments_meet_their_ends(seed: int, duration: float) -> None:
     """A line meets positions, a cubic velocities too, a quintic accelerations too."""
     rng = np.random.default_rng(seed)
     begin, end = (RobotState(*rng.normal(size=(3, 4))) for _ in range(2))
-    straight = linear(1.0, duration, begin.position, end.position)
-    third, fifth = cubic(1.0, duration, begin, end), quintic(1.0, duration, begin, end)
-    for segment in (straight, third, fifth):
-        assert segment.at(1.0).position == pytest.approx(begin.position)
-        assert segment.at(1.0 + duration).position == pytest.approx(end.position, abs=1e-9)
-    for segment in (third, fifth):
-        assert segment.at(1.0).velocity == pytest.approx(begin.velocity)
-        assert segment.at(1.0 + duration).velocity == pytest.approx(end.velocity, abs=1e-8)
-    assert fifth.at(1.0).acceleration == pytest.approx(begin.acceleration)
-    assert fifth.at(1.0 + duration).acceleration == pytest.approx(end.acceleration, abs=1e-6)
+    lasts, q = np.array([duration]), np.array([begin.position, end.position])
+    straight = Path(lasts, lines(lasts, q))
+    third = Path(lasts, cubics(lasts, q, np.array([begin.velocity, end.velocity])))
+    fifth = Path.between(duration, begin, end)
+    for path in (straight, third, fifth):
+        assert path.at(0.0).position == pytest.approx(begin.position)
+        assert path.end.position == pytest.approx(end.position, abs=1e-9)
+    for path in (third, fifth):
+        assert path.at(0.0).velocity == pytest.approx(begin.velocity)
+        assert path.end.velocity == pytest.approx(end.velocity, abs=1e-8)
+    assert fifth.at(0.0).acceleration == pytest.approx(begin.acceleration)
+    assert fifth.end.acceleration == pytest.approx(end.acceleration, abs=1e-6)
 
 
 @settings(max_examples=30, deadline=None)
@@ -44,8 +45,8 @@ def test_derivatives_of_segments_are_differences(seed: int, share: float) -> Non
     """Velocity and acceleration are the difference quotients of what they derive."""
     rng, step = np.random.default_rng(seed), 1e-6
     begin, end = (RobotState(*rng.normal(size=(3, 4))) for _ in range(2))
-    segment = quintic(0.0, 1.0, begin, end)
-    before, here, after = (segment.at(share + shift) for shift in (-step, 0.0, step))
+    path = Path.between(1.0, begin, end)
+    before, here, after = (path.at(share + shift) for shift in (-step, 0.0, step))
     assert here.velocity == pytest.approx(
         (after.position - before.position) / (2 * step), abs=1e-5
     )
@@ -73,13 +74,13 @@ def test_rounded_paths_are_smooth(seed: int, step: float) -> None:
     """Positions, speeds and accelerations are continuous, however dense the corners are."""
     limits = robot('prbt').limits
     rows = np.cumsum(np.random.default_rng(seed).normal(size=(12, 6)), axis=0) * 0.1 * step
-    lines = [linear(n * step, step, rows[n], rows[n + 1]) for n in range(len(rows) - 1)]
-    path = rounded(Path(lines), limits)
-    for before, after in zip(path.segments, path.segments[1:], strict=False):
-        one, other = before.at(after.start), after.at(after.start)
-        assert other.position == pytest.approx(one.position, abs=1e-9)
-        assert other.velocity == pytest.approx(one.velocity, abs=1e-8)
-        assert other.acceleration == pytest.approx(one.acceleration, abs=1e-6)
+    lasts = np.full(len(rows) - 1, step)
+    path = rounded(Path(lasts, lines(lasts, rows)), limits)
+    numbers = np.arange(len(path.durations))
+    for order, tolerance in enumerate((1e-9, 1e-8, 1e-6)):
+        before = path.derived(order, numbers, path.durations)[:-1]
+        after = path.derived(order, numbers, np.zeros(len(numbers)))[1:]
+        assert after == pytest.approx(before, abs=tolerance)
     assert path.at(0.0).position == pytest.approx(rows[0])
     assert path.end.position == pytest.approx(rows[-1])
 
@@ -90,8 +91,8 @@ def test_time_scaled_paths_lead_through_the_same_places(seed: int) -> None:
     """A path that is followed slower is the same path, within the limits."""
     limits = robot('gp110').limits
     rows = np.random.default_rng(seed).uniform(-0.3, 0.3, (5, 6))
-    lines = [linear(0.25 * n, 0.25, rows[n], rows[n + 1]) for n in range(4)]
-    given_path = rounded(Path(lines), limits)
+    lasts = np.full(4, 0.25)
+    given_path = rounded(Path(lasts, lines(lasts, rows)), limits)
     scaled = Timing(given_path, limits).time_scaled()
     assume(scaled is not None and scaled is not given_path)
     assert scaled is not None

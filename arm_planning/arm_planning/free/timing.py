@@ -8,7 +8,6 @@ every corner follows the straight motions exactly. The quickest that is valid co
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -38,7 +37,7 @@ def timed_path(places: Array, limits: JointLimits, check: MotionCheck) -> Path |
         ends = [0, *sorted(stops), len(places) - 1]
         pieces = [_rounded(places[begin : end + 1], limits) for begin, end in pairwise(ends)]
         found = [piece for piece in pieces if piece is not None]
-        path = _joined(found) if len(found) == len(pieces) else None
+        path = Path.joined(found) if len(found) == len(pieces) else None
         violation = None if path is None else check.path(path)
         if path is not None and violation is None:
             return path
@@ -108,10 +107,3 @@ def _half_times(velocities: Array, limits: JointLimits) -> Array:
     by_jerk = np.sqrt(1.5 * jumps / limits.jerk)
     halves: Array = ROUNDING_ROOM * np.maximum(by_acceleration, by_jerk).max(axis=1)
     return np.maximum(halves, MIN_SEGMENT)
-
-
-def _joined(pieces: Sequence[Path]) -> Path:
-    path = pieces[0]
-    for piece in pieces[1:]:
-        path = path.followed_by(piece.segments)
-    return path

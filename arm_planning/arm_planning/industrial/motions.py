@@ -46,7 +46,7 @@ def ptp_path(start: Array, goal: Array, limits: JointLimits) -> FullSpeedPath:
     speed = min(speed, peak)
     coefficients = np.zeros((6, len(way)))
     coefficients[0], coefficients[1] = start, way * speed
-    path = Path.of(np.array([1.0 / speed]), coefficients[None])
+    path = Path(np.array([1.0 / speed]), coefficients[None])
     return FullSpeedPath(path, acceleration / speed, jerk / speed, straight=True)
 
 

@@ -124,9 +124,7 @@ class IndustrialPlanner:
             if item.blend_radius == 0.0:
                 plans.append(self._group(group, number + 1 - len(group), check))
                 group = []
-        path = plans[0].path
-        for plan in plans[1:]:
-            path = path.followed_by(plan.path.segments)
+        path = Path.joined([plan.path for plan in plans])
         notes = tuple(note for plan in plans for note in plan.notes)
         return MotionPlan(path, request.planner_id, notes)
 

@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 
 from arm_model import Array
-from arm_trajectory import Path, quintics, Segment
+from arm_trajectory import Path
 
 from ..exceptions import PlanningCode, PlanningError
 from ..ik.link_kinematics import LinkKinematics
@@ -104,7 +104,7 @@ def joined(
             zip(pairwise(parts), radii, strict=False)
         )
     ]
-    segments: list[Segment] = []
+    pieces: list[Path] = []
     begin = 0.0
     for number, part in enumerate(parts):
         end = blends[number].leave if number < len(blends) else part.path.duration
@@ -112,17 +112,13 @@ def joined(
             raise _refused(
                 f'blends at both ends of item {first + number} overlap; give smaller ones'
             )
-        segments += _cut(part.path, begin, end)
+        pieces.append(part.path.part(begin, end))
         if number < len(blends):
-            segments.append(blends[number].segment)
+            pieces.append(blends[number].path)
             begin = blends[number].join
-    path = Path.of(
-        np.array([each.duration for each in segments]),
-        np.array([each.coefficients for each in segments]),
-    )
     notes = tuple(note for part in parts for note in part.notes)
     return FullSpeedPath(
-        path,
+        Path.joined(pieces),
         BLEND_MARGIN * min(part.acceleration for part in parts),
         BLEND_MARGIN * min(part.jerk for part in parts),
         notes=notes,
@@ -135,7 +131,7 @@ class _Blend:
 
     leave: float  # when the first is left, in its time in [s]
     join: float  # when the second is joined, in its time in [s]
-    segment: Segment  # what leads from one to the other
+    path: Path  # what leads from one to the other
 
     @classmethod
     def between(
@@ -155,7 +151,9 @@ class _Blend:
                     )
             assert leave is not None  # noqa: S101  both were looked at
             assert join is not None  # noqa: S101
-            blend = cls(leave, join, _bridge(before, leave, after, join))
+            lasts = before.duration - leave + join
+            bridge = Path.between(lasts, before.at(leave), after.at(join))
+            blend = cls(leave, join, bridge)
             if blend.farthest(corner, link) <= radius:
                 return blend
             smaller *= SHRINK
@@ -166,8 +164,7 @@ class _Blend:
 
     def farthest(self, corner: Array, link: LinkKinematics) -> float:
         """Return the greatest distance of the link from the corner on it in [m]."""
-        path = Path([self.segment])
-        rows = path.positions(np.linspace(0.0, path.duration, SAMPLES))
+        rows = self.path.positions(np.linspace(0.0, self.path.duration, SAMPLES))
         return max(float(np.linalg.norm(link.pose(row).position - corner)) for row in rows)
 
 
@@ -190,33 +187,6 @@ def _last_crossing(
                 low, high = (low, middle) if outside(middle) else (middle, high)
             return low
     return None
-
-
-def _bridge(before: Path, leave: float, after: Path, join: float) -> Segment:
-    """Return the polynomial from a place on a path to a place on the next."""
-    begin, end = before.at(leave), after.at(join)
-    duration = before.duration - leave + join
-    ends = (np.array([getattr(begin, name), getattr(end, name)]) for name in _FIELDS)
-    return Segment(0.0, duration, quintics(np.array([duration]), *ends)[0])
-
-
-def _cut(path: Path, begin: float, end: float) -> list[Segment]:
-    """Return the segments of a path between two times, exactly."""
-    inner = path.starts[(path.starts > begin) & (path.starts < end)]
-    times = np.concatenate(((begin,), inner, (end,)))
-    numbers = np.searchsorted(path.starts, times[:-1], side='right') - 1
-    lasts = np.diff(times)
-    segments = []
-    for number, time, last in zip(numbers.tolist(), times.tolist(), lasts.tolist(), strict=False):
-        piece = path.segments[number]
-        # six values at two ends make the same polynomial again
-        ends = piece.at(time), piece.at(time + last)
-        values = (np.array([getattr(each, name) for each in ends]) for name in _FIELDS)
-        segments.append(Segment(0.0, last, quintics(np.array([last]), *values)[0]))
-    return segments
-
-
-_FIELDS = ('position', 'velocity', 'acceleration')
 
 
 def _refused(reason: str) -> PlanningError:

@@ -142,7 +142,7 @@ class _Tracer:
         durations, pieces = self._pieces(places)
         ratio = np.abs([each.first for each in places]) / self._speed
         joint = int(ratio.max(axis=0).argmax())
-        return Trace(Path.of(durations, pieces[:, :, :-1]), float(ratio.max()), joint)
+        return Trace(Path(durations, pieces[:, :, :-1]), float(ratio.max()), joint)
 
     def _pieces(self, places: Sequence[_Place]) -> tuple[Array, Array]:
         """Return the polynomials from place to place: of the joints and, last, of the share.

@@ -18,7 +18,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_model import Array
 from arm_model.ros import duration_fields, seconds
-from arm_trajectory import Path, quintics
+from arm_trajectory import cubics, lines, Path, quintics
 
 from ..exceptions import PlanningCode, PlanningError
 
@@ -186,25 +186,7 @@ def path_of(trajectory: Any) -> Path:  # noqa: ANN401
     if a.shape == q.shape == v.shape:
         pieces = quintics(lasts, q, v, a)
     elif v.shape == q.shape:
-        pieces = _cubics(lasts, q, v)
+        pieces = cubics(lasts, q, v)
     else:
-        pieces = _lines(lasts, q)
-    return Path.of(lasts, pieces)
-
-
-def _cubics(lasts: Array, q: Array, v: Array) -> Array:
-    """Return coefficients as quintics() does, of points without accelerations."""
-    pieces = _lines(lasts, q)
-    t, way = lasts[:, None], np.diff(q, axis=0)
-    pieces[:, 1] = v[:-1]
-    pieces[:, 2] = (3.0 * way - (2.0 * v[:-1] + v[1:]) * t) / t**2
-    pieces[:, 3] = (-2.0 * way + (v[:-1] + v[1:]) * t) / t**3
-    return pieces
-
-
-def _lines(lasts: Array, q: Array) -> Array:
-    """Return coefficients as quintics() does, of points that are positions alone."""
-    pieces = np.zeros((len(lasts), 6, q.shape[1]))
-    pieces[:, 0] = q[:-1]
-    pieces[:, 1] = np.diff(q, axis=0) / lasts[:, None]
-    return pieces
+        pieces = lines(lasts, q)
+    return Path(lasts, pieces)

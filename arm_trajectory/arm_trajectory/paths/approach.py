@@ -16,7 +16,7 @@ from arm_model import JointLimits, RobotState
 
 from ..otg import OnlineTrajectoryGenerator, Plan
 from .bounds import farthest_beyond
-from .path import Path, quintic
+from .path import Path
 from .time_scaling import Timing
 
 MIN_PHASE = 1e-7  # least length of a segment with one jerk in [s]; shorter ones are left out
@@ -44,7 +44,7 @@ def _candidates(
     state: RobotState, begin: RobotState, duration: float, limits: JointLimits
 ) -> Iterator[Path]:
     if duration > 0.0:
-        smooth = Path([quintic(0.0, duration, state, begin)])
+        smooth = Path.between(duration, state, begin)
         if Timing(smooth, limits).demand.time_factor <= 1.0:
             yield smooth
     generator = OnlineTrajectoryGenerator(limits)
@@ -61,7 +61,7 @@ def stop_path(state: RobotState, limits: JointLimits) -> Path | None:
 
 
 def _phases(plan: Plan) -> Path:
-    """Return a plan as segments with one jerk each."""
+    """Return a plan as polynomials with one jerk each."""
     ends = plan.switches
     times = ends[np.diff(ends, prepend=0.0) > MIN_PHASE]
     times = np.concatenate(((0.0,), times[:-1], (plan.duration,)))
@@ -73,4 +73,4 @@ def _phases(plan: Plan) -> Path:
     ):
         jerk = (after.acceleration - before.acceleration) / length
         piece[:4] = before.position, before.velocity, before.acceleration / 2.0, jerk / 6.0
-    return Path.of(lengths, coefficients)
+    return Path(lengths, coefficients)

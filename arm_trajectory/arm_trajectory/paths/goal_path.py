@@ -6,18 +6,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 import math
 
 import numpy as np
 
-from arm_model import JointLimits, RobotState
+from arm_model import Array, JointLimits, Mask, RobotState
 
 from ..exceptions import GoalError
 from ..goal import GoalRules, TrajectoryGoal
 from .approach import approach_path, stop_path
 from .bounds import farthest_beyond
-from .path import cubic, linear, Path, quintic, Segment
+from .path import cubics, lines, Path, quintics
 from .points import Points, refuse, upcoming_points
 from .rounding import rounded, run_out
 from .time_scaling import Demand, Timing
@@ -115,16 +114,16 @@ def _tried(points: Points, limits: JointLimits, state: RobotState) -> GoalPath |
 
 def _from_rest(points: Points, limits: JointLimits, state: RobotState) -> GoalPath | _TimeDeficit:
     """Return the path through points from a state of rest, or why there is too little time."""
-    segments = [*_first(points, state), *_between(points, limits)]
-    if not segments:  # one point, at once, where the arm is
-        segments.append(linear(0.0, 1e-3, points.positions[0], points.positions[0]))
-    path = Path([*segments, *_run_out(points, segments, limits)])
+    pieces = [*_first(points, state), *_between(points, limits)]
+    if not pieces:  # one point, at once, where the arm is
+        pieces.append(_line(1e-3, points.positions[0], points.positions[0]))
+    path = Path.joined([*pieces, *_run_out(points, pieces, limits)])
     beyond = _beyond(path, limits, state)
     if beyond is not None:
         if points.velocities is not None or points.times[0] == 0.0:
             raise beyond
-        straight = linear(0.0, segments[0].duration, state.position, points.positions[0])
-        path = Path([straight, *segments[1:]])
+        straight = _line(pieces[0].duration, state.position, points.positions[0])
+        path = Path.joined([straight, *pieces[1:]])
     scaled, deficit = _time_scaled(path, limits)
     return deficit if scaled is None else _in_time(scaled, points, deficit)
 
@@ -138,17 +137,17 @@ def _from_motion(
     """
     lead, begin = float(points.times[0]), points.at(0)
     shifted, deficit = points.delayed(-lead), _TimeDeficit('', '', lead)
-    segments = _between(shifted, limits)
-    onward: Sequence[Segment] = [*segments, *_run_out(shifted, segments, limits)]
+    pieces = _between(shifted, limits)
+    onward = [*pieces, *_run_out(shifted, pieces, limits)]
     if onward:
-        path = Path(onward)
+        path = Path.joined(onward)
         if (beyond := _beyond(path, limits, state)) is not None:
             raise beyond
         scaled, deficit = _time_scaled(path, limits, from_rest=False)
         deficit = replace(deficit, time=lead + deficit.time)
         if scaled is None:
             return deficit
-        begin, onward = scaled.at(0.0), scaled.segments
+        begin, onward = scaled.at(0.0), [scaled]
     approach = approach_path(state, begin, lead, limits)
     if approach is None:
         return _after_stop(points, limits, state)
@@ -159,7 +158,7 @@ def _from_motion(
             'way from the motion to the first point',
             lead,
         )
-    return _in_time(approach.followed_by(onward), points, deficit)
+    return _in_time(Path.joined([approach, *onward]), points, deficit)
 
 
 def _after_stop(points: Points, limits: JointLimits, state: RobotState) -> GoalPath | _TimeDeficit:
@@ -180,7 +179,7 @@ def _after_stop(points: Points, limits: JointLimits, state: RobotState) -> GoalP
         'stop in front of it',
         stop.duration,
     )
-    return _in_time(stop.followed_by(answer.path.segments), points, deficit)
+    return _in_time(Path.joined([stop, answer.path]), points, deficit)
 
 
 def _time_scaled(
@@ -237,13 +236,11 @@ def _time_deficit(demand: Demand, limits: JointLimits, factor: float) -> _TimeDe
     )
 
 
-def _run_out(points: Points, segments: list[Segment], limits: JointLimits) -> list[Segment]:
+def _run_out(points: Points, pieces: Sequence[Path], limits: JointLimits) -> list[Path]:
     """Return how the arm comes to rest behind the last point, where that has a velocity."""
     if points.velocities is None:
         return []
-    last = segments[-1] if segments else None
-    end = float(points.times[-1])
-    return run_out(end, points.at(-1) if last is None else last.at(end), limits)
+    return run_out(pieces[-1].end if pieces else points.at(-1), limits)
 
 
 def _beyond(path: Path, limits: JointLimits, state: RobotState) -> GoalError | None:
@@ -285,40 +282,53 @@ def _from_here(points: Points, limits: JointLimits, state: RobotState, rules: Go
     return points.delayed(float(np.max(needed)))
 
 
-def _first(points: Points, state: RobotState) -> list[Segment]:
-    """Return the segment from the commanded state to the first point, unless it is there."""
+def _first(points: Points, state: RobotState) -> list[Path]:
+    """Return the way from the commanded state to the first point, unless it is there."""
     if points.times[0] > 0.0:
         toward = points.at(0)
         if points.velocities is None and len(points.times) > 1:  # run into the line that follows
             step = points.times[1] - points.times[0]
             line = (points.positions[1] - points.positions[0]) / step
             toward = RobotState(toward.position, line, toward.acceleration)
-        return [quintic(0.0, float(points.times[0]), state, toward)]
+        return [Path.between(float(points.times[0]), state, toward)]
     return []
 
 
-def _between(points: Points, limits: JointLimits) -> list[Segment]:
-    """Return the segments between the points."""
-    segments = []
-    for place, (start, end) in enumerate(pairwise(points.times.tolist())):
-        ends, duration = (points.at(place), points.at(place + 1)), end - start
-        if points.velocities is None:
-            segments.append(linear(start, duration, ends[0].position, ends[1].position))
-            continue
-        segment = quintic(start, duration, *ends)
-        if points.accelerations is None or _jerky(segment, limits):
-            segment = cubic(start, duration, *ends)
-        line = linear(start, duration, ends[0].position, ends[1].position)
-        bulge = (
-            segment.at(start + 0.5 * duration).position - line.at(start + 0.5 * duration).position
-        )
-        if _jerky(segment, limits) and np.abs(bulge).max() < STRAIGHT_TOLERANCE:
-            segment = line
-        segments.append(segment)
-    return segments
+def _between(points: Points, limits: JointLimits) -> list[Path]:
+    """Return the way between the points; nothing for one point."""
+    lasts, q, v, a = (
+        np.diff(points.times),
+        points.positions,
+        points.velocities,
+        points.accelerations,
+    )
+    if not len(lasts):
+        return []
+    straight = lines(lasts, q)
+    if v is None:
+        return [Path(lasts, straight)]
+    pieces = cubics(lasts, q, v)
+    if a is not None:
+        fifth = quintics(lasts, q, v, a)
+        smooth = ~_jerky(lasts, fifth, limits)
+        pieces[smooth] = fifth[smooth]
+    numbers, middles = np.arange(len(lasts)), 0.5 * lasts
+    bulges = Path(lasts, pieces - straight).derived(0, numbers, middles)
+    flat = np.abs(bulges).max(axis=1) < STRAIGHT_TOLERANCE
+    flat &= _jerky(lasts, pieces, limits)
+    pieces[flat] = straight[flat]
+    return [Path(lasts, pieces)]
 
 
-def _jerky(segment: Segment, limits: JointLimits) -> bool:
-    """Whether no smooth way joins the accelerations of two points: the rounding does it then."""
-    jerk = Path([segment]).derived(3, np.zeros(3, int), segment.duration * np.arange(3.0) / 2.0)
-    return bool(np.any(np.abs(jerk) > limits.jerk))
+def _jerky(lasts: Array, pieces: Array, limits: JointLimits) -> Mask:
+    """Return where no smooth way joins the ends (k): the rounding does it then."""
+    places = np.repeat(np.arange(len(lasts)), 3)
+    times = (lasts[:, None] * [0.0, 0.5, 1.0]).ravel()
+    jerks = Path(lasts, pieces).derived(3, places, times).reshape(len(lasts), -1, len(limits))
+    jerky: Mask = np.any(np.abs(jerks) > limits.jerk, axis=(1, 2))
+    return jerky
+
+
+def _line(duration: float, begin: Array, end: Array) -> Path:
+    lasts = np.array([duration])
+    return Path(lasts, lines(lasts, np.array([begin, end])))

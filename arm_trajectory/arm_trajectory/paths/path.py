@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 import math
 
 import numpy as np
@@ -30,24 +29,6 @@ _BERNSTEIN = np.array(
 _BINOMIAL = np.array([[math.comb(column, row) for column in range(6)] for row in range(6)])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Segment:
-    """A polynomial of at most fifth degree."""
-
-    start: float  # when it begins in [s]
-    duration: float  # how long it lasts in [s]
-    coefficients: Array  # of the powers 0 to 5 of the time since its start (6, n)
-
-    def at(self, time: float) -> RobotState:
-        """Return the place at a time of the path in [s]."""
-        t = time - self.start
-        powers = t**_POWERS
-        first = np.concatenate(((0.0,), _POWERS[1:] * powers[:-1]))
-        second = np.concatenate(((0.0, 0.0), _POWERS[2:] * _POWERS[1:-1] * powers[:-2]))
-        c = self.coefficients
-        return RobotState(powers @ c, first @ c, second @ c)
-
-
 def shifted(coefficients: Array, by: Array) -> Array:
     """Return the coefficients of polynomials (k, 6, n) whose times begin later.
 
@@ -60,31 +41,36 @@ def shifted(coefficients: Array, by: Array) -> Array:
     return moved
 
 
-def linear(start: float, duration: float, begin: Array, end: Array) -> Segment:
-    """Return the straight segment between two positions."""
-    coefficients = np.zeros((6, len(begin)))
-    coefficients[0], coefficients[1] = begin, (end - begin) / duration
-    return Segment(start, duration, coefficients)
-
-
-def cubic(start: float, duration: float, begin: RobotState, end: RobotState) -> Segment:
-    """Return the cubic that meets positions and velocities at both ends.
+def lines(durations: Array, positions: Array) -> Array:
+    """Return the coefficients (k, 6, n) of the straight motions from each place to the next.
 
     Args:
-        begin: Its begin; the acceleration is not used.
+        positions: Positions in [rad] (k + 1, n).
     """
-    t, way = duration, end.position - begin.position
-    coefficients = np.zeros((6, len(way)))
-    coefficients[0], coefficients[1] = begin.position, begin.velocity
-    coefficients[2] = (3 * way / t - 2 * begin.velocity - end.velocity) / t
-    coefficients[3] = (-2 * way / t + begin.velocity + end.velocity) / t**2
-    return Segment(start, duration, coefficients)
+    pieces = np.zeros((len(durations), 6, positions.shape[1]))
+    pieces[:, 0] = positions[:-1]
+    pieces[:, 1] = np.diff(positions, axis=0) / durations[:, None]
+    return pieces
 
 
-def quintic(start: float, duration: float, begin: RobotState, end: RobotState) -> Segment:
-    """Return the quintic that meets positions, velocities and accelerations at both ends."""
-    ends = (np.array(pair) for pair in zip(_fields(begin), _fields(end), strict=True))
-    return Segment(start, duration, quintics(np.array([duration]), *ends)[0])
+def cubics(durations: Array, positions: Array, velocities: Array) -> Array:
+    """Return the coefficients (k, 6, n) of the cubics from each place to the next.
+
+    Args:
+        positions: Positions in [rad] (k + 1, n).
+        velocities: Velocities in [rad/s] (k + 1, n).
+    """
+    pieces = lines(durations, positions)
+    t, slope, first, last = (
+        durations[:, None],
+        pieces[:, 1].copy(),
+        velocities[:-1],
+        velocities[1:],
+    )
+    pieces[:, 1] = first
+    pieces[:, 2] = (3.0 * slope - 2.0 * first - last) / t
+    pieces[:, 3] = (-2.0 * slope + first + last) / t**2
+    return pieces
 
 
 def quintics(durations: Array, positions: Array, velocities: Array, accelerations: Array) -> Array:
@@ -110,41 +96,46 @@ def quintics(durations: Array, positions: Array, velocities: Array, acceleration
     return np.stack(rows, axis=1)
 
 
-def _fields(point: RobotState) -> tuple[Array, Array, Array]:
-    return point.position, point.velocity, point.acceleration
-
-
 class Path:
-    """Segments one after the other.
+    """Polynomials of at most fifth degree, one after the other.
 
     Attributes:
-        segments: The segments, without gaps.
         starts: When they begin in [s] (k).
-        coefficients: Their coefficients (k, 6, n).
+        durations: How long they last in [s] (k).
+        coefficients: Of the powers 0 to 5 of the time since their begin (k, 6, n).
         duration: How long all of it lasts in [s].
         end: Its last place; beyond it the arm rests there.
     """
 
-    def __init__(self, segments: Sequence[Segment]) -> None:
-        """Join segments.
-
-        Args:
-            segments: At least one; each begins where and when the one before ends.
-        """
-        self.segments = tuple(segments)
-        self._starts = [segment.start for segment in self.segments]  # bisect is quicker on a list
-        self.starts: Array = np.array(self._starts)
-        self.coefficients: Array = np.array([each.coefficients for each in self.segments])
-        last = self.segments[-1]
-        self.duration = last.start + last.duration
-        self.end = last.at(self.duration)
+    def __init__(self, durations: Array, coefficients: Array) -> None:
+        self.durations, self.coefficients = durations, coefficients
+        self.starts: Array = np.concatenate(((0.0,), np.cumsum(durations)[:-1]))
+        self._starts = self.starts.tolist()  # bisect is quicker on a list
+        self.duration = float(self.starts[-1] + durations[-1])
+        self.end = self._state(-1, self.duration - self._starts[-1])
 
     @classmethod
-    def of(cls, durations: Array, coefficients: Array) -> Path:
-        """Return polynomials (k, 6, n) one after the other, of durations in [s] (k)."""
-        starts = np.concatenate(((0.0,), np.cumsum(durations)[:-1]))
-        rows = zip(starts.tolist(), durations.tolist(), coefficients, strict=True)
-        return cls([Segment(*each) for each in rows])
+    def between(cls, duration: float, begin: RobotState, end: RobotState) -> Path:
+        """Return the quintic that meets positions, velocities and accelerations at both ends."""
+        ends = (np.array(pair) for pair in zip(_fields(begin), _fields(end), strict=True))
+        lasts = np.array([duration])
+        return cls(lasts, quintics(lasts, *ends))
+
+    @classmethod
+    def joined(cls, paths: Sequence[Path]) -> Path:
+        """Return paths one after the other; each begins where the one before ends."""
+        return cls(
+            np.concatenate([each.durations for each in paths]),
+            np.concatenate([each.coefficients for each in paths]),
+        )
+
+    def part(self, begin: float, end: float) -> Path:
+        """Return what lies between two times in [s], exactly."""
+        inner = self.starts[(self.starts > begin) & (self.starts < end)]
+        times = np.concatenate(((begin,), inner, (end,)))
+        numbers = np.searchsorted(self.starts, times[:-1], side='right') - 1
+        late = times[:-1] - self.starts[numbers]
+        return Path(np.diff(times), shifted(self.coefficients[numbers], late))
 
     @property
     def control_values(self) -> Array:
@@ -153,18 +144,13 @@ class Path:
         control: Array = np.einsum('cp,kpn->kcn', _BERNSTEIN, scaled)
         return control
 
-    def followed_by(self, segments: Sequence[Segment]) -> Path:
-        """Return it with the segments of another path, which begins at 0, behind its end."""
-        later = (replace(each, start=self.duration + each.start) for each in segments)
-        return Path([*self.segments, *later])
-
     def at(self, time: float) -> RobotState:
         """Return the place at a time of the path in [s]; beyond its end it rests there."""
         if time > self.duration:
             rest = np.zeros(len(self.end.position))
             return RobotState(self.end.position, rest, rest)
         place = max(0, bisect_right(self._starts, time) - 1)
-        return self.segments[place].at(max(time, 0.0))
+        return self._state(place, max(time, 0.0) - self._starts[place])
 
     def positions(self, times: Array) -> Array:
         """Return the positions (k, n) in [rad] at times of the path (k) in [s]."""
@@ -172,11 +158,13 @@ class Path:
         places = np.maximum(np.searchsorted(self.starts, within, side='right') - 1, 0)
         return self.derived(0, places, within - self.starts[places])
 
-    @property
-    def durations(self) -> Array:
-        """How long the segments last in [s] (k)."""
-        lasts: Array = np.array([segment.duration for segment in self.segments])
-        return lasts
+    def _state(self, number: int, t: float) -> RobotState:
+        """Return the place at a time since the begin of a polynomial."""
+        powers = t**_POWERS
+        first = np.concatenate(((0.0,), _POWERS[1:] * powers[:-1]))
+        second = np.concatenate(((0.0, 0.0), _POWERS[2:] * _POWERS[1:-1] * powers[:-2]))
+        c = self.coefficients[number]
+        return RobotState(powers @ c, first @ c, second @ c)
 
     def derived(self, order: int, places: Places, times: Array) -> Array:
         """Return a derivative (m, n) by the path's time.
@@ -192,3 +180,7 @@ class Path:
         rows = self.coefficients[places, order:]
         derived: Array = np.einsum('mp,mpn->mn', powers * factors, rows)
         return derived
+
+
+def _fields(point: RobotState) -> tuple[Array, Array, Array]:
+    return point.position, point.velocity, point.acceleration

@@ -4,13 +4,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from arm_model import Array, JointLimits, RobotState
 
-from .path import Path, quintic, Segment, shifted
+from .path import Path, shifted
 
 DURATION_FACTOR = 1.25
 """How much longer than its peaks need the rounding of a corner takes: segments bend too."""
@@ -47,7 +47,7 @@ def rounded(path: Path, limits: JointLimits, *, from_rest: bool = True) -> Path:
     begin or end at rest gets longer by d there.
 
     Args:
-        path: Segments, of which neighbours may meet in a corner.
+        path: Polynomials, of which neighbours may meet in a corner.
         from_rest: Whether the arm rests at its begin; else that stays as it is.
     """
     corners = _corners(path, from_rest=from_rest)
@@ -58,27 +58,29 @@ def rounded(path: Path, limits: JointLimits, *, from_rest: bool = True) -> Path:
         return path
     lead = max(float(np.max(halves - corners.times)), 0.0)
     tail = max(float(np.max(corners.times + halves)) - path.duration, 0.0)
-    base = _between_rests(path, lead, tail)
+    rests = _rest(lead, path.at(0.0).position), _rest(tail, path.end.position)
+    base = Path.joined([*rests[0], path, *rests[1]])
+    corners = replace(corners, times=corners.times + lead)
     starts = _breaks(base, corners.times, halves)
     pieces = _cut(base, starts)
     for corner in np.flatnonzero(halves):
         _round(pieces, starts, corners, int(corner), float(halves[corner]))
-    return Path.of(np.diff(starts), pieces)
+    return Path(np.diff(starts), pieces)
 
 
-def run_out(start: float, end: RobotState, limits: JointLimits) -> list[Segment]:
+def run_out(end: RobotState, limits: JointLimits) -> list[Path]:
     """Return how a path that ends with a velocity comes to rest behind its end."""
     still = np.zeros_like(end.velocity)
     duration = 2.0 * float(_needed(end.velocity[None], still[None], limits)[0])
     if duration == 0.0:
         return []
     behind = RobotState(end.position + 0.5 * duration * end.velocity, still, still)
-    return [quintic(start, duration, RobotState(end.position, end.velocity, still), behind)]
+    return [Path.between(duration, RobotState(end.position, end.velocity, still), behind)]
 
 
 def _corners(path: Path, *, from_rest: bool) -> _Corners:
-    """Return the joints of the segments, and begin and end against rest."""
-    places, lasts = np.arange(len(path.segments)), path.durations
+    """Return where polynomials meet, and begin and end against rest."""
+    places, lasts = np.arange(len(path.durations)), path.durations
     at_rest = np.zeros((1, path.coefficients.shape[2]))
     jumps, bends = (
         np.concatenate((path.derived(order, places, 0.0 * lasts), at_rest))
@@ -117,31 +119,22 @@ def _halves(corners: _Corners, limits: JointLimits) -> Array:
     return halves
 
 
-def _between_rests(path: Path, lead: float, tail: float) -> Path:
-    """Put rests in front of a path and behind it."""
-    segments = list(path.segments)
-    if lead > 0.0:
-        segments.insert(0, _rest(-lead, lead, path.at(0.0).position))
-    if tail > 0.0:
-        segments.append(_rest(path.duration, tail, path.end.position))
-    return Path(segments)
-
-
-def _rest(start: float, duration: float, position: Array) -> Segment:
-    coefficients = np.zeros((6, len(position)))
-    coefficients[0] = position
-    return Segment(start, duration, coefficients)
+def _rest(duration: float, position: Array) -> list[Path]:
+    """Return a rest; none that takes no time."""
+    coefficients = np.zeros((1, 6, len(position)))
+    coefficients[0, 0] = position
+    return [Path(np.array([duration]), coefficients)] if duration > 0.0 else []
 
 
 def _breaks(base: Path, times: Array, halves: Array) -> Array:
     """Return the times between which the rounded path is one polynomial in [s]."""
     rounds = halves > 0.0
-    begin, end = base.starts[0], base.duration
+    end = base.duration
     ends = (times[rounds] - halves[rounds], times[rounds], times[rounds] + halves[rounds])
     inner = np.sort(np.concatenate((base.starts[1:], *ends)))
-    inner = inner[(inner > begin + MERGE_TOLERANCE) & (inner < end - MERGE_TOLERANCE)]
-    apart = np.diff(inner, prepend=begin) > MERGE_TOLERANCE
-    breaks: Array = np.concatenate(((begin,), inner[apart], (end,)))
+    inner = inner[(inner > MERGE_TOLERANCE) & (inner < end - MERGE_TOLERANCE)]
+    apart = np.diff(inner, prepend=0.0) > MERGE_TOLERANCE
+    breaks: Array = np.concatenate(((0.0,), inner[apart], (end,)))
     return breaks
 
 

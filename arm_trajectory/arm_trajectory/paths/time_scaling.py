@@ -233,4 +233,4 @@ def _scaled_path(path: Path, scaling: TimeScaling) -> Path:
     velocity = speed / r[:, None]
     acceleration = bend / (r**2)[:, None] - speed * (slope / r**3)[:, None]
     lengths = np.diff(scaling.times(given))
-    return Path.of(lengths, quintics(lengths, q, velocity, acceleration))
+    return Path(lengths, quintics(lengths, q, velocity, acceleration))
