@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+import re
 from types import SimpleNamespace
 from typing import cast
 
@@ -87,29 +88,6 @@ POSITIONS = 'scale_pos_to_dev: -57295.78\nscale_pos_from_dev: -1.745329e-5'
 RATES = 'scale_vel_to_dev: 1000\nscale_vel_from_dev: 0.001'
 
 
-@pytest.mark.parametrize(
-    ('piece', 'warns'),
-    [
-        (POSITIONS, True),
-        (f'{POSITIONS}\n{RATES}', False),  # written, and so meant
-        (f'{POSITIONS}\nscale_vel_to_dev: 5\nscale_vel_from_dev: 0.2', False),
-        ('scale_pos_to_dev: 1000', False),
-        ('mandatory: false', False),
-        ('scale_from_factor_group: true', False),
-    ],
-)
-def test_velocities_left_at_the_default(tmp_path: Path, piece: str, *, warns: bool) -> None:
-    """As most files of ros2_canopen have them: positions in rad, velocities by 1000."""
-    report = check_file(write_bus(tmp_path, added(JOINT, piece), eds=EDS))
-    found = [each for each in report.warnings if 'velocities the default' in each.message]
-    assert len(found) == warns
-    for each in found:
-        assert each.key.endswith('scale_pos_to_dev')
-        assert 'moves at 0.01745 where 1.0 is asked' in each.message
-        assert 'write scale_vel_to_dev: -57295.8 (increments per second' in each.remedy
-        assert 'rpm of the joint: -9.549297' in each.remedy
-
-
 IN_RPM = 'scale_vel_to_dev: -9.549\nscale_vel_from_dev: -0.10472'
 
 
@@ -171,34 +149,39 @@ def test_what_one_is_of_accelerations(
     assert len(found) == (not by and units.rule is not UnitRule.UPSTREAM)
 
 
+BOTH = f'{POSITIONS}\n{RATES}\n'
+LEFT = 'moves at 0.01745 where 1.0 is asked.* scale_vel_to_dev: -57295.8 .*joint: -9.549297'
+
+
 @pytest.mark.parametrize(
-    ('piece', 'remedy'),
+    ('piece', 'said'),
     [
-        ('offset_pos_from_dev: 0.5', 'write offset_pos_to_dev: 28647.89'),
-        ('offset_pos_to_dev: 100', 'write offset_pos_to_dev: 0 '),
-        ('offset_pos_from_dev: 0.5\noffset_pos_to_dev: 28647.89', ''),
-        ('offset_pos_from_dev: 0.5\noffset_pos_to_dev: -28647.89', '28647.89'),
-        ('mandatory: false', ''),
+        (POSITIONS, LEFT),
+        (BOTH, '!velocities the default'),  # written, and so meant
+        (f'{POSITIONS}\nscale_vel_to_dev: 5\nscale_vel_from_dev: 0.2', '!velocities the default'),
+        ('scale_pos_to_dev: 1000', '!velocities the default'),
+        ('mandatory: false', '!velocities the default|do not cancel'),
+        ('scale_from_factor_group: true', '!velocities the default'),
+        (f'{BOTH}offset_pos_from_dev: 0.5', 'do not cancel.* offset_pos_to_dev: 28647.89'),
+        (f'{BOTH}offset_pos_to_dev: 100', 'do not cancel.* offset_pos_to_dev: 0 '),
+        (f'{BOTH}offset_pos_from_dev: 0.5\noffset_pos_to_dev: 28647.89', '!do not cancel'),
+        (f'{BOTH}offset_pos_from_dev: 0.5\noffset_pos_to_dev: -28647.89', 'cancel.*: 28647.89'),
+        ('scale_pos_to_dev: 0.0001\nscale_pos_from_dev: 10000', 'correct scale_pos_to_dev'),
+        ('scale_vel_to_dev: 0.0001\nscale_vel_from_dev: 10000', 'correct scale_vel_to_dev'),
     ],
 )
-def test_offsets_that_do_not_cancel_are_a_warning(tmp_path: Path, piece: str, remedy: str) -> None:
-    """A target at the position that is shown would move the axis, as far as the warning says."""
-    text = added(JOINT, f'{POSITIONS}\n{RATES}\n{piece}')
-    report = check_file(write_bus(tmp_path, text, eds=EDS))
-    found = [each for each in report.warnings if 'do not cancel' in each.message]
-    assert len(found) == bool(remedy)
-    for each in found:
-        assert 'offset_pos' in each.key
-        assert remedy in each.remedy
+def test_scales_and_offsets_that_move_something_else(
+    tmp_path: Path, piece: str, said: str
+) -> None:
+    """Positions in rad beside velocities by 1000, a shown position that is no target, rounding.
 
-
-@pytest.mark.parametrize('key', ['scale_pos_to_dev', 'scale_vel_to_dev'])
-def test_a_scale_that_rounds_everything_is_a_warning(tmp_path: Path, key: str) -> None:
-    """As in the robot_control sample of ros2_canopen, where the two directions are mixed up."""
-    other = key.replace('_to_', '_from_')
-    text = added(JOINT, f'{key}: 0.0001\n{other}: 10000')
-    found = [w for w in check_file(write_bus(tmp_path, text, eds=EDS)).warnings if key in w.key]
-    assert len(found) == 1
+    What is not said begins with an exclamation mark.
+    """
+    report = check_file(write_bus(tmp_path, added(JOINT, piece), eds=EDS))
+    pattern = said.removeprefix('!')
+    found = [w for w in report.warnings if re.search(pattern, f'{w.message}; {w.remedy}')]
+    assert len(found) == (pattern == said)
+    assert all(warning.key.startswith('nodes.joint1.') for warning in found)
 
 
 @pytest.mark.parametrize('offset', [0.0, 0.3])
