@@ -16,7 +16,7 @@ from can_addresses import free_multicast, free_virtual
 from can_receiving import DEADLINE, unstamped
 from config_samples import write_bus
 import pytest
-from tool_environment import ENVIRONMENT, Output
+from tool_environment import ENVIRONMENT, Output, REPOSITORY
 
 from arm_canopen import BusError
 from arm_canopen.can import Bus, Frame, LogWriter, open_bus, read_log
@@ -214,15 +214,6 @@ def test_a_log_is_converted(suffix: str, capsys: Output, tmp_path: Path) -> None
     assert source.read_text() == TWO_BUSES
 
 
-def test_a_file_that_is_no_log_is_refused_by_name(capsys: Output, tmp_path: Path) -> None:
-    """Nothing and success is no answer."""
-    path = tmp_path / 'mail.txt'
-    path.write_text('Dear all,\n')
-    code, out, err = run_main(capsys, '--read', str(path))
-    assert (code, out) == (1, '')
-    assert 'no log of a known format' in err
-
-
 def test_filters_of_a_log_count_from_its_begin(capsys: Output, tmp_path: Path) -> None:
     """Two of them can be compared; the time since the line before is that of what is shown."""
     path = tmp_path / 'bus.log'
@@ -270,6 +261,7 @@ def test_quiet_prints_nothing_and_still_logs(capsys: Output, tmp_path: Path) -> 
         (['paecan:x'], 'no interface paecan'),
         (['--bus-config', 'nowhere/bus.yml'], 'nowhere/bus.yml'),
         (['--read', 'nowhere.log'], 'nowhere.log'),
+        (['--read', str(REPOSITORY / 'LICENSE')], 'no log of a known format'),
         (['udp_multicast:239.1.2.3', '--log', 'nowhere/bus.log'], 'nowhere/bus.log'),
     ],
 )

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 import threading
@@ -150,6 +149,10 @@ def test_scan_leaves_the_sdo_channels_to_a_master(name: str, witness: Bus, capsy
     assert main(['scan', '--can', name, *LISTEN, '--query']) == 0
     assert 'its transfers may fail' in capsys.readouterr().err
     assert {frame.can_id for frame in witness.receive(0.0)} >= {0x602, 0x582, 0x603, 0x583}
+    assert main(['read', '2', '0x6041', '--value', '--can', name]) == 0
+    captured = capsys.readouterr()
+    assert captured.out == '592\n'
+    assert 'a master is on this bus (SYNC), and shares the SDO channel' in captured.err
 
 
 def test_scan_of_an_empty_bus(name: str, capsys: Output) -> None:
@@ -182,6 +185,8 @@ def test_objects_without_any_file(name: str, capsys: Output) -> None:
     assert capsys.readouterr().out == '0x607C:00 Home offset = -1\n'
     assert main(['read', '2', '0x6083', '--type', 'bytes', '--value', '--can', name]) == 0
     assert capsys.readouterr().out == '10 27 00 00\n'
+    assert main(['write', '2', '0x2000', '1', '--can', name]) == 2  # its type is not guessed
+    assert 'name it with --type' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -239,24 +244,6 @@ def test_answers_that_deviate_are_read_as_the_master_reads_them(
     assert warning in captured.err
 
 
-def test_two_devices_with_one_node_id_make_the_scan_fail(
-    name: str, runner: DeviceRunner, capsys: Output
-) -> None:
-    """They are named with the remedy, and a script notices by the exit code."""
-    right = runner.host.devices[1]
-    inject = partial(right.faults.inject, FaultInjection(Fault.NODE_ID_CONFLICT))
-    runner.call(lambda: inject(time.monotonic())).result(DEADLINE)
-    assert main(['scan', '--can', name, *LISTEN]) == 1
-    assert 'node 3: several devices answer' in capsys.readouterr().err
-
-
-@pytest.mark.usefixtures('runner')
-def test_an_unknown_type_is_not_guessed_in_writing(name: str, capsys: Output) -> None:
-    """Without a file, an object that no standard describes needs its type."""
-    assert main(['write', '2', '0x2000', '1', '--can', name]) == 2
-    assert 'name it with --type' in capsys.readouterr().err
-
-
 def test_a_device_that_holds_something_else_is_reported(
     name: str, witness: Bus, capsys: Output
 ) -> None:
@@ -287,15 +274,6 @@ def test_a_command_is_not_read_back(name: str, runner: DeviceRunner, capsys: Out
     runner.call(lambda: inject(slow, time.monotonic())).result(DEADLINE)
     assert main(['write', '2', '0x1010:1', '0x65766173', '--type', 'u32', '--can', name]) == 0
     assert capsys.readouterr().out.endswith('was written\n')
-
-
-@pytest.mark.usefixtures('runner', 'master')
-def test_reading_beside_a_master_is_warned_of(name: str, capsys: Output) -> None:
-    """The value comes on stdout, the warning beside it."""
-    assert main(['read', '2', '0x6041', '--value', '--can', name]) == 0
-    captured = capsys.readouterr()
-    assert captured.out == '592\n'
-    assert 'a master is on this bus (SYNC), and shares the SDO channel' in captured.err
 
 
 @pytest.mark.usefixtures('runner')
@@ -345,14 +323,9 @@ def test_diff_with_an_eds(name: str, capsys: Output) -> None:
     )
 
 
+@pytest.mark.usefixtures('runner')
 def test_parameters_of_ros_name_bus_and_file(name: str, bus_yml: str, capsys: Output) -> None:
     """The parameters of the nodes work here too."""
-    with ExitStack() as stack:
-        bus = stack.enter_context(open_bus(name))
-        devices = DeviceRunner(bus)
-        devices.host.add(2, load_eds(EDS).dictionary)
-        devices.start()
-        stack.callback(devices.stop)
-        ros = ['--ros-args', '-p', f'can_interface_name:={name}', '-p', f'bus_config:={bus_yml}']
-        assert main(['read', 'left', 'Statusword', '--value', *ros]) == 0
+    ros = ['--ros-args', '-p', f'can_interface_name:={name}', '-p', f'bus_config:={bus_yml}']
+    assert main(['read', 'left', 'Statusword', '--value', *ros]) == 0
     assert capsys.readouterr().out == '592\n'
