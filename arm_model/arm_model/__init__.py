@@ -26,7 +26,6 @@ from .exceptions import (
     ObjectNameError,
     SceneError,
 )
-from .frame_tree import FrameTree, TRANSFORM_TIMEOUT
 from .kinematics import Kinematics
 from .limits import JointLimits, load_limits, merge_limits
 from .model import RobotModel
@@ -56,7 +55,6 @@ from .state import RobotState
 __all__ = [
     'OCTOMAP_NAME',
     'ORIGIN',
-    'TRANSFORM_TIMEOUT',
     'AllowedCollisionMatrix',
     'ArmError',
     'ArmFiles',
@@ -72,7 +70,6 @@ __all__ = [
     'Cone',
     'Contact',
     'Cylinder',
-    'FrameTree',
     'JointLimits',
     'Kinematics',
     'LeastClearance',

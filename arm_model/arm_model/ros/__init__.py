@@ -19,12 +19,12 @@ from .robot_parameters import (
     GroupModels,
     same_robot,
 )
-from .tf_listener import learn_static, learn_transforms, STATIC_QOS, TfListener
+from .tf import FrameTree, TfListener
 
 __all__ = [
-    'STATIC_QOS',
     'Description',
     'FrameOf',
+    'FrameTree',
     'GroupModels',
     'TfListener',
     'allowed_collisions',
@@ -34,8 +34,6 @@ __all__ = [
     'declare_robot',
     'duration_fields',
     'hull_of',
-    'learn_static',
-    'learn_transforms',
     'pose_of',
     'primitive_shape',
     'same_robot',

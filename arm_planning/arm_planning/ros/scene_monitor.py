@@ -22,16 +22,15 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Empty
 
-from arm_model import Array
-from arm_model.ros import scene_change
+from arm_model import Array, combined, Pose
+from arm_model.ros import scene_change, TfListener
 from node_runner import LATCHED
 
-from ..exceptions import PlanningCode, PlanningError
+from ..exceptions import coded, PlanningCode, PlanningError
 from .robot_groups import RobotGroups
 from .scene_changes import apply_scene
 from .scene_messages import ALL_COMPONENTS, attached_messages, collision_message, scene_message
 from .scene_snapshot import SceneSnapshot
-from .tf_frames import TfFrames
 from .trajectories import joints_of, state_message
 
 DEPTH = 100  # messages of changes that may wait: each of them counts
@@ -56,12 +55,12 @@ class SceneMonitor:
             frame_prefix: Before the names of its links in TF.
         """
         self.robot = robot
-        frames = TfFrames(node, robot.kinematics, frame_prefix)
+        self._tf = TfListener(node, robot.kinematics, frame_prefix, on_demand=True)
         self.snapshot = SceneSnapshot(
             robot.scene,
             name=f'{robot.name} scene',
             world_frames=robot.world_frames,
-            outer_frames=frames.pose,
+            outer_frames=self._outer_frame,
         )
         self._node = node
         self._places: dict[str, float] = {}
@@ -157,6 +156,16 @@ class SceneMonitor:
                     f'joint {joint}: its position on {topic} is {since}; start what publishes it'
                     f'{other}',
                 )
+
+    def _outer_frame(self, frame: str, positions: Array) -> Pose:
+        """Return where a frame of TF is in the root link, by the first link that TF connects."""
+        kinematics = self.robot.kinematics
+        link = self._tf.link(frame)
+        if link is not None:
+            return kinematics.link_pose(link, positions)
+        with coded(PlanningCode.FRAME_TRANSFORM_FAILURE):
+            link, pose = self._tf.connected(frame, kinematics.root, *kinematics.frames)
+        return combined(kinematics.link_pose(link, positions), pose)
 
     def _clear_octomap(self, _request: Empty.Request, response: Empty.Response) -> Empty.Response:
         scene = scene_change()

@@ -53,7 +53,7 @@ class Servo:
         self._parameters = parameters
         self._modes = ServoModes(node, self._stop, gateway.holds.renew)
         model = gateway.model
-        frames = TfListener(node, model, parameters.frame_prefix)
+        frames = TfListener(node, model.kinematics, parameters.frame_prefix, model.base)
         self.converter = CommandConverter(model, frames, parameters, read_scales(node))
         self._refusals = Refusals()
         self._status = node.create_publisher(ServoStatus, parameters.status_topic, 10)

@@ -1,0 +1,198 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Frames of TF, such as that of a camera, that are no links of the robot."""
+
+from __future__ import annotations
+
+from collections import deque
+from contextlib import suppress
+import math
+import threading
+import time
+
+from geometry_msgs.msg import TransformStamped
+import numpy as np
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.serialization import deserialize_message
+from tf2_msgs.msg import TFMessage
+
+from ..arrays import checked
+from ..exceptions import CommandError
+from ..kinematics import Kinematics
+from ..pose import combined, inverse, Pose, rotation_of
+from .numbers import seconds, xyz, xyzw
+
+STATIC_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""How /tf_static is published."""
+
+TRANSFORM_TIMEOUT = 1.0  # age at which a transform of /tf counts no more in [s]
+KEPT_TIME = 5.0  # age at which a message that was not needed is left unread in [s]
+KEPT_MESSAGES = 2000  # how many of them at most
+
+
+class FrameTree:
+    """The newest transforms of /tf and /tf_static."""
+
+    def __init__(self) -> None:
+        self._links: dict[str, tuple[str, Pose, float]] = {}  # parent, pose in it, time
+
+    def learn(self, child: str, parent: str, pose: Pose, time: float) -> None:
+        """Store a transform.
+
+        Args:
+            parent: Name of the frame in which its pose is given.
+            time: Steady time of its arrival in [s]; infinity for a static one.
+        """
+        self._links[child] = parent, pose, time
+
+    def age(self, frame: str, now: float) -> float:
+        """Return how old the newest transform of a frame is in [s]; infinity where it has none."""
+        link = self._links.get(frame)
+        return math.inf if link is None else max(now - link[2], 0.0)
+
+    def pose(self, frame: str, base: str, now: float) -> Pose | None:
+        """Return the pose of a frame in another; None where they are not connected."""
+        up, over = self._to_root(frame, now), self._to_root(base, now)
+        for name, pose in up.items():
+            if name in over:
+                return combined(inverse(over[name]), pose)
+        return None
+
+    def _to_root(self, frame: str, now: float) -> dict[str, Pose]:
+        """Return the pose of a frame in itself and in each of its ancestors, nearest first."""
+        pose = Pose(np.eye(3), np.zeros(3))
+        found = {frame: pose}
+        while link := self._links.get(frame):
+            parent, in_parent, learned = link
+            if now - learned >= TRANSFORM_TIMEOUT or parent in found:  # too old, or a loop
+                break
+            pose, frame = combined(in_parent, pose), parent
+            found[frame] = pose
+        return found
+
+
+class TfListener:
+    """Listens to TF; any thread may ask for frames."""
+
+    def __init__(
+        self,
+        node: Node,
+        kinematics: Kinematics,
+        prefix: str = '',
+        base: str = '',
+        *,
+        on_demand: bool = False,
+    ) -> None:
+        """Prepare.
+
+        Args:
+            prefix: Before the names of the robot's links in TF.
+            base: Link in which :meth:`pose` is.
+            on_demand: Whether messages are kept as they come and read when a frame is asked for:
+                robots publish the frames of their own links 100 times a second, and few requests
+                name others. Else it listens from the first frame on that is no link, and reads
+                each message as it comes, so that no control cycle reads many.
+        """
+        self._node, self._prefix, self._base = node, prefix, base
+        self._links = frozenset(kinematics.frames)
+        self._on_demand, self._is_listening = on_demand, False
+        self._unread: deque[tuple[float, float, bytes]] = deque(maxlen=KEPT_MESSAGES)
+        self._tree, self._lock = FrameTree(), threading.Lock()
+        if on_demand:
+            self._listen()
+
+    def link(self, frame: str) -> str | None:
+        """Return the link of the robot that a frame is, with or without its prefix."""
+        name = frame.removeprefix(self._prefix)
+        return name if name in self._links else None
+
+    def pose(self, frame: str) -> Pose:
+        """Return the pose of a frame of TF in the base.
+
+        Raises:
+            CommandError: It is unknown, not connected with the base, or too old.
+        """
+        return self.connected(frame, self._base)[1]
+
+    def connected(self, frame: str, *links: str) -> tuple[str, Pose]:
+        """Return the first of some links with which TF connects a frame, and its pose in it.
+
+        Raises:
+            CommandError: It is unknown, not connected with any of them, or too old.
+        """
+        self._listen()
+        with self._lock:
+            self._read()
+            now = time.monotonic()
+            for link in links:
+                found = self._tree.pose(frame, self._prefix + link, now)
+                if found is not None:
+                    return link, found
+            raise CommandError(self._reason(frame, self._prefix + links[0], now))
+
+    def _reason(self, frame: str, base: str, now: float) -> str:
+        age = self._tree.age(frame, now)
+        if not math.isfinite(age):
+            return (
+                f'Unknown frame: {frame!r}; it is no link of the robot, and /tf does not have it:'
+                ' start what publishes it'
+            )
+        what = f'Unable to transform from frame {frame!r} to frame {base!r}'
+        if age > TRANSFORM_TIMEOUT:
+            return (
+                f'{what}: its newest transform on /tf is {age:.1f} s old; see that its publisher'
+                ' goes on'
+            )
+        return (
+            f'{what}: /tf does not connect them with transforms of the last second; publish what'
+            ' is between them'
+        )
+
+    def _listen(self) -> None:
+        if self._is_listening:
+            return
+        self._is_listening = True
+        self._node.create_subscription(TFMessage, '/tf_static', self._learn_static, STATIC_QOS)
+        if self._on_demand:
+            self._node.create_subscription(TFMessage, '/tf', self._keep, 100, raw=True)
+        else:
+            self._node.create_subscription(TFMessage, '/tf', self._learn_now, 100)
+
+    def _arrival(self) -> tuple[float, float]:
+        """Return the steady time, and that of the clock of the stamps, in [s]."""
+        return time.monotonic(), float(self._node.get_clock().now().nanoseconds) * 1e-9
+
+    def _keep(self, data: bytes) -> None:
+        self._unread.append((*self._arrival(), data))
+
+    def _read(self) -> None:
+        oldest = time.monotonic() - KEPT_TIME
+        with suppress(IndexError):  # until none is left; more may come meanwhile
+            while True:
+                now, clock, data = self._unread.popleft()
+                if now > oldest:
+                    self._learn(deserialize_message(data, TFMessage), now, clock)
+
+    def _learn_now(self, message: TFMessage) -> None:
+        with self._lock:
+            self._learn(message, *self._arrival())
+
+    def _learn(self, message: TFMessage, now: float, clock: float) -> None:
+        """Store a message of /tf; what comes late is as old as its stamps say."""
+        for each in message.transforms:
+            self._store(each, now - max(clock - seconds(each.header.stamp), 0.0))
+
+    def _learn_static(self, message: TFMessage) -> None:
+        with self._lock:
+            for each in message.transforms:
+                self._store(each, math.inf)
+
+    def _store(self, transform: TransformStamped, when: float) -> None:
+        try:
+            rotation = rotation_of(xyzw(transform.transform.rotation))
+            position = checked(xyz(transform.transform.translation), 3, 'translation')
+        except CommandError:
+            return  # other listeners of TF report it to its publisher
+        child, parent = transform.child_frame_id, transform.header.frame_id
+        self._tree.learn(child, parent, Pose(rotation, position), when)
