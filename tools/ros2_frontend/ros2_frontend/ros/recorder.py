@@ -147,8 +147,10 @@ class Recorder:
         handle = self._node.create_subscription(
             message_class, name, _not_called, to_profile(qos), raw=True
         )
-        hashes = [str(each.topic_type_hash) for each in endpoints]
-        topic = Topic(name, type_, self._definition(type_), hashes[0] if hashes else '', profiles)
+        hashes = (str(each.topic_type_hash) for each in endpoints)
+        # publishers of other DDS vendors have none, which is printed as INVALID
+        known = next((each for each in hashes if each.startswith('RIHS')), '')
+        topic = Topic(name, type_, self._definition(type_), known, profiles)
         self._topics[name] = _Subscribed(topic, handle, qos)
         self._queue.set_topic(topic)
         self._log.info(f"Subscribed to topic '{name}'")
