@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 import math
-from typing import Any
 
 from quad_description import RobotState
 
@@ -36,7 +35,7 @@ class ReplayedRobot(ObservedRobot):
     ) -> None:
         super().__init__(settings, on_state=on_state, on_change=on_change, on_refusal=on_refusal)
         self._status = LinkStatus(detail='the log begins')
-        self._dialect: Dialect[Any] | None = None  # how the robot was talked to
+        self._dialect: Dialect | None = None  # how the robot was talked to
         self._now = self._bytes_at = 0.0
         self._reported_at = -math.inf
 
@@ -114,7 +113,7 @@ class ReplayedRobot(ObservedRobot):
         self._bytes_at = self._now
         self._handle(self._received.feed(transfer.data), self._dialect)
 
-    def _command(self, dialect: Dialect[Any], frame: Frame) -> None:
+    def _command(self, dialect: Dialect, frame: Frame) -> None:
         """Process a frame that was sent; targets of the legs show which feet stand."""
         angles = dialect.handle_sent(frame, self._now)
         if angles.keys() >= set(LEG_MOTORS):
@@ -123,7 +122,7 @@ class ReplayedRobot(ObservedRobot):
             legs = self.names[: self._settings.joints.leg_count]
             self._estimator.command(self._now, [positions[name] for name in legs])
 
-    def _handle(self, frames: list[Frame], dialect: Dialect[Any]) -> None:
+    def _handle(self, frames: list[Frame], dialect: Dialect) -> None:
         for frame in frames:
             report = dialect.handle_frame(frame, self._now)
             if report is None:

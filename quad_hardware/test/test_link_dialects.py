@@ -51,7 +51,7 @@ class OldRig:
 
     def __init__(self, latency: float = 0.002) -> None:
         self.now = 0.0
-        self.dialect: Dialect[Frame] = V1Dialect(self.now)
+        self.dialect: Dialect = V1Dialect(self.now)
         self.latency = latency
         self.lose_each = 0
         self._requested = 0

@@ -208,7 +208,7 @@ def test_no_command_slips_through_when_the_robot_falls_silent(
     """While the pending one is being withdrawn, another is refused already."""
     answers: list[tuple[bool, bool]] = []
 
-    def command_meanwhile(_: Dialect[Any]) -> None:
+    def command_meanwhile(_: Dialect) -> None:
         answers.append((rig.driver.command(LEGS), rig.driver.torque(on=False)))
 
     for dialect in (V2Dialect, V1Dialect):

@@ -80,10 +80,7 @@ def foot_position(leg: LegGeometry, angles: Vector) -> Vector:
     Args:
         angles: Hip, thigh, calf in [rad].
     """
-    roll = leg.signs[0] * angles[0]
-    thigh = leg.signs[1] * angles[1]
-    upper = thigh + leg.thigh_pitch
-    lower = thigh + leg.signs[2] * angles[2] + leg.calf_pitch
+    roll, upper, lower = _pitches(leg, angles)
     x = leg.thigh_x - leg.thigh_length * math.sin(upper) - leg.calf_length * math.sin(lower)
     z = leg.thigh_z - leg.thigh_length * math.cos(upper) - leg.calf_length * math.cos(lower)
     y, sine, cosine = leg.offset_y, math.sin(roll), math.cos(roll)
@@ -108,10 +105,7 @@ def jacobian(leg: LegGeometry, angles: Vector) -> tuple[Vector, Vector, Vector]:
     Args:
         angles: Hip, thigh, calf in [rad].
     """
-    roll = leg.signs[0] * angles[0]
-    thigh = leg.signs[1] * angles[1]
-    upper = thigh + leg.thigh_pitch
-    lower = thigh + leg.signs[2] * angles[2] + leg.calf_pitch
+    roll, upper, lower = _pitches(leg, angles)
     sine, cosine = math.sin(roll), math.cos(roll)
     lower_x = -leg.calf_length * math.cos(lower)
     lower_z = leg.calf_length * math.sin(lower)
@@ -124,6 +118,12 @@ def jacobian(leg: LegGeometry, angles: Vector) -> tuple[Vector, Vector, Vector]:
         (pitch * both_x, -pitch * both_z * sine, pitch * both_z * cosine),
         (knee * lower_x, -knee * lower_z * sine, knee * lower_z * cosine),
     )
+
+
+def _pitches(leg: LegGeometry, angles: Vector) -> Vector:
+    """Return the roll of the leg's plane, and the pitches of thigh and calf in it."""
+    hip, thigh, calf = (sign * angle for sign, angle in zip(leg.signs, angles, strict=True))
+    return hip, thigh + leg.thigh_pitch, thigh + calf + leg.calf_pitch
 
 
 def wrapped(angle: float) -> float:

@@ -101,12 +101,8 @@ class Quadruped:
     def hip_centre(self) -> Vector:
         """Mean of the hip points in the body's frame in [m]."""
         hips = [leg.hip for leg in self.legs]
-        count = len(hips)
-        return (
-            sum(hip[0] for hip in hips) / count,
-            sum(hip[1] for hip in hips) / count,
-            sum(hip[2] for hip in hips) / count,
-        )
+        x, y, z = (sum(axis) / len(hips) for axis in zip(*hips, strict=True))
+        return x, y, z
 
     @property
     def others(self) -> tuple[int, ...]:
@@ -132,10 +128,8 @@ class Quadruped:
 
     def foot_poses(self, positions: Sequence[float]) -> list[FootPose]:
         """Return where the feet are and how they are turned, as :meth:`feet`."""
-        return [
-            FootPose(foot_position(leg, angles), calf_rotation(leg, angles))
-            for leg, angles in zip(self.legs, self.leg_angles(positions), strict=True)
-        ]
+        pairs = zip(self.legs, self.leg_angles(positions), strict=True)
+        return [FootPose(foot_position(*pair), calf_rotation(*pair)) for pair in pairs]
 
     def standing_height(self, positions: Sequence[float]) -> float:
         """Return how high a level base_link is above ground that its lowest foot touches [m]."""

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 import math
-from typing import Generic, TypeVar
+from typing import Any
 
 from quad_description.rotations import Vector
 
@@ -30,10 +30,6 @@ class LinkState(Enum):
     STALE = 'stale'  # the port is open and no report came for a while
     REFUSED = 'refused'  # reports come, and for a while none of them could be
     STOPPED = 'stopped'
-
-
-Received = TypeVar('Received')
-"""What the parser of a session finds: frames, or states of the vendor's library."""
 
 
 @dataclass(slots=True)
@@ -76,29 +72,24 @@ class Step:
     wake: float  # when to come back at the latest, on the clock of the caller [s]
 
 
-class Dialect(ABC, Generic[Received]):
+class Dialect(ABC):
     """Conversation with one robot.
 
     The caller does :meth:`step` again when its ``wake`` has come, after :meth:`command` and after
     frames; and :meth:`handle_frame` for each frame.
     """
 
-    def __init__(self, protocol: Protocol, now: float) -> None:
+    def __init__(self, protocol: Protocol) -> None:
         """Begin a conversation."""
         self.protocol = protocol  # what the robot speaks
         self.can_release = True  # the torque of its servos can be switched off
         self._counters = DialectCounters()
-        self._now = now
+        self._torque = b''  # bytes of a change that is still to be sent
 
     @property
     def counters(self) -> DialectCounters:
         """A copy of the counters."""
         return replace(self._counters)
-
-    @property
-    @abstractmethod
-    def motors(self) -> tuple[int, ...]:
-        """Ids of the motors whose angles the robot reports."""
 
     @property
     @abstractmethod
@@ -108,7 +99,7 @@ class Dialect(ABC, Generic[Received]):
     @property
     def torque_pending(self) -> bool:
         """Whether a change of torque has not been given to the line yet."""
-        return False
+        return bool(self._torque)
 
     @abstractmethod
     def command(self, angles: Mapping[int, float]) -> None:
@@ -130,7 +121,7 @@ class Dialect(ABC, Generic[Received]):
     def step(self, now: float) -> Step:
         """Return what is to be sent now."""
 
-    def handle_sent(self, frame: Received, now: float) -> Mapping[int, float]:
+    def handle_sent(self, frame: Any, now: float) -> Mapping[int, float]:  # noqa: ANN401
         """Process a frame that was sent in a recorded session, in the place of step.
 
         Returns:
@@ -139,7 +130,7 @@ class Dialect(ABC, Generic[Received]):
         return {}
 
     @abstractmethod
-    def handle_frame(self, frame: Received, now: float) -> Report | None:
+    def handle_frame(self, frame: Any, now: float) -> Report | None:  # noqa: ANN401
         """Process a frame of the robot; return the report that it completes, if any."""
 
 

@@ -12,7 +12,6 @@ import os
 import select
 import threading
 import time
-from typing import Any
 
 from ..exceptions import LinkError
 from ..report import Report
@@ -228,7 +227,7 @@ class Driver:
                 timeout = min(timeout, QUIET_TIME)
             bytes_at = self._listen(session, max(timeout, 0.0), bytes_at)
 
-    def _owes(self, dialect: Dialect[Any]) -> bool:
+    def _owes(self, dialect: Dialect) -> bool:
         """Return whether an order was accepted that is still to be sent."""
         ordered = self._angles is not None or self._torque is not None
         return self._status.state is LinkState.RUNNING and (dialect.pending or ordered)
@@ -240,7 +239,7 @@ class Driver:
             (end for end in ends if end >= now), default=self._received_at + RECONNECT_TIMEOUT
         )
 
-    def _fall_silent(self, dialect: Dialect[Any], now: float) -> None:
+    def _fall_silent(self, dialect: Dialect, now: float) -> None:
         state, what = LinkState.STALE, 'no report'
         if now - self._received_at <= STALE_TIME:
             state, what = LinkState.REFUSED, f'every report is refused, {self._status.refusal}'
@@ -249,7 +248,7 @@ class Driver:
             self._enter(state, f'{what} for {STALE_TIME} s: {does}')
         dialect.cancel_pending()  # only now: from here on no order is accepted
 
-    def _post(self, dialect: Dialect[Any]) -> None:
+    def _post(self, dialect: Dialect) -> None:
         angles, torque = self._take_orders()
         if angles is not None:
             dialect.command(angles)

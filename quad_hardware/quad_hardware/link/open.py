@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 import select
 import time
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..exceptions import LinkError, NoAnswerError
 from ..protocol import (
@@ -76,7 +76,7 @@ class Session:
     port: SerialPort  # the open port, owned by the holder of the session
     firmware: str  # version of the robot
     parser: StreamParser | VendorParser  # finds frames in its bytes
-    dialect: Dialect[Any]  # how to talk to it
+    dialect: Dialect  # how to talk to it
     model: Model | None = None  # whose ranges scale bytes in protocol v1; None in others
 
 
@@ -107,7 +107,7 @@ def open_session(options: LinkOptions) -> Session:
     return Session(port, firmware, parser, make_dialect(model, now, options.rate), model)
 
 
-def make_dialect(model: Model | None, now: float, rate: int = 50) -> Dialect[Frame]:
+def make_dialect(model: Model | None, now: float, rate: int = 50) -> Dialect:
     """Return how to talk to a robot.
 
     Args:

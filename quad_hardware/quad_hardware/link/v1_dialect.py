@@ -107,7 +107,7 @@ _READ_IMU = _Request(Register.IMU, _IMU.length)
 _READ_BATTERY = _Request(Register.BATTERY, 1)
 
 
-class V1Dialect(Dialect[Frame]):
+class V1Dialect(Dialect):
     """Polls a robot; a command goes out as soon as the line is free.
 
     A board that is slower than the period makes the reports fewer. How long an answer is waited
@@ -120,7 +120,7 @@ class V1Dialect(Dialect[Frame]):
         Args:
             rate: Reports a second [Hz].
         """
-        super().__init__(V1, now)
+        super().__init__(V1)
         self._spans = ANGLE_SPANS[model]
         self._period = 1.0 / rate
         self._cycle_at = now
@@ -130,7 +130,7 @@ class V1Dialect(Dialect[Frame]):
         self._requested_at = now
         self._latency_limit = MAX_LATENCY
         self._free_at = now
-        self._legs = self._torque = b''
+        self._legs = b''
         self._arm: dict[int, bytes] = {}
         self._arm_sent: dict[int, tuple[bytes, float]] = {}  # and until when that counts [s]
         self._unseen: dict[int, UnseenServo] = {}
@@ -140,19 +140,9 @@ class V1Dialect(Dialect[Frame]):
         self._charges: deque[int] = deque(maxlen=3)
 
     @property
-    def motors(self) -> tuple[int, ...]:
-        """Ids of the motors whose angles the robot reports."""
-        return BULK_READ_ORDER
-
-    @property
     def pending(self) -> bool:
         """Whether a command or a change of torque has not been given to the line yet."""
         return bool(self._legs or self._arm or self._torque)
-
-    @property
-    def torque_pending(self) -> bool:
-        """Whether a change of torque has not been given to the line yet."""
-        return bool(self._torque)
 
     def command(self, angles: Mapping[int, float]) -> None:
         """Set the angles that are sent when the line is free.

@@ -25,7 +25,7 @@ STATE_WIRE_TIME = V2.wire_time(V2.overhead + STATE.length)  # [s]
 _SEQUENCE = 1 << 16
 
 
-class V2Dialect(Dialect[Frame]):
+class V2Dialect(Dialect):
     """Requests 50 states a second, and again whenever they stop coming."""
 
     def __init__(self, now: float, rate: int = 50) -> None:
@@ -34,30 +34,20 @@ class V2Dialect(Dialect[Frame]):
         Args:
             rate: Reports a second [Hz].
         """
-        super().__init__(V2, now)
+        super().__init__(V2)
         requests = (
             Frame(Kind.WRITE, Code.FEEDBACK_RATE, bytes((rate,))),
             Frame(Kind.WRITE, Code.FEEDBACK, b'\x01'),
         )
         self._requests = b''.join(frame.encode(V2) for frame in requests)
         self._request_at = now
-        self._pending = self._torque = b''
+        self._pending = b''
         self._sequence: int | None = None
-
-    @property
-    def motors(self) -> tuple[int, ...]:
-        """Ids of the motors whose angles the robot reports."""
-        return MOTOR_ORDER
 
     @property
     def pending(self) -> bool:
         """Whether a command or a change of torque has not been given to the line yet."""
         return bool(self._pending or self._torque)
-
-    @property
-    def torque_pending(self) -> bool:
-        """Whether a change of torque has not been given to the line yet."""
-        return bool(self._torque)
 
     def command(self, angles: Mapping[int, float]) -> None:
         """Set the angles that are sent at the next step, in one frame."""

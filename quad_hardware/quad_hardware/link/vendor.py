@@ -161,7 +161,7 @@ class VendorParser:
         return []
 
 
-class VendorDialect(Dialect[object]):
+class VendorDialect(Dialect):
     """States of the vendor's parser; commands by the vendor's methods."""
 
     def __init__(self, dog: Any, now: float, method: str) -> None:  # noqa: ANN401
@@ -173,7 +173,7 @@ class VendorDialect(Dialect[object]):
         Raises:
             LinkError: There is no such method.
         """
-        super().__init__(VENDOR, now)
+        super().__init__(VENDOR)
         self.can_release = False
         self._request_at = now
         self._dog = dog
@@ -181,11 +181,6 @@ class VendorDialect(Dialect[object]):
         registry = importlib.import_module('xgo_lib2.registry')
         self._slots = {motor: int(registry.feedback_slot_of(motor)) for motor in MOTOR_ORDER}
         self._angles: dict[int, float] = {}
-
-    @property
-    def motors(self) -> tuple[int, ...]:
-        """Ids of the motors whose angles the robot reports."""
-        return MOTOR_ORDER
 
     @property
     def pending(self) -> bool:
