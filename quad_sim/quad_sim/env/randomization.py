@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 import math
 from typing import Any
@@ -16,6 +15,8 @@ from ..physics.variation import Variation
 from ..plant.noise import BOARD, Noise, NONE
 
 Range = tuple[float, float]
+_VARIED = ('friction', 'trunk_mass', 'stiffness', 'damping')  # as in Variation
+_FIXED = {'kick_interval', 'noise'}  # no ranges
 
 
 def check_range(name: str, span: Range) -> None:
@@ -46,9 +47,9 @@ class Randomization:
     def __post_init__(self) -> None:
         """Refuse what nothing can be drawn from."""
         for field in fields(self):
-            if field.name not in {'kick_interval', 'noise'}:
+            if field.name not in _FIXED:
                 check_range(field.name, getattr(self, field.name))
-        self._variation([span[0] for span in self._spans])  # refuses what no robot has
+        Variation(*(getattr(self, name)[0] for name in _VARIED))  # refuses what no robot has
         if self.delay[0] < 0.0:
             raise SetupError(f'delay {self.delay} s: give 0 or more')
         if not 0.0 <= self.kick_interval < math.inf:
@@ -56,7 +57,7 @@ class Randomization:
 
     def variation(self, random: np.random.Generator) -> Variation:
         """Draw a robot and its ground."""
-        return self._variation([float(random.uniform(*span)) for span in self._spans])
+        return Variation(*(float(random.uniform(*getattr(self, name))) for name in _VARIED))
 
     def scaled(self, share: float) -> Randomization:
         """Return ranges that are nearer to the robot as it is; kicks are weaker. Noise stays.
@@ -77,18 +78,9 @@ class Randomization:
                 )
             )
             for field in fields(self)
-            if field.name not in {'kick_interval', 'noise'}
+            if field.name not in _FIXED
         }
         return replace(self, **spans)
-
-    @property
-    def _spans(self) -> tuple[Range, ...]:
-        return self.friction, self.trunk_mass, self.stiffness, self.damping
-
-    @staticmethod
-    def _variation(numbers: Sequence[float]) -> Variation:
-        friction, trunk_mass, stiffness, damping = numbers
-        return Variation(friction, trunk_mass, stiffness, damping)
 
 
 NO_RANDOMIZATION = Randomization(

@@ -68,29 +68,6 @@ class Fault:
     duration: float = FOREVER  # for how long [s]; infinite until it is ended
     values: Mapping[str, float] = field(default_factory=dict)  # its details by name
 
-    def __post_init__(self) -> None:
-        """Refuse times and details without sense.
-
-        Raises:
-            SetupError: The message names what the fault takes.
-        """
-        known = SETTINGS[self.kind]
-        for name, value in self.values.items():
-            if name not in known:
-                takes = ', '.join(('at', 'for', *known))
-                raise SetupError(f'fault {self.kind.value} has no {name!r}; it takes {takes}')
-            setting = known[name]
-            if not setting.lowest <= value <= setting.highest:
-                raise SetupError(
-                    f'fault {self.kind.value}: {name} {value} ({setting.meaning}) is not '
-                    f'{setting.lowest:g} to {setting.highest:g}'
-                )
-        if not (math.isfinite(self.start) and self.start >= 0.0 and self.duration > 0.0):
-            raise SetupError(
-                f'fault {self.kind.value}: at {self.start} for {self.duration}; '
-                'give times in [s], from zero on'
-            )
-
     def __getitem__(self, name: str) -> float:
         """Return a detail, or its default."""
         return self.values.get(name, SETTINGS[self.kind][name].default)
@@ -117,10 +94,29 @@ def make_fault(
     try:
         kind = FaultKind(name)
     except ValueError:
-        known = ', '.join(kind.value for kind in FaultKind)
-        raise SetupError(f'unknown fault {name!r}; there are {known}') from None
-    values = dict(_assignment(name, word) for word in settings)
-    start, duration = values.pop('at', start), values.pop('for', duration)
+        kinds = ', '.join(kind.value for kind in FaultKind)
+        raise SetupError(f'unknown fault {name!r}; there are {kinds}') from None
+    known, values = SETTINGS[kind], {'at': start, 'for': duration}
+    for word in settings:
+        detail, _, text = (part.strip() for part in word.partition('='))
+        if detail not in {*values, *known}:
+            takes = ', '.join(('at', 'for', *known))
+            raise SetupError(f'fault {name} has no {detail!r}; it takes {takes}')
+        try:
+            values[detail] = float(text)
+        except ValueError:
+            raise SetupError(f'fault {name}: {word!r} is not name=number') from None
+        _, lowest, highest, meaning = known.get(detail, (0.0, -math.inf, math.inf, ''))
+        if meaning and not lowest <= values[detail] <= highest:
+            raise SetupError(
+                f'fault {name}: {detail} {values[detail]} ({meaning}) is not '
+                f'{lowest:g} to {highest:g}'
+            )
+    start, duration = values.pop('at'), values.pop('for')
+    if not (math.isfinite(start) and start >= 0.0 and duration > 0.0):
+        raise SetupError(
+            f'fault {name}: at {start} for {duration}; give times in [s], from zero on'
+        )
     return Fault(kind, start, duration, values)
 
 
@@ -132,14 +128,6 @@ def parse_fault(text: str) -> Fault:
     """
     name, *settings = (word.strip() for word in text.split(','))
     return make_fault(name, settings)
-
-
-def _assignment(fault: str, word: str) -> tuple[str, float]:
-    name, _, value = word.partition('=')
-    try:
-        return name.strip(), float(value)
-    except ValueError:
-        raise SetupError(f'fault {fault}: {word!r} is not name=number') from None
 
 
 class FaultPlan:
