@@ -262,21 +262,23 @@ class Controller:
         Returns:
             The targets to send, and what happened.
         """
-        events: list[Event] = []
-        self._take(state, dt, events)
+        refused = self._health.take(state, dt)
+        events = [Event(EventKind.REPEATED, text) for text in refused]
+        self._commands.pass_time(dt)
         last = self._last_targets(dt, events)
         if last is None:
             return Output(None, None, self._machine.title, False, tuple(events))
         self._latch_faults(last, events)
         self._advance_state(last, events)
-        self._report_conditions(events)
+        events += self._notices.step(self._conditions(), self._ended_conditions())
         if self._unseen.is_pending:  # targets of before would move it, those of one sample, too
             return Output(None, None, self._machine.title, self._health.complete, tuple(events))
         situation, dt_motion = self._situation(), min(dt, MAX_STEP)
         wanted = self._move(situation, dt_motion, last, events)
         shadow = self._policies.watch(situation, dt_motion, last)
         targets = self._limiter.step(wanted, dt)
-        self._track(targets, dt)
+        if self._health.joints is not None:
+            self._tracking.step(targets, self._health.joints.positions, dt)
         return Output(
             targets,
             shadow,
@@ -287,11 +289,6 @@ class Controller:
             self._policies.asked(self._machine.motion) if not self._held else None,
         )
 
-    def _take(self, state: RobotState, dt: float, events: list[Event]) -> None:
-        """Take in what arrived, and the time that passed."""
-        events += [Event(EventKind.REPEATED, text) for text in self._health.take(state, dt)]
-        self._commands.pass_time(dt)
-
     def _last_targets(self, dt: float, events: list[Event]) -> Targets | None:
         """Return what was sent last; where the joints are, at the start and after a pause."""
         if dt > STREAM_TIMEOUT and self._limiter.last:
@@ -299,7 +296,9 @@ class Controller:
             self._unseen.lose()
         if self._moved_unseen():
             self._limiter.reset()
-        return self._limiter.last or self._start()
+        if self._limiter.last is None and self._health.joints is not None:
+            self._machine.hold(self._limiter.start(self._health.joints.positions))
+        return self._limiter.last
 
     def _moved_unseen(self) -> bool:
         """Whether joints that are held were moved by something else while nobody knew it."""
@@ -321,28 +320,10 @@ class Controller:
         if state is not before and state is not State.FAULT:
             events.append(Event(EventKind.NEWS, f'{before.value} -> {state.value}'))
 
-    def _report_conditions(self, events: list[Event]) -> None:
-        """Report what stops the robot without being a fault, and when it is over."""
-        state = self._machine.state
-        events += self._notices.step(self._conditions(state), self._ended_conditions(state))
-
-    def _track(self, targets: Targets, dt: float) -> None:
-        """Compare what is sent with where the joints are."""
-        if self._health.joints is not None:
-            self._tracking.step(targets, self._health.joints.positions, dt)
-
     @property
     def _held(self) -> bool:
         """Whether nothing moves on, because nobody knows any more where the joints are."""
         return self._health.held and Fault.JOINTS not in self._tolerated
-
-    def _start(self) -> Targets | None:
-        """Begin where the joints are, as soon as that is known."""
-        if self._health.joints is None:
-            return None
-        targets = self._limiter.start(self._health.joints.positions)
-        self._machine.hold(targets)
-        return targets
 
     def _wake(self, pause: float, last: Targets) -> list[Event]:
         """Begin anew after a pause [s] in which the hardware node may have laid the robot down.
@@ -377,9 +358,9 @@ class Controller:
             if fault in watched:
                 events += self._latch_fault(fault, reason, last)
 
-    def _conditions(self, state: State) -> dict[str, str]:
+    def _conditions(self) -> dict[str, str]:
         """Return what stops the robot without being a fault, by a name for each."""
-        conditions = {}
+        state, conditions = self._machine.state, {}
         if stale := self._commands.warning(state):
             conditions['command'] = stale
         if self._held and (state in UPRIGHT_STATES or not self._machine.motion.finished):
@@ -399,14 +380,12 @@ class Controller:
             )
         return conditions
 
-    def _ended_conditions(self, state: State) -> dict[str, str]:
-        """Return what to say when one of these is over, where that lets the robot move again."""
-        over = {}
-        if state in MOVING_STATES:
-            over['command'] = 'velocities: in order again'
-        if state is not State.FAULT:
-            over['held'] = 'joint states: in order again'
-        return over
+    def _ended_conditions(self) -> dict[str, str]:
+        """Return what to report when one of these is over, where the robot may move again."""
+        over = {} if self._machine.state is State.FAULT else {'held': 'joint states'}
+        if self._machine.state in MOVING_STATES:
+            over['command'] = 'velocities'
+        return {name: f'{what}: in order again' for name, what in over.items()}
 
     def _latch_fault(self, fault: Fault, reason: str, last: Targets) -> list[Event]:
         new = self._latch.latch(fault, reason)
