@@ -152,7 +152,7 @@ def _show_log(options: argparse.Namespace, config: BusConfig | None) -> None:
         if options.log:
             _refuse_conversion(path, Path(options.log), several)
             name = wanted or next(iter(found), '')
-            log = stack.enter_context(closing(LogWriter(Path(options.log), name, 0.0)))
+            log = stack.enter_context(_log(options, name, 0.0))
         screen = _screen(options, config, 0.0, several)
         for interface, frame in chain(first, logged):
             if interface not in found:
@@ -186,7 +186,7 @@ def _show_bus(options: argparse.Namespace, config: BusConfig | None) -> None:
         bus = stack.enter_context(open_bus(options.bus))
         log = None
         if options.log:
-            log = stack.enter_context(closing(LogWriter(Path(options.log), bus.name, offset)))
+            log = stack.enter_context(_log(options, bus.name, offset))
         listener = Listener(bus, options.timeout)
         for number in (signal.SIGINT, signal.SIGTERM):
             stack.callback(signal.signal, number, signal.signal(number, listener.stop))
@@ -225,6 +225,12 @@ def _print_counters(bus: Bus) -> None:
     counters = bus.counters
     malformed = f', {counters.malformed} malformed' if counters.malformed else ''
     _print_note(f'{counters.received} frames, {counters.lost} lost{malformed}')
+
+
+def _log(options: argparse.Namespace, name: str, offset: float) -> closing[LogWriter]:
+    if Path(options.log).suffix.lower() == '.asc':
+        _print_note('an .asc does not keep what an error frame was about; a .log does')
+    return closing(LogWriter(Path(options.log), name, offset))
 
 
 def _print_note(text: str) -> None:

@@ -168,6 +168,16 @@ def test_a_log_is_shown_like_a_bus(suffix: str, capsys: Output, tmp_path: Path) 
     ]
 
 
+def test_an_error_frame_of_a_log_has_the_long_identifier_of_a_live_one(
+    capsys: Output, tmp_path: Path
+) -> None:
+    """Its identifier says what the error was."""
+    path = tmp_path / 'bus.log'
+    path.write_text('(1.000000) can0 20000004#0004000000000000\n')
+    _, out, _ = run_main(capsys, '--read', str(path), '-t', 'n')
+    assert out.split()[0] == '00000004'
+
+
 TWO_BUSES = '(1.000000) can0 702#05\n(2.000000) vcan1 702#7F\n(3.000000) can0 182#3716\n'
 
 
@@ -197,8 +207,9 @@ def test_a_log_is_converted(suffix: str, capsys: Output, tmp_path: Path) -> None
     source.write_text(
         ' (1700000000.250000)  can0  702   [1]  05\n (1700000001.000000)  can0  080   [0]\n'
     )
-    code, out, _ = run_main(capsys, '--read', str(source), '--log', str(target), '--quiet')
+    code, out, err = run_main(capsys, '--read', str(source), '--log', str(target), '--quiet')
     assert (code, out) == (0, '')
+    assert ('.asc does not keep what an error frame was about' in err) == (suffix == '.asc')
     frames = list(read_log(target))
     assert unstamped(frames) == [Frame(0x702, b'\x05'), Frame(0x080)]
     assert [frame.timestamp for frame in frames] == pytest.approx([1.7e9 + 0.25, 1.7e9 + 1.0])

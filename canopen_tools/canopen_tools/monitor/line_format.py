@@ -62,7 +62,8 @@ class LineFormat:
 
     def line(self, frame: Frame, description: Description) -> str:
         """Return the line of a frame, without its end."""
-        identifier = f'{frame.can_id:08X}' if frame.is_extended else f'{frame.can_id:03X}'
+        has_long_id = frame.is_extended or frame.is_error
+        identifier = f'{frame.can_id:08X}' if has_long_id else f'{frame.can_id:03X}'
         content = 'remote request' if frame.is_remote else frame.data.hex(' ').upper()
         label = description.label.ljust(_LABEL_WIDTH)
         node = description.node.ljust(self._node_width)
