@@ -92,17 +92,6 @@ def test_usage_errors(arguments: list[str]) -> None:
     assert 'usage: workspace' in done.stderr
 
 
-@pytest.mark.parametrize(
-    'target', ['demo', 'test', 'build', 'lint', 'bench', 'findings', 'clean', 'setup']
-)
-def test_makefile_has_the_target_and_explains_it(target: str) -> None:
-    """`make` alone names every target."""
-    makefile = ['make', '--no-print-directory', '-C', str(TOOLS.parent)]
-    shown = subprocess.run([*makefile, 'help'], check=True, capture_output=True, text=True).stdout
-    assert f'make {target} ' in shown
-    subprocess.run([*makefile, '--dry-run', target], check=True, capture_output=True)
-
-
 def test_demo_passes_the_duration_on() -> None:
     """DURATION=20 becomes --duration 20, and without it there is no such option."""
     makefile = ['make', '--no-print-directory', '-C', str(TOOLS.parent), '--dry-run', 'demo']

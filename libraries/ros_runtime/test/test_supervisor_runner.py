@@ -58,18 +58,6 @@ def nothing(_: Runner) -> None:
     """Leave it to the processes."""
 
 
-def test_ctrl_c_stops_in_order_and_exits_0() -> None:
-    """The lower stop order ends first, whatever the order of starting."""
-    watch = Watch(
-        program('good', 'slaves', notifies_ready=True, stop_order=2),
-        program('good', 'master', notifies_ready=True, stop_order=0),
-        when_ready=ctrl_c,
-    )
-    assert watch.run() == Outcome(0, 'stopped by the user')
-    byes = [name for name, text in watch.lines if text == 'bye']
-    assert byes == ['master', 'slaves']
-
-
 def test_each_process_has_a_session_of_its_own() -> None:
     """So Ctrl-C in the terminal reaches the supervisor only."""
     watch = Watch(program('good', notifies_ready=True), when_ready=ctrl_c)
@@ -111,14 +99,6 @@ def test_a_python_program_that_hangs_says_what_it_does() -> None:
     watch.run()
     assert 'Fatal Python error: Aborted' in watch.said('deaf')
     assert any('in <module>' in line for line in watch.said('deaf'))
-
-
-def test_not_ready_in_time_ends_all() -> None:
-    """The reason names what was waited for."""
-    late = program('silent', notifies_ready=True, ready_timeout=0.2)
-    outcome = Watch(late, when_ready=nothing).run()
-    assert outcome.exit_code == 1
-    assert outcome.reason.startswith('silent did not get ready within 0.2 s')
 
 
 def test_a_flood_of_output_loses_nothing_and_starves_nobody() -> None:
@@ -188,22 +168,6 @@ def test_stop_works_from_another_thread() -> None:
     assert Watch(program('good', notifies_ready=True), when_ready=stop).run() == Outcome(
         3, 'enough'
     )
-
-
-def test_the_first_ctrl_c_can_be_taken_over() -> None:
-    """Then nothing is stopped until the one who took it stops them."""
-
-    def notify(notice: Notice) -> None:
-        if notice.text.startswith('all is ready'):
-            signal.raise_signal(signal.SIGINT)
-
-    def take() -> bool:
-        runner.stop(Outcome(3, 'taken over'))
-        return True
-
-    specs = [program('good', notifies_ready=True)]
-    with Runner(specs, lambda *_: None, notify, on_interrupt=take) as runner:
-        assert runner.run() == Outcome(3, 'taken over')
 
 
 def test_an_error_in_the_supervisor_stops_its_processes() -> None:

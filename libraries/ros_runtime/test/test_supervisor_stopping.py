@@ -85,18 +85,3 @@ def test_each_signal_is_sent_once_and_only_as_long_as_needed(
     assert signals == [signal for signal, _ in STEPS[: last + 1]]
     times = [when for when, _, _ in play.sent]
     assert times == [sum(timeout for _, timeout in STEPS[:i]) for i in range(last + 1)]
-
-
-def test_force_kills_everybody_at_once_whatever_the_order() -> None:
-    """After force, those whose turn had not come are killed too."""
-    sent: list[tuple[str, Signals]] = []
-    sequence = StopSequence(lambda name, signal: sent.append((name, signal)))
-    sequence.add('master', 0, STEPS)
-    sequence.add('slaves', 2, STEPS)
-    sequence.advance(0.0)
-    sequence.force(0.5)
-    assert sent == [
-        ('master', Signals.SIGINT),
-        ('master', Signals.SIGKILL),
-        ('slaves', Signals.SIGKILL),
-    ]
