@@ -394,8 +394,14 @@ def _poses(
     for name, pose in poses.items():
         if missing := [joint for joint in limits.names if joint not in pose]:
             other = ', '.join(sorted(set(pose) - set(limits.names)))
-            has = f', and has {other}, which the group has not' if other else ''
-            notes.append(f'pose {name!r} of the SRDF lacks joint {missing[0]}{has}; left out')
+            has = f' ({other} is none of them)' if other else ''
+            if len(missing) == len(limits.names):
+                notes.append(f'pose {name!r} of the SRDF has no joint of the group{has}; left out')
+                continue
+            notes.append(
+                f'pose {name!r} of the SRDF leaves {", ".join(missing)} where they are{has}: it is'
+                ' a goal for clients, and no pose to start from'
+            )
             continue
         values = frozen([pose[joint] for joint in limits.names])
         outside = (values < limits.lower) | (values > limits.upper)
