@@ -305,7 +305,9 @@ def _parse(text: str) -> ET.Element:
     try:
         robot = ET.fromstring(text)  # noqa: S314  a robot's own description, not from the network
     except ET.ParseError as error:
-        raise DescriptionError(f'the robot description is no XML: {error}') from error
+        raise DescriptionError(
+            f'the robot description is no XML: {error}; give its text: "$(xacro robot.xacro)"'
+        ) from error
     if robot.tag != 'robot':
         raise DescriptionError(f'the robot description begins with <{robot.tag}>, not <robot>')
     return robot
