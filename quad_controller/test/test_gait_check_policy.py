@@ -17,7 +17,7 @@ from quad_controller.attach_contract import run as attach
 from quad_controller.policy.contract.mjlab import read_metadata
 from quad_controller.policy.contract.model import build_contract, PolicyContract
 from quad_controller.policy.network import OnnxNetwork
-from quad_controller.policy_check.main import run
+from quad_controller.policy_check.main import ExitCode, run
 from quad_gait_policies import joined, metadata, write_policy
 from quad_gait_rig import ROBOT
 
@@ -179,7 +179,7 @@ def test_wrong_use_ends_with_two(
     """Before anything is loaded."""
     with pytest.raises(SystemExit) as ended:
         run([SHIPPED, *arguments])
-    assert ended.value.code == 2
+    assert ended.value.code == ExitCode.WRONG_USE
     assert words in capsys.readouterr().err
 
 

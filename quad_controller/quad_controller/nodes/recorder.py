@@ -135,32 +135,33 @@ def _message(
 ) -> ControllerStep:
     """Return a step as it is recorded."""
     sec, nanosec = divmod(stamp, NS)
-    step = ControllerStep(
+    seen, asked = output.situation, output.asked
+    joints, imu = (seen.joints, seen.imu) if seen is not None else (None, None)
+    velocity = seen.velocity if seen is not None else REST
+    numbers = {
+        'target': output.targets,
+        'position': joints and joints.positions,
+        'velocity': joints and joints.velocities,
+        'orientation': imu and imu.orientation,
+        'angular_velocity': imu and imu.angular_velocity,
+        'acceleration': imu and imu.acceleration,
+        'linear_velocity': seen and seen.linear_velocity,
+        'foot_contacts': seen and seen.foot_contacts,
+        'command': (velocity.x, velocity.y, velocity.yaw),
+        'observation': asked and asked.answer.observation,
+        'action': asked and asked.answer.action,
+    }
+    return ControllerStep(
         stamp=Time(sec=sec, nanosec=nanosec),
         state=output.title,
+        policy=asked.policy.name if asked else '',
+        policy_digest=asked.policy.digest if asked else '',
+        policy_step=asked.step if asked else 0,
         dt=dt,
         computing=computing,
         latency=latency,
+        **{name: _numbers(values) for name, values in numbers.items()},
     )
-    step.target = _numbers(output.targets)
-    if (seen := output.situation) is not None:
-        if seen.joints is not None:
-            step.position = _numbers(seen.joints.positions)
-            step.velocity = _numbers(seen.joints.velocities)
-        if seen.imu is not None:
-            step.orientation = _numbers(seen.imu.orientation)
-            step.angular_velocity = _numbers(seen.imu.angular_velocity)
-            step.acceleration = _numbers(seen.imu.acceleration)
-        step.linear_velocity = _numbers(seen.linear_velocity)
-        step.foot_contacts = _numbers(seen.foot_contacts)
-    velocity = seen.velocity if seen is not None else REST
-    step.command = _numbers((velocity.x, velocity.y, velocity.yaw))
-    if (asked := output.asked) is not None:
-        step.policy, step.policy_digest = asked.policy.name, asked.policy.digest
-        step.policy_step = asked.step
-        step.observation = _numbers(asked.answer.observation)
-        step.action = _numbers(asked.answer.action)
-    return step
 
 
 def _numbers(values: Any) -> array[float]:  # noqa: ANN401  # a sequence, an array or None
