@@ -143,28 +143,19 @@ class Arm:
         if drive.state not in {DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE}:
             self.coasted = max(self.coasted, abs(drive.velocity) / SCALE)
 
-    def simulated(self, name: str = FAULTY) -> SimulatedDrive:
-        """Return the drive of a simulated device."""
-        drive = self.net.simulated(name)
-        return drive
-
-    def motor(self, name: str) -> float:
-        """Return where a motor really is in [rad]."""
-        return self.simulated(name).position / SCALE
-
     def state(self, name: str = FAULTY) -> DriveState:
         """Return the state in which a simulated drive really is."""
-        return self.simulated(name).state
+        return self.net.simulated(name).state
 
     def move(self, mode: OperationMode) -> None:
         """Set both drives in motion in a mode."""
         for name in (FAULTY, WITNESS):
             self.net.enable(mode, name)
         for name in (FAULTY, WITNESS):
-            self.net.commands[name].set_target(target_of(mode))
+            self.net.target(target_of(mode), name)
         self.net.run(0.6)
-        assert self.motor(FAULTY) > 0.05
-        assert self.motor(WITNESS) > 0.05
+        assert self.net.motor(FAULTY) > 0.05
+        assert self.net.motor(WITNESS) > 0.05
 
     def stop(self, name: str, mode: OperationMode) -> None:
         """Have a drive stand that is enabled."""
@@ -174,10 +165,10 @@ class Arm:
 
     def stands(self, *names: str, duration: float = 0.5) -> None:
         """Check that motors rest for a while, whatever their drives do."""
-        before = {name: self.motor(name) for name in names}
+        before = {name: self.net.motor(name) for name in names}
         self.net.run(duration)
         for name in names:
-            assert self.motor(name) == pytest.approx(before[name], abs=CREEP), self.net.story()
+            assert self.net.motor(name) == pytest.approx(before[name], abs=CREEP), self.net.story()
 
     def lose(self, *cob_ids: int) -> None:
         """Lose all frames of some identifiers."""
@@ -220,22 +211,22 @@ def restore_bus(arm: Arm) -> None:
 
 def over_current(arm: Arm) -> None:
     """Raise a fault with EMCY 0x2310."""
-    arm.simulated().raise_fault(0x2310, arm.net.now)
+    arm.net.simulated().raise_fault(0x2310, arm.net.now)
 
 
-def open_safety_circuit(arm: Arm) -> None:
+def open_circuit(arm: Arm) -> None:
     """Take the voltage away."""
-    arm.simulated().set_voltage(False, arm.net.now)
+    arm.net.simulated().set_voltage(False, arm.net.now)
 
 
-def close_safety_circuit(arm: Arm) -> None:
+def close_circuit(arm: Arm) -> None:
     """Give it back."""
-    arm.simulated().set_voltage(True, arm.net.now)
+    arm.net.simulated().set_voltage(True, arm.net.now)
 
 
 def following_error(arm: Arm) -> None:
     """Raise the fault of a motor that does not follow."""
-    arm.simulated().raise_fault(0x8611, arm.net.now)
+    arm.net.simulated().raise_fault(0x8611, arm.net.now)
 
 
 def stop_heartbeat(arm: Arm) -> None:
@@ -265,8 +256,6 @@ class Fault:
         state: States in one of which the drive ends; None when it is gone.
         cause: Why targets are refused meanwhile.
         emcy: Code of the EMCY that the master has received, None when it need not have one.
-        witness_stops: The other drive is met, too.
-        braked: The drive keeps its power until it stands, as nothing takes that away.
         cure: Removes the cause.
         way: What brings the drive back.
     """
@@ -279,8 +268,16 @@ class Fault:
     cure: Callable[[Arm], None]
     way: Way
     emcy: int | None = None
-    witness_stops: bool = False
-    braked: bool = False
+
+    @property
+    def witness_stops(self) -> bool:
+        """Whether the other drive is met, too."""
+        return self.cure is restore_bus and self.way is Way.RECOVER
+
+    @property
+    def braked(self) -> bool:
+        """Whether the drive keeps its power until it stands, as nothing takes that away."""
+        return self.happen is stop_heartbeat
 
     def __str__(self) -> str:
         """Name the row in the id of a test."""
@@ -288,91 +285,24 @@ class Fault:
 
 
 SWITCHED_OFF, FAULT = DriveState.SWITCH_ON_DISABLED, DriveState.FAULT
+LOST, DRIVE = EventKind.HEARTBEAT_LOST, EventKind.DRIVE
+OFFLINE, FAULTED = RefusalCause.OFFLINE, RefusalCause.FAULT
+NOT_ENABLED, RECOVER, ENABLE = RefusalCause.NOT_ENABLED, Way.RECOVER, Way.ENABLE
 FAULTS = (
+    Fault('slave killed', kill, LOST, None, OFFLINE, revive, Way.INIT),
+    Fault('slave rebooted', reboot, LOST, SWITCHED_OFF, NOT_ENABLED, nothing, Way.INIT),
+    Fault('master unheard', silence_master, LOST, FAULT, OFFLINE, restore_bus, RECOVER, 0x8130),
+    Fault('bus down', cut_bus, EventKind.BUS, FAULT, OFFLINE, restore_bus, RECOVER),
+    Fault('EMCY', over_current, DRIVE, FAULT, FAULTED, nothing, RECOVER, 0x2310),
+    Fault('STO low', open_circuit, DRIVE, FAULT, FAULTED, close_circuit, RECOVER),
+    Fault('following error', following_error, DRIVE, FAULT, FAULTED, nothing, RECOVER, 0x8611),
     Fault(
-        'slave killed',
-        kill,
-        EventKind.HEARTBEAT_LOST,
-        None,
-        RefusalCause.OFFLINE,
-        revive,
-        Way.INIT,
-    ),
-    Fault(
-        'slave rebooted',
-        reboot,
-        EventKind.HEARTBEAT_LOST,
-        SWITCHED_OFF,
-        RefusalCause.NOT_ENABLED,
-        nothing,
-        Way.INIT,
-    ),
-    Fault(
-        'master unheard',
-        silence_master,
-        EventKind.HEARTBEAT_LOST,
-        FAULT,
-        RefusalCause.OFFLINE,
-        restore_bus,
-        Way.RECOVER,
-        emcy=0x8130,
-        witness_stops=True,
-    ),
-    Fault(
-        'bus down',
-        cut_bus,
-        EventKind.BUS,
-        FAULT,
-        RefusalCause.OFFLINE,
-        restore_bus,
-        Way.RECOVER,
-        witness_stops=True,
-    ),
-    Fault(
-        'EMCY',
-        over_current,
-        EventKind.DRIVE,
-        FAULT,
-        RefusalCause.FAULT,
-        nothing,
-        Way.RECOVER,
-        emcy=0x2310,
-    ),
-    Fault(
-        'STO low',
-        open_safety_circuit,
-        EventKind.DRIVE,
-        FAULT,
-        RefusalCause.FAULT,
-        close_safety_circuit,
-        Way.RECOVER,
-    ),
-    Fault(
-        'following error',
-        following_error,
-        EventKind.DRIVE,
-        FAULT,
-        RefusalCause.FAULT,
-        nothing,
-        Way.RECOVER,
-        emcy=0x8611,
-    ),
-    Fault(
-        'heartbeat stopped',
-        stop_heartbeat,
-        EventKind.HEARTBEAT_LOST,
-        SWITCHED_OFF,
-        RefusalCause.OFFLINE,
-        restore_bus,
-        Way.ENABLE,
-        braked=True,
+        'heartbeat stopped', stop_heartbeat, LOST, SWITCHED_OFF, OFFLINE, restore_bus, Way.ENABLE
     ),
 )
 
 
-@pytest.mark.parametrize(
-    ('happen', 'error'), [(over_current, '0x2310'), (open_safety_circuit, '0x3220')]
-)
+@pytest.mark.parametrize(('happen', 'error'), [(over_current, '0x2310'), (open_circuit, '0x3220')])
 def test_what_stops_a_motion_names_the_error(happen: Callable[[Arm], None], error: str) -> None:
     """The EMCY that came with it; 0x603F is read when the motion has ended already."""
     arm = Arm()
@@ -409,7 +339,7 @@ def test_fault_in_motion(fault: Fault, mode: OperationMode) -> None:
         assert refusal is not None
         assert refusal.cause is fault.cause
         with pytest.raises(DriveError):
-            arm.net.commands[name].set_target(0.1)
+            arm.net.target(0.1, name)
     if fault.state is not None:
         assert arm.state() is fault.state, arm.net.story()
         arm.stands(FAULTY)
@@ -432,8 +362,7 @@ def test_fault_in_motion(fault: Fault, mode: OperationMode) -> None:
 def test_fault_while_homing(fault: Fault) -> None:
     """The command ends with the reason, the axis stops, and homing does not go on by itself."""
     arm = Arm()
-    commands = arm.net.commands[FAULTY]
-    running = commands.run('home', commands.home(17))
+    running = arm.net.home(17)
     arm.net.run(1.0)
     assert not running.done
     fault.happen(arm)
@@ -451,12 +380,12 @@ def test_fault_while_homing(fault: Fault) -> None:
 def assert_accepts_targets(arm: Arm, mode: OperationMode) -> None:
     """Check that the drive goes where it is sent now."""
     if mode not in POSITION_MODES:
-        arm.net.commands[FAULTY].set_target(-target_of(mode))
+        arm.net.target(-target_of(mode))
         arm.net.run_until(lambda: arm.net.drives[FAULTY].view.velocity < -0.1, 1.0)
         return
-    arm.net.commands[FAULTY].set_target(-0.2)
+    arm.net.target(-0.2)
     arm.net.run(2.0)
-    assert arm.motor(FAULTY) == pytest.approx(-0.2, abs=0.01)
+    assert arm.net.motor(FAULTY) == pytest.approx(-0.2, abs=0.01)
 
 
 DEVIATIONS = {
@@ -482,8 +411,7 @@ def test_a_drive_that_deviates_is_used_as_any_other(
         arm.net.do(FAULTY, 'enable')
         arm.stands(FAULTY)
         assert_accepts_targets(arm, other)
-    commands = arm.net.commands[FAULTY]
-    assert 'homed' in arm.net.result(commands.run('home', commands.home(35)))
+    assert 'homed' in arm.net.result(arm.net.home(35))
     assert_accepts_targets(arm, OperationMode.CYCLIC_POSITION)
     assert arm.state() is DriveState.OPERATION_ENABLED
     warnings = [event.text for event in arm.net.events if event.severity is Severity.WARNING]
@@ -573,7 +501,7 @@ def test_a_stop_is_as_short_as_the_drive_can_whatever_it_counts_in(
     arm = Arm(0.3, deviation, **faulty)
 
     def place() -> float:
-        return (arm.simulated().position - zero) / SCALE
+        return (arm.net.simulated().position - zero) / SCALE
 
     for stop in ('halt', 'quick_stop', 'disable'):
         begin = place()
@@ -581,9 +509,9 @@ def test_a_stop_is_as_short_as_the_drive_can_whatever_it_counts_in(
         arm.net.run(0.3)
         assert place() == pytest.approx(begin, abs=2e-4)
         target = SPEED if mode in VELOCITY_MODES else begin + FAR
-        arm.net.commands[FAULTY].set_target(target)
+        arm.net.target(target)
         arm.net.run(0.5)
-        speed, at = arm.simulated().velocity / SCALE, place()
+        speed, at = arm.net.speed(), place()
         assert speed == pytest.approx(SPEED if mode in VELOCITY_MODES else 1.0, rel=0.1)
         arm.net.do(FAULTY, stop, preempt=True)
         ramp = DECELERATION if stop == 'halt' else QUICK_STOP_DECELERATION
@@ -595,7 +523,7 @@ def test_a_stop_is_as_short_as_the_drive_can_whatever_it_counts_in(
         assert 0.9 * shortest < place() - at < longest, (stop, shortest, longest)
         arm.stands(FAULTY)
     arm.net.enable(OperationMode.CYCLIC_POSITION, FAULTY)
-    arm.net.commands[FAULTY].set_target(0.3)
+    arm.net.target(0.3)
     arm.net.run(3.0)
     assert place() == pytest.approx(0.3, abs=1e-3)
 
@@ -616,27 +544,27 @@ def test_a_drive_outside_its_limits_is_led_back_and_stopped(side: int, stop: str
             arm.net.run(CYCLE)
 
     def enable() -> None:
-        begin = arm.motor(FAULTY)
+        begin = arm.net.motor(FAULTY)
         arm.net.enable(OperationMode.CYCLIC_POSITION, FAULTY)
         arm.net.run(0.5)
-        assert arm.motor(FAULTY) == pytest.approx(begin, abs=2e-4)
+        assert arm.net.motor(FAULTY) == pytest.approx(begin, abs=2e-4)
 
     enable()
     with pytest.raises(DriveError, match='software limits'):
         stream(1, 0.1)
     stream(20, -0.5)
-    at, speed = arm.motor(FAULTY), abs(arm.simulated().velocity) / SCALE
+    at, speed = arm.net.motor(FAULTY), abs(arm.net.speed())
     assert speed == pytest.approx(0.5, rel=0.1)
     arm.net.do(FAULTY, stop, preempt=True)
-    assert abs(arm.motor(FAULTY) - at) < speed**2 / 2.0 / DECELERATION + LATE * speed
+    assert abs(arm.net.motor(FAULTY) - at) < speed**2 / 2.0 / DECELERATION + LATE * speed
     arm.stands(FAULTY)
-    assert abs(arm.motor(FAULTY)) > 1.0
+    assert abs(arm.net.motor(FAULTY)) > 1.0
     enable()
     stream(40, -0.5)
-    assert abs(arm.motor(FAULTY)) < 0.85
+    assert abs(arm.net.motor(FAULTY)) < 0.85
     with pytest.raises(DriveError, match='software limits'):
         stream(100, 0.5)
-    assert abs(arm.motor(FAULTY)) < 1.0 + 2e-3
+    assert abs(arm.net.motor(FAULTY)) < 1.0 + 2e-3
 
 
 TPDOS, RPDOS = (0x180, 0x280, 0x380), (0x200, 0x300, 0x400)
@@ -673,7 +601,7 @@ def test_lost_pdos_in_motion(
         assert drive.control.halted is bool(causes) or not drive.control.acts
         if silent:
             with pytest.raises(DriveError, match='TPDOs'):
-                arm.net.commands[name].set_target(0.1)
+                arm.net.target(0.1, name)
     stopped_by_sdo = deaf and mode not in POSITION_MODES  # which end by themselves
     if stopped_by_sdo:
         halts = [arm.net.begin(name, 'halt', preempt=True) for name in names]
@@ -711,13 +639,13 @@ def test_a_stop_that_the_drive_ignores(
     arm = Arm()
     arm.move(mode)
     if mode in POSITION_MODES:
-        arm.net.commands[FAULTY].set_target(50.0)
+        arm.net.target(50.0)
         arm.net.run(0.1)
     for fault in ignored:
         arm.net.devices[FAULTY].faults.inject(FaultInjection(fault), arm.net.now)
     begin = arm.net.now
     answer = arm.net.do(FAULTY, stop, preempt=True)
-    assert abs(arm.simulated().velocity) / SCALE < STANDING
+    assert abs(arm.net.speed()) < STANDING
     assert arm.net.now - begin < 2.5
     assert arm.state().title in answer
     halted = stop == 'halt' and mode not in HALTED_BY_DRIVE  # the master brakes its target itself
@@ -736,7 +664,7 @@ def test_a_stop_in_pre_operational(stop: str, mode: OperationMode) -> None:
     arm.net.run(0.3)
     assert arm.state() is DriveState.OPERATION_ENABLED
     answer = arm.net.do(FAULTY, stop, preempt=True)
-    assert abs(arm.simulated().velocity) / SCALE < STANDING
+    assert abs(arm.net.speed()) < STANDING
     assert SWITCHED_OFF.title in answer
     assert arm.state() is SWITCHED_OFF
     arm.stands(FAULTY)
@@ -806,7 +734,7 @@ def test_a_device_that_deviates_is_driven(deviation: FaultInjection, said: str) 
     net.boot()
     objects = net.network.nodes[FAULTY].objects
     net.enable(OperationMode.PROFILE_POSITION, FAULTY)
-    net.commands[FAULTY].set_target(0.1)
+    net.target(0.1)
     net.run(1.0)
     assert net.drives[FAULTY].view.position == pytest.approx(0.1, abs=0.01)
     net.result(objects.write_object(0x6098, 0, -3))
@@ -914,8 +842,7 @@ def test_another_device_than_expected_is_not_driven() -> None:
     with pytest.raises(DriveError, match='vendor id'):
         net.do(FAULTY, 'init')
     net.do(WITNESS, 'init')
-    assert (stranger := net.devices[FAULTY].drive) is not None
-    assert stranger.state is DriveState.SWITCH_ON_DISABLED
+    assert net.simulated().state is DriveState.SWITCH_ON_DISABLED
     net.power_off(FAULTY)
     net._dictionaries.clear()
     net.power_on(FAULTY)

@@ -94,19 +94,15 @@ def test_what_waits_for_sync_leaves_with_the_cycle() -> None:
     assert [struct.unpack('<h', data) for data in net.frames(SYNC_COB_ID)] == [(-7,)]
 
 
-def test_the_other_objects_of_the_frame_stay_as_the_device_has_them() -> None:
-    """The start-up has read what nobody published."""
-    net = booted(outputs=0x11, mask=0x22)
+@pytest.mark.parametrize('written', [False, True], ids=['as it was', 'by bus.yml'])
+def test_the_other_objects_of_the_frame_stay_as_the_device_has_them(*, written: bool) -> None:
+    """The start-up has read what nobody published, after the configuration."""
+    writes = (sdo_write(*OUTPUTS, 0x44),) if written else ()
+    net = booted(module(sdo_writes=writes), outputs=0x11, mask=0x22)
     publish(net, MASK, 0x33)
     net.run(0.1)
-    assert [struct.unpack('<II', data) for data in net.frames(COB_ID)] == [(0x11, 0x33)]
-
-
-def test_what_bus_yml_writes_is_what_the_frame_carries() -> None:
-    """Present values are those after the configuration."""
-    net = booted(module(sdo_writes=(sdo_write(*OUTPUTS, 0x44),)), outputs=0x11)
-    publish(net, MASK, 1)
-    assert struct.unpack('<II', net.frames(COB_ID)[-1]) == (0x44, 1)
+    outputs = 0x44 if written else 0x11
+    assert [struct.unpack('<II', data) for data in net.frames(COB_ID)] == [(outputs, 0x33)]
 
 
 def test_an_sdo_write_is_not_undone() -> None:
@@ -123,16 +119,12 @@ def test_an_sdo_write_is_not_undone() -> None:
 
 def test_an_sdo_write_to_an_object_of_a_drive_that_is_mapped_stays() -> None:
     """The RPDOs of a drive leave in each cycle, with what was written."""
-    config = drive_config('joint', 2)
-    speeds = pdo(4, 0x502, (0x6081, 0))
-    net = VirtualNetwork(bus_config(replace(config, rpdos=(*config.rpdos, speeds))))
-    net.boot()
-    assert struct.unpack('<I', net.frames(0x502)[-1]) == (10_000,)
-    node = net.network.nodes['joint']
+    net = drive_with_speed_mapped()
+    assert speeds(net, since=0.0)[-1] == 10_000
+    node = net.network.nodes[JOINT]
     net.result(node.objects.write_object(0x6081, 0, 2_000))
     net.run(0.2)
-    (speed,) = struct.unpack('<I', net.result(node.sdo.read(0x6081, 0, 0.2)))
-    assert speed == 2_000
+    assert net.result(node.sdo.read(0x6081, 0, 0.2)) == struct.pack('<I', 2_000)
 
 
 def drive_with_speed_mapped() -> VirtualNetwork:

@@ -1,16 +1,28 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Targets that no RPDO carries: confirmed before they act, refused in words, written once."""
+"""Targets that no RPDO carries: confirmed before they act, refused in words, written once.
+
+And drives whose EDS leaves something out, or that have none, and PDOs that lack something.
+"""
 
 from __future__ import annotations
 
 import contextlib
 from dataclasses import replace
 from itertools import cycle
+from pathlib import Path
 import random
+import re
 
-from bus_rig import VirtualNetwork
-from drive_samples import bus_config, drive_config, every_mode, PERIOD, SCALE
+from bus_rig import booted, VirtualNetwork
+from drive_samples import (
+    bus_config,
+    drive_config,
+    drive_dictionary,
+    DRIVE_EDS,
+    every_mode,
+    PERIOD,
+)
 import pytest
 
 from arm_canopen import (
@@ -21,24 +33,31 @@ from arm_canopen import (
     SdoTimeoutError,
     Severity,
 )
-from arm_canopen.can import Frame
 from arm_canopen.cia402.position_modes import Move
-from arm_canopen.config import NodeConfig
+from arm_canopen.config import load_bus, load_eds, NodeConfig
+from arm_canopen.config.model.boot_plan import BootWrite
+from arm_canopen.config.resolve.eds_files import DEFAULT_DRIVE
 from arm_canopen.master.scheduler import Promise
+from arm_canopen.standard import ObjectDictionary
 from canopen_sim import Fault, FaultInjection
 
 pytestmark = pytest.mark.slow
 
 JOINT, NODE_ID = 'joint1', 2
+
 REQUEST, ANSWER = 0x600 + NODE_ID, 0x580 + NODE_ID
+
 DOWNLOADS = frozenset({0x22, 0x23, 0x27, 0x2B, 0x2F})
+
 POSITION, VELOCITY, VL_VELOCITY, TORQUE = 0x607A, 0x60FF, 0x6042, 0x6071
+
 TARGETS = {
     OperationMode.PROFILE_POSITION: POSITION,
     OperationMode.VELOCITY: VL_VELOCITY,
     OperationMode.PROFILE_VELOCITY: VELOCITY,
     OperationMode.PROFILE_TORQUE: TORQUE,
 }
+
 SIZES = {POSITION: 4, VELOCITY: 4, VL_VELOCITY: 2, TORQUE: 2}
 
 
@@ -48,16 +67,9 @@ def unmapped() -> NodeConfig:
     return replace(config, rpdos=config.rpdos[:1])
 
 
-def booted(config: NodeConfig | None = None) -> VirtualNetwork:
-    """Boot such a drive."""
-    net = VirtualNetwork(bus_config(config or unmapped()))
-    net.boot()
-    return net
-
-
 def running_in(mode: OperationMode) -> VirtualNetwork:
     """Boot such a drive, enable it, and select a mode."""
-    net = booted()
+    net = booted(unmapped())
     net.enable(mode)
     return net
 
@@ -91,35 +103,30 @@ def give(net: VirtualNetwork, target: float) -> Promise[str]:
     return commands.deliver(lambda: commands.set_target(target))
 
 
-# ------------------------------------------------------------------ nothing stale acts
-
-
+@pytest.mark.parametrize('moment', ['enable', 'switch'])
 @pytest.mark.parametrize('mode', TARGETS)
-def test_what_others_left_in_the_target_moves_nothing_at_enable(mode: OperationMode) -> None:
-    """The holding value is written whatever the master wrote before, ahead of the enable."""
-    net = running_in(mode)
-    net.do(JOINT, 'disable')
-    leave_behind(net, TARGETS[mode], 3_000)
-    begin, before = net.now, net.motor()
-    net.do(JOINT, 'enable')
-    net.run(1.0)
-    assert net.motor() == pytest.approx(before, abs=1e-3)
-    assert downloads(net, since=begin) == [TARGETS[mode]]
+def test_what_others_left_in_the_target_moves_nothing(mode: OperationMode, moment: str) -> None:
+    """The holding value is written whatever the master wrote before, ahead of the edge.
 
-
-@pytest.mark.parametrize('mode', TARGETS)
-def test_what_others_left_in_the_target_moves_nothing_at_a_switch(mode: OperationMode) -> None:
-    """Also where the drive stays enabled, and the mode was left a moment ago."""
+    Also where the drive stays enabled, and the mode was left a moment ago.
+    """
     net = running_in(mode)
     other = OperationMode.PROFILE_POSITION
     if mode is other:
         other = OperationMode.PROFILE_VELOCITY
-    net.select(JOINT, other)
+    if moment == 'enable':
+        net.do(JOINT, 'disable')
+    else:
+        net.select(JOINT, other)
     leave_behind(net, TARGETS[mode], 3_000)
-    before = net.motor()
-    net.select(JOINT, mode)
+    begin, before = net.now, net.motor()
+    if moment == 'enable':
+        net.do(JOINT, 'enable')
+    else:
+        net.select(JOINT, mode)
     net.run(1.0)
     assert net.motor() == pytest.approx(before, abs=1e-3)
+    assert moment == 'switch' or downloads(net, since=begin) == [TARGETS[mode]]
 
 
 @pytest.mark.parametrize('mode', TARGETS)
@@ -140,12 +147,7 @@ def test_a_refused_holding_value_keeps_the_drive_disabled(mode: OperationMode) -
 def test_the_mode_that_a_drive_stays_in_is_held_at_enable() -> None:
     """It does not follow to mode 0; what others left in the target of mode 3 would move it."""
     net = running_in(OperationMode.PROFILE_VELOCITY)
-
-    def stays_in_mode_3(sender: str, frame: Frame) -> Frame:
-        mode_command = frame.can_id == 0x200 + NODE_ID
-        return frame._replace(data=frame.data[:2] + b'\x03') if mode_command else frame
-
-    net.wire.alters = stays_in_mode_3
+    net.keep_mode(OperationMode.PROFILE_VELOCITY)
     net.do(JOINT, 'init')
     net.do(JOINT, 'disable')
     leave_behind(net, VELOCITY, 3_000)
@@ -171,9 +173,6 @@ def test_a_refused_holding_value_keeps_the_mode() -> None:
     net.result(give(net, 0.2))
     net.run(2.0)
     assert net.motor() == pytest.approx(0.2, abs=1e-3)
-
-
-# ------------------------------------------------------------------ taken means delivered
 
 
 @pytest.mark.parametrize(
@@ -251,9 +250,6 @@ def test_a_target_that_came_too_late_for_its_answer_moves_nothing(mode: Operatio
     net.result(give(net, 0.2))
     net.run(2.0)
     assert net.motor() > 0.1
-
-
-# ------------------------------------------------------------------ refused targets
 
 
 @pytest.mark.parametrize('mode', TARGETS)
@@ -398,12 +394,9 @@ def test_a_target_after_a_stream_is_not_stopped_by_what_was_under_way() -> None:
     assert net.drives[JOINT].view.rate == pytest.approx(0.3, abs=0.02)
 
 
-# ------------------------------------------------------------------ nothing unasked
-
-
 def test_only_the_target_of_the_mode_is_written() -> None:
     """From boot to a mode and back, 0x6042 and 0x6071 belong to whoever else uses them."""
-    net = booted()
+    net = booted(unmapped())
     net.run(1.0)
     assert not set(downloads(net)) & set(TARGETS.values())
     net.do(JOINT, 'init')
@@ -449,7 +442,7 @@ def test_a_controlword_that_is_refused_is_written_seldom() -> None:
 
 def test_of_values_behind_one_that_failed_only_the_newest_is_sent() -> None:
     """Whoever delivered one that was dropped is notified when the device has the newest."""
-    net = booted()
+    net = booted(unmapped())
     node = net.network.nodes[JOINT]
     writer, sent = node.objects.writer(VELOCITY), []
     under_way: Promise[None] = Promise()
@@ -472,8 +465,6 @@ def test_of_values_behind_one_that_failed_only_the_newest_is_sent() -> None:
     assert dropped.error is None
 
 
-# ------------------------------------------------------------------ all of it in any order
-
 SELECTED = (
     OperationMode.PROFILE_POSITION,
     OperationMode.VELOCITY,
@@ -492,7 +483,7 @@ class Client:
 
     def __init__(self, seed: int) -> None:
         """Enable the drive."""
-        self.net = booted()
+        self.net = booted(unmapped())
         self.net.do(JOINT, 'init')
         self.commanded = False
         self.log: list[str] = []
@@ -551,3 +542,111 @@ def test_nothing_moves_that_was_not_commanded(seed: int) -> None:
             before = client.net.motor()
             client.net.run(0.3)
             assert client.net.motor() == pytest.approx(before, abs=1e-3), client.log
+
+
+def without_default(*indices: int) -> ObjectDictionary:
+    """Return the drive's dictionary as a vendor writes it: objects without defaults."""
+    return ObjectDictionary(
+        replace(entry, default=None) if entry.index in indices else entry
+        for entry in drive_dictionary().for_node(2)
+    )
+
+
+def with_dictionary(dictionary: ObjectDictionary, **changes: object) -> VirtualNetwork:
+    """Boot a drive that has this dictionary."""
+    config = replace(drive_config(JOINT, 2), dictionary=dictionary, **changes)  # type: ignore[arg-type]
+    net = VirtualNetwork(bus_config(config))
+    net.boot()
+    return net
+
+
+def test_a_simulated_drive_has_the_modes_that_its_objects_allow() -> None:
+    """0x6502 of EPOS, Kollmorgen and Elmo has no default; the drive is of use all the same."""
+    dictionary = ObjectDictionary(
+        entry for entry in without_default(0x6502) if entry.index not in (0x6071, 0x6042)
+    )
+    net = with_dictionary(dictionary)
+    reported = net.drives[JOINT].view.parameters.supported_modes
+    assert reported
+    wanted = (OperationMode.PROFILE_POSITION, OperationMode.HOMING, OperationMode.PROFILE_VELOCITY)
+    assert all(reported & mode.support_bit for mode in wanted)
+    missing = (OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE, OperationMode.VELOCITY)
+    assert not any(reported & mode.support_bit for mode in missing)
+    net.enable(OperationMode.PROFILE_POSITION)
+    net.target(0.3)
+    net.run(5.0)
+    assert net.drives[JOINT].view.position == pytest.approx(0.3, abs=1e-3)
+
+
+def test_default_mappings_whose_lengths_have_a_flag_of_the_vendor_are_used(
+    tmp_path: Path,
+) -> None:
+    """Bit 7 of the length in 0x1600 and 0x1A00 is ignored: by boot, PDOs and the comparison."""
+
+    def flagged(match: re.Match[str]) -> str:
+        return f'DefaultValue={match[1]}{int(match[2], 16) | 0x80:02X}'
+
+    pattern = re.compile(r'DefaultValue=(0x60[0-9A-F]{4})(08|10|20)$', re.MULTILINE)
+    eds, count = pattern.subn(flagged, DRIVE_EDS.read_text())
+    assert count > 10
+    (tmp_path / 'drive.eds').write_text(eds)
+    (tmp_path / 'bus.yml').write_text(
+        'master: {node_id: 1, driver: "ros2_canopen::MasterDriver", sync_period: 10000}\n'
+        'joint1: {node_id: 2, driver: "ros2_canopen::Cia402Driver", dcf: drive.eds,\n'
+        '  tpdo: {2: {transmission: 1}, 3: {transmission: 1}}, rpdo: {2: {enabled: true}, '
+        '3: {enabled: true}}}\n'
+    )
+    bus = load_bus(tmp_path / 'bus.yml')
+    net = VirtualNetwork(bus)
+    net.boot()
+    net.enable(OperationMode.PROFILE_POSITION)
+    net.target(0.3)
+    net.run(5.0)
+    assert net.drives[JOINT].view.position == pytest.approx(0.3, abs=2e-3)
+    held = net.result(net.network.nodes[JOINT].sdo.read(0x1A01, 1, 1.0))
+    assert BootWrite(0x1A01, 1, b'\x10\x00\x41\x60', 'tpdo').fits(held)
+
+
+def test_an_idle_drive_fills_no_bus_with_its_targets() -> None:
+    """Each target is reached; enabled and at rest, nothing is written by SDO."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    for target in (0.5, -0.2):
+        net.target(target)
+        net.run(5.0)
+        assert net.drives[JOINT].view.position == pytest.approx(target, abs=1e-3)
+    begin = net.now
+    net.run(2.0)
+    assert net.frames(REQUEST, since=begin) == []
+    assert net.reported(Severity.WARNING) == []
+
+
+def test_a_stream_needs_its_rpdo() -> None:
+    """A target in every cycle does not go by SDO; the object to be mapped is named."""
+    with pytest.raises(DriveError, match='0x607A is in no RPDO'):
+        running_in(OperationMode.CYCLIC_POSITION)
+
+
+@pytest.mark.parametrize('period', [0.02, 0.05, 0.2])
+def test_a_position_without_a_tpdo_is_read_once_a_period(period: float) -> None:
+    """As often as `period` of the device says, by SDO."""
+    config = drive_config(JOINT, 2)
+    config = replace(config, tpdos=config.tpdos[:1], poll_period=period)
+    net = VirtualNetwork(bus_config(config))
+    net.boot()
+    begin = net.now
+    net.run(2.0)
+    requests = [data[:3] for data in net.frames(0x602, since=begin)]
+    assert requests.count(b'\x40\x64\x60') == pytest.approx(2.0 / period, rel=0.1)
+
+
+def test_a_drive_moves_by_the_default_dictionary() -> None:
+    """The simulated drive, whose own EDS nobody has read, is booted, enabled and moved."""
+    general = load_eds(DEFAULT_DRIVE).dictionary
+    config = replace(drive_config('a', 2), dictionary=general.for_node(2), sdo_writes=())
+    net = VirtualNetwork(bus_config(config), dictionaries={'a': drive_dictionary().for_node(2)})
+    net.boot()
+    net.enable(OperationMode.PROFILE_POSITION, 'a')
+    net.commands['a'].set_target(0.5)
+    net.run(10.0)
+    assert net.drives['a'].view.position == pytest.approx(0.5, abs=1e-3)
+    assert net.reported(Severity.ERROR) == []
