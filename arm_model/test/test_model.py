@@ -12,7 +12,7 @@ from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from model_robots import chain, chain_texts, ready, robot, ROBOTS, table, texts
+from model_robots import chain, chain_texts, ready, robot, ROBOTS, table, texts, two_arms
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -20,6 +20,7 @@ import pytest
 from arm_model import Array, CommandError, example_files, load_limits, ModelError, Pose, RobotModel
 
 CHAINS = ('zyy', 'zyyz', 'zyyzy', 'cyyzyz', 'zpyzyzc', 'zyzyzyzy')
+TIPS = ('left_3_link', 'right_2_link', 'torso_link')  # of two arms
 
 # pose, position of the tip in [m]: numbers of the makers
 CHECKS = [
@@ -62,12 +63,14 @@ def test_ranges_of_the_gp110_are_those_of_its_data_sheet() -> None:
 
 
 @pytest.mark.parametrize(
-    'model', [*map(robot, ROBOTS), *map(chain, CHAINS)], ids=[*ROBOTS, *CHAINS]
+    'model',
+    [*map(robot, ROBOTS), *map(chain, CHAINS), *(two_arms(tip=tip) for tip in TIPS)],
+    ids=[*ROBOTS, *CHAINS, *TIPS],
 )
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 10**6))
 def test_jacobians_are_differences(model: RobotModel, seed: int) -> None:
-    """The Jacobian of every arm, 3 to 8 joints, is the difference quotient of its pose."""
+    """Of chains of 3 to 8 joints and of a tree the Jacobian is the difference of the pose."""
     at, step = any_position(model, seed), 1e-6
     differences = [
         twist_between(model.pose(at - step * unit), model.pose(at + step * unit)) / (2 * step)
@@ -76,13 +79,12 @@ def test_jacobians_are_differences(model: RobotModel, seed: int) -> None:
     assert model.jacobian(at) == pytest.approx(np.array(differences).T, abs=1e-7)
 
 
-@pytest.mark.parametrize('name', ROBOTS)
+@pytest.mark.parametrize('model', [*map(robot, ROBOTS), two_arms()], ids=[*ROBOTS, 'two arms'])
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 10**6))
-def test_gradients_of_distances_are_differences(name: str, seed: int) -> None:
+def test_gradients_of_distances_are_differences(model: RobotModel, seed: int) -> None:
     """Apart or in contact, the gradient of a distance is its difference quotient."""
-    model, step = robot(name), 1e-3
-    at = any_position(model, seed)
+    step, at = 1e-3, any_position(model, seed)
     for near in model.nearest(at, 0.3, 4):
         if abs(near.distance) < 5e-3:
             continue  # the normal turns about at the touch
@@ -172,53 +174,40 @@ def test_soft_limits_narrow_a_joint(
     assert (model.limits.lower[0], model.limits.upper[0]) == wanted
 
 
-Broken = Callable[[str, str, dict[str, Any]], tuple[str, str, dict[str, Any]]]
+Texts = tuple[str, str, dict[str, Any]]
+LIMIT = '<limit lower="-2" upper="2" velocity="2" effort="1"/>'
 
-BROKEN: dict[str, tuple[Broken, str]] = {
-    'joint missing in limits': (
-        lambda u, s, t: (u, s, {k: v for k, v in t.items() if k != 'j2'}),
-        'joint j2 is missing',
-    ),
-    'negative jerk': (
-        lambda u, s, t: (u, s, {**t, 'j2': {**t['j2'], 'max_jerk': -1.0}}),
-        'max_jerk is -1',
-    ),
-    'word for a number': (
-        lambda u, s, t: (u, s, {**t, 'j2': {**t['j2'], 'max_jerk': 'high'}}),
-        "'high'",
-    ),
-    'wider velocity': (
-        lambda u, s, t: (u, s, {**t, 'j2': {**t['j2'], 'max_velocity': 3.0}}),
-        'wider than the description',
-    ),
-    'wider positions': (
-        lambda u, s, t: (u, s, {**t, 'j2': {**t['j2'], 'min_position': -3, 'max_position': 1}}),
-        'wider than the description',
-    ),
-    'misspelt key': (
-        lambda u, s, t: (u, s, {**t, 'j2': {**t['j2'], 'max_yerk': 1.0}}),
-        "'max_yerk'",
-    ),
-    'no group': (lambda u, s, t: (u, '<robot name="chain"/>', t), 'groups none'),
-    'srdf no xml': (lambda u, s, t: (u, '<robot', t), 'SRDF is no XML'),
-    'urdf no xml': (lambda u, s, t: ('<robot', s, t), 'description is no XML'),
-    'unknown tip': (lambda u, s, t: (u, s.replace('"tip"', '"top"'), t), "'top'"),
-    'no limit': (
-        lambda u, s, t: (
-            u.replace('<limit lower="-2" upper="2" velocity="2" effort="1"/>', ''),
-            s,
-            t,
-        ),
-        'needs <limit',
-    ),
+
+def entry(**values: object) -> Callable[[Texts], Texts]:
+    """Return what changes the limits file's entry of a joint."""
+
+    def changed(texts: Texts) -> Texts:
+        urdf, srdf, limits = texts
+        return urdf, srdf, {**limits, 'j2': {**limits['j2'], **values}}
+
+    return changed
+
+
+BROKEN: dict[str, tuple[Callable[[Texts], Texts], str]] = {
+    'no joint': (lambda t: (*t[:2], {'j1': t[2]['j1'], 'j3': t[2]['j3']}), 'joint j2 is missing'),
+    'negative jerk': (entry(max_jerk=-1.0), 'max_jerk is -1'),
+    'word for a number': (entry(max_jerk='high'), "'high'"),
+    'wider velocity': (entry(max_velocity=3.0), 'wider than the description'),
+    'wider positions': (entry(min_position=-3, max_position=1), 'wider than the description'),
+    'misspelt key': (entry(max_yerk=1.0), "'max_yerk'"),
+    'no group': (lambda t: (t[0], '<robot name="chain"/>', t[2]), 'groups none'),
+    'srdf no xml': (lambda t: (t[0], '<robot', t[2]), 'SRDF is no XML'),
+    'urdf no xml': (lambda t: ('<robot', *t[1:]), 'description is no XML'),
+    'unknown tip': (lambda t: (t[0], t[1].replace('"tip"', '"top"'), t[2]), "'top'"),
+    'no limit': (lambda t: (t[0].replace(LIMIT, ''), *t[1:]), 'needs <limit'),
 }
 
 
 @pytest.mark.parametrize(('broken', 'words'), BROKEN.values(), ids=BROKEN.keys())
-def test_broken_files_are_refused(broken: Broken, words: str) -> None:
+def test_broken_files_are_refused(broken: Callable[[Texts], Texts], words: str) -> None:
     """What does not make an arm is refused in words that name it."""
     with pytest.raises(ModelError, match=words):
-        RobotModel(*broken(*chain_texts('zyy')))
+        RobotModel(*broken(chain_texts('zyy')))
 
 
 def test_what_no_file_says_has_a_default_that_is_noted_once() -> None:

@@ -8,11 +8,21 @@ from concurrent.futures import ThreadPoolExecutor
 import math
 import sys
 
-from model_robots import chain, robot, ROBOTS, two_arms
+from model_robots import chain, chain_texts, robot, ROBOTS, two_arms
 import numpy as np
 import pytest
 
-from arm_model import Array, Clearances, RobotModel
+from arm_model import (
+    Array,
+    AttachedBody,
+    Clearances,
+    CollisionObject,
+    Cone,
+    Cylinder,
+    Plane,
+    Pose,
+    RobotModel,
+)
 
 ARMS = [*(robot(name) for name in ROBOTS), chain('zpyypz'), two_arms()]
 """The robots, a chain with sliding joints, and a tree."""
@@ -20,7 +30,18 @@ ARMS = [*(robot(name) for name in ROBOTS), chain('zpyypz'), two_arms()]
 ROUNDING = 1e-4  # accuracy of a distance that was searched for from another begin in [m]
 
 
-@pytest.mark.parametrize('model', ARMS, ids=lambda model: model.name)
+def among_things() -> RobotModel:
+    """Return a chain between a table, an object, and one that it carries."""
+    model = RobotModel(*chain_texts('zyyp'))
+    place = Pose(np.eye(3), np.array([0.4, 0.0, 0.5]))
+    cup = CollisionObject('cup', Cylinder(0.04, 0.1), pose=place)
+    scene = model.scene.with_object(CollisionObject('table', Plane(offset=-0.1))).with_object(cup)
+    tool = AttachedBody(CollisionObject('tool', Cone(0.05, 0.2)), 'link_4')
+    model.use_scene(Clearances(scene.with_attached(tool)))
+    return model
+
+
+@pytest.mark.parametrize('model', [*ARMS, among_things()], ids=lambda model: model.name)
 @pytest.mark.parametrize('stride', [0.003, 0.05, 1.0])
 def test_what_is_known_is_a_lower_bound_and_exact_where_it_matters(
     model: RobotModel, stride: float

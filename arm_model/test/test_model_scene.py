@@ -182,21 +182,6 @@ def test_gradients_of_distances_to_objects_are_differences(
         assert (np.abs(near.gradient) <= scene.distance_rate_bounds[near.pair] + 1e-9).all()
 
 
-@pytest.mark.parametrize('stride', [0.01, 0.2])
-def test_what_is_known_is_a_lower_bound_with_objects_too(stride: float) -> None:
-    """On a random walk between a table, an object and a carried one."""
-    cup = CUP.at(Pose(np.eye(3), np.array([0.4, 0.0, 0.5])))
-    at, rng = np.zeros(4), np.random.default_rng(2)
-    tool = AttachedBody(CollisionObject('tool', Cone(0.05, 0.2)), 'link_4')
-    scene = MODEL.scene.with_object(TABLE).with_object(cup).with_attached(tool)
-    known = Clearances(scene)
-    for _ in range(200):
-        at = np.clip(at + stride * rng.uniform(-1.0, 1.0, 4), -1.9, 1.9)
-        exact, bounds = Clearances(scene).least(at, math.inf), known.least(at, 0.05)
-        assert (bounds <= exact + 1e-4).all()
-        assert bounds[exact < 0.05] == pytest.approx(exact[exact < 0.05], abs=1e-4)
-
-
 def test_contacts_are_named_with_their_place_and_depth() -> None:
     """The deepest first; the normal leads from the first body to the second."""
     scene = MODEL.scene.with_object(
@@ -400,14 +385,6 @@ def test_padding_is_the_same_in_every_direction_and_for_the_world_only(
     by_hand = MODEL.scene.with_object(mark).with_attached(AttachedBody(scaled, 'link_4'))
     name = next(pair for pair in bare if {'mark', 'thing'} <= {*pair})
     assert distances(larger, at)[name] == pytest.approx(distances(by_hand, at)[name], abs=1e-5)
-
-
-def test_several_parts_are_replaced_in_one_step() -> None:
-    """It is the scene that single steps make; what is not given stays."""
-    both = MODEL.scene.with_contents(objects={'table': TABLE, 'cup': CUP})
-    single = MODEL.scene.with_object(TABLE).with_object(CUP)
-    assert both.pairs == single.pairs
-    assert both.with_contents(objects={}).pairs == MODEL.scene.pairs
 
 
 def test_scenes_are_the_same_by_what_is_in_them() -> None:
