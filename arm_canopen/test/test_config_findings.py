@@ -512,22 +512,27 @@ JOINT2 = 'joint2: {node_id: 3}'
 KEPT = 'heartbeat_consumer: false\nreset_communication: false'
 BY_EDS: list[tuple[str, str, str, int]] = [
     *(
-        (unsigned(index), in_pdo(index), f'0x{index:04X}:00 as UNSIGNED32', 1)
+        (unsigned(index), in_pdo(index), f'!0x{index:04X}:00 as UNSIGNED32', 1)
         for index in (0x607A, 0x60FF, 0x6064, 0x606C)
     ),
     (eds_text(), in_pdo(0x607A), 'as UNSIGNED32', 0),
     (unsigned(0x607A), '', 'as UNSIGNED32', 0),
     (unsigned(0x607A), f'driver: "ros2_canopen::ProxyDriver"\n{in_pdo(0x607A)}', 'as UNSIGN', 0),
     (OTHER_PROFILE, '', 'profile 401, whose objects', 1),
-    (FIXED_HEARTBEAT, 'heartbeat_producer: 100', 'fixed at 250 ms', 1),
+    (FIXED_HEARTBEAT, 'heartbeat_producer: 100', '!fixed at 250 ms', 1),
     (FIXED_HEARTBEAT, 'heartbeat_producer: 250', 'fixed at', 0),
-    (fixed_tpdos(), 'tpdo: {1: {mapping: [{index: 0x6064}]}}', 'mapping of TPDO 1 .* is fixed', 1),
+    (
+        fixed_tpdos(),
+        'tpdo: {1: {mapping: [{index: 0x6064}]}}',
+        '!mapping of TPDO 1 .* is fixed',
+        1,
+    ),
     (with_default_mapping('0x70000020'), '', '0x7000:00, which is not there; taken as UNSI', 1),
     (with_default_mapping('0x60410090', '0x606400A0'), '', 'bit 7 of the length is set', 1),
     (
         with_default_mapping('0x607A0020', index='1601').replace('$NODEID+0x300', '0x6A0'),
         JOINT2,
-        'COB-ID 0x6A0 of RPDO 2 of joint2 is also that of RPDO 2 of joint1',
+        '!COB-ID 0x6A0 of RPDO 2 of joint2 is also that of RPDO 2 of joint1',
         1,
     ),
     (RICH_EDS.replace('=$NODEID+0x80', '=0x91'), '', 'EMCY COB-ID 0x091 .* is not that of', 1),
@@ -539,11 +544,11 @@ BY_EDS: list[tuple[str, str, str, int]] = [
     (FIXED_HEARTBEAT, KEPT, 'does not boot this way', 0),
     (TWO_AXES, TWO, 'joint1_1 cannot be (enabled|watched) in the cycle', 2),
     (TWO_AXES, f'{TWO}\nchannels: [{{scale_pos_to_dev: 57.3}}, {{}}]', 'is 0.0573, not 1', 1),
-    (TWO_AXES, f"{TWO}\nchannel_names: [elbow, 'left arm']", 'no name for a ROS node', 1),
-    (TWO_AXES, f"{TWO}\nchannel_names: [elbow, '1st']", 'no name for a ROS node', 1),
-    (TWO_AXES, f"{TWO}\nchannel_names: [elbow, '']", 'no name for a ROS node', 1),
-    (TWO_AXES, f'{TWO}\nchannel_names: [a, a]', 'two channels have one name', 1),
-    (TWO_AXES, f'{TWO}\nchannel_names: [joint2, elbow]', "both have an axis 'joint2'", 1),
+    (TWO_AXES, f"{TWO}\nchannel_names: [elbow, 'left arm']", '!no name for a ROS node', 1),
+    (TWO_AXES, f"{TWO}\nchannel_names: [elbow, '1st']", '!no name for a ROS node', 1),
+    (TWO_AXES, f"{TWO}\nchannel_names: [elbow, '']", '!no name for a ROS node', 1),
+    (TWO_AXES, f'{TWO}\nchannel_names: [a, a]', '!two channels have one name', 1),
+    (TWO_AXES, f'{TWO}\nchannel_names: [joint2, elbow]', "!both have an axis 'joint2'", 1),
 ]
 
 
@@ -553,14 +558,15 @@ BY_EDS: list[tuple[str, str, str, int]] = [
 def test_what_bus_yml_and_the_eds_say_together(
     tmp_path: Path, eds: str, piece: str, said: str, count: int
 ) -> None:
-    """As often as it should be reported, each time with a line of its file."""
+    """As often as it should be reported, with a line of its file; `!` begins what is an error."""
     text = added('joint1', piece)
     if JOINT2 in piece or 'joint2' in said:
         text = added('nodes', JOINT2, text.replace(JOINT2, ''))
     report = report_of(tmp_path, text, eds)
-    found = listed(report.errors + report.warnings, said)
+    found = listed(report.errors + report.warnings, said.removeprefix('!'))
     assert len(found) == count
     assert all(problem.line for problem in found)
+    assert all((problem in report.errors) == said.startswith('!') for problem in found)
 
 
 @pytest.mark.parametrize(
@@ -594,6 +600,16 @@ def test_a_fixed_mapping_is_kept(tmp_path: Path) -> None:
     (node,) = load_text(tmp_path, eds=fixed_tpdos()).nodes
     assert [pdo.fixed_mapping for pdo in node.tpdos] == [True] * 6
     assert {mapped.word for pdo in node.tpdos for mapped in pdo.mapping} == {0x6041_0010}
+
+
+def test_odd_mappings_of_an_eds_are_taken_as_far_as_they_are_understood(tmp_path: Path) -> None:
+    """An unknown object by its length; bit 7 of a length belongs to the vendor."""
+    for words, taken in (
+        (['0x70000020'], [0x7000_0020]),
+        (['0x60410090', '0x606400A0'], [0x6041_0010, 0x6064_0020]),
+    ):
+        (node,) = load_text(tmp_path, eds=with_default_mapping(*words)).nodes
+        assert [mapped.word for mapped in node.tpdos[1].mapping] == taken
 
 
 def test_a_cyclic_mode_needs_sync(tmp_path: Path) -> None:
