@@ -39,7 +39,7 @@ def read_bus(robot: Robot) -> BusConfig:
 
 
 def in_namespace_of_bus(ros: RosOptions, bus: BusConfig) -> RosOptions:
-    """Take over the namespace of bus.yml, unless the command line has one: all nodes share it.
+    """Use the namespace of bus.yml for all nodes, unless the command line has one.
 
     Raises:
         RobotError: Its nodes are in several.

@@ -33,7 +33,7 @@ EXAMPLE_ACCELERATIONS = (2.0, 0.5)
 
 
 def check_robot(robot: Robot) -> list[Finding]:
-    """Look at everything in a robot folder.
+    """Check everything in a robot folder.
 
     Returns:
         What is wrong; empty when all is well.
@@ -67,7 +67,7 @@ def check_robot(robot: Robot) -> list[Finding]:
 
 
 def _remedies(robot: Robot, drives: Collection[str], tree: KinematicTree) -> Iterable[str]:
-    """Say how each file that is missing is made."""
+    """Explain how to make each missing file."""
     if not robot.semantic.is_file():
         yield f'{srdf_command(robot)} makes the SRDF'
     if not robot.limits.is_file():

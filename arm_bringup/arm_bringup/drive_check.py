@@ -19,7 +19,7 @@ LONGER = 5.0  # times the way of a stop within the limits, from which on one sur
 def check_drives(
     place: str, drives: Mapping[str, AxisUnits | None], limits: JointLimits
 ) -> Iterable[Finding]:
-    """Look at speed limit and decelerations of each drive; None where these are unknown."""
+    """Check speed limit and decelerations of each drive; None where these are unknown."""
     from arm_canopen.standard import Index
 
     rows = zip(limits.names, limits.velocity, limits.acceleration, strict=True)

@@ -36,7 +36,7 @@ class Finding:
     remedy: str
 
     def __str__(self) -> str:
-        """Say it in two lines or more."""
+        """Format it in two lines or more."""
         remedy = textwrap.indent(self.remedy, '    ')
         return f'{self.severity.value}: {self.place}: {self.problem}\n{remedy}'
 

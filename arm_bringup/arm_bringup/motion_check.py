@@ -40,7 +40,7 @@ def check_motion(
     semantic: SemanticDescription,
     drives: Mapping[str, AxisUnits | None],
 ) -> list[Finding]:
-    """Look at the files that trajectories and jogging need.
+    """Check the files that trajectories and jogging need.
 
     Args:
         robot: The robot; its SRDF and its limits exist.

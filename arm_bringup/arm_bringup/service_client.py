@@ -23,7 +23,7 @@ class ServiceClient(GraphClient):
         self._clients: dict[str, Any] = {}
 
     def prepare(self, services: Iterable[str]) -> None:
-        """Look for services that will be called, so that they are known when they are needed."""
+        """Create clients of services that will be called, so that they are matched in time."""
         for name in services:
             self._clients[name] = self.node.create_client(Trigger, name)
 

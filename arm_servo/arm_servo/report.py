@@ -31,7 +31,7 @@ class Limiter:
     factor: float  # what it leaves of the asked speed, 0 to 1
 
     def __str__(self) -> str:
-        """Say it in a few words."""
+        """Describe it in a few words."""
         if self.cause is Cause.COLLISION:
             return f'collision: {self.name} at {1e3 * self.amount:.0f} mm, {self.factor:.2f}x'
         if self.cause is Cause.JOINT_POSITION:
@@ -59,7 +59,7 @@ class MotionReport:
         return MotionReport(min(self.factor, limiter.factor), (limiter, *self.limiters))
 
     def __str__(self) -> str:
-        """Say it in one line."""
+        """Describe it in one line."""
         if not self.limiters:
             return 'free'
         return '; '.join(str(limiter) for limiter in self.limiters)

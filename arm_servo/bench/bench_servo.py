@@ -43,7 +43,7 @@ class Tally:
     factors: list[float] = field(default_factory=list)
 
     def __str__(self) -> str:
-        """Say it in a few words."""
+        """Describe it in a few words."""
         share = 100.0 * self.stuck / max(self.commands, 1)
         return f'{self.stuck} of {self.commands} stuck ({share:.0f} %)'
 

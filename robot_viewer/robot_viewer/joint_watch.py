@@ -30,7 +30,7 @@ class JointWatch:
         self._publisher_due = math.inf
 
     def take(self, names: Iterable[str]) -> None:
-        """Take in the names of a message."""
+        """Add the names of a message."""
         self._received = True
         self._silent.difference_update(names)
         self._unknown.update(name for name in names if name not in self._known)
@@ -65,7 +65,7 @@ class JointWatch:
         ]
 
     def _silence(self, now: float, topic: str, publishers: int) -> list[str]:
-        """Report a publisher that is silent, or that nobody has begun to publish."""
+        """Report a silent publisher, or that there is none yet."""
         if publishers and self._publisher_due == math.inf:
             self._publisher_due = now + SILENCE_TIMEOUT
         begun = self._publisher_due < math.inf

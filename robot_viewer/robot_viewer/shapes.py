@@ -24,7 +24,7 @@ class Meshes:
     """Files of triangles, each of which is read once."""
 
     def __init__(self, folder: Path | None = None) -> None:
-        """Have none yet."""
+        """Begin without shapes."""
         self._folder = folder
         self._read: dict[Path, trimesh.Trimesh] = {}
 

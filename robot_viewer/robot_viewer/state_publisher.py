@@ -104,7 +104,7 @@ class StatePublisher:
     """Computes which transforms are to be published when joint positions come in."""
 
     def __init__(self, model: KinematicTree, settings: Settings | None = None) -> None:
-        """Take a robot.
+        """Use a robot.
 
         Args:
             model: Its tree.
@@ -135,7 +135,7 @@ class StatePublisher:
     def update(
         self, names: Sequence[str], positions: Sequence[float], stamp: int, now: int
     ) -> Update:
-        """Take in a JointState.
+        """Store a JointState.
 
         Args:
             names: Names of joints, those of other robots among them.

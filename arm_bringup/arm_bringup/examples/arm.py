@@ -169,7 +169,7 @@ class ArmDemo(Demo[ServiceClient]):
         return client
 
     def prepare(self) -> None:
-        """Look for the services while the drives boot."""
+        """Discover the services while the drives boot."""
         self.client.prepare([*itertools.chain(*self._enabling), *self.services()])
 
     def perform(self) -> None:
@@ -192,7 +192,7 @@ class ArmDemo(Demo[ServiceClient]):
                 self.observe(source)
 
     def observe(self, drive: str) -> None:  # a demo may need the latest only
-        """Look at a drive of which new figures have come."""
+        """Handle new figures of a drive."""
 
     def is_enabled(self, name: str) -> bool:
         """Return whether a drive can move."""
@@ -248,7 +248,7 @@ class ArmDemo(Demo[ServiceClient]):
             self.found.append(str(error))
 
     def conclude(self) -> None:
-        """Leave summary, problems and warnings."""
+        """Set summary, problems and warnings."""
         width = max((len(name) for name, _ in self.rows), default=0)
         self.summary = [f'{name:<{width}}  {figures}' for name, figures in self.rows]
         self.problems = self.found
@@ -289,7 +289,7 @@ class ArmDemo(Demo[ServiceClient]):
         self.client.wait_until(reached, timeout, what)
 
     def pause(self, duration: float) -> None:
-        """Let a time in [s] pass."""
+        """Wait for a time in [s]."""
         end = time.monotonic() + duration
         self.wait_moving(lambda: time.monotonic() >= end, math.inf, 'a pause')
 

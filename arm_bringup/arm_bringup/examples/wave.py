@@ -130,7 +130,7 @@ class Axis:
         return self._target
 
     def ask(self) -> None:
-        """Let it take part as soon as it stands and can follow."""
+        """Request that it joins as soon as it stands and can follow."""
         self._wanted, self._wanted_since = True, math.nan
 
     def observe(self, drive: Mapping[str, str], now: float, *, enabled: bool) -> None:
@@ -153,7 +153,7 @@ class Axis:
                 self._wanted = False
 
     def leave(self, reason: str) -> None:
-        """Take no part any more."""
+        """Leave the wave."""
         self.active, self._wanted, self.left = False, False, reason
 
     @property
@@ -289,7 +289,7 @@ class Wave(ArmDemo):
         return self.left or time.monotonic() >= end
 
     def _ask(self) -> None:
-        """Take in every drive that stands and can follow; those that are in it go on."""
+        """Request that every drive joins that stands and can follow; active ones continue."""
         with self._lock:
             for axis in self.axes.values():
                 if not axis.active:

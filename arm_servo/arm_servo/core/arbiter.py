@@ -53,7 +53,7 @@ class CommandArbiter:
         return self.target if self.active is Source.TARGET else None
 
     def jog(self, command: Command, fresh_until: float, client: Hashable) -> None:
-        """Let a jog command move the arm.
+        """Make a jog command the active motion.
 
         Args:
             fresh_until: Steady time until which it counts in [s].
@@ -79,12 +79,12 @@ class CommandArbiter:
         return self.execution.on_path
 
     def follow(self, execution: Execution) -> None:
-        """Let a trajectory move the arm."""
+        """Make a trajectory the active motion."""
         self.release('a new trajectory took over')
         self.active, self.execution = Source.TRAJECTORY, execution
 
     def aim(self, target: SingleTarget) -> None:
-        """Let a single target move the arm."""
+        """Make a single target the active motion."""
         if self.active is Source.TARGET:  # displacements add up: what was asked before is in it
             self.end(CONTINUED)
         self.release('a single target took over')
@@ -99,7 +99,7 @@ class CommandArbiter:
         self.release(outcome.reason)
 
     def release(self, reason: str) -> None:
-        """Take the arm from what moves it; it comes to rest unless something else takes over."""
+        """End the active motion; the arm comes to rest unless another one takes over."""
         self.end(Outcome(GoalCode.INVALID_GOAL, reason))
         self._jogging.end()
         self.active, self.held = Source.NONE, False

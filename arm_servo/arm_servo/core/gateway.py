@@ -93,7 +93,7 @@ class CommandGateway:
     def command(
         self, request: ImmediateRequest, get_ready: Callable[[], object] = lambda: None
     ) -> Future[None]:
-        """Have a jog, a stop, a pause or a speed override count from the next cycle on.
+        """Apply a jog, a stop, a pause or a speed override from the next cycle on.
 
         A stop refuses from the moment of the call what was requested before it, a pause what jogs.
 
@@ -141,7 +141,7 @@ class CommandGateway:
     def request(
         self, request: MotionRequest, get_ready: Callable[[], object] = lambda: None
     ) -> MotionCommand:
-        """Have a motion prepared, and begun when it is found to be clear.
+        """Prepare a motion, and begin it when its path is clear.
 
         Args:
             get_ready: Gets back drives that others have, where the arm does not follow; called in
@@ -154,7 +154,7 @@ class CommandGateway:
         self._motions.cancel(command, reason)
 
     def use_scene(self, scene: PlanningScene) -> Future[int]:
-        """Have another scene count from the next cycle on, for jogs, targets and trajectories.
+        """Use another scene from the next cycle on, for jogs, targets and trajectories.
 
         It is measured here, beside the cycle, which takes some milliseconds for 100 objects. A
         trajectory under way is checked again, and ends on its path where it would collide.

@@ -33,7 +33,7 @@ class HoldToRun:
         self._barred: dict[Hashable, str] = {}
 
     def command(self, client: Hashable, now: float, *, is_zero: bool) -> None:
-        """Take note of a command.
+        """Record a command.
 
         Args:
             is_zero: Whether it commands standing still.
@@ -56,14 +56,14 @@ class HoldToRun:
             )
 
     def interrupt(self, reason: str, now: float) -> None:
-        """Have whoever holds let go first."""
+        """Require active clients to release before they jog again."""
         with self._lock:
             for client, (_, last) in self._held.items():
                 if now - last <= GONE_AFTER:
                     self._barred.setdefault(client, reason)
 
     def begin(self, now: float) -> bool:
-        """The arm begins to follow: have whoever has held for longer let go first.
+        """The arm begins to follow: require clients that have held for longer to release first.
 
         Returns:
             Whether somebody has to let go.
@@ -75,7 +75,7 @@ class HoldToRun:
             return bool(self._barred)
 
     def renew(self) -> None:
-        """Take what comes from now on for a new jog: a person has requested it."""
+        """Treat the next command as a new jog: a person has requested it."""
         with self._lock:
             self._held.clear()
             self._barred.clear()

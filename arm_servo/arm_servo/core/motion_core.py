@@ -210,7 +210,7 @@ class MotionCore:
         return PreparedScene.of(scene, version, near=near, checks_paths=checks_paths)
 
     def use_scene(self, scene: PreparedScene) -> Execution | None:
-        """Let another scene count from now on, for jogs, targets and trajectories.
+        """Use another scene from now on, for jogs, targets and trajectories.
 
         Returns:
             The trajectory under way, whose path is to be checked again beside the cycle; see
@@ -259,7 +259,7 @@ class MotionCore:
     def commit(
         self, prepared: Prepared, now: float, elapsed: float = 0.0, *, in_any_scene: bool = False
     ) -> None:
-        """Let a request count from now on; where a motion is off, the arm catches up smoothly.
+        """Apply a request from now on; where a motion is off, the arm catches up smoothly.
 
         Args:
             elapsed: Time since its basis in [s], by which a motion that begins later waits less.
@@ -408,7 +408,7 @@ class MotionCore:
         self._arbiter.stop(outcome)
 
     def _check_held(self) -> None:
-        """Refuse what would wait, and begin when nobody expects it any more."""
+        """Refuse what would wait, and begin when it is no longer expected."""
         if self._paused:
             raise CommandError(PAUSED)
         if self._speed == 0.0:

@@ -120,7 +120,7 @@ class MotionQueue:
         self._preparing: MotionCommand | None = None
 
     def request(self, request: MotionRequest, get_ready: Callable[[], object]) -> MotionCommand:
-        """Have a motion prepared, and begun when it is found to be clear."""
+        """Prepare a motion, and begin it when its path is clear."""
         with self._lock:
             command = MotionCommand(request, self._order.number(), self._clock(), get_ready)
             is_full = len(self._waiting) >= MAX_QUEUED_MOTIONS
@@ -204,7 +204,7 @@ class MotionQueue:
         self._orders.append(hand_out)
 
     def _hand_out(self, command: MotionCommand, since: float, cycle: Cycle) -> None:
-        """Have a motion prepared from the state of this cycle."""
+        """Prepare a motion from the state of this cycle."""
         self._order.admit(command.source, command.number, since, cycle)
         basis = self._core.basis
         self._submit(command, lambda: self._prepare(command, basis, cycle))
@@ -265,7 +265,7 @@ class MotionQueue:
         self._orders.append(rest)
 
     def _order_commit(self, command: MotionCommand, prepared: Prepared, planned: float) -> None:
-        """Have a motion begin at the time for which it was planned, or as soon as can be."""
+        """Begin a motion at the time for which it was planned, or as soon as possible."""
         self._order.check(command.source, command.number)  # no cycle may come that does
         ordered = max(self._clock(), planned)
 
@@ -296,7 +296,7 @@ class MotionQueue:
         self._orders.append(commit)
 
     def _guarded(self, command: MotionCommand, step: Callable[[], Any]) -> bool:
-        """Take a step of a motion; return whether it was not refused."""
+        """Run a step of a motion; return whether it was accepted."""
         try:
             if command.is_canceled:
                 raise CancelledError  # noqa: TRY301

@@ -133,7 +133,7 @@ class MovingArms:
         return Neighbours(self, self._groups.index(tuple(joints)))
 
     def use_scene(self, scene: PlanningScene) -> None:
-        """Let attached bodies, allowed collisions and joints beside the arms count.
+        """Use attached bodies, allowed collisions and joints beside the arms of a scene.
 
         It is measured here, in the thread of the caller.
 
@@ -161,7 +161,7 @@ class MovingArms:
             self.version += 1
 
     def put(self, number: int, stop: _Stop | None) -> None:
-        """Let the others know how an arm would come to rest; None while that is not known."""
+        """Publish to the others how an arm would come to rest; None while that is unknown."""
         self._stops[number] = stop
 
     def least(self, number: int, plan: Plan, begin: float, within: float) -> LeastClearance:
@@ -240,9 +240,9 @@ class Neighbours:
         return self._arms.least(self._number, stop, begin, within)
 
     def stops(self, plan: Plan, begin: float) -> None:
-        """Let the others know the stop behind a step."""
+        """Publish to the others the stop behind a step."""
         self._arms.put(self._number, _Stop.of(plan, begin))
 
     def stands(self, state: RobotState | None) -> None:
-        """Let the others know where the arm is while something else may move it."""
+        """Publish to the others where the arm is while something else may move it."""
         self._arms.put(self._number, None if state is None else _Stop(state.position))

@@ -115,7 +115,7 @@ class SafetyFilter:
         self._apart = ClearanceFloor(neighbours.least, self._generator.brake)
 
     def stands(self, state: RobotState | None) -> None:
-        """Let other arms know where the arm is while something else has its drives."""
+        """Publish to other arms where the arm is while something else has its drives."""
         if self._neighbours is not None:
             with self._neighbours.lock:
                 self._neighbours.stands(state)
@@ -144,7 +144,7 @@ class SafetyFilter:
         now: float = 0.0,
         apart: float | None = None,
     ) -> tuple[RobotState, Limiter | None]:
-        """Let a step pass, or brake instead.
+        """Return the step if it is safe, else a braking one.
 
         Args:
             clearance: Least distance between links on a stop in [m]; None where what moves the
@@ -181,7 +181,7 @@ class SafetyFilter:
 
     @contextmanager
     def _turn(self) -> Iterator[None]:
-        """Look at other arms, if there are any, while none of them steps in another thread."""
+        """Hold the lock of other arms, if any, so that none of them steps meanwhile."""
         neighbours = self._neighbours
         if neighbours is None:
             yield
@@ -230,7 +230,7 @@ class SafetyFilter:
         self._upper = np.maximum(self._limits.upper, np.minimum(self._upper, upper))
 
     def _announce(self, stop: Plan, begin: float) -> None:
-        """Let other arms know how this one would come to rest now."""
+        """Publish to other arms how this one would come to rest now."""
         if self._neighbours is not None:
             self._neighbours.stops(stop, begin)
 

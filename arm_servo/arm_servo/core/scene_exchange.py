@@ -23,7 +23,7 @@ class SceneExchange:
         self._versions = count(1)
 
     def use(self, scene: PlanningScene, near: Array | None) -> Future[int]:
-        """Have a scene count from the next cycle on; measured here, in the thread of the caller.
+        """Use a scene from the next cycle on; it is measured here, in the caller's thread.
 
         Args:
             near: Where the arm is in [rad]; None while that is not known.
@@ -57,7 +57,7 @@ class SceneExchange:
         self._worker.submit(lambda: self._check(execution, begin, scene))
 
     def _check(self, execution: Execution, begin: float, scene: PreparedScene) -> None:
-        """Look for contact on the rest of a path; in the worker's thread."""
+        """Check the rest of a path for contact; in the worker's thread."""
         if scene is not self._core.scene:
             return  # a newer one counts, in which it is checked as well
         try:

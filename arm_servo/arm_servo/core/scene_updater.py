@@ -72,7 +72,7 @@ class SceneUpdater:
         return self.gateway.snapshot.reference is not None
 
     def replace(self, change: SceneChange) -> None:
-        """Have a scene count in the place of the present one, and of any that waits."""
+        """Replace the present scene, and any that waits."""
         self._newest.append(change)
 
     def update(self, joints: JointPlaces, now: float) -> None:

@@ -57,7 +57,7 @@ class StopDistances:
         return ARM_DISTANCE if self._settings.check_self_collision else None
 
     def refusal(self, limiter: Limiter, *, near_arm: bool) -> str:
-        """Say why a motion cannot go on, and what to do."""
+        """Explain why a motion cannot go on, and what to do."""
         if near_arm:
             return (
                 f'{limiter.name} would come nearer than {ARM_DISTANCE * 1e3:g} mm to another arm; '

@@ -20,7 +20,7 @@ ASK_TIMEOUT = 5.0
 
 
 class TrajectoryStream:
-    """What comes on a topic, where nobody says who sends it; for any thread.
+    """A stream on a topic whose senders are unknown; for any thread.
 
     A single trajectory is a request, and gets drives back. A stream was requested once, at its
     begin: what stops the arm from following ends it, and it stays out however it pauses, as a
@@ -37,7 +37,7 @@ class TrajectoryStream:
         self._barred = ''
 
     def take(self) -> None:
-        """Take note of a trajectory.
+        """Record a trajectory.
 
         Raises:
             NotReadyError: It belongs to a stream that was ended.
@@ -89,7 +89,7 @@ class TrajectoryStream:
             return goes_on
 
     def renew(self) -> None:
-        """Take what comes from now on for a new request, where no stream is going on."""
+        """Treat the next trajectory as a new request, unless a stream is going on."""
         now = self._clock()
         with self._lock:
             if now - self._last > TOGETHER:

@@ -111,9 +111,9 @@ def taken_away(axis: str, refusal: Refusal) -> str:
 
 
 def before_first_command(refusal: Refusal) -> Refusal | str:
-    """Return why an arm that nobody has moved yet has to be commanded first.
+    """Return why an arm that has not moved yet has to be commanded first.
 
-    A drive that was initialized, or got its mode, before that was taken from nobody.
+    A drive that was initialized, or got its mode, before that had no client.
     """
     return UNUSED if refusal.cause in PREPARATIONS else refusal
 

@@ -35,7 +35,7 @@ class DriveSource:
 
     It follows while every drive can. When one drops out, the others stop on the path, and a
     trajectory ends with the drive named. Afterwards it takes the arm over where the drives'
-    set-points are: at once when nobody took a drive away, else when it is attached again.
+    set-points are: at once when no drive was taken away, else when it is attached again.
     """
 
     def __init__(self, gateway: CommandGateway) -> None:

@@ -87,7 +87,7 @@ class FollowingWatch:
         )
 
     def _learn(self, measured: Array) -> None:
-        """Take a measurement into the mean and the noise."""
+        """Update the mean and the noise by a measurement."""
         near = self._unwound(measured, self._last)
         self._noise = self._noise + MEAN_GAIN * (np.abs(near - self._last) - self._noise)
         self._last = near
@@ -98,7 +98,7 @@ class FollowingWatch:
         return near - self._joints.error(near, measured)
 
     def problem(self, measured: Array) -> str:
-        """Say which joint does not follow; empty when all do."""
+        """Describe the joint that does not follow; empty when all do."""
         errors = self.errors(measured)
         worst = int(np.argmax(errors))
         if not 0.0 < self._limits.error < errors[worst]:

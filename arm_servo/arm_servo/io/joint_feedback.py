@@ -36,7 +36,7 @@ class JointFeedback:
         velocities: Sequence[float],
         now: float,
     ) -> None:
-        """Take a message; numbers that are not finite are passed over.
+        """Store a message; numbers that are not finite are ignored.
 
         Args:
             velocities: Their velocities in [rad/s]; may be empty.

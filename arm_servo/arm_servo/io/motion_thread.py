@@ -23,7 +23,7 @@ from .following import FollowingWatch
 from .joint_feedback import JointFeedback
 
 RESYNC_SILENCE = 0.3
-"""How long nobody must command an arm that did not follow, before it takes commands, in [s]."""
+"""Silence of all clients in [s] after which an arm that did not follow accepts commands."""
 
 STOP_TIMEOUT = 3.0  # longest time for the arm to come to rest at the end of the program in [s]
 

@@ -31,7 +31,7 @@ class Jogging:
         self._slowing_since: float | None = None
 
     def begin(self) -> None:
-        """Take over the arm: nothing is held yet."""
+        """Begin to jog: nothing is held yet."""
         self._servo.reset()
 
     def end(self) -> None:
@@ -39,7 +39,7 @@ class Jogging:
         self._command = None
 
     def take(self, command: Command, fresh_until: float) -> None:
-        """Take a command.
+        """Set the command.
 
         Args:
             fresh_until: Steady time until which it counts in [s].

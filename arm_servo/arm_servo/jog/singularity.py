@@ -124,7 +124,7 @@ def distance_to_singularity(
 def way_out(
     jacobian_at: Callable[[Array], Array], position: Array, found: Directions, command: Array
 ) -> Array | None:
-    """Look for joint speeds that lead out of a singular pose in the sense of a command.
+    """Find joint speeds that lead out of a singular pose in the sense of a command.
 
     Along the lost joint directions N the tool stands still at first order. At second order it
     moves along the lost tool direction u by n' H n / 2 with H = N' d(J'u)/dq N. A direction n with

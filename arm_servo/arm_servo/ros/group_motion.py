@@ -154,7 +154,7 @@ def build_tool(model: RobotModel, node: Node, make_drives: MakeDrives) -> MovedG
 def set_tool_active(
     controller: TrajectoryController, gateway: CommandGateway, active: bool
 ) -> None:
-    """Take trajectories and gripper goals, or come to rest and take none."""
+    """Accept trajectories and gripper goals, or come to rest and accept none."""
     controller.set_active(active)
     if not active:
         gateway.command(StopRequest('the controller was deactivated', (Source.TARGET,)))

@@ -45,7 +45,7 @@ class JointSamples:
         self._received: dict[str, JointSample] = {}
 
     def receive(self, joint: str, sample: JointSample) -> None:
-        """Take what the drive of another joint has measured."""
+        """Store what the drive of another joint has measured."""
         self._received[joint] = sample
 
     def fresh(self, snapshot: Snapshot, now: float) -> dict[str, JointSample]:

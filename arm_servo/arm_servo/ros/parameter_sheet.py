@@ -15,7 +15,7 @@ class ParameterSheet:
     """What declarations need of a node; made of the tables of a parameter file."""
 
     def __init__(self, name: str, table: Mapping[str, Any]) -> None:
-        """Take what the file has for a node.
+        """Read what the file has for a node.
 
         Args:
             table: Parameters by name; tables in it are names with dots.

@@ -39,7 +39,7 @@ OTHERS_TIMEOUT = 5.0  # time for which joints beside a group are awaited without
 
 
 def keep_apart(gateways: Sequence[CommandGateway]) -> MovingArms | None:
-    """Have arms that move by themselves heed each other; before their first cycles.
+    """Keep arms that move by themselves apart; before their first cycles.
 
     Returns:
         What they know of each other; None where there is one arm.

@@ -217,5 +217,5 @@ class TopicDrives:
         self.thread = MotionThread(cycle, loop.period, begin)
 
     def prepare(self) -> bool:
-        """Return that nothing was got back: whoever has the drives keeps them."""
+        """Return that nothing was got back: the drives stay with their client."""
         return False

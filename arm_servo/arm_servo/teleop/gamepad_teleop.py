@@ -57,7 +57,7 @@ class GamepadTeleop(DeadmanMapping):
         return jog if any(jog.linear) or any(jog.angular) else None
 
     def feed(self, state: GamepadState) -> list[str]:
-        """Take a state of the gamepad; return what was chosen, in words."""
+        """Process a state of the gamepad; return what was chosen, in words."""
         before, joints = self.take(state), len(self.robot.names.joints)
         for button in state.pressed_since(before):
             if button in FRAME_BUTTONS:

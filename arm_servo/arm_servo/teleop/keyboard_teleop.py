@@ -114,12 +114,12 @@ class KeyboardTeleop(KeyMapping):
         return due if self._step is None else min(due, self._step[1])
 
     def end(self) -> None:
-        """Let go of everything at the end of the program."""
+        """Release everything at the end of the program."""
         self._step = None
         super().end()
 
     def feed(self, event: KeyEvent) -> list[Request]:
-        """Take an event; return what the person requests besides a motion."""
+        """Process an event; return what the person requests besides a motion."""
         key = event.key.lower() if len(event.key) == 1 else event.key
         event = replace(event, key=key)
         joints = len(self.robot.names.joints)

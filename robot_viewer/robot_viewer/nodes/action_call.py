@@ -24,7 +24,7 @@ class ActionCall:
         client.send_goal_async(goal).add_done_callback(self._answered)
 
     def cancel(self) -> None:
-        """Have it canceled."""
+        """Cancel it."""
         self._is_canceled = True
         if self._handle is not None:
             self._handle.cancel_goal_async()

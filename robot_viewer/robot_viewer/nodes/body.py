@@ -75,7 +75,7 @@ class Body:
         self._poses: Publisher | None = None
 
     def describe(self, tree: KinematicTree) -> None:
-        """Take another robot; the page has taken the panel away."""
+        """Use another robot; the page has removed the panel."""
         self._tree, self._feet, self._panel = tree, feet_of(tree), None
         self._masses, self._radius = (), 0.0
         self._contacts = self._support = None

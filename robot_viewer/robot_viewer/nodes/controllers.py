@@ -140,7 +140,7 @@ class Controllers:
         self.history.add(targets, positions, time.monotonic())
 
     def aim(self, name: str, targets: Mapping[str, float], share: float) -> None:
-        """Have targets sent, and no other joint moved; of several of a joint the last one counts.
+        """Send targets and move no other joint; of several of a joint the last one counts.
 
         Args:
             name: The controller.

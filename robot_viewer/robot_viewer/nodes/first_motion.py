@@ -156,7 +156,7 @@ class FirstMotion:
         self._panel = self._page.offer_first_motion(kinds, self)
 
     def take(self, positions: Mapping[str, float]) -> None:
-        """Take note of positions that have come."""
+        """Store new positions."""
         if math.isfinite(positions.get(self._request.joint, math.nan)):
             self._seen_at = time.monotonic()
 
@@ -171,7 +171,7 @@ class FirstMotion:
         self._order(self._forget)
 
     def beat(self) -> None:
-        """Take a heartbeat of the held button that counts."""
+        """Process a valid heartbeat of the held button."""
         self._order(partial(self._beat, time.monotonic()))
 
     def release(self) -> None:
@@ -187,7 +187,7 @@ class FirstMotion:
         self._order(partial(self._conclude, saw, distance))
 
     def choose(self, cause: Cause) -> None:
-        """Take one of several causes."""
+        """Choose one of several causes."""
         self._order(partial(self._propose, cause))
 
     def write(self) -> None:
@@ -383,7 +383,7 @@ class FirstMotion:
         self._disable(guard.detail)
 
     def _disable(self, why: str) -> None:
-        """Leave a joint without power that moves as nobody has commanded, as at the terminal."""
+        """Disable a joint that moves without a command, as at the terminal."""
         joint = self._request.joint
         self._fail(f'{why}; the drive is being disabled')
         if self._panel is not None:

@@ -49,7 +49,7 @@ class Grippers:
         return frozenset(each.joint for each in self._found.values())
 
     def describe(self, tree: KinematicTree) -> None:
-        """Take another robot."""
+        """Use another robot."""
         self._ends = {joint.name: travel(joint) for joint in tree.movable()}
         for name in [n for n, each in self._found.items() if each.joint not in self._ends]:
             self._found.pop(name).client.destroy()

@@ -32,7 +32,7 @@ class Listening:
         take: Callable[[Any], None],
         qos: QoSProfile | int,
     ) -> None:
-        """Have messages of a topic taken while somebody looks."""
+        """Subscribe to a topic while a page is open."""
         maker = partial(self._node.create_subscription, kind, topic, take, qos)
         self._makers.append(maker)
         if self._made:

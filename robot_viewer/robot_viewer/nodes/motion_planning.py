@@ -108,7 +108,7 @@ class MotionPlanning:
     # -- what there is
 
     def describe(self, tree: KinematicTree) -> None:
-        """Take another robot; the page has taken the panel away."""
+        """Use another robot; the page has removed the panel."""
         self._tree, self._panel = tree, None
         self._drop()
 
@@ -158,7 +158,7 @@ class MotionPlanning:
     # -- what people do
 
     def _order_here(self, action: Callable[[], None]) -> None:
-        """Have done what people do, unless they did it to a robot that has gone."""
+        """Carry out actions of the page, unless they belong to a robot that has gone."""
 
         def act() -> None:
             if self._panel is not None:
@@ -220,7 +220,7 @@ class MotionPlanning:
         panel.show_ghost(everywhere)
 
     def drag_goal(self, pose: Transform) -> None:
-        """Have the tip at a pose in the root link."""
+        """Set the goal of the tip to a pose in the root link."""
         self._drop()
         if self._goal != DRAGGED and self._panel is not None:
             self._goal = DRAGGED
@@ -229,7 +229,7 @@ class MotionPlanning:
         self._solve()
 
     def _solve(self) -> None:
-        """Look for joints with which the tip is where it is dragged to; one request at a time."""
+        """Solve for joints that bring the tip to the dragged pose; one request at a time."""
         links, tree = self._links, self._tree
         pose, now = self._pose, time.monotonic()
         if pose is None or links is None or tree is None:

@@ -59,7 +59,7 @@ class SceneEditor:
         self._show()
 
     def _ask(self) -> None:
-        """Have the whole scene: the topic of MoveIt may have had nothing but a change."""
+        """Request the whole scene: MoveIt's topic may have carried a change only."""
         if self._whole is not None and self._whole.service_is_ready():
             self._changed_since = False
             request = import_module('moveit_msgs.srv').GetPlanningScene.Request()

@@ -31,7 +31,7 @@ class Border:
             self.report(what, error)
 
     def report(self, what: str, error: Exception) -> None:
-        """Say an error, once."""
+        """Log an error once."""
         text = f'{what}: {_reason(error)}'
         if text in self._said:
             return

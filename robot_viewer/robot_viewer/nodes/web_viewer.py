@@ -199,7 +199,7 @@ class WebViewer(Node):
             self._status_times[status.name] = time.monotonic()
 
     def _aged(self, status: Status, now: float) -> Status:
-        """Return a status as it is known now: whoever has ended says nothing any more."""
+        """Return a status as it is known now; the last one of a node that has ended is old."""
         age = now - self._status_times[status.name]
         if age < STATUS_AGE:
             return status
@@ -385,7 +385,7 @@ class WebViewer(Node):
         self._order(partial(self._request_mode, mode))
 
     def publish_joints(self, positions: Mapping[str, float]) -> None:
-        """Publish joint states, where nobody else does."""
+        """Publish joint states, where no other node does."""
         self._order(partial(self._publish_joints, positions))
 
     def aim(self, controller: str, targets: Mapping[str, float], share: float) -> None:

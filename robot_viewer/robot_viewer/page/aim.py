@@ -81,7 +81,7 @@ class History:
     def add(
         self, targets: Mapping[str, float], positions: Mapping[str, float], now: float
     ) -> None:
-        """Take in where joints are; what comes too soon after the last is left out."""
+        """Store joint positions; ones that come too soon after the last are ignored."""
         for name in (each for each in targets if each in positions):
             samples = self._samples.setdefault(name, deque())
             if samples and now - samples[-1].time < STEP:

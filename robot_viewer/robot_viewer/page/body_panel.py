@@ -56,7 +56,7 @@ class BodyPanel:
         self._line: LineSegmentsHandle | None = None
 
     def offer_pose(self, send: Callable[[Pose], None]) -> None:
-        """Let people move the body."""
+        """Enable the controls of the body."""
         if self._sliders:
             return
 
@@ -81,7 +81,7 @@ class BodyPanel:
             gui.add_button('Level', color=NEUTRAL).on_click(lambda _: level())
 
     def remove(self) -> None:
-        """Take all of it off the page."""
+        """Remove all of it from the page."""
         self._folder.remove()
         for node in (*self._feet.values(), self._mass, self._line):
             if node is not None:

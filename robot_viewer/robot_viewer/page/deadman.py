@@ -36,11 +36,11 @@ class Deadman:
         self._released: dict[_Press, float] = {}
 
     def stop(self) -> None:
-        """Let no heartbeat of a button count that is held now, until it is let go."""
+        """Ignore heartbeats of a button that is held now, until it is released."""
         self._barred |= self._pressed
 
     def release(self, page: Hashable, button: Hashable, now: float) -> bool:
-        """Take note that a page has let go; return whether it was the one that holds."""
+        """Record that a page has released; return whether it was the one that held."""
         press = page, button
         self._pressed.discard(press)
         self._barred.discard(press)
@@ -48,7 +48,7 @@ class Deadman:
         return page == self._holder
 
     def beat(self, page: Hashable, button: Hashable, now: float) -> bool:
-        """Take a heartbeat; return whether it counts."""
+        """Process a heartbeat; return whether it counts."""
         press = page, button
         if now - self._released.get(press, -math.inf) < LEAST_GAP:
             return False  # of the button that was let go; threads may have changed their order

@@ -209,7 +209,7 @@ class GuardedTargets:
         return self.guard.needs_release and self._beat > self._since
 
     def beat(self, now: float) -> None:
-        """Take a heartbeat of the held button that counts."""
+        """Process a valid heartbeat of the held button."""
         self._beat = now
 
     def release(self) -> None:

@@ -39,7 +39,7 @@ class FirstMotionActions(Protocol):
         """Another joint was chosen: what was prepared counts no more."""
 
     def beat(self) -> None:
-        """Take a heartbeat of the held button that counts."""
+        """Process a valid heartbeat of the held button."""
 
     def release(self) -> None:
         """The button was let go."""
@@ -51,7 +51,7 @@ class FirstMotionActions(Protocol):
         """Conclude from what was seen, and how far about it was in [rad] or [m]."""
 
     def choose(self, cause: Cause) -> None:
-        """Take one of several causes."""
+        """Choose one of several causes."""
 
     def write(self) -> None:
         """Change bus.yml."""
@@ -106,7 +106,7 @@ class FirstMotionPanel:
         self.begin('', failed=False)
 
     def remove(self) -> None:
-        """Take it off the page."""
+        """Remove it from the page."""
         self._folder.remove()
 
     # -- what is shown

@@ -97,7 +97,7 @@ class JogPanel:
                         self._add_gripper(gripper)
 
     def remove(self) -> None:
-        """Take all of it off the page."""
+        """Remove all of it from the page."""
         self._folder.remove()
 
     def show(self, positions: Mapping[str, float]) -> None:

@@ -176,7 +176,7 @@ class PlanActions(Protocol):
         """Go to a state of the SRDF, or to where the goal is dragged."""
 
     def drag_goal(self, pose: Transform) -> None:
-        """Have the tip at a pose in the root link."""
+        """Set the goal of the tip to a pose in the root link."""
 
     def plan(self, share: float) -> None:
         """Plan, at a share of the greatest velocity and acceleration."""

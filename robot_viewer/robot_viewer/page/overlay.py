@@ -46,7 +46,7 @@ class Overlay:
     """Answers requests for STOP, and adds itself to the page that viser serves."""
 
     def __init__(self, stop: Callable[[], Future[StopAnswer]]) -> None:
-        """Take what STOP does: in the thread of the server, without waiting for the robot."""
+        """Set what STOP does: in the server's thread, without waiting for the robot."""
         self._stop = stop
         self._html = Path(__file__).with_name('overlay.html').read_bytes()
         self._page = b''

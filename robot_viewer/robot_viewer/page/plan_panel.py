@@ -92,7 +92,7 @@ class PlanPanel:
         self.choose_object(NO_OBJECT, None)
 
     def remove(self) -> None:
-        """Take all of it off the page; what hangs on the robot goes with the robot."""
+        """Remove all of it from the page; what is attached to the robot goes with the robot."""
         self._folder.remove()
         self._objects.remove()
         for node in (self._ghost, self._line, self._goal_gizmo, self._object_gizmo):
@@ -116,7 +116,7 @@ class PlanPanel:
         _choose(self._goal, name)
 
     def place_goal(self, pose: Transform | None) -> None:
-        """Let the goal be dragged from a pose."""
+        """Show the goal's handle at a pose."""
         if pose is None:
             if self._goal_gizmo is not None:
                 self._goal_gizmo.visible = False
@@ -164,7 +164,7 @@ class PlanPanel:
         )
 
     def allow(self, *, execute: bool) -> None:
-        """Let the buttons be pressed that need a plan."""
+        """Enable the buttons that need a plan."""
         for button in (self._execute, self._again):
             button.disabled = not execute
 

@@ -229,7 +229,7 @@ class RobotPage:
             self._jog.show(positions if age is not None and age < SILENCE else {})
 
     def show_silence(self, age: float | None) -> None:
-        """Say it in front of everything when nothing is received from the robot any more."""
+        """Show a banner while nothing is received from the robot."""
         text = '' if age is None or age <= SILENCE else _line(SILENT.format(age), COLORS[2])
         if self._silence.content != text:
             self._silence.content = text
@@ -253,7 +253,7 @@ class RobotPage:
         )
 
     def offer_sliders(self, *, offered: bool) -> None:
-        """Let people move the joints, where nobody else says where they are."""
+        """Offer sliders of the joints, where no other node publishes them."""
         tree = self._tree
         if tree is None or offered is bool(self._sliders):
             return
@@ -332,7 +332,7 @@ class RobotPage:
         return True
 
     def follow(self, controller: str, *, busy: bool, positions: Mapping[str, float]) -> None:
-        """Let the sliders of a controller show where its joints are."""
+        """Set the sliders of a controller to its joints' positions."""
         if controller in self._targets:
             self._targets[controller].follow(positions, busy=busy)
 

@@ -126,7 +126,7 @@ class RobotScene:
         return RobotScene(self._scene, self._tree, look=look, meshes=self._meshes)
 
     def show(self, *, seen: bool) -> None:
-        """Let it be seen, or not."""
+        """Show or hide it."""
         if self._base.visible is not seen:
             self._base.visible = seen
 
@@ -139,7 +139,7 @@ class RobotScene:
         return self._paths.get(frame, '')
 
     def remove(self) -> None:
-        """Take the robot out of the scene."""
+        """Remove the robot from the scene."""
         self._base.remove()
 
     def _add_joints(self) -> None:

@@ -58,7 +58,7 @@ class TargetPanel:
             self._sliders[joint.name] = slider
 
     def follow(self, positions: Mapping[str, float], *, busy: bool) -> None:
-        """Let the sliders show where the joints are, unless somebody moves them.
+        """Set the sliders to the joints' positions, unless a person moves them.
 
         Args:
             positions: Where the joints are.

@@ -150,7 +150,7 @@ class GripperController:
         return state.reached or (state.stalled and self._parameters.allow_stalling)
 
     def _hold(self) -> None:
-        """Have the drives hold where they are, once a goal that was not reached has come to rest.
+        """Hold the drives where they are, once a goal that was not reached has come to rest.
 
         They may be blocked, and would push on towards the place of the last set-point.
         """

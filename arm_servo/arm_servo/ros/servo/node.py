@@ -167,4 +167,4 @@ class Servo:
 
 
 def _do_nothing() -> None:
-    """Leave the drives to who has them."""
+    """Do not take drives back."""

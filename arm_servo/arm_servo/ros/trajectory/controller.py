@@ -69,7 +69,7 @@ class TrajectoryController:
             self._override(parameters.speed)
 
     def set_active(self, active: bool) -> None:  # a callback of the manager
-        """Take trajectories, or stop on the path and take none."""
+        """Accept trajectories, or stop on the path and accept none."""
         self.active = active
         if active:
             self._gateway.stream.renew()

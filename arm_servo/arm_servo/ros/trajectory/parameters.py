@@ -121,7 +121,7 @@ def _constraint(read: ParameterReader, joint: str, kind: str, default: float) ->
 
 
 def _declare_interfaces(read: ParameterReader) -> None:
-    """Take what configurations for ros2_control say, and refuse what is not offered."""
+    """Accept parameters of ros2_control's configurations, and refuse what is not offered."""
     wanted = read.texts('command_interfaces', ['position'], 'position is what is commanded')
     if set(wanted) - {'position', 'velocity'} or 'position' not in wanted:
         raise ModelError(f'command_interfaces {wanted}: positions are commanded, use [position]')

@@ -88,7 +88,7 @@ class FoxgloveBridge(Node):
         return f'open {self.url} in Foxglove or Lichtblick (open connection, Foxglove WebSocket)'
 
     def close(self) -> None:
-        """Let all clients go."""
+        """Close all connections."""
         self._service_calls.close()
         self._relay.close()
         self._server.stop()

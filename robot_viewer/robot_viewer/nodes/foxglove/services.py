@@ -92,7 +92,7 @@ class Services:
             server.add_services(new)
 
     def close(self) -> None:
-        """Let nobody wait any longer."""
+        """Fail all waiting calls."""
         for name in set(self._unanswered.values()):
             self._abandon(name, 'the bridge ends')
 
