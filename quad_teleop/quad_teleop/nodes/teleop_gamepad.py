@@ -13,8 +13,7 @@ from operator_input.ros import declare_gamepad, run_teleop, TeleopNode
 from ..exceptions import TeleopError
 from ..gamepad_teleop import GamepadTeleop
 from ..motion import Speeds
-from .robot_link import RobotLink
-from .settings import declare_speeds, declare_steps, declare_stream
+from .robot_link import declare_speeds, declare_steps, declare_stream, RobotLink
 
 SPEEDS = {'': Speeds(0.15, 0.6), 'turbo_': Speeds(0.3, 1.2)}
 

@@ -12,8 +12,7 @@ from operator_input.ros import declare_keyboard, run_teleop, TeleopNode
 from ..exceptions import TeleopError
 from ..keyboard_teleop import KeyboardTeleop
 from ..motion import Speeds
-from .robot_link import RobotLink
-from .settings import declare_speeds, declare_steps, declare_stream
+from .robot_link import declare_speeds, declare_steps, declare_stream, RobotLink
 
 
 class TeleopKeyboard(TeleopNode):
