@@ -21,11 +21,10 @@ from .gait.parameters import GaitParameters
 from .policy.contract.model import PolicyContract
 from .policy.load import find_policy, load_policy, LoadedPolicy
 from .policy.network import Floats
-from .policy.observation import observed_places
+from .policy.observation import ObservationStatistics, observed_places, STATISTICS_KEY
 from .policy.options import PolicyOptions
 from .policy.report import table_text
 from .policy.runner import PolicyRunner
-from .policy.statistics import ObservationStatistics, STATISTICS_KEY
 from .recording import inputs_of, PolicyRun, read_recording, Step
 from .states.controller import MAX_STEP
 

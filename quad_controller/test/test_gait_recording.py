@@ -27,9 +27,9 @@ from quad_controller import (
 )
 from quad_controller.nodes.recorder import Recorder
 from quad_controller.policy import onnx_file
+from quad_controller.policy.observation import ObservationStatistics, STATISTICS_KEY
 from quad_controller.policy.options import GravitySource
 from quad_controller.policy.runner import PolicyRunner
-from quad_controller.policy.statistics import ObservationStatistics, STATISTICS_KEY
 from quad_controller.recording import inputs_of, PolicyRun, read_recording, TOPIC, unpack
 from quad_controller.replay_policy import feed, statistics_of
 from quad_description import JointSample, robot_urdf, RobotState

@@ -20,7 +20,7 @@ import numpy as np
 import optax
 from policy_export import Floats
 
-from quad_controller.policy.statistics import ObservationStatistics
+from quad_controller.policy.observation import ObservationStatistics
 from quad_sim.env import ProcessVectorEnv
 
 BATCH = 1024

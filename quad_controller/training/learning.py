@@ -25,7 +25,7 @@ from practice import Practice, Practised
 from progress import Progress
 import skrl
 
-from quad_controller.policy.statistics import ObservationStatistics, STATISTICS_KEY
+from quad_controller.policy.observation import ObservationStatistics, STATISTICS_KEY
 from quad_description import quadruped, robot_urdf
 from quad_sim.env import ProcessVectorEnv, Randomization
 

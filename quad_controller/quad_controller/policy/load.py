@@ -17,11 +17,10 @@ from .contract.files import read_contract_file
 from .contract.mjlab import CONTRACT_KEY, read_metadata
 from .contract.model import build_contract, PolicyContract, Source
 from .network import Floats, OnnxNetwork
-from .observation import PolicyInputs
+from .observation import PolicyInputs, STATISTICS_KEY
 from .options import ImuFrame, PolicyOptions
 from .report import Report, Row
 from .runner import PolicyRunner
-from .statistics import STATISTICS_KEY
 
 SHIPPED = Path(__file__).parents[1] / 'policies'
 UPRIGHT = ImuSample((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81))
