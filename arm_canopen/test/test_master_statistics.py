@@ -7,7 +7,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from arm_canopen.master.statistics import CycleStatistics
+from arm_canopen.master.runner import CycleStatistics
 
 LATE = st.lists(st.floats(-0.001, 0.1), min_size=1, max_size=60)
 

@@ -19,7 +19,7 @@ from ..master.events import EventKind, Report, Severity
 from ..master.network import Network
 from ..master.process_image import SentRpdo
 from ..master.remote_node import BootPhase, RemoteNode
-from ..master.statistics import CycleFigures, CycleStatistics
+from ..master.runner import CycleFigures, CycleStatistics
 from ..standard.cob_id import CAN_ID_MASK, CobId
 from ..standard.drive import DriveState, OperationMode
 from ..standard.emcy import error_code_text

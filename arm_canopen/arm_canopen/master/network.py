@@ -9,6 +9,7 @@ a function. See ``runner.py`` for the thread that does so on a real bus.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from datetime import datetime, timezone
 from functools import partial
 from traceback import walk_tb
 from typing import TypeAlias
@@ -20,6 +21,7 @@ from ..standard.cob_id import CAN_ID_MASK, CobId
 from ..standard.dictionary import object_address
 from ..standard.nmt import ALL_NODES, COMMANDED_STATES, NmtCommand, NmtState, parse_nmt
 from ..standard.pdo import Number
+from ..standard.time_of_day import encode_time_of_day
 from .boot import BootManager
 from .bus_sender import BusSender
 from .controller_watch import ControllerWatch
@@ -27,7 +29,7 @@ from .events import Event, EventKind, Report, Severity
 from .nmt_sender import NmtSender
 from .other_master import OtherMasterWatch
 from .process_image import SyncRound
-from .producers import HeartbeatProducer, SyncCounter, TimeProducer, utc_now, WallClock
+from .producers import PeriodicFrame
 from .remote_node import RemoteNode
 from .scheduler import completed, Promise, Scheduler
 from .sdo_client import SdoClient
@@ -49,7 +51,7 @@ class Network:
         config: BusConfig,
         send: Callable[[Frame], None],
         report: Report,
-        wall_clock: WallClock = utc_now,
+        wall_clock: Callable[[], datetime] = lambda: datetime.now(timezone.utc),
         *,
         beside_master: bool = False,
     ) -> None:
@@ -86,10 +88,19 @@ class Network:
         self._defects: dict[object, float] = {}  # when each may be reported again, by its place
         self._pauses: list[float] = []  # hold-ups since one was reported
         self._pause_reported = -NEVER
-        self._sync_counter = SyncCounter(master.sync_overflow)
-        self._heartbeat = HeartbeatProducer(master.node_id, master.heartbeat_producer, self.send)
-        self._time = TimeProducer(
-            master.time_cob_id & CAN_ID_MASK, master.time_period, wall_clock, self.send
+        self._sync_count = 0
+        # with the set-points, so that it ends when they do
+        self._heartbeat = PeriodicFrame(
+            CobId.HEARTBEAT + master.node_id,
+            master.heartbeat_producer,
+            lambda: bytes((self.state,)),
+            self.send,
+        )
+        self._time = PeriodicFrame(  # CiA 301, 7.2.6
+            master.time_cob_id & CAN_ID_MASK,
+            master.time_period,
+            lambda: encode_time_of_day(wall_clock()),
+            self.send,
         )
         self._broadcasts = not beside_master
         self._nmt = NmtSender(self.scheduler, self.send, master.nmt_inhibit_time, self._note_nmt)
@@ -159,7 +170,12 @@ class Network:
     def sync(self) -> None:
         """Send SYNC at its deadline; nothing that takes time stands before it."""
         if self._syncs:
-            self.send(Frame(CobId.SYNC, self._sync_counter.next()))
+            overflow = self.config.master.sync_overflow
+            if not overflow:
+                self.send(Frame(CobId.SYNC))
+                return
+            self._sync_count = self._sync_count % overflow + 1  # CiA 301, 7.2.5.2.2
+            self.send(Frame(CobId.SYNC, bytes((self._sync_count,))))
 
     def cycle(self, now: float, period: float) -> None:
         """Begin the cycle whose SYNC has just been sent."""
@@ -196,7 +212,7 @@ class Network:
             self._feedback_due = False
             self._contain(partial(self.on_feedback, self._sync_time))
         if updated:
-            self._contain(partial(self._heartbeat.advance, now, self.state))
+            self._contain(partial(self._heartbeat.advance, now))
 
     @property
     def _syncs(self) -> bool:

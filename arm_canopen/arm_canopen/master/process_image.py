@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The process image of one device: last values of its TPDOs, next values for its RPDOs.
 
-Values are addressed once, by object, when a ``Reader`` or ``Writer`` is made; in the cycle they
+Values are addressed once, by object, when a reader or writer is made; in the cycle they
 are list look-ups. Objects that no PDO carries are read and written by SDO in the background.
 """
 
@@ -184,34 +184,6 @@ class SentRpdo:
         return Frame(self._cob_id, self._pack(self.values))
 
 
-class Source(Protocol):
-    """What values come in: a TPDO, or the polling of an object.
-
-    Attributes:
-        timestamp: Steady time at which they came last in [s].
-        stale_after: Age in [s] from which they are too old to act on; infinite where they come on
-            change only.
-    """
-
-    timestamp: float
-    stale_after: float
-
-    def stale(self, now: float) -> bool:
-        """Return whether they are unknown, or too old to act on, at a steady time in [s]."""
-
-
-class Reader(Protocol):
-    """Last known value of an object of the device."""
-
-    @property
-    def value(self) -> Number | None:
-        """The value, None while unknown."""
-
-    @property
-    def source(self) -> Source:
-        """What it comes in, which knows its age."""
-
-
 class Writer(Protocol):
     """Next value of an object of the device."""
 
@@ -255,7 +227,7 @@ class InputReader:
         return None if values is None else values[self._position]
 
     @property
-    def source(self) -> Source:
+    def source(self) -> ReceivedTpdo:
         """Its TPDO."""
         return self._source
 

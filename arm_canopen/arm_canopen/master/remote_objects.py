@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from functools import partial
 import math
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from ..config.model import NodeConfig
 from ..config.model.tpdo_freshness import PERIODS_MISSED, STALE_AFTER
@@ -20,7 +20,7 @@ from ..standard.objects import is_controlword
 from ..standard.pdo import MappedObject, Number, PdoCodec
 from .bus_sender import Send
 from .events import EventKind, Severity
-from .process_image import Limits, limits_of, ProcessImage, Reader, Source, SyncRound, Writer
+from .process_image import InputReader, Limits, limits_of, ProcessImage, SyncRound, Writer
 from .scheduler import Promise, Scheduler
 from .sdo_client import SdoClient
 
@@ -59,7 +59,7 @@ class BackgroundReader:
         self.stale_after = stale_after  # age in [s] from which the value is too old to act on
 
     @property
-    def source(self) -> Source:
+    def source(self) -> BackgroundReader:
         """Itself: it is polled alone."""
         return self
 
@@ -188,6 +188,10 @@ class SdoWriter:
 
     def _offline(self) -> SdoError:
         return SdoError(f'{self._objects.name} is offline')
+
+
+Reader: TypeAlias = InputReader | BackgroundReader
+"""Last known value of an object of the device, and what it comes in, which knows its age."""
 
 
 class RemoteObjects:

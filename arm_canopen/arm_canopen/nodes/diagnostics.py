@@ -16,7 +16,7 @@ from ..can.load import LoadFigures
 from ..cia402.status import DriveStatus
 from ..master.controller_watch import ControllerWatch
 from ..master.network import Network
-from ..master.statistics import CycleFigures
+from ..master.runner import CycleFigures
 from ..master.status import node_status, NodeStatus
 from ..standard.drive import DriveState
 from .output_thread import OutputThread

@@ -199,6 +199,7 @@ class VirtualNetwork:
         """
         self.now = START
         self.wire = VirtualWire()
+        _defects.found.clear()  # those of other tests
         self.events: list[Event] = []
         self.allows_defects = False
         self.feedback_times: list[tuple[float, float]] = []

@@ -68,8 +68,7 @@ class MovingDrive:
     @property
     def device(self) -> SimulatedDrive:
         """The simulated drive."""
-        drive = self.net.simulated()
-        return drive
+        return self.net.simulated()
 
     def run(self, duration: float) -> None:
         """Let time pass in [s], and look at the drive in each cycle."""
