@@ -21,9 +21,8 @@ from .execution.speed_scaling import TimerState, TrajectoryTimer
 from .execution.tolerances import merge_tolerances, Tolerances
 from .goal import GoalPoint, GoalRules, JointTolerance, TrajectoryGoal
 from .otg import brakeable, brakeable_velocity, hard_brake, OnlineTrajectoryGenerator, Plan
-from .paths.bounds import Excess, farthest_beyond
 from .paths.goal_path import build_path
-from .paths.path import cubics, lines, Path, quintics
+from .paths.path import cubics, Excess, farthest_beyond, lines, Path, quintics
 from .paths.path_check import PathCheck, PathContact
 from .paths.time_scaling import Demand, Timing
 

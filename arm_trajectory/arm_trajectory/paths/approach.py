@@ -15,8 +15,7 @@ import numpy as np
 from arm_model import JointLimits, RobotState
 
 from ..otg import OnlineTrajectoryGenerator, Plan
-from .bounds import farthest_beyond
-from .path import Path
+from .path import farthest_beyond, Path
 from .time_scaling import Timing
 
 MIN_PHASE = 1e-7  # least length of a segment with one jerk in [s]; shorter ones are left out

@@ -15,8 +15,7 @@ from arm_model import Array, JointLimits, Mask, RobotState
 from ..exceptions import GoalError
 from ..goal import GoalRules, TrajectoryGoal
 from .approach import approach_path, stop_path
-from .bounds import farthest_beyond
-from .path import cubics, lines, Path, quintics
+from .path import cubics, farthest_beyond, lines, Path, quintics
 from .points import Points, refuse, upcoming_points
 from .rounding import rounded, run_out
 from .time_scaling import Demand, Timing
