@@ -327,7 +327,7 @@ class RobotModel:
         return moved
 
     def _use(self, kinematics: Kinematics, scene: PlanningScene) -> None:
-        """Take over kinematics and scene of the same group."""
+        """Use kinematics and scene of the same group."""
         self.kinematics, self.scene = kinematics, scene
         self._model = kinematics.native
         self._thread = _Thread(scene)

@@ -33,7 +33,7 @@ MIN_QUALITY = 0.02
 """Quality of a pose of the SRDF at least: it is taken before any that is searched for."""
 
 BELOW = 0.01  # share of its quality that a pose below the mounting plane has
-DECIMALS = 2  # places of the numbers that are found: somebody copies them into an SRDF
+DECIMALS = 2  # decimals of the numbers that are found: they are copied into an SRDF
 
 
 def start_pose(model: RobotModel) -> Array:
@@ -93,7 +93,7 @@ def _room(model: RobotModel, positions: Array) -> float:
 
 
 def _samples(model: RobotModel) -> Iterator[Array]:
-    """Go through poses in the ranges; no joint is turned by more than half a turn."""
+    """Yield poses within the ranges; no joint is turned by more than half a turn."""
     draw = np.random.default_rng(SEED)
     revolute = np.maximum(model.limits.lower, -np.pi), np.minimum(model.limits.upper, np.pi)
     empty = revolute[0] >= revolute[1]  # a range beyond half a turn

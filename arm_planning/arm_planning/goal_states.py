@@ -29,7 +29,7 @@ _NOT_EXACTLY = (
     PlanningCode.NO_IK_SOLUTION,
     PlanningCode.GOAL_VIOLATES_PATH_CONSTRAINTS,
 )
-"""Of goals that may be reached within their tolerances all the same."""
+"""Codes of goals that may still be reached within their tolerances."""
 
 
 class GoalStates:

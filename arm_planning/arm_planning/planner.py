@@ -227,7 +227,7 @@ def _require_start(constraints: ConstraintCheck, start: Array) -> None:
 
 
 def unknown_planner(planner_id: str, planner_ids: Sequence[str]) -> PlanningError:
-    """Return the refusal of a planner that there is not."""
+    """Return the refusal of an unknown planner."""
     known = ', '.join((*planner_ids, *PLANNER_IDS))
     return PlanningError(
         PlanningCode.FAILURE, f'unknown planner_id {planner_id!r}; choose one of {known}'

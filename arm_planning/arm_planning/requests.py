@@ -123,7 +123,7 @@ class MotionPlan:
     path: Path  # the path with its times, jerk-limited, from rest to rest
     planner_id: str  # the planner that found it
     notes: Sequence[str] = ()  # what a person should know, such as where it is slower than asked
-    planning_time: float = 0.0  # how long it took in [s]; 0 where nobody measured
+    planning_time: float = 0.0  # how long it took in [s]; 0 where that was not measured
 
 
 def check_scaling(request: MotionRequest, least: float = 0.0) -> None:

@@ -4,7 +4,7 @@
 
 Groups come from the chains of the description, end effectors from what branches off at their ends,
 pairs of links from sampling, and ``ready`` from a search for a pose that is free and not singular.
-What somebody wrote into an SRDF that is there already stays: all but the pairs, and of those what
+What a person wrote into an existing SRDF stays: all but the pairs, and of those what
 has a reason that begins with ``User``.
 """
 
@@ -43,7 +43,7 @@ END = re.compile(r'\s*</robot>\s*\Z')
 
 @dataclass(frozen=True, slots=True)
 class SrdfDraft:
-    """An SRDF, and what there is to say about it."""
+    """An SRDF, and a report on it."""
 
     text: str  # the SRDF as XML text
     report: Sequence[str]  # what was found, line by line
@@ -166,7 +166,7 @@ class _Branches:
             self._joints.setdefault(joint.parent, []).append(joint)
 
     def chains(self) -> Iterator[_Chain]:
-        """Go through the arms: from the root, or a fork of arms, to the next fork."""
+        """Yield the arms: from the root, or a fork of arms, to the next fork."""
         ends = list(self._ends(self._tree.root, self._tree.root))
         for base, tip, tool in ends:
             yield _Chain('arm' if len(ends) == 1 else f'arm_{tip}', base, tip, tool)

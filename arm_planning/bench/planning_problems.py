@@ -136,7 +136,7 @@ def problem(model: RobotModel, kind: str, seed: int) -> Problem:
 
 
 def _without_mounting(model: RobotModel, scene: PlanningScene) -> PlanningScene:
-    """Let the links that cannot leave their objects touch them: the arm stands on the table."""
+    """Allow links to touch objects that they cannot leave: the arm stands on the table."""
     here = Clearances(scene)
     for name, other in {contact.bodies for contact in here.contacts(model.poses['ready'])}:
         scene = scene.allowing(name, other)

@@ -12,7 +12,7 @@ from model_robots import chain_texts, ready, robot, ROBOTS
 import numpy as np
 import pytest
 
-from arm_model import CollisionObject, Pose, RobotModel, Sphere
+from arm_model import Pose, RobotModel
 from arm_planning.cartesian_path import cartesian_path, JumpThresholds
 from arm_planning.ik.link_kinematics import LinkKinematics
 
@@ -57,26 +57,6 @@ def test_the_fraction_ends_where_the_reach_does(name: str) -> None:
     assert 'no joint positions' in found.reason
     way = tip(name).pose(found.positions[-1]).position - moved(name, 0.0, 0.0, 0.0).position
     assert way == pytest.approx([0.0, 4.0 * found.fraction, 0.0], abs=1e-8)
-
-
-def test_contact_and_constraints_end_a_path() -> None:
-    """The pair is named; what a caller checks counts as well."""
-    name = 'gp110'
-    ball = CollisionObject('ball', Sphere(0.03), pose=moved(name, 0.0, -0.3, 0.0))
-    scene = robot(name).scene.with_object(ball)
-    goal = moved(name, 0.0, -0.6, 0.0)
-    found = cartesian_path(robot(name), ready(name), [goal], 0.01, scene=scene)
-    assert 0.1 < found.fraction < 0.5
-    assert 'ball overlap by' in found.reason
-    half = cartesian_path(
-        robot(name),
-        ready(name),
-        [goal],
-        0.01,
-        is_valid=lambda row: bool(tip(name).pose(row).position[1] > -0.2),
-    )
-    assert half.fraction == pytest.approx(1 / 3, abs=0.02)
-    assert 'constraint' in half.reason
 
 
 def test_jumps_end_a_path() -> None:

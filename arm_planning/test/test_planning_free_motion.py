@@ -82,12 +82,17 @@ def test_a_plan_never_touches_and_never_breaks_a_limit(name: str, seed: int) -> 
     assert np.allclose(plan.path.end.velocity, 0.0, atol=1e-6)
 
 
+def at_a_pillar() -> tuple[RobotModel, PlanningScene, Array, Array]:
+    """Return the Panda, a scene with a pillar before it, and a state on either side of that."""
+    model = robot('panda')
+    start, goal = (ready('panda') + turn * np.eye(7)[0] for turn in (-0.8, 0.8))
+    scene = with_box(model.scene, 'pillar', (0.1, 0.1, 1.5), (0.4, 0.0, 0.75))
+    return model, scene, start, goal
+
+
 def test_an_obstacle_is_gone_around() -> None:
     """The straight motion is blocked, and the plan is longer, but there."""
-    model = robot('panda')
-    start, goal = ready('panda').copy(), ready('panda').copy()
-    start[0], goal[0] = -0.8, 0.8
-    scene = with_box(model.scene, 'pillar', (0.1, 0.1, 1.5), (0.4, 0.0, 0.75))
+    model, scene, start, goal = at_a_pillar()
     planner = Planner(model)
     alone = planner.plan(request(start, goal))
     around = planner.plan(request(start, goal), scene)
@@ -100,13 +105,10 @@ def around_a_pillar(
     seed: int, expired: Callable[[], bool] = lambda: False, *, turned: float | None = None
 ) -> Path:
     """Plan from one side of a pillar to the other, or to the same with a turned hand."""
-    model = robot('panda')
-    start, goal = ready('panda').copy(), ready('panda').copy()
-    start[0], goal[0] = -0.8, 0.8
+    model, scene, start, goal = at_a_pillar()
     goals = [goal]
     if turned is not None:
         goals.append(goal - turned * np.eye(7)[6])
-    scene = with_box(model.scene, 'pillar', (0.1, 0.1, 1.5), (0.4, 0.0, 0.75))
     check = ValidityCheck(model.limits, scene)
     return FreeMotion(model.limits, check, np.random.default_rng(seed)).plan(start, goals, expired)
 
@@ -165,10 +167,7 @@ def test_more_time_never_loses_a_plan(seed: int) -> None:
 
 def test_the_same_seed_gives_the_same_plan() -> None:
     """What went wrong once can be looked at again."""
-    model = robot('panda')
-    start, goal = ready('panda').copy(), ready('panda').copy()
-    start[0], goal[0] = -0.8, 0.8
-    scene = with_box(model.scene, 'pillar', (0.1, 0.1, 1.5), (0.4, 0.0, 0.75))
+    model, scene, start, goal = at_a_pillar()
     one, other = (Planner(model, seed=5).plan(request(start, goal), scene) for _ in range(2))
     assert np.array_equal(one.path.coefficients, other.path.coefficients)
 

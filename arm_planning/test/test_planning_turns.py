@@ -13,7 +13,6 @@ from isolation import reserve
 from model_robots import chain_texts
 from move_group_rig import joint_goal, motion_request, MoveGroupRig, pose_goal
 from moveit_msgs.msg import Constraints, JointConstraint, MoveItErrorCodes
-from moveit_msgs.srv import GetPositionFK
 import numpy as np
 import pytest
 
@@ -72,8 +71,7 @@ def test_a_joint_without_end_turns_the_shorter_way(rig: MoveGroupRig, planner: s
 
 def test_a_pose_within_a_tolerance_is_reached_in_the_same_turn(rig: MoveGroupRig) -> None:
     """Its middle is out of reach, a part of it is not."""
-    asked = GetPositionFK.Request(fk_link_names=['tip'])
-    here = rig.client.call(GetPositionFK, '/compute_fk', asked).pose_stamped[0].pose
+    here = rig.fk('tip')
     goal = pose_goal(PoseMessage(position=here.position), 'tip', 'base')
     goal.orientation_constraints = []
     goal.position_constraints[0].constraint_region.primitive_poses[0].position.z += 5.0

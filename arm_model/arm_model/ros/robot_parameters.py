@@ -29,7 +29,7 @@ class GroupModels:
 
     @property
     def notes(self) -> list[str]:
-        """What there is to know of them, once each; tools may touch, so no pairs of theirs."""
+        """Notes on all groups, once each; without those on pairs of tools, which may touch."""
         of_arms = [note for model in self.arms for note in model.notes]
         of_tools = [note for model in self.tools for note in model.notes_beside_contact]
         return list(dict.fromkeys((*of_arms, *of_tools)))

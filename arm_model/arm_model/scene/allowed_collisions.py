@@ -13,7 +13,7 @@ from urdf_reader import Pair, SemanticDescription
 
 @dataclass(frozen=True, slots=True)
 class AllowedCollisionMatrix:
-    """Pairs of links and objects that are not checked, or are all the same; immutable.
+    """Pairs of links and objects that are not checked, or are checked in any case; immutable.
 
     An entry of a pair decides. Where there is none, the defaults of its two names do: with one
     default, that; with two, both must allow. Where there are none, the pair is checked.
@@ -25,7 +25,7 @@ class AllowedCollisionMatrix:
     defaults: Mapping[str, bool] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Keep copies that nobody else changes."""
+        """Copy both, so that they cannot change."""
         object.__setattr__(self, 'entries', MappingProxyType(dict(self.entries)))
         object.__setattr__(self, 'defaults', MappingProxyType(dict(self.defaults)))
 

@@ -69,7 +69,7 @@ def link_shapes(tree: KinematicTree, folder: Path | None = None) -> LinkShapes:
 
 
 def _left_out(unusable: Mapping[str, Sequence[str]], found: bool) -> Sequence[str]:
-    """Say in one line of which links collisions are not checked, and why."""
+    """Return one line that names the links whose collisions are not checked, and why."""
     if not unusable:
         return () if found else ('no link has a <collision>, so self-collision is not checked',)
     reasons = '; '.join(f'{", ".join(links)}: {reason}' for reason, links in unusable.items())
@@ -77,7 +77,7 @@ def _left_out(unusable: Mapping[str, Sequence[str]], found: bool) -> Sequence[st
 
 
 def _loose(fullness: Mapping[str, float]) -> Sequence[str]:
-    """Name in one line the links whose hull is much larger than they are."""
+    """Return one line that names the links whose hull is much larger than they are."""
     if not fullness:
         return ()
     links = ', '.join(f'{link} ({100 * share:.0f} %)' for link, share in fullness.items())

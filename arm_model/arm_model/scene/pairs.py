@@ -4,7 +4,7 @@
 
 MoveIt's setup assistant writes ``disable_collisions`` for links that are adjacent, or in contact
 nearly always. :func:`with_default_collisions` makes up for that where an SRDF does not say it.
-Links that the assistant finds never in contact are checked all the same: a sample is no proof, and
+Links that the assistant finds never in contact are still checked: a sample is no proof, and
 distances that are great cost nothing. For an SRDF that other programs read,
 :func:`sample_link_pairs` looks for contacts much longer.
 """

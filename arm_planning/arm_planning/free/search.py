@@ -194,7 +194,7 @@ def _at(places: Array, along: Array, length: float) -> Array:
 
 
 def _without_needless(places: Array, check: MotionCheck, expired: Callable[[], bool]) -> Array:
-    """Leave out places whose neighbours see each other, from the start to the farthest one."""
+    """Return places without those whose neighbours are joined by a free straight motion."""
     kept = [0]
     while kept[-1] < len(places) - 1:
         here = kept[-1]

@@ -44,7 +44,7 @@ class Descent:
 
 
 def descend(link: LinkKinematics, pose: Pose, start: Array, lower: Array, upper: Array) -> Descent:
-    """Go to a pose from a start.
+    """Approach a pose from a start.
 
     Args:
         pose: Where it is wanted, in the root link.

@@ -209,7 +209,7 @@ class IkSolver:
         )
 
     def _why_none(self, pose: Pose, best: Descent, starts: int) -> str:
-        """Say why no start led to the pose: without limits one may."""
+        """Return why no start led to the pose: without limits one may."""
         none = np.full(len(self._limits), np.inf)
         unlimited = descend(self.link, pose, best.positions, -none, none)
         if unlimited.converged:

@@ -80,7 +80,7 @@ def read_settings(
         places: Where they come from, of those that come from a file.
 
     Raises:
-        ConfigError: A value is none, or names what there is not.
+        ConfigError: A value is refused, or names something unknown.
     """
     places = places or {}
     check(values, places)
@@ -112,7 +112,7 @@ def of_nothing(
     joints: Sequence[str],
     controllers: Sequence[str],
 ) -> list[str]:
-    """Return a line for each table of a group, joint or controller that there is not.
+    """Return a line for each table of an unknown group, joint or controller.
 
     MoveIt reads none of them, and does not say so.
 

@@ -247,7 +247,7 @@ class MotionAction:
         self._follow(goal, planned)
 
     def _follow(self, goal: _Goal, planned: PlannedMotion) -> None:
-        """Have the next trajectory of a plan followed, or end the goal after the last."""
+        """Execute the next trajectory of a plan, or end the goal after the last."""
         if goal.stops != self._execution.stops:
             self._end(goal, PlanningCode.PREEMPTED, 'everything was stopped meanwhile')
             return
@@ -265,7 +265,7 @@ class MotionAction:
             goal.begun += 1
 
     def _executed(self, goal: _Goal, code: PlanningCode, reason: str) -> None:
-        """Go on, end it, or plan anew where the scene has changed and the options say so."""
+        """Continue, end, or plan anew where the scene has changed and the options ask for it."""
         if code is PlanningCode.SUCCESS and goal.planned is not None:
             if goal.is_canceled and goal.begun < len(goal.planned.trajectories):
                 self._end(goal, PlanningCode.PREEMPTED, 'canceled')
@@ -286,7 +286,7 @@ class MotionAction:
         self._after(goal, max(options.replan_delay, 0.0), self._begin_planning)
 
     def _after(self, goal: _Goal, delay: float, plan: Callable[[_Goal], None]) -> None:
-        """Go on with a goal later, unless it is canceled."""
+        """Continue with a goal later, unless it is canceled."""
 
         def go_on() -> None:
             if goal.delay is not timer:
@@ -334,7 +334,7 @@ class MotionAction:
 
 
 def _conclude(handle: Any, code: PlanningCode) -> None:  # noqa: ANN401
-    """Give a goal the status of an outcome, as MoveIt does."""
+    """Set the status of a goal by its outcome, as MoveIt does."""
     if code is PlanningCode.SUCCESS:
         handle.succeed()
     elif code is PlanningCode.PREEMPTED and handle.is_cancel_requested:

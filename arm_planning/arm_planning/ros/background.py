@@ -55,7 +55,7 @@ class Background:
     def submit(
         self, work: Callable[[], Any], then: Callable[[Future[Any]], None], lane: str = ''
     ) -> Future[Any]:
-        """Have work done, and what follows from it in the executor of the node.
+        """Run work in a thread, and what follows from it in the executor of the node.
 
         Args:
             then: Gets the future of the work when that is done or cancelled.

@@ -97,7 +97,7 @@ class TrajectoryExecution:
         limits: ExecutionLimits,
         followers: Collection[str] = (),
     ) -> None:
-        """Know the controllers; their actions may come later.
+        """Create clients of the controllers, whose actions may come later.
 
         Args:
             received: Returns where joints are in [rad], by joint; raises PlanningError where
@@ -136,15 +136,15 @@ class TrajectoryExecution:
         return [each for each in self._running if each.ending is None]
 
     def on_start(self, begun: Callable[[], None]) -> None:
-        """Have something called when one more trajectory is on its way."""
+        """Register a callback for each trajectory that begins."""
         self._begun = begun
 
     def on_failure(self, find_out: Callable[[Execution], None]) -> None:
-        """Have somebody find out why a controller gave up, who answers with :meth:`explain`."""
+        """Register what finds out why a controller gave up, and answers with :meth:`explain`."""
         self._find_out = find_out
 
     def explain(self, execution: Execution, change: str) -> None:
-        """Take why a controller gave up.
+        """Store why a controller gave up.
 
         Args:
             change: How the scene has changed that it had to; empty where its own words alone
@@ -164,7 +164,7 @@ class TrajectoryExecution:
         done: Done,
         names: Sequence[str] = (),
     ) -> Execution:
-        """Have a trajectory followed, once the actions of its controllers are found.
+        """Execute a trajectory, once the actions of its controllers are found.
 
         Args:
             done: Called once, when it has ended, or its controllers are not there.
@@ -256,7 +256,7 @@ class TrajectoryExecution:
         code: PlanningCode = PlanningCode.PREEMPTED,
         reason: str = 'stopped on request',
     ) -> None:
-        """Have it stopped; ``done`` is called when the controllers have."""
+        """Stop an execution; ``done`` is called when its controllers have stopped."""
         if execution.is_over:
             return
         if execution.ending is not None:
@@ -265,7 +265,7 @@ class TrajectoryExecution:
                 self._conclude(execution)
             return
         execution.ending = code, reason
-        if execution.held:  # nobody was asked
+        if execution.held:  # no controller was asked
             execution.is_complete = False
             execution.held.clear()
             execution.waits_for.clear()
@@ -276,7 +276,7 @@ class TrajectoryExecution:
             handle.cancel_goal_async()
 
     def stop_all(self, reason: str) -> None:
-        """Have everything stopped that is on its way; what was to follow counts :attr:`stops`."""
+        """Stop all executions, and count it in :attr:`stops` for those that were to follow."""
         self.stops += 1
         for execution in list(self._running):
             self.stop(execution, PlanningCode.PREEMPTED, reason)

@@ -81,7 +81,7 @@ def declare_parameters(node: Node, package: MoveItPackage | None = None) -> Move
 
 
 def declare_others(node: Node, names: Sequence[str]) -> None:
-    """Declare what was given and nobody declared, so that tools list it; log it once.
+    """Declare what was given and not declared, so that tools list it; log it once.
 
     Raises:
         ParameterError: A name that is not known looks like one that is.

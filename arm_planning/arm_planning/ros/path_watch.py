@@ -33,7 +33,7 @@ class PathWatch:
     def __init__(
         self, monitor: SceneMonitor, execution: TrajectoryExecution, background: Background
     ) -> None:
-        """Look at what is on its way after each change of the scene, and as it begins.
+        """Check executions after each change of the scene, and as they begin.
 
         The scene may have changed since a trajectory was planned.
         """
@@ -54,7 +54,7 @@ class PathWatch:
         self._background.submit(lambda: contact_ahead(failed.way, here, scene), found)
 
     def _look(self) -> None:
-        """Look at all executions in the present scene, once more where one look is not done."""
+        """Check all executions in the present scene; once more where a check is under way."""
         self._looks_again = self._is_looking
         if self._is_looking or not (running := self._execution.running):
             return

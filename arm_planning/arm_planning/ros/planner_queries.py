@@ -28,7 +28,7 @@ class PlannerQueries:
         node.create_service(SetPlannerParams, 'set_planner_params', self._set)
 
     def _set(self, request: Any, response: Any) -> Any:  # noqa: ANN401  # rclpy has no types here
-        """Say that it counts nothing: the response has no place for it."""
+        """Log that it has no effect: the response has no field for that."""
         self._log.warning(
             f'set_planner_params: {request.planner_config or "the planners"} of group'
             f' {request.group!r} cannot be set; {", ".join(request.params.keys) or "nothing"}'

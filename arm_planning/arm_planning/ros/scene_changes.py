@@ -192,7 +192,7 @@ def _check_mesh(message: Any, what: str) -> None:  # noqa: ANN401
     """Make sure that a shape_msgs/Mesh is a body.
 
     Raises:
-        PlanningError: It has no triangle or no volume, or names a corner that there is not.
+        PlanningError: It has no triangle or no volume, or names an unknown corner.
     """
     problem = _problem(*_arrays(message))
     if problem:

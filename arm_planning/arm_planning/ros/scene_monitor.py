@@ -85,7 +85,7 @@ class SceneMonitor:
         node.create_timer(REST_PERIOD, self._publish_rest)
 
     def on_change(self, listener: Callable[[], None]) -> None:
-        """Have something called after each change of the scene."""
+        """Register a callback for each change of the scene."""
         self._listeners.append(listener)
 
     def received(self, joints: Sequence[str]) -> Mapping[str, float]:
@@ -204,8 +204,8 @@ class SceneMonitor:
     def _publish_rest(self) -> None:
         """Publish the scene when the robot has come to rest elsewhere: viewers show it there.
 
-        Not while it moves, as MoveIt may: whoever reads the scene in a cycle would read it all
-        the time.
+        Not while it moves, as MoveIt may: programs that read the scene in a cycle would read it
+        all the time.
         """
         here, before = self.positions(), self._seen
         self._seen = here

@@ -55,7 +55,7 @@ class CatchUpInterpolator:
     def step(
         self, state: RobotState, ahead: Callable[[float], RobotState], period: float
     ) -> RobotState | None:
-        """Take a step.
+        """Advance by a step.
 
         Args:
             ahead: The state to follow, by the time from now in [s].

@@ -259,7 +259,7 @@ def _beyond(path: Path, limits: JointLimits, state: RobotState) -> GoalError | N
 
 
 def _from_here(points: Points, limits: JointLimits, state: RobotState, rules: GoalRules) -> Points:
-    """Give a first point without time the time to get there, or leave it out in motion."""
+    """Add the time to reach a first point without time; drop that point in motion."""
     off = np.abs(points.positions[0] - state.position)
     if points.times[0] > 0.0:
         return points

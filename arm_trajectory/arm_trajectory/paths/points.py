@@ -192,7 +192,7 @@ def _filled(rows: Sequence[Sequence[float]], places: Sequence[int], default: Arr
 
 
 def _upcoming(points: Points, age: float) -> Points:
-    """Leave out the points that have passed."""
+    """Return the points that have not passed yet."""
     times = points.times - age
     if times[-1] < 0.0:
         raise refuse(
