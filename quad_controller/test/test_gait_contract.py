@@ -411,38 +411,6 @@ def test_other_actions_than_positions_of_all_joints_are_refused(
     assert words in capsys.readouterr().out
 
 
-@pytest.mark.parametrize('offset', [0.0, 2.5])
-def test_targets_far_off_the_stand_are_refused(tmp_path: Path, offset: float) -> None:
-    """An offset that is not that of the training leads the legs elsewhere at once."""
-    tool = TOOLS['playground']()
-    write_network(tool, tmp_path / 'policy.onnx')
-    arguments = [*attached(tool, tmp_path), '--set', f'action.offset={offset}']
-    assert run(arguments) == 0
-    with pytest.raises(PolicyError, match='targets standing'):
-        load(tmp_path / 'policy.onnx')
-
-
-def test_a_whole_list_of_terms_has_its_own_order() -> None:
-    """Terms that all have their source replace those of the file; single keys do not."""
-    base = document_of(GOOD, 'file')
-    terms = {'q': {'source': 'joint_positions', 'relative': True}, 'down': {'source': 'gravity'}}
-    whole = document_of({'observation': {'terms': terms}}, 'side').over(base)
-    assert [term.name for term in build_contract(whole).terms] == ['q', 'down']
-    part = document_of({'observation': {'terms': {'gyro': {'frame': 'yawed'}}}}, 'side').over(base)
-    assert [term.name for term in build_contract(part).terms] == ['gyro', 'q']
-
-
-def test_recurrent_states_of_other_sizes_are_refused(tmp_path: Path) -> None:
-    """Before the second step would fail with the robot on its legs."""
-    tool = TOOLS['playground']()
-    write_network(tool, tmp_path / 'policy.onnx')
-    arguments = attached(tool, tmp_path)
-    arguments[arguments.index('--set', -2) + 1] = 'recurrence={h_in: actions}'
-    assert run(arguments) == 0
-    with pytest.raises(PolicyError, match=r'recurrence\.h_in'):
-        load(tmp_path / 'policy.onnx')
-
-
 def test_a_model_is_written_whole_and_beside_its_weights(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -471,11 +439,30 @@ def test_clips_of_isaac_lab_are_matched_with_joints(tmp_path: Path) -> None:
     assert [clip == [-0.1, 0.1] for clip in clips] == ['hip' in name for name in JOINTS]
 
 
-def test_clips_beyond_the_limits_are_refused(tmp_path: Path) -> None:
-    """No target would be both within the clip and where the joint may be."""
-    tool = TOOLS['rl_sar']()
+@pytest.mark.parametrize(
+    ('name', 'setting', 'reason'),
+    [
+        ('playground', 'action.offset=0.0', 'targets standing'),
+        ('playground', 'action.offset=2.5', 'targets standing'),
+        ('playground', 'recurrence={h_in: actions}', r'recurrence\.h_in'),
+        ('rl_sar', 'action.target_clip=[3.0, 4.0]', 'outside of its soft limits'),
+    ],
+)
+def test_what_leads_the_legs_elsewhere_is_refused(
+    name: str, setting: str, reason: str, tmp_path: Path
+) -> None:
+    """Complete as the contract is: offsets, recurrent states of other sizes, clips off limits."""
+    tool = TOOLS[name]()
     write_network(tool, tmp_path / 'policy.onnx')
-    clip = ['--set', 'action.target_clip=[3.0, 4.0]']
-    assert run([*attached(tool, tmp_path), *clip]) == 0
-    with pytest.raises(PolicyError, match='outside of its soft limits'):
+    assert run([*attached(tool, tmp_path), '--set', setting]) == 0
+    with pytest.raises(PolicyError, match=reason):
         load(tmp_path / 'policy.onnx')
+
+
+def test_a_whole_list_of_terms_has_its_own_order() -> None:
+    """Terms that all have their source replace those of the file; single keys do not."""
+    terms = {'q': {'source': 'joint_positions', 'relative': True}, 'down': {'source': 'gravity'}}
+    for given, names in ((terms, ['q', 'down']), ({'gyro': {'frame': 'yawed'}}, ['gyro', 'q'])):
+        side = document_of({'observation': {'terms': given}}, 'side')
+        contract = build_contract(side.over(document_of(GOOD, 'file')))
+        assert [term.name for term in contract.terms] == names
