@@ -25,7 +25,7 @@ from quad_controller import (
     Velocity,
 )
 from quad_controller.gait.body import UPRIGHT
-from quad_controller.policy.observation import PolicyInputs
+from quad_controller.policy.observation import Situation
 from quad_description import ImuSample, JointSample, quadruped, robot_urdf, RobotState
 
 STEPS = 5000
@@ -61,7 +61,7 @@ def main() -> None:
     joints = JointSample(stand, (0.0,) * len(stand))
     policy = load_policy(POLICY, robot, stand, PolicyOptions(), PERIOD).runner
     policy.reset(stand)
-    seen = PolicyInputs(joints, IMU, VELOCITY)
+    seen = Situation(joints, IMU, VELOCITY)
     report('policy, 47-128-64-12', lambda: policy.step(seen, PERIOD))
     controller = Controller(robot, GaitParameters(), StateParameters())
     measurement = RobotState(joints, IMU, 0.8)

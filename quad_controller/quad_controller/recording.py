@@ -19,7 +19,7 @@ from rosbag_files import BagError, BagReader, load_metadata, METADATA_FILE
 from .exceptions import ParameterError, PolicyError
 from .gait.velocity import Velocity
 from .policy.network import Floats
-from .policy.observation import PolicyInputs
+from .policy.observation import Situation
 from .policy.options import PolicyOptions
 from .states.parameters import StateParameters
 
@@ -80,7 +80,7 @@ def unpack(definition: str, data: bytes) -> Step:
     return values
 
 
-def inputs_of(step: Step) -> PolicyInputs | None:
+def inputs_of(step: Step) -> Situation | None:
     """Return what a policy may see of a step; None when joints or attitude were not known."""
 
     def vector(name: str) -> Any:  # noqa: ANN401  # as long as the field is
@@ -90,7 +90,7 @@ def inputs_of(step: Step) -> PolicyInputs | None:
     if positions is None or orientation is None:
         return None
     contacts = vector('foot_contacts')
-    return PolicyInputs(
+    return Situation(
         JointSample(positions, vector('velocity')),
         ImuSample(orientation, vector('angular_velocity'), vector('acceleration')),
         Velocity(*step['command'].tolist()),

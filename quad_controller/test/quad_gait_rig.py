@@ -9,7 +9,7 @@ import math
 
 from quad_builds import Build, urdf
 from quad_controller import Controller, GaitParameters, State, StateParameters, Velocity
-from quad_controller.policy.observation import PolicyInputs
+from quad_controller.policy.observation import Situation
 from quad_controller.policy.runner import PolicyRunner, PolicyStep
 from quad_description import ImuSample, JointSample, quadruped, RobotState, Targets
 
@@ -30,11 +30,15 @@ def tilted(angle: float) -> ImuSample:
 class StillPolicy(PolicyRunner):
     """A policy that stands, and answers wrongly on request."""
 
-    def missing(self, inputs: PolicyInputs) -> str:
+    def missing(self, inputs: Situation) -> str:
         """Return what it has to see: what every policy sees."""
-        if inputs.joints.velocities is None:
+        if inputs.joints is None or inputs.joints.velocities is None:
             return 'a policy needs the velocities of the joints'
-        return '' if inputs.imu.angular_velocity else 'a policy needs what /imu does not have'
+        return (
+            ''
+            if inputs.imu and inputs.imu.angular_velocity
+            else 'a policy needs what /imu does not have'
+        )
 
     def __init__(self, targets: Targets) -> None:
         """Answer always the same targets."""
@@ -47,7 +51,7 @@ class StillPolicy(PolicyRunner):
         """Count."""
         self.resets += 1
 
-    def step(self, inputs: PolicyInputs, dt: float) -> PolicyStep:
+    def step(self, inputs: Situation, dt: float) -> PolicyStep:
         """Answer."""
         self.velocities.append(inputs.velocity)
         return PolicyStep(self.targets, '' if self.targets is not None else 'broken on purpose')

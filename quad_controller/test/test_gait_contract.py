@@ -28,7 +28,7 @@ from quad_controller.policy.contract.files import read_contract_file
 from quad_controller.policy.contract.model import build_contract, RecurrentState
 from quad_controller.policy.load import LoadedPolicy
 from quad_controller.policy.network import OnnxNetwork
-from quad_controller.policy.observation import PolicyInputs
+from quad_controller.policy.observation import Situation
 from quad_controller.policy.options import GravitySource
 from quad_description import ImuSample, JointSample, RobotState
 from quad_description.rotations import normalized
@@ -81,7 +81,7 @@ def test_policies_answer_as_in_their_tool(name: str, external: bool, tmp_path: P
         assert [targets[place] for place in ORDER] == pytest.approx(expected, abs=1e-5)
 
 
-def recorded(random: np.random.Generator) -> tuple[PolicyInputs, Step]:
+def recorded(random: np.random.Generator) -> tuple[Situation, Step]:
     """Return a step of a run, as the robot and as a tool sees it."""
     positions = np.array(STAND) + random.uniform(-0.6, 0.6, 12)
     velocities = random.uniform(-6.0, 6.0, 12)
@@ -90,7 +90,7 @@ def recorded(random: np.random.Generator) -> tuple[PolicyInputs, Step]:
     x, y, z, w = normalized((*random.uniform(-0.3, 0.3, 3).tolist(), 1.0))
     # third row of the rotation of body to world, negative: gravity in the body
     gravity = [-2 * (x * z - w * y), -2 * (y * z + w * x), -(1 - 2 * (x * x + y * y))]
-    inputs = PolicyInputs(
+    inputs = Situation(
         JointSample(tuple(positions.tolist()), tuple(velocities.tolist())),
         ImuSample((x, y, z, w), tuple(angular.tolist()), None),
         Velocity(*command.tolist()),
@@ -385,9 +385,9 @@ def test_contacts_of_feet_are_observed_in_the_order_of_the_training(tmp_path: Pa
     assert not controller.set_mode('policy').accepted
 
 
-def standing(velocity: Velocity) -> PolicyInputs:
+def standing(velocity: Velocity) -> Situation:
     """Return what a robot that stands measures."""
-    return PolicyInputs(JointSample(STAND, (0.0,) * 12), UPRIGHT, velocity, (0.0, 0.0, 0.0))
+    return Situation(JointSample(STAND, (0.0,) * 12), UPRIGHT, velocity, (0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize(

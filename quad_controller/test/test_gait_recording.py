@@ -104,6 +104,8 @@ def test_a_step_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert math.isnan(step['latency'])
     inputs = inputs_of(step)
     assert inputs is not None
+    assert inputs.joints is not None
+    assert inputs.imu is not None
     assert inputs.joints.positions == pytest.approx(STANDING)
     assert inputs.joints.velocities == (0.5,) * 12
     assert inputs.imu.orientation == (0.0, 0.0, 0.0, 1.0)

@@ -23,7 +23,7 @@ from quad_controller.policy.contract.document import document_of
 from quad_controller.policy.contract.mjlab import CONTRACT_KEY
 from quad_controller.policy.contract.model import build_contract, PolicyContract, Source
 from quad_controller.policy.network import Floats, OnnxNetwork
-from quad_controller.policy.observation import PolicyInputs
+from quad_controller.policy.observation import Situation
 from quad_controller.policy.runner import PolicyRunner
 from quad_controller.states.motion import StepLimiter
 from quad_description import Quadruped, quadruped, robot_urdf, Targets
@@ -182,16 +182,10 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
         return self._observe(), float(reward), fallen, over, info
 
     @property
-    def inputs(self) -> PolicyInputs:
-        """What is measured and commanded now.
-
-        Raises:
-            ValueError: The environment measures no joints or no attitude.
-        """
-        joints, imu = self.simulation.state.joints, self.simulation.state.imu
-        if joints is None or imu is None:
-            raise ValueError('a robot in physics measures joints and attitude')
-        return PolicyInputs(joints, imu, Velocity(*self.simulation.command))
+    def inputs(self) -> Situation:
+        """What is measured and commanded now."""
+        state = self.simulation.state
+        return Situation(state.joints, state.imu, Velocity(*self.simulation.command))
 
     def _observe(self) -> Floats:
         seen: Floats = self._runner.observe(self.inputs)[0].copy()
@@ -217,6 +211,8 @@ class TaughtEnv(gymnasium.ObservationWrapper[Floats, Floats, Floats]):
     def observation(self, observation: Floats) -> Floats:
         """Return an observation with the action of the teacher behind it."""
         inputs = self._env.inputs
+        if inputs.imu is None:
+            raise ValueError('a robot in physics measures its attitude')
         sine, cosine = observation[self._phase : self._phase + 2].tolist()
         targets = self._teacher.targets(
             inputs.velocity if math.hypot(sine, cosine) > 0.0 else Velocity(),

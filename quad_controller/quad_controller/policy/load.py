@@ -17,7 +17,7 @@ from .contract.files import read_contract_file
 from .contract.mjlab import CONTRACT_KEY, read_metadata
 from .contract.model import build_contract, PolicyContract, Source
 from .network import Floats, OnnxNetwork
-from .observation import PolicyInputs, STATISTICS_KEY
+from .observation import Situation, STATISTICS_KEY
 from .options import ImuFrame, PolicyOptions
 from .report import Report, Row
 from .runner import PolicyRunner
@@ -139,7 +139,7 @@ def _observed(runner: PolicyRunner, stand: Targets) -> Floats:
     """Return what a policy observes of a robot that stands."""
     runner.reset(stand)
     still = JointSample(stand, (0.0,) * len(stand))
-    return runner.observe(PolicyInputs(still, UPRIGHT, REST, (0.0, 0.0, 0.0), (True,) * len(FEET)))
+    return runner.observe(Situation(still, UPRIGHT, REST, (0.0, 0.0, 0.0), (True,) * len(FEET)))
 
 
 def shipped_policies() -> dict[str, Path]:

@@ -19,6 +19,7 @@ from quad_description import FEET, ImuSample, JointSample
 from quad_description.rotations import Vector
 
 from ..exceptions import PolicyError
+from ..gait.body import BodyPose, UPRIGHT
 from ..gait.velocity import Velocity
 from .contract.model import (
     BodyFrame,
@@ -66,17 +67,18 @@ def gravity(imu: ImuSample, source: GravitySource) -> Vector:
 
 
 @dataclass(frozen=True, slots=True)
-class PolicyInputs:
-    """What a policy may see in one step."""
+class Situation:
+    """What a motion, by the gait or by a policy, may know of the world in one step."""
 
-    joints: JointSample  # measured joints
-    imu: ImuSample  # measured attitude and turning
+    joints: JointSample | None  # the joints, None when they are not known any more
+    imu: ImuSample | None  # attitude and turning, None when they are not known any more
     velocity: Velocity  # velocity that is requested
-    # of the body in its own frame in [m/s], estimated; None where nobody does
+    # of the body in its own frame in [m/s], None while it is not estimated
     linear_velocity: Vector | None = None
-    # which feet are on the ground, in the order of :data:`quad_description.FEET`; None where
-    # nobody estimates it
+    # which feet are on the ground, in the order of :data:`quad_description.FEET`; None while it
+    # is not estimated
     foot_contacts: tuple[bool, ...] | None = None
+    pose: BodyPose = UPRIGHT  # pose of the body that is requested
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +90,8 @@ class Observed:
     imu: ImuSample  # attitude and turning
     velocity: Velocity  # velocity that is requested
     previous: Floats  # the last action
-    linear_velocity: Vector | None  # as in the inputs
-    foot_contacts: tuple[bool, ...] | None  # as in the inputs
+    linear_velocity: Vector | None  # as in the situation
+    foot_contacts: tuple[bool, ...] | None  # as in the situation
 
 
 def _in_frame(vector: Vector | None, frame: BodyFrame) -> Vector:

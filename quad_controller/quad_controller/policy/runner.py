@@ -15,7 +15,7 @@ from ..exceptions import PolicyError
 from ..gait.velocity import Velocity
 from .contract.model import PolicyContract, Source
 from .network import Floats, OnnxNetwork
-from .observation import ObservationBuilder, Observed, PolicyInputs
+from .observation import ObservationBuilder, Observed, Situation
 from .options import PolicyOptions
 
 
@@ -83,9 +83,11 @@ class PolicyRunner:
         self._wanted: Floats | None = None
         self._filtered: Floats | None = None
 
-    def missing(self, inputs: PolicyInputs) -> str:
+    def missing(self, inputs: Situation) -> str:
         """Return which measurement it lacks; nothing when all is there."""
         needs, joints, imu = self.contract.needs, inputs.joints, inputs.imu
+        if joints is None or imu is None:
+            return 'a policy needs joint states and an attitude; there are none yet'
         if joints.velocities is None and needs(Source.JOINT_VELOCITIES):
             return 'a policy needs the velocities of the joints, which /joint_states does not have'
         if imu.angular_velocity is None and needs(Source.ANGULAR_VELOCITY):
@@ -115,9 +117,11 @@ class PolicyRunner:
         ordered[self._policy_places] = np.array(positions)[self._robot_places]
         return ordered
 
-    def observe(self, inputs: PolicyInputs) -> Floats:
+    def observe(self, inputs: Situation) -> Floats:
         """Return the observation; its history goes on by one step."""
-        joints = inputs.joints
+        joints, imu = inputs.joints, inputs.imu
+        if joints is None or imu is None:
+            raise ValueError('a policy observes joints and attitude')
         # joints that only the policy has keep their defaults
         self._positions[self._policy_places] = np.array(joints.positions)[self._robot_places]
         if joints.velocities is not None:
@@ -126,7 +130,7 @@ class PolicyRunner:
             Observed(
                 self._positions,
                 self._velocities,
-                inputs.imu,
+                imu,
                 self._command(inputs.velocity),
                 self._previous,
                 inputs.linear_velocity,
@@ -134,7 +138,7 @@ class PolicyRunner:
             )
         )
 
-    def step(self, inputs: PolicyInputs, dt: float) -> PolicyStep:
+    def step(self, inputs: Situation, dt: float) -> PolicyStep:
         """Advance by some [s]; a slower policy is asked in one of several steps."""
         self.advance(dt)
         if missing := self.missing(inputs):

@@ -21,6 +21,7 @@ from ..gait.generator import GaitGenerator
 from ..gait.parameters import GaitParameters
 from ..gait.schedule import Gait
 from ..gait.velocity import REST, Velocity
+from ..policy.observation import Situation
 from ..policy.runner import PolicyRunner
 from .commands import Commands
 from .get_up import get_up_refusal, stands
@@ -41,7 +42,7 @@ from .modes import (
     UPRIGHT_STATES,
     WAYS_DOWN,
 )
-from .motion import Situation, StepLimiter
+from .motion import StepLimiter
 from .parameters import StateParameters
 from .policy_motion import NO_POLICY, PolicyChoice
 from .status import Event, EventKind, Notices, Output, Status

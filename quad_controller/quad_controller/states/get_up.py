@@ -23,10 +23,11 @@ import math
 from quad_description import ImuSample, Quadruped, Targets
 from quad_description.rotations import Vector
 
+from ..policy.observation import Situation
 from .get_up_poses import Lying, lying_on, RECOVERIES
 from .health import Health
 from .modes import Fault, FaultLatch
-from .motion import Blend, Hold, Motion, Situation, Swing
+from .motion import Blend, Hold, Motion, Swing
 
 STILL_ANGLE = 0.05  # [rad] by which the body of a robot at rest may turn
 STILL_TIME = 0.4  # [s] for which it must not have turned more

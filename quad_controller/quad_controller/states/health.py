@@ -11,7 +11,7 @@ from quad_description import ImuSample, JointSample, RobotState
 from quad_description.rotations import Vector
 
 from ..gait.velocity import REST
-from ..policy.observation import PolicyInputs
+from ..policy.observation import Situation
 from ..policy.runner import PolicyRunner
 from .modes import Fault
 from .parameters import StateParameters
@@ -169,12 +169,10 @@ class Health:
         """Return what a policy would need and nobody measures; nothing for none."""
         if policy is None:
             return ''
-        if self.joints is None or self.imu is None:
-            return 'a policy needs joint states and an attitude; there are none yet'
         if self.uncertainty:
             return self.uncertainty
         return policy.missing(
-            PolicyInputs(self.joints, self.imu, REST, self.linear_velocity, self.foot_contacts)
+            Situation(self.joints, self.imu, REST, self.linear_velocity, self.foot_contacts)
         )
 
     def _silence(self, what: Fault, age: float, topic: str) -> str:

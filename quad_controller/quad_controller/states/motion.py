@@ -6,16 +6,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 import math
 
-from quad_description import ImuSample, JointLimits, JointSample, Targets
-from quad_description.rotations import Vector
+from quad_description import JointLimits, Targets
 
-from ..gait.body import BodyPose
 from ..gait.generator import GaitGenerator
-from ..gait.velocity import Velocity
-from ..policy.observation import PolicyInputs
+from ..policy.observation import Situation
 
 MAX_PERIODS = 1.5  # periods; a step that comes late may not be a leap
 
@@ -72,29 +68,6 @@ class StepLimiter:
             sent.append(target)
         self._last = tuple(sent)
         return self._last
-
-
-@dataclass(frozen=True, slots=True)
-class Situation:
-    """What a motion may know of the world in one step."""
-
-    joints: JointSample | None  # the joints, None when they are not known any more
-    imu: ImuSample | None  # attitude and turning, None when they are not known any more
-    velocity: Velocity  # velocity that is requested
-    pose: BodyPose  # pose of the body that is requested
-    # of the body in its own frame in [m/s], None while nobody estimates it
-    linear_velocity: Vector | None = None
-    # which feet are on the ground, None while nobody estimates it
-    foot_contacts: tuple[bool, ...] | None = None
-
-    @property
-    def policy_inputs(self) -> PolicyInputs | None:
-        """What a policy may see; None while joints or attitude are not known."""
-        if self.joints is None or self.imu is None:
-            return None
-        return PolicyInputs(
-            self.joints, self.imu, self.velocity, self.linear_velocity, self.foot_contacts
-        )
 
 
 class Motion(ABC):

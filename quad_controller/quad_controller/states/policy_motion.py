@@ -6,8 +6,9 @@ from __future__ import annotations
 
 from quad_description import Targets
 
+from ..policy.observation import Situation
 from ..policy.runner import PolicyRunner, PolicyStep
-from .motion import Motion, Situation
+from .motion import Motion
 from .status import Asked
 
 NO_POLICY = 'no policy is loaded (parameter policy, or ~/load_policy)'
@@ -51,12 +52,11 @@ class PolicyMotion(Motion):
     def step(self, situation: Situation, dt: float) -> Targets:
         """Return the next targets; the last ones when there is nothing to go by."""
         self._rest_time = self._rest_time + dt if situation.velocity.at_rest else 0.0
-        inputs = situation.policy_inputs
         self.answer = None
-        if inputs is None:
+        if situation.joints is None or situation.imu is None:
             return self._last
         self.steps += 1
-        step = self.answer = self.policy.step(inputs, dt)
+        step = self.answer = self.policy.step(situation, dt)
         if step.targets is None:
             self._bad_steps += 1
             if self._bad_steps >= MAX_BAD_STEPS:
@@ -106,13 +106,14 @@ class PolicyChoice:
 
     def watch(self, situation: Situation, dt: float, last: Targets) -> Targets | None:
         """Return what a policy that is only watched would send, None without one."""
-        self._asked, inputs = None, situation.policy_inputs
-        if self.policy is None or not self.dry_run or inputs is None:
+        self._asked = None
+        unknown = situation.joints is None or situation.imu is None
+        if self.policy is None or not self.dry_run or unknown:
             return None
         if not self._watched_steps:
             self.policy.reset(last)
         self._watched_steps += 1
-        answer = self.policy.step(inputs, dt)
+        answer = self.policy.step(situation, dt)
         self._asked = Asked(self.policy, answer, self._watched_steps)
         return answer.targets
 

@@ -12,9 +12,9 @@ from quad_description import Targets
 
 from ..gait.schedule import Gait
 from ..gait.velocity import Velocity
+from ..policy.observation import Situation
 from ..policy.runner import PolicyRunner, PolicyStep
 from .modes import State
-from .motion import Situation
 
 
 @dataclass(frozen=True, slots=True)
