@@ -61,6 +61,17 @@ def without(*indices: int) -> tuple[Row, ...]:
     return tuple(row for row in SAMPLE if row.index not in indices)
 
 
+def follow(master: CanopenMaster, name: str, target: float) -> None:
+    """Enable a drive, and stream a target until it is there."""
+    drive = master.drive(name)
+    drive.enable()
+    drive.select_mode(OperationMode.CYCLIC_POSITION)
+    deadline = time.monotonic() + DEADLINE
+    while abs(drive.position - target) > 1e-3 and time.monotonic() < deadline:
+        drive.set_target(target)
+    assert drive.position == pytest.approx(target, abs=1e-3)
+
+
 def test_a_new_bus_boots_and_follows(tmp_path: Path, capsys: Output) -> None:
     """On simulated drives, in the mode that it has; units by the EDS and as said."""
     bus_yml = tmp_path / 'robot' / 'bus.yml'
@@ -75,12 +86,7 @@ def test_a_new_bus_boots_and_follows(tmp_path: Path, capsys: Output) -> None:
     ):
         master.boot()
         for name, counts in (('shoulder', 1000.0), ('elbow', -36000 / TURN), ('lift', 50000)):
-            drive = master.drive(name)
-            drive.enable()
-            drive.select_mode(OperationMode.CYCLIC_POSITION)
-            deadline = time.monotonic() + DEADLINE
-            while abs(drive.position - 0.02) > 1e-3 and time.monotonic() < deadline:
-                drive.set_target(0.02)
+            follow(master, name, 0.02)
             assert master.sdo(name).read(0x6064) == pytest.approx(0.02 * counts, rel=0.06)
 
 
@@ -139,13 +145,7 @@ def test_a_drive_that_counts_in_rpm_follows(
         CanopenMaster.from_bus_yml(bus_yml, bus=bus) as master,
     ):
         master.boot()
-        drive = master.drive('arm')
-        drive.enable()
-        drive.select_mode(OperationMode.CYCLIC_POSITION)
-        deadline = time.monotonic() + DEADLINE
-        while abs(drive.position - 0.5) > 0.01 and time.monotonic() < deadline:
-            drive.set_target(0.5)
-        assert drive.position == pytest.approx(0.5, abs=0.01)
+        follow(master, 'arm', 0.5)
 
 
 RPM, TENTHS, DEGREES, METRES, COUNTS = (
@@ -286,6 +286,12 @@ def test_several_axes_are_not_made_one(
         (SAMPLE, ['--turn', 'arm=far'], '--turn arm=far: give a number'),
         (without(0x60C1), ['--mode', 'arm=7'], r'0x6502 .*0x81. has no mode 7 .*, it has 1, 8;'),
         (SAMPLE, ['--mode', 'arm=3'], '--mode arm=3: choose one of 8 .cyclic position'),
+        (SAMPLE, ['drive.eds@2'], 'is no device; write it as shoulder=drive.eds@2'),
+        (SAMPLE, ['2=drive.eds@2'], 'is no device'),
+        (SAMPLE, ['leg=drive.eds@128'], '128 is no node id'),
+        (SAMPLE, ['arm=drive.eds@3'], 'name arm is there twice'),
+        (SAMPLE, ['leg=drive.eds@5'], 'node id 5 is there twice'),
+        (SAMPLE, ['leg=other.eds@2'], 'no such file'),
     ],
 )
 def test_what_is_not_said_is_asked_for(
@@ -297,37 +303,11 @@ def test_what_is_not_said_is_asked_for(
     capsys: Output,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """With the option that says it; no file is written."""
+    """With the option or the way to write it; no file is written."""
     monkeypatch.chdir(tmp_path)
     written(tmp_path, 'drive.eds', rows)
     assert main(['new', 'arm=drive.eds@5', *options]) != 0
     assert re.search(words, capsys.readouterr().err)
-    assert not (tmp_path / 'bus.yml').exists()
-
-
-@pytest.mark.parametrize(
-    ('devices', 'words'),
-    [
-        (['drive.eds@2'], 'is no device; write it as shoulder=drive.eds@2'),
-        (['2=drive.eds@2'], 'is no device'),
-        (['arm=drive.eds@128'], '128 is no node id'),
-        (['arm=drive.eds@2', 'arm=drive.eds@3'], 'name arm is there twice'),
-        (['arm=drive.eds@2', 'leg=drive.eds@2'], 'node id 2 is there twice'),
-        (['arm=other.eds@2'], 'no such file'),
-    ],
-)
-def test_devices_that_cannot_be(
-    devices: Sequence[str],
-    words: str,
-    tmp_path: Path,
-    capsys: Output,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """They are named."""
-    monkeypatch.chdir(tmp_path)
-    written(tmp_path, 'drive.eds', SAMPLE)
-    assert main(['new', *devices]) != 0
-    assert words in capsys.readouterr().err
     assert not (tmp_path / 'bus.yml').exists()
 
 
@@ -364,38 +344,36 @@ def test_a_turn_far_above_the_factor_group_is_doubted(
     assert (words in bus.read_text()) is is_doubted
 
 
-def test_a_person_is_asked_for_units(
-    tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ('rows', 'options', 'answers', 'scale', 'value'),
+    [
+        (without(0x608F, 0x6092), [], ['a', '', '0', ' 62831.853*2 '], 'pos', 20_000.0),
+        # 0x60A9 names turns, and the increments are known by --turn alone
+        ([*SAMPLE, RPM], ['--turn', 'arm=83200'], ['-1', 'fast', '26'], 'vel', 26 * 60 / TURN),
+    ],
+)
+def test_a_person_is_asked_for_what_the_eds_does_not_say(
+    *,
+    rows: Sequence[Row],
+    options: Sequence[str],
+    answers: Sequence[str],
+    scale: str,
+    value: float,
+    tmp_path: Path,
+    capsys: Output,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Where the EDS does not say them; again after what is no number of increments."""
+    """Increments, then turns of the motor; again after what is no such number."""
     monkeypatch.chdir(tmp_path)
-    written(tmp_path, 'drive.eds', without(0x608F, 0x6092))
+    written(tmp_path, 'drive.eds', rows)
     monkeypatch.setattr('sys.stdin.isatty', lambda: True, raising=False)
-    answers = ['a', '', '0', ' 62831.853*2 ']
-    monkeypatch.setattr('builtins.input', lambda asked: answers.pop(0) if 'arm' in asked else '')
-    assert main(['new', 'arm=drive.eds@2']) == 0
-    out = capsys.readouterr().out
-    wanted = 'give a number of increments other than 0, such as 360000, -36000.5 or 2000*50'
-    assert [f'{wanted}, not {answer!r}' in out for answer in ('a', '', '0')] == [True] * 3
+    given = iter(answers)
+    monkeypatch.setattr('builtins.input', lambda asked: next(given) if 'arm' in asked else '')
+    assert main(['new', 'arm=drive.eds@2', *options]) == 0
+    asked_again = re.findall("give a number .* such as .*, not '(.*)'", capsys.readouterr().out)
+    assert asked_again == answers[:-1]
     (node,) = load_bus(tmp_path / 'bus.yml').nodes
-    assert node.axes[0].scale_pos_to_dev == pytest.approx(20_000.0)
-
-
-def test_a_person_is_asked_what_turns(
-    tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Where 0x60A9 names turns, and the increments are known by --turn alone."""
-    monkeypatch.chdir(tmp_path)
-    written(tmp_path, 'drive.eds', [*SAMPLE, RPM])
-    monkeypatch.setattr('sys.stdin.isatty', lambda: True, raising=False)
-    answers = ['-1', 'fast', '26']
-    monkeypatch.setattr('builtins.input', lambda asked: answers.pop(0) if 'arm' in asked else '')
-    assert main(['new', 'arm=drive.eds@2', '--turn', 'arm=83200']) == 0
-    out = capsys.readouterr().out
-    assert "give a number above 0, such as 100, not '-1'" in out
-    assert "give a number above 0, such as 100, not 'fast'" in out
-    (node,) = load_bus(tmp_path / 'bus.yml').nodes
-    assert node.axes[0].scale_vel_to_dev == pytest.approx(26 * 60 / TURN)
+    assert getattr(node.drive, f'scale_{scale}_to_dev') == pytest.approx(value)
 
 
 def changed(row: Row, fits: set[int], constant: set[int]) -> Row:
