@@ -45,15 +45,12 @@ def load_eds(path: str | os.PathLike[str]) -> Eds:
     path = Path(path)
     findings = Findings()
     ini = read_ini(read_eds_text(path, findings))
-    objects = ObjectReader(ini)
     node_id = _node_id(ini)
-    dictionary = ObjectDictionary(objects.entries(), source=str(path), node_id=node_id)
+    dictionary = ObjectDictionary(ObjectReader(ini).entries(), source=str(path), node_id=node_id)
     if not len(dictionary):
         findings.error(Place(path), 'no object in this file', 'name an EDS or DCF file of CiA 306')
         findings.raise_errors()
-    for line, message in ini.oddities:
-        findings.warning(Place(path, line), message, TOLERATED)
-    for line, key, message in objects.oddities:
+    for line, key, message in ini.oddities:
         findings.warning(Place(path, line, key), message, TOLERATED)
     return Eds(path, dictionary, node_id, _dummy_types(ini), findings.warnings, _numbers(ini))
 
@@ -77,28 +74,24 @@ def read_eds_text(path: Path, findings: Findings) -> str:
     return ''
 
 
+def _number(ini: IniFile, section: str, key: str) -> int:
+    """Return a number beside the objects, 0 where the file has none."""
+    try:
+        return parse_integer(ini.sections[section].text(key))
+    except (KeyError, ValueError):
+        return 0
+
+
 def _node_id(ini: IniFile) -> int | None:
-    for name in COMMISSIONING:
-        if name in ini.sections:
-            try:
-                node_id = parse_integer(ini.sections[name].text('nodeid'))
-            except ValueError:
-                continue
-            if NODE_ID_MIN <= node_id <= NODE_ID_MAX:
-                return node_id
-    return None
+    found = (_number(ini, section, 'nodeid') for section in COMMISSIONING)
+    return next((number for number in found if NODE_ID_MIN <= number <= NODE_ID_MAX), None)
 
 
 def _numbers(ini: IniFile) -> tuple[int, int, int]:
-    section = ini.sections.get('deviceinfo')
-
-    def number(key: str) -> int:
-        try:
-            return parse_integer(section.text(key)) if section is not None else 0
-        except ValueError:
-            return 0
-
-    return number('vendornumber'), number('productnumber'), number('revisionnumber')
+    vendor, product, revision = (
+        _number(ini, 'deviceinfo', f'{what}number') for what in ('vendor', 'product', 'revision')
+    )
+    return vendor, product, revision
 
 
 def _dummy_types(ini: IniFile) -> frozenset[int]:

@@ -48,8 +48,12 @@ class IniFile:
 
     # sections by name in lower case without blanks
     sections: dict[str, IniSection] = field(default_factory=dict)
-    # line and description of everything that had to be skipped or guessed
-    oddities: list[tuple[int, str]] = field(default_factory=list)
+    # line, section and description of everything that had to be skipped or guessed
+    oddities: list[tuple[int, str, str]] = field(default_factory=list)
+
+    def odd(self, line: int, message: str, section: str = '') -> None:
+        """Report what was skipped or guessed."""
+        self.oddities.append((line, section, message))
 
 
 def decode_text(data: bytes) -> str:
@@ -91,7 +95,7 @@ def read_ini(text: str) -> IniFile:
         if line.startswith('['):
             section = _open_section(result, line, number)
         elif section is None:
-            result.oddities.append((number, f'{line[:40]!r} stands before the first section'))
+            result.odd(number, f'{line[:40]!r} stands before the first section')
         else:
             _add_value(result, section, line, number)
     return result
@@ -100,13 +104,11 @@ def read_ini(text: str) -> IniFile:
 def _open_section(result: IniFile, line: str, number: int) -> IniSection:
     title, bracket, _ = line[1:].partition(']')
     if not bracket:
-        result.oddities.append((number, f'section {line[:40]!r} has no closing bracket'))
+        result.odd(number, f'section {line[:40]!r} has no closing bracket')
     name = section_name(title)
     if name in result.sections:
         first = result.sections[name]
-        result.oddities.append(
-            (number, f'section [{title}] was already opened in line {first.line}')
-        )
+        result.odd(number, f'section [{title}] was already opened in line {first.line}')
         return first
     return result.sections.setdefault(name, IniSection(title.strip(), number))
 
@@ -115,11 +117,9 @@ def _add_value(result: IniFile, section: IniSection, line: str, number: int) -> 
     key, equals, text = line.partition('=')
     name = key.strip().lower()
     if not equals or not name:
-        result.oddities.append((number, f'{line[:40]!r} is neither a section nor a value'))
+        result.odd(number, f'{line[:40]!r} is neither a section nor a value')
         return
     if name in section.values:
         earlier = section.values[name].line
-        result.oddities.append(
-            (number, f'{key.strip()} was already given in line {earlier}; this one counts')
-        )
+        result.odd(number, f'{key.strip()} was already given in line {earlier}; this one counts')
     section.values[name] = IniValue(text.strip(), number)

@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 import re
+from typing import TypeVar
 
 from ...standard.cob_id import COB_ID_INVALID, CobId, PREDEFINED_MAX
 from ...standard.datatypes import DataType, integer_range, REAL_FORMATS, Value
@@ -13,6 +15,8 @@ from ...standard.dictionary import AccessType, object_address, ObjectCode, Objec
 from ...standard.objects import Index, PDO_COUNT_MAX
 from .eds_ini import IniFile, IniSection
 from .eds_values import EdsValue, parse_integer, parse_value
+
+T = TypeVar('T')
 
 OBJECT_SECTION = re.compile(r'([0-9a-f]{1,4})(?:sub([0-9a-f]{1,2}))?')
 LISTS = ('mandatoryobjects', 'optionalobjects', 'manufacturerobjects')
@@ -35,11 +39,9 @@ COLLECTIONS = (ObjectCode.ARRAY, ObjectCode.RECORD, ObjectCode.DEFSTRUCT)
 
 
 class ObjectReader:
-    """Reads all objects of one file."""
+    """Reads all objects of one file; its oddities get what is skipped or guessed."""
 
     def __init__(self, ini: IniFile) -> None:
-        # line, key and description of everything that had to be skipped or guessed
-        self.oddities: list[tuple[int, str, str]] = []
         self._ini = ini
         self._objects: dict[int, IniSection] = {}
         self._parts: dict[int, dict[int, IniSection]] = {}
@@ -52,7 +54,7 @@ class ObjectReader:
                     self._parts.setdefault(index, {})[int(match[2], 16)] = section
 
     def entries(self) -> Iterator[ObjectEntry]:
-        """Yield all entries; what cannot be understood is in ``oddities``."""
+        """Yield all entries."""
         compact = list(self._compact_pdos())
         self._check_lists({entry.index for entry in compact})
         yield from compact
@@ -188,19 +190,15 @@ class ObjectReader:
         return low, high
 
     def _value(self, section: IniSection, key: str, data_type: DataType) -> EdsValue | None:
-        text = section.text(key)
-        try:
-            return parse_value(data_type, text)
-        except ValueError as error:
-            self._odd(section, key, f'{error}; ignored')
-            return None
+        return self._field(section, key, partial(parse_value, data_type), None)
 
     def _number(self, section: IniSection, key: str, default: int) -> int:
+        return self._field(section, key, parse_integer, default)
+
+    def _field(self, section: IniSection, key: str, parse: Callable[[str], T], default: T) -> T:
         text = section.text(key)
-        if not text:
-            return default
         try:
-            return parse_integer(text)
+            return parse(text) if text else default
         except ValueError as error:
             self._odd(section, key, f'{error}; ignored')
             return default
@@ -231,11 +229,9 @@ class ObjectReader:
         missing = sorted(listed - self._objects.keys() - compact)
         unlisted = sorted(self._objects.keys() - listed)
         if missing:
-            self.oddities.append(
-                (0, '', f'listed, but without a section: {_hexadecimal(missing)}')
-            )
+            self._ini.odd(0, f'listed, but without a section: {_hexadecimal(missing)}')
         if unlisted and listed:
-            self.oddities.append((0, '', f'in no list of objects: {_hexadecimal(unlisted)}'))
+            self._ini.odd(0, f'in no list of objects: {_hexadecimal(unlisted)}')
 
     def _listed(self, section: IniSection) -> set[int]:
         keys = [key for key in section.values if key != 'supportedobjects']
@@ -246,7 +242,7 @@ class ObjectReader:
         return {self._number(section, key, 0) for key in keys} - {0}
 
     def _odd(self, section: IniSection, key: str, message: str) -> None:
-        self.oddities.append((section.line_of(key), f'[{section.title}]', message))
+        self._ini.odd(section.line_of(key), message, f'[{section.title}]')
 
 
 def _compact_parameters(index: int, base: int, number: int, mask: int) -> Iterator[ObjectEntry]:

@@ -76,40 +76,39 @@ def estimate_load(config: BusConfig, bitrate: int | None = None) -> LoadEstimate
     traffic = [*_master_traffic(config)]
     for node in config.nodes:
         subject = Subject(config, node, Findings())
-        if node.heartbeat_producer > 0:
-            period = node.heartbeat_producer
-            cob_id = CobId.HEARTBEAT + node.node_id
-            reason = f'every {period * 1e3:g} ms'
-            traffic.append(Traffic(node.name, 'heartbeat', cob_id, 1, 1 / period, reason))
+        traffic += _periodic(
+            node.name, 'heartbeat', CobId.HEARTBEAT + node.node_id, 1, node.heartbeat_producer
+        )
         traffic += [_pdo_traffic(subject, direction, pdo) for direction, pdo in subject.pdos()]
         traffic += _guarding(node)
         traffic += _polling(subject)
     return LoadEstimate(bitrate or config.master.bitrate, tuple(traffic))
 
 
+def _periodic(
+    device: str, service: str, cob_id: int, size: int, period: float
+) -> Iterator[Traffic]:
+    """Yield what a device sends on time; a period of 0 is never."""
+    if period > 0:
+        yield Traffic(device, service, cob_id, size, 1 / period, f'every {period * 1e3:g} ms')
+
+
 def _master_traffic(config: BusConfig) -> Iterator[Traffic]:
     master = config.master
-    if master.sync_period > 0:
-        size = 1 if master.sync_overflow else 0
-        reason = f'every {master.sync_period * 1e3:g} ms'
-        yield Traffic(master.name, 'SYNC', CobId.SYNC, size, 1 / master.sync_period, reason)
-    if master.heartbeat_producer > 0:
-        cob_id = CobId.HEARTBEAT + master.node_id
-        period = master.heartbeat_producer
-        reason = f'every {period * 1e3:g} ms'
-        yield Traffic(master.name, 'heartbeat', cob_id, 1, 1 / period, reason)
-    if master.time_period > 0:
-        reason = f'every {master.time_period * 1e3:g} ms'
-        cob_id = master.time_cob_id & CAN_ID_MASK
-        yield Traffic(master.name, 'TIME', cob_id, 6, 1 / master.time_period, reason)
+    name, heartbeat = master.name, CobId.HEARTBEAT + master.node_id
+    time_id = master.time_cob_id & CAN_ID_MASK
+    counter = 1 if master.sync_overflow else 0  # [byte]
+    yield from _periodic(name, 'SYNC', CobId.SYNC, counter, master.sync_period)
+    yield from _periodic(name, 'heartbeat', heartbeat, 1, master.heartbeat_producer)
+    yield from _periodic(name, 'TIME', time_id, 6, master.time_period)
 
 
 def _guarding(node: NodeConfig) -> Iterator[Traffic]:
     """Yield question and answer of node guarding (CiA 301, 7.2.8.2.2)."""
     if node.uses_node_guarding:
-        cob_id, reason = CobId.HEARTBEAT + node.node_id, f'every {node.guard_time * 1e3:g} ms'
-        yield Traffic(node.name, 'guarding', cob_id, 0, 1 / node.guard_time, reason)
-        yield Traffic(node.name, 'guarding', cob_id, 1, 1 / node.guard_time, reason)
+        for size in (0, 1):
+            cob_id = CobId.HEARTBEAT + node.node_id
+            yield from _periodic(node.name, 'guarding', cob_id, size, node.guard_time)
 
 
 def _polling(subject: Subject) -> Iterator[Traffic]:
