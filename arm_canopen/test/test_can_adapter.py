@@ -40,18 +40,21 @@ class ScriptedDriver(can.BusABC):
 
 
 @pytest.fixture
-def opened_with(monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
+def messages() -> list[can.Message]:
+    """Give what the scripted driver delivers."""
+    return []
+
+
+@pytest.fixture
+def opened_with(monkeypatch: pytest.MonkeyPatch, messages: list[can.Message]) -> dict[str, object]:
     """Put a scripted driver in place of all drivers, and note what it was opened with."""
     options: dict[str, object] = {}
-    messages: list[can.Message] = []
 
     def open_driver(**given: object) -> can.BusABC:
         options.update(given)
-        options['messages'] = messages
         return ScriptedDriver(messages)
 
     monkeypatch.setattr(can, 'Bus', open_driver)
-    options['messages'] = messages
     return options
 
 
@@ -95,10 +98,9 @@ def _message(**fields: object) -> can.Message:
     return can.Message(arbitration_id=0x181, is_extended_id=False, **fields)  # type: ignore[arg-type]
 
 
-def test_echoes_and_fd_messages_are_not_delivered(opened_with: dict[str, object]) -> None:
+@pytest.mark.usefixtures('opened_with')
+def test_echoes_and_fd_messages_are_not_delivered(messages: list[can.Message]) -> None:
     """Drivers that echo mark it; CAN FD messages are counted and dropped."""
-    messages = opened_with['messages']
-    assert isinstance(messages, list)
     messages += [_message(is_rx=False), _message(is_fd=True, data=bytes(64)), _message(data=b'1')]
     with open_bus('pcan:X') as bus:
         frames = bus.receive(0.0)
@@ -106,11 +108,10 @@ def test_echoes_and_fd_messages_are_not_delivered(opened_with: dict[str, object]
         assert bus.counters.malformed == 1
 
 
+@pytest.mark.usefixtures('opened_with')
 @pytest.mark.parametrize('age', [0.0, 0.5, -5.0, 4e8], ids=['now', 'recent', 'future', 'uptime'])
-def test_stamps_of_drivers_become_steady_time(opened_with: dict[str, object], age: float) -> None:
+def test_stamps_of_drivers_become_steady_time(messages: list[can.Message], age: float) -> None:
     """Wall clock stamps are moved over; those that count from something else become now."""
-    messages = opened_with['messages']
-    assert isinstance(messages, list)
     before, expected = monotonic(), age if age == 0.5 else 0.0
     messages.append(_message(timestamp=time() - age))
     with open_bus('pcan:X') as bus:
@@ -119,7 +120,8 @@ def test_stamps_of_drivers_become_steady_time(opened_with: dict[str, object], ag
     assert before - 0.2 <= frame.timestamp + expected <= monotonic() + 0.2
 
 
-def test_a_refused_frame_is_counted_and_reported(opened_with: dict[str, object]) -> None:
+@pytest.mark.usefixtures('opened_with')
+def test_a_refused_frame_is_counted_and_reported() -> None:
     """The driver's error becomes ours, with its reason."""
     with open_bus('pcan:X') as bus:
         with pytest.raises(BusError, match='bus off'):

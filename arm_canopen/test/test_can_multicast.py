@@ -12,7 +12,7 @@ from threading import current_thread, Thread
 from time import monotonic, time_ns
 
 import can
-from can.interfaces.udp_multicast.utils import pack_message, unpack_message
+from can.interfaces.udp_multicast.utils import pack_message
 from can_addresses import free_multicast
 from can_receiving import DEADLINE, receive_count, unstamped
 from can_strategies import frames
@@ -240,13 +240,6 @@ def test_decode_inverts_encode(frame: Frame, stamp: float) -> None:
     assert decode(encode(frame), stamp) == frame._replace(timestamp=stamp)
 
 
-@given(frames())
-def test_python_can_reads_ours(frame: Frame) -> None:
-    """python-can's unpacking gives the same frame, and accepts it in its strict check."""
-    message = unpack_message(encode(frame), check=True)
-    assert from_message(message, 0.0) == frame
-
-
 @given(frames(), st.floats(0.0, 2e9), st.one_of(st.none(), st.text(), st.integers(0, 9)))
 def test_messages_with_a_time_and_a_channel_are_read(
     frame: Frame, stamp: float, channel: str | int | None
@@ -267,39 +260,34 @@ def test_the_order_of_the_keys_means_nothing(frame: Frame, shuffler: st.DataObje
     assert decode(msgpack.packb({k: v for k, v in fields if k in needed}), 0.0) == frame
 
 
-@given(st.binary(max_size=200))
+@st.composite
+def damaged(draw: st.DrawFn) -> bytes:
+    """Return a datagram with another byte in one place."""
+    datagram = bytearray(encode(draw(frames())))
+    datagram[draw(st.integers(0, len(datagram) - 1))] = draw(st.integers(0, 255))
+    return bytes(datagram)
+
+
+@given(st.one_of(st.binary(max_size=200), damaged()))
 @example(b'')
 @example(b'\x8b')
 @example(encode(Frame(0x181, bytes(8)))[:-1])
 @example(encode(Frame(0x181, bytes(8))) + b'\0')
 @example(b'\x93' * 200)
-def test_garbage_is_refused_and_never_crashes(datagram: bytes) -> None:
-    """Any bytes either are a frame or raise the one error that the bus counts."""
+def test_any_bytes_are_a_possible_frame_or_refused(datagram: bytes) -> None:
+    """Garbage and damage raise the one error that the bus counts."""
     try:
         frame = decode(datagram, 0.0)
     except CodecError:
         return
-    assert isinstance(frame, Frame)
-
-
-@given(frames(), st.integers(0), st.integers(0, 255))
-def test_a_changed_byte_never_gives_an_impossible_frame(
-    frame: Frame, place: int, value: int
-) -> None:
-    """A damaged datagram is refused or still within what a CAN frame can be."""
-    damaged = bytearray(encode(frame))
-    damaged[place % len(damaged)] = value
-    try:
-        read = decode(bytes(damaged), 0.0)
-    except CodecError:
-        return
-    encode(read)
+    encode(frame)
 
 
 @pytest.mark.parametrize(
     ('datagram', 'reason'),
     [
         (packed(is_fd=True), 'CAN FD'),
+        (pack_message(can.Message(is_fd=True, data=bytes(64), is_extended_id=False)), 'CAN FD'),
         (packed(arbitration_id=0x800), 'out of range'),
         (packed(arbitration_id=-1), 'out of range'),
         (packed(arbitration_id='x'), "identifier 'x'"),
@@ -316,10 +304,3 @@ def test_what_is_no_classic_frame_is_named(datagram: bytes, reason: str) -> None
     """Each way to be wrong has its own message."""
     with pytest.raises(CodecError, match=reason):
         decode(datagram, 0.0)
-
-
-def test_an_fd_message_of_python_can_is_refused() -> None:
-    """A CAN FD frame of 64 bytes on the group is not taken for a classic one."""
-    message = can.Message(is_fd=True, data=bytes(64), is_extended_id=False)
-    with pytest.raises(CodecError, match='CAN FD'):
-        decode(pack_message(message), 0.0)

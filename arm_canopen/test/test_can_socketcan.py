@@ -116,33 +116,34 @@ def test_a_kernel_without_can_names_the_multicast_bus(monkeypatch: pytest.Monkey
         open_bus('cna0')
 
 
-def test_a_full_transmit_queue_is_reported_and_not_waited_for(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Refused frames are counted and raise at once; when there is room again sending goes on."""
-    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+@pytest.fixture
+def kernel(monkeypatch: pytest.MonkeyPatch) -> Iterator[socket.socket]:
+    """Give the far end of the socket that can0 opens."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours.setblocking(False)
     monkeypatch.setattr('arm_canopen.can.socketcan._open_socket', lambda name: ours)
-    with SocketCanBus('can0') as bus, theirs:
+    with theirs:
+        yield theirs
+
+
+def test_a_full_transmit_queue_is_reported_and_not_waited_for(kernel: socket.socket) -> None:
+    """Refused frames are counted and raise at once; when there is room again sending goes on."""
+    with SocketCanBus('can0') as bus:
         with pytest.raises(BusError, match='transmit queue of can0 is full'):
             send_for_ever(bus)
         accepted = bus.counters.sent
         assert bus.counters.send_errors == 1
         for _ in range(accepted):
-            assert theirs.recv(16) == pack(Frame(1))
+            assert kernel.recv(16) == pack(Frame(1))
         bus.send(Frame(2))
         assert bus.counters.sent == accepted + 1
 
 
-def test_two_cycles_of_a_master_wait_for_a_bus_that_takes_none(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+@pytest.mark.usefixtures('kernel')
+def test_two_cycles_of_a_master_wait_for_a_bus_that_takes_none() -> None:
     """Nobody wants the set-points of half a second ago when the cable is plugged in again."""
-    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    ours.setblocking(False)
-    monkeypatch.setattr('arm_canopen.can.socketcan._open_socket', lambda name: ours)
     config = bus_config(*(drive_config(f'joint{number}', number) for number in range(2, 9)))
-    with SocketCanBus('can0') as bus, theirs:
+    with SocketCanBus('can0') as bus:
         CanopenMaster(config, bus)
         with pytest.raises(BusError, match='transmit queue of can0 is full'):
             send_for_ever(bus)
@@ -150,14 +151,11 @@ def test_two_cycles_of_a_master_wait_for_a_bus_that_takes_none(
         assert 2 * cycle <= bus.counters.sent <= 4 * cycle
 
 
-def test_what_is_no_frame_of_the_kernel_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_no_frame_of_the_kernel_is_dropped(kernel: socket.socket) -> None:
     """A read of another length is counted and does not end the bus."""
-    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
-    ours.setblocking(False)
-    monkeypatch.setattr('arm_canopen.can.socketcan._open_socket', lambda name: ours)
-    with SocketCanBus('can0') as bus, theirs:
-        theirs.send(b'short')
-        theirs.send(pack(Frame(3, b'\x01')))
+    with SocketCanBus('can0') as bus:
+        kernel.send(b'short')
+        kernel.send(pack(Frame(3, b'\x01')))
         assert unstamped(receive_count(bus, 1)) == [Frame(3, b'\x01')]
         assert bus.counters.malformed == 1
 

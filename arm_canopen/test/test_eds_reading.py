@@ -31,8 +31,6 @@ from arm_canopen.standard import (
     integer_range,
     ObjectEntry,
     REAL_FORMATS,
-    SIGNED_BITS,
-    UNSIGNED_BITS,
 )
 from arm_canopen.standard.datatypes import decode, encode, Value
 
@@ -298,9 +296,6 @@ def test_files_that_are_no_eds_are_refused(
         assert problem.remedy
 
 
-INTEGERS = [*SIGNED_BITS, *UNSIGNED_BITS]
-
-
 @pytest.mark.parametrize(
     ('text', 'value'),
     [
@@ -326,16 +321,6 @@ def test_what_is_no_number_is_refused(text: str) -> None:
     """Nothing is guessed; the message shows the text."""
     with pytest.raises(ValueError, match='not a whole number'):
         parse_integer(text)
-
-
-@given(data_type=st.sampled_from(INTEGERS), data=st.data())
-def test_every_integer_is_read_in_both_notations(data_type: DataType, data: st.DataObject) -> None:
-    """Decimal and two's complement in hexadecimal mean the same value."""
-    low, high = integer_range(data_type) or (0, 0)
-    value = data.draw(st.integers(low, high))
-    pattern = value % (high - low + 1)
-    assert parse_value(data_type, str(value)) == EdsValue(value)
-    assert parse_value(data_type, f'0x{pattern:X}') == EdsValue(value)
 
 
 @pytest.mark.parametrize(
@@ -519,17 +504,14 @@ NUMBERS = [data_type for data_type in DataType if integer_range(data_type) is no
 
 @given(st.sampled_from(NUMBERS), st.data())
 def test_numbers_come_back(data_type: DataType, data: st.DataObject) -> None:
-    """Every value of every integer type, and of BOOLEAN."""
+    """Every value of BOOLEAN and the integers: decimal, and two's complement in hexadecimal."""
     low, high = integer_range(data_type) or (0, 0)
     value = data.draw(st.integers(low, high))
-    size = byte_length(data_type) or 0
-    raw = value.to_bytes(size, 'little', signed=low < 0)
-    text = text_from_bytes(data_type, raw)
-    assert bytes_from_text(data_type, text) == raw
-    if data_type is not DataType.BOOLEAN:
-        assert text == str(value)
-    if value >= 0:
-        assert bytes_from_text(data_type, f'0x{value:X}') == raw
+    raw = value.to_bytes(byte_length(data_type) or 0, 'little', signed=low < 0)
+    shown = text_from_bytes(data_type, raw)
+    assert shown == (str(value == 1).lower() if data_type is DataType.BOOLEAN else str(value))
+    for text in (shown, str(value), f'0x{value % (high - low + 1):X}'):
+        assert bytes_from_text(data_type, text) == raw
 
 
 @given(st.sampled_from(list(REAL_FORMATS)), st.floats(width=32, allow_nan=False))
@@ -563,12 +545,9 @@ def test_strings_come_back(text: str) -> None:
     ('data_type', 'text'),
     [
         (DataType.UNSIGNED8, '256'),
-        (DataType.UNSIGNED8, '-1'),
-        (DataType.INTEGER16, 'fast'),
         (DataType.INTEGER16, ''),
         (DataType.INTEGER16, '1.5'),
         (DataType.UNSIGNED32, '$NODEID+1'),
-        (DataType.REAL32, 'much'),
         (DataType.DOMAIN, 'xyz'),
         (DataType.TIME_OF_DAY, '00 01'),
         (DataType.VISIBLE_STRING, '\u20ac'),
