@@ -4,14 +4,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Coroutine, Iterable
+import heapq
+from itertools import count
+from typing import Any, TypeVar
+
+from device_rig import drive_dictionary, with_defaults
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from lss_network import LssNetwork
 import pytest
 
 from arm_canopen import LssError
 from arm_canopen.can import Frame
-from arm_canopen.master import Scheduler
+from arm_canopen.master import Promise, Scheduler
 from arm_canopen.standard import (
     BIT_RATES,
     decode_lss,
@@ -25,16 +30,60 @@ from arm_canopen.standard import (
     LssCommand,
     LssMessage,
     LssState,
+    UNCONFIGURED,
 )
+from canopen_sim import DeviceHost
 from canopen_tools.lss_master import LssMaster
 from canopen_tools.monitor import FrameDescriber
 
 pytestmark = pytest.mark.slow
 
+T = TypeVar('T')
+
 FIRST = LssAddress(0x555, 0x1234, 0x10002, 0xCAFE)
 SECOND = FIRST._replace(serial=0xCAFF)
 NUMBER = st.integers(0, 0xFFFF_FFFF)
 ADDRESS = st.builds(LssAddress, NUMBER, NUMBER, NUMBER, NUMBER)
+
+
+class LssNetwork:
+    """A master and simulated devices on a bus that takes some time, in virtual time."""
+
+    def __init__(self, addresses: Iterable[LssAddress]) -> None:
+        """Switch devices of these identities on, without a node id."""
+        # how late frames of the devices arrive in [s], one after another; 1 ms after these
+        self.delays: list[float] = []
+        self._scheduler = Scheduler(1.0)
+        self._order = count()
+        self._way: list[tuple[float, int, Frame]] = []
+        self._host = DeviceHost(self._answer)
+        for address in addresses:
+            values = {(0x1018, part + 1): number for part, number in enumerate(address)}
+            self._host.add(UNCONFIGURED, with_defaults(drive_dictionary(), values))
+        self._host.advance(1.0)
+        self.master = LssMaster(self._scheduler, self._send)
+
+    def run(self, coroutine: Coroutine[Promise[Any], None, T]) -> T:
+        """Run a service to its end."""
+        task = self._scheduler.spawn(coroutine)
+        while not task.done:
+            deadline = self._scheduler.next_deadline()
+            arrival = self._way[0][0] if self._way else float('inf')
+            assert deadline is not None
+            now = min(deadline, arrival)
+            self._scheduler.set_time(now)
+            while self._way and self._way[0][0] <= now:
+                self.master.receive(heapq.heappop(self._way)[2]._replace(timestamp=now))
+            self._host.advance(now)
+            self._scheduler.advance(now)
+        return task.result()
+
+    def _send(self, frame: Frame) -> None:
+        self._host.receive(frame, self._scheduler.now)
+
+    def _answer(self, frame: Frame) -> None:
+        delay = self.delays.pop(0) if self.delays else 0.001
+        heapq.heappush(self._way, (self._scheduler.now + delay, next(self._order), frame))
 
 
 @settings(max_examples=30)

@@ -116,7 +116,6 @@ def test_a_device_with_an_id_is_selected_by_its_address(
     assert 'no device has the LSS address' in capsys.readouterr().err
 
 
-@pytest.mark.usefixtures('runner')
 def test_the_only_device_is_not_one_of_two(
     name: str, runner: DeviceRunner, capsys: Output
 ) -> None:
