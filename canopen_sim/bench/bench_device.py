@@ -4,19 +4,14 @@
 """What simulated drives cost, without bus and in virtual time.
 
 Seven drives with the PDOs of the article's bus.yml: in each SYNC cycle every drive gets two RPDOs
-and sends two TPDOs. Where python-canopen's LocalNode does the same thing it stands beside, in the
-same run; it has no drive, no PDO engine and no NMT state machine to compare with.
+and sends two TPDOs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 import math
 from pathlib import Path
 from time import process_time
-from typing import Any
-
-import canopen
 
 from arm_canopen.can import Frame
 from arm_canopen.config import load_eds
@@ -27,7 +22,6 @@ EDS = Path(__file__).parents[2] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
 NODE_IDS = range(2, 9)
 CYCLES = 2000
 PERIOD = 0.01  # [s]
-REPEAT = 20_000
 
 ARTICLE: tuple[tuple[int, int, int, tuple[int, ...]], ...] = (
     (0x1800, 0x180, 1, (0x60410010, 0x60610008)),
@@ -113,66 +107,6 @@ def cycle_cost(mode: int, velocity: int, amplitude: float) -> tuple[float, float
     return (process_time() - start) / CYCLES * 1e6, network.frames / CYCLES
 
 
-def per_call(function: Callable[[], object], repeat: int = REPEAT) -> float:
-    """Return the CPU time of a call in [us]."""
-    start = process_time()
-    for _ in range(repeat):
-        function()
-    return (process_time() - start) / repeat * 1e6
-
-
-def local_node() -> tuple[Any, Any]:
-    """Return python-canopen's simulated slave and its network, connected to nothing."""
-    make_network: Any = canopen.Network
-    make_node: Any = canopen.LocalNode
-    network = make_network()
-    network.send_message = lambda *_args, **_kwargs: None
-    node = make_node(NODE_IDS[0], str(EDS))
-    network.add_node(node)
-    return network, node
-
-
-def compare_sdo() -> tuple[float, float]:
-    """Return the cost of answering an expedited read in [us]: ours, python-canopen's."""
-    network = Network()
-    request = Frame(0x602, b'\x40\x00\x10\x00\x00\x00\x00\x00')
-    ours = per_call(lambda: network.host.receive(request, network.now))
-    other, _ = local_node()
-    data = bytearray(request.data)
-    return ours, per_call(lambda: other.notify(0x602, data, 0.0))
-
-
-def compare_pdo() -> tuple[float, float, float, float]:
-    """Return [us] of packing and of taking a PDO of two objects: ours, python-canopen's, twice."""
-    network = Network()
-    device = network.host.devices[0]
-    tpdo = device._tpdos.active[1]  # noqa: SLF001
-    frame = Frame(0x302, bytes(8))
-    _, node = local_node()
-    for kind, mapping in (('tpdo', (0x6064, 0x606C)), ('rpdo', (0x607A, 0x60FF))):
-        pdo = getattr(node, kind)[2]
-        for index in mapping:
-            pdo.add_variable(index)
-        pdo.cob_id = 0x282
-
-    def pack() -> bytes:
-        node.tpdo[2][0x6064].raw = 1000
-        node.tpdo[2][0x606C].raw = 1000
-        return bytes(node.tpdo[2].data)
-
-    def take() -> tuple[int, int]:
-        node.rpdo[2].on_message(0x282, bytearray(8), 0.0)
-        return node.rpdo[2][0x607A].raw, node.rpdo[2][0x60FF].raw
-
-    receive = device.handlers[0x302]
-    return (
-        per_call(tpdo.pack),
-        per_call(pack, REPEAT // 10),
-        per_call(lambda: receive(frame, network.now)),
-        per_call(take, REPEAT // 10),
-    )
-
-
 def main() -> None:
     """Print the figures."""
     head = 'seven drives, one SYNC cycle (14 RPDOs and a SYNC in)'
@@ -185,13 +119,6 @@ def main() -> None:
     ):
         cost, frames = cycle_cost(mode, velocity, amplitude)
         print(f'  {title:<54}{cost:8.0f}{frames:12.1f}{cost / PERIOD / 1e4:13.2f}')
-    print(f'\n{"one device, [us]":<54}{"ours":>9}{"python-canopen LocalNode":>26}')
-    ours, theirs = compare_sdo()
-    print(f'  {"answer an expedited SDO read":<52}{ours:9.1f}{theirs:26.1f}')
-    pack, their_pack, take, their_take = compare_pdo()
-    print(f'  {"pack a TPDO of two objects":<52}{pack:9.2f}{their_pack:26.2f}')
-    print(f'  {"take an RPDO of two objects":<52}{take:9.2f}{their_take:26.2f}')
-    print('  (LocalNode: by index, and without putting an RPDO into the dictionary)')
 
 
 if __name__ == '__main__':

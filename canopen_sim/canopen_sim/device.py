@@ -146,7 +146,12 @@ class Device:
         node_id, store, send, nmt = self.node_id, self.store, self._send, self._nmt
         self._sdo = SdoServers(node_id, store, send, self._subscribe)
         self._error_control = ErrorControl(
-            store, nmt, self._errors, self.drives, send=send, subscribe=self._subscribe
+            store,
+            nmt,
+            self._errors,
+            lost=self._connection_lost,
+            send=send,
+            subscribe=self._subscribe,
         )
         self._storage = ParameterStorage(store, self._memory)
         self._storage.load()
@@ -289,8 +294,7 @@ class Device:
                 drive.start(now)
         if state is NmtState.STOPPED:
             self._sdo.reset()
-            for drive in self.drives:
-                drive.connection_lost(now)
+            self._connection_lost(now)
         self._errors.allow(state is not NmtState.STOPPED, now)
         if state is NmtState.OPERATIONAL:
             self._rpdos.start()
@@ -299,6 +303,10 @@ class Device:
             self._rpdos.stop(now)
             self._tpdos.stop()
         self._subscribe()
+
+    def _connection_lost(self, now: float) -> None:
+        for drive in self.drives:
+            drive.connection_lost(now)
 
     def _subscribe(self) -> None:
         """Offer the services of the present NMT state."""

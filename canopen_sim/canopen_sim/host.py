@@ -14,7 +14,7 @@ from .device import Device, RateUnits
 from .drive.axis import ServoModel
 from .objects.parameter_memory import ParameterMemory
 from .services.rpdo import Handler
-from .timed import NEVER, Timed
+from .timed import NEVER
 
 DEFECT_PAUSE = 0.1  # [s] after a defect in a device, before it is looked at again
 
@@ -27,7 +27,6 @@ class DeviceHost:
 
     Attributes:
         devices: In the order in which they were added.
-        observers: Advanced after each step, and when they are due.
     """
 
     def __init__(
@@ -43,7 +42,6 @@ class DeviceHost:
                 the exception leaves the host.
         """
         self.devices: list[Device] = []
-        self.observers: list[Timed] = []
         self._send = send
         self._on_defect = on_defect
         self._resting: dict[Device, float] = {}  # until when, after a defect
@@ -92,17 +90,12 @@ class DeviceHost:
     @property
     def deadline(self) -> float:
         """Steady time in [s] at which :meth:`advance` has something to do."""
-        due = min((self._due(device) for device in self.devices), default=NEVER)
-        return (
-            min(due, *(observer.deadline for observer in self.observers))
-            if self.observers
-            else due
-        )
+        return min((self._due(device) for device in self.devices), default=NEVER)
 
     def receive(self, frame: Frame, now: float) -> None:
         """Hand a frame from the bus to all devices that want it."""
         self._dispatch(frame, None, now)
-        self._finish(now)
+        self._dispatch_echoes(now)
 
     def advance(self, now: float) -> None:
         """Do what is due at steady time ``now`` in [s]."""
@@ -113,7 +106,7 @@ class DeviceHost:
                     device.advance(now)
                 except Exception as error:  # noqa: BLE001  # the other devices go on
                     self._defect(device, error, now)
-        self._finish(now)
+        self._dispatch_echoes(now)
 
     def postpone_watches(self, stalled: float) -> None:
         """Have all devices leave out a time in [s] in which this computer stood still."""
@@ -143,13 +136,6 @@ class DeviceHost:
 
     def _outdate(self) -> None:
         self._outdated = True
-
-    def _finish(self, now: float) -> None:
-        self._dispatch_echoes(now)
-        if self.observers:
-            for observer in self.observers:
-                observer.advance(now)
-            self._dispatch_echoes(now)
 
     def _dispatch_echoes(self, now: float) -> None:
         # after the frame that caused them, which everybody has got by then

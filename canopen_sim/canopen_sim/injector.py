@@ -5,14 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Protocol
 
 from arm_canopen.standard import Index, object_address
 
 from .deviations import Fault, FaultInjection
 from .drive.drive import Drive
-from .line import FaultLine, LineFault
+from .line import ActiveFault, FaultLine
 from .objects.object_store import ObjectStore
 from .timed import NEVER
 
@@ -52,21 +52,6 @@ class Powered(Protocol):
 
     def faults_changed(self) -> None:
         """The line has other faults from now on."""
-
-
-@dataclass(slots=True)
-class ActiveFault:
-    """A fault that goes on.
-
-    Attributes:
-        injection: Its description.
-        end: Steady time in [s] at which it ends.
-        line: Its part on the line, None when it has none.
-    """
-
-    injection: FaultInjection
-    end: float
-    line: LineFault | None = None
 
 
 class FaultInjector:
@@ -116,9 +101,7 @@ class FaultInjector:
         for drive in self._axes(injection) if kind.of_drive else ():
             drive.inject(injection, now)
         if injection.lasting:
-            line = LineFault(injection, self._device.node_id) if kind.services else None
-            end = now + injection.duration if injection.duration else NEVER
-            self._active[injection.key] = ActiveFault(injection, end, line)
+            self._go_on(injection, injection.duration, now)
             self._update_line()
 
     def end(self, now: float, fault: Fault | None = None) -> None:
@@ -168,8 +151,11 @@ class FaultInjector:
         for fault in POWER_FAULTS:  # off is off, however often it is requested
             self._active.pop(replace(injection, fault=fault).key, None)
         self._device.switch_off(now)
+        self._go_on(injection, duration, now)
+
+    def _go_on(self, injection: FaultInjection, duration: float, now: float) -> None:
         end = now + duration if duration else NEVER
-        self._active[injection.key] = ActiveFault(injection, end)
+        self._active[injection.key] = ActiveFault(injection, self._device.node_id, end)
 
     def _disguise(self, injection: FaultInjection) -> None:
         store = self._device.store
@@ -198,12 +184,11 @@ class FaultInjector:
 
     def _forget_exhausted(self) -> None:
         self._active = {
-            key: active
-            for key, active in self._active.items()
-            if active.line is None or not active.line.exhausted
+            key: active for key, active in self._active.items() if not active.exhausted
         }
 
     def _update_line(self) -> None:
         self._forget_exhausted()
-        self._line.faults = [a.line for a in self._active.values() if a.line is not None]
+        faults = self._active.values()
+        self._line.faults = [fault for fault in faults if fault.injection.fault.value.services]
         self._device.faults_changed()

@@ -40,17 +40,19 @@ class Traffic(NamedTuple):
     number: int = 0
 
 
-class LineFault:
-    """A fault of the line while it goes on.
+class ActiveFault:
+    """A fault that goes on.
 
     Attributes:
         injection: Its description.
+        end: Steady time in [s] at which it ends.
         exhausted: It hit as many frames as it was to hit.
     """
 
-    def __init__(self, injection: FaultInjection, node_id: int) -> None:
+    def __init__(self, injection: FaultInjection, node_id: int, end: float) -> None:
         """Begin; each device and fault has random numbers of its own."""
         self.injection = injection
+        self.end = end
         self.exhausted = False
         self._left = injection.count
         seed = f'{injection.seed}/{node_id}/{injection.fault.label}/{injection.pdo}'
@@ -113,7 +115,7 @@ class FaultLine:
             abort: Sends an SDO abort, on the line.
             identify: Returns what a frame is, given whether it is outgoing.
         """
-        self.faults: list[LineFault] = []
+        self.faults: list[ActiveFault] = []
         self.now = 0.0
         self._send = send
         self._abort = abort

@@ -519,8 +519,8 @@ def test_drive_stops_when_it_is_taken_off_the_network(loss: NmtCommand, mode: in
     rig.nmt(loss)
     assert still(rig)
     rig.nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
-    assert rig.state == DriveState.FAULT.value
-    assert (rig.get(0x603F), rig.get(0x1001)) == (0x8130, 0x11)
+    assert (rig.state, rig.get(0x603F)) == (DriveState.FAULT, 0x8130)
+    assert rig.get(0x1001) == 0x11
 
 
 def test_option_to_go_on() -> None:

@@ -8,6 +8,8 @@ moves or has to be waited for. How often it looks has no influence on the motion
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 import math
 
 from arm_canopen import DriveState as State
@@ -16,9 +18,10 @@ from arm_canopen.standard import Controlword, STATE_WORDS, Statusword
 from ..deviations import Fault, FaultInjection
 from ..objects.object_store import ObjectStore
 from ..services.emcy_producer import EmcyProducer
+from ..services.sync_consumer import SyncConsumer
 from ..timed import NEVER
 from .axis import Axis, ServoModel
-from .modes.mode import Dwell, Mode, SyncClock, TARGET_REACHED
+from .modes.mode import Dwell, Mode, TARGET_REACHED
 from .modes.selection import ModeSelection
 from .objects import DriveObjects, MILLISECOND, NO_WINDOW
 from .state_machine import (
@@ -54,6 +57,9 @@ HOMED = int(Statusword.TARGET_REACHED | Statusword.HOMING_ATTAINED)
 class Drive:
     """One axis of a device.
 
+    Times ``now`` are on the steady clock in [s], by default when the drive last looked at its
+    axis.
+
     Attributes:
         deadline: Steady time in [s] at which it wants to look at its axis.
         number: Of the axis in its device, from 0.
@@ -65,22 +71,13 @@ class Drive:
         self,
         store: ObjectStore,
         errors: EmcyProducer,
-        clock: SyncClock,
+        clock: SyncConsumer,
         model: ServoModel,
         *,
         number: int = 0,
         rate_units: tuple[float, float] = (1.0, 1.0),
     ) -> None:
-        """Work on the objects of a device.
-
-        Args:
-            store: Objects of the device.
-            errors: Reports faults on the network.
-            clock: What is known of SYNC.
-            model: Time constants of the motor.
-            number: Of the axis in its device, from 0.
-            rate_units: What 1 of its velocities is in [inc/s], of its accelerations in [inc/s^2].
-        """
+        """Work on the objects of a device; ``rate_units`` are those of :class:`DriveObjects`."""
         self.deadline = NEVER
         self.faults: set[int] = set()
         self.causes: set[Fault] = set()
@@ -144,12 +141,7 @@ class Drive:
         self._publish(now)
 
     def count_from(self, position: float, now: float | None = None) -> None:
-        """Count from a position where the motor is, as its encoder does after power-on.
-
-        Args:
-            position: What the encoder reads, in [inc]; 0 for an incremental one.
-            now: Steady time in [s]; by default when the drive last looked at its axis.
-        """
+        """Count from a position in [inc] where the motor is, as its encoder after power-on."""
         now = self._axis.time if now is None else now
         self._axis.advance(now)
         self._axis.shift(position - self._axis.position)
@@ -174,18 +166,18 @@ class Drive:
         if self._machine.operating and self._mode.sync(now):
             self._schedule(now)
 
-    def raise_fault(self, code: int, now: float | None = None, *, at_once: bool = False) -> None:
-        """Let a fault happen.
-
-        Args:
-            code: Error code for 0x603F and EMCY.
-            now: Steady time in [s]; by default when the drive last looked at its axis.
-            at_once: It leaves no torque to brake with, whatever 0x605E selects.
-        """
+    @contextmanager
+    def _at(self, now: float | None) -> Iterator[float]:
+        """Advance to a time, let something happen then, and publish what can be seen of it."""
         now = self._axis.time if now is None else now
         self._move(now)
-        self._fail(code, now, at_once=at_once)
+        yield now
         self._publish(now)
+
+    def raise_fault(self, code: int, now: float | None = None, *, at_once: bool = False) -> None:
+        """Raise a fault; ``at_once`` leaves no torque to brake with, whatever 0x605E selects."""
+        with self._at(now) as moment:
+            self._fail(code, moment, at_once=at_once)
 
     def inject(self, injection: FaultInjection, now: float) -> None:
         """Begin a fault; the cause of one that lasts stays until :meth:`clear`."""
@@ -223,45 +215,30 @@ class Drive:
         self._publish(now)
 
     def block(self, at: float | None = None, now: float | None = None) -> None:
-        """Put a mechanical stop in the way.
-
-        Args:
-            at: Position in [inc]; beyond it, as seen from the motor, there is no way. By
-                default the motor is stuck where it is.
-            now: Steady time in [s]; by default when the drive last looked at its axis.
-        """
-        now = self._axis.time if now is None else now
-        self._move(now)
-        here = self._axis.position
-        if at is None:
-            self._axis.set_stops(here, here)
-        elif at >= here:
-            self._axis.set_stops(-math.inf, at)
-        else:
-            self._axis.set_stops(at, math.inf)
-        self._publish(now)
+        """Put a mechanical stop at a position in [inc]; by default the motor is stuck."""
+        with self._at(now):
+            here = self._axis.position
+            if at is None:
+                self._axis.set_stops(here, here)
+            elif at >= here:
+                self._axis.set_stops(-math.inf, at)
+            else:
+                self._axis.set_stops(at, math.inf)
 
     def release(self, now: float | None = None) -> None:
         """Take mechanical stops away."""
-        now = self._axis.time if now is None else now
-        self._move(now)
-        self._axis.set_stops(-math.inf, math.inf)
-        self._publish(now)
+        with self._at(now):
+            self._axis.set_stops(-math.inf, math.inf)
 
     def set_load(self, torque: float, now: float | None = None) -> None:
-        """Load the axis, as gravity does.
+        """Load the axis, as gravity does, with what it takes to hold it.
 
-        Args:
-            torque: What it takes to hold it, in [0.1 % of the rated torque]; a positive load
-                pulls towards negative positions.
-            now: Steady time in [s]; by default when the drive last looked at its axis.
+        A positive load in [0.1 % of the rated torque] pulls towards negative positions.
         """
-        now = self._axis.time if now is None else now
-        self._move(now)
-        self._axis.load = torque
-        if self._machine.operating:
-            self._mode.load_changed(now)
-        self._publish(now)
+        with self._at(now) as moment:
+            self._axis.load = torque
+            if self._machine.operating:
+                self._mode.load_changed(moment)
 
     def set_switches(self, switches: Switches) -> None:
         """Put limit switches, home switch and index pulse in other places."""
@@ -271,45 +248,38 @@ class Drive:
     def set_voltage(self, present: bool, now: float | None = None, *, fault: bool = True) -> None:
         """Supply the power stage, or cut its supply.
 
-        Args:
-            present: There is voltage.
-            now: Steady time in [s]; by default when the drive last looked at its axis.
-            fault: Without it a drive that is switched on faults; otherwise it goes to Switch on
-                disabled, as with safe torque off.
+        Without voltage a drive that is switched on faults, or goes to Switch on disabled, as
+        with safe torque off (no ``fault``).
         """
-        now = self._axis.time if now is None else now
-        self._move(now)
-        self._machine.set_voltage(present, now)
-        if not present and self._machine.state in VOLTAGE_STATES:
-            if fault:
-                self._fail(UNDER_VOLTAGE_CODE, now)
-            else:
-                self._machine.disable()
-        self._publish(now)
+        with self._at(now) as moment:
+            self._machine.set_voltage(present, moment)
+            if not present and self._machine.state in VOLTAGE_STATES:
+                if fault:
+                    self._fail(UNDER_VOLTAGE_CODE, moment)
+                else:
+                    self._machine.disable()
 
     def connection_lost(self, now: float) -> None:
         """React to the loss of the master as 0x6007 selects, if the motor has torque."""
         if self._machine.state not in POWERED_STATES:
             return
-        self._move(now)
-        match chosen(self._objects.abort_connection, AbortConnectionOption.FAULT):
-            case AbortConnectionOption.FAULT:
-                self._fail(CONNECTION_CODE, now)
-            case AbortConnectionOption.DISABLE_VOLTAGE:
-                self._machine.disable()
-            case AbortConnectionOption.QUICK_STOP if self._machine.operating:
-                self._machine.quick_stop()
-        self._publish(now)
+        with self._at(now):
+            match chosen(self._objects.abort_connection, AbortConnectionOption.FAULT):
+                case AbortConnectionOption.FAULT:
+                    self._fail(CONNECTION_CODE, now)
+                case AbortConnectionOption.DISABLE_VOLTAGE:
+                    self._machine.disable()
+                case AbortConnectionOption.QUICK_STOP if self._machine.operating:
+                    self._machine.quick_stop()
 
     def _move(self, now: float) -> None:
         """Advance the axis to a time, and what depends on where it is."""
-        axis, mode = self._axis, self._mode if self._machine.operating else None
-        if mode is None:
+        axis, mode = self._axis, self._mode
+        if not self._machine.operating:
             axis.advance(now)
-        else:
-            while axis.time < now:
-                axis.step(min(now, mode.due))
-                mode.step(axis.time)
+        while axis.time < now:
+            axis.step(min(now, mode.due))
+            mode.step(axis.time)
         self._watch_following_error(now)
         self._machine.advance(now)
 

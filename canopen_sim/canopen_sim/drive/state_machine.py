@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable
+from collections.abc import Callable, Container
 from enum import auto, Enum
 from functools import partial
 from typing import NamedTuple, TypeVar
@@ -66,30 +66,25 @@ class Transition(NamedTuple):
 
 
 COMMANDED_TRANSITIONS: dict[tuple[State, DriveCommand], Transition] = {
-    (State.SWITCH_ON_DISABLED, DriveCommand.SHUTDOWN): Transition(2, State.READY_TO_SWITCH_ON),
-    (State.READY_TO_SWITCH_ON, DriveCommand.SWITCH_ON): Transition(3, State.SWITCHED_ON),
-    # "enable operation" passes Switched On by itself (table 26, note)
-    (State.READY_TO_SWITCH_ON, DriveCommand.ENABLE_OPERATION): Transition(3, State.SWITCHED_ON),
-    (State.READY_TO_SWITCH_ON, DriveCommand.DISABLE_VOLTAGE): Transition(
-        7, State.SWITCH_ON_DISABLED
-    ),
-    (State.READY_TO_SWITCH_ON, DriveCommand.QUICK_STOP): Transition(7, State.SWITCH_ON_DISABLED),
-    (State.SWITCHED_ON, DriveCommand.ENABLE_OPERATION): Transition(4, State.OPERATION_ENABLED),
-    (State.SWITCHED_ON, DriveCommand.SHUTDOWN): Transition(6, State.READY_TO_SWITCH_ON),
-    (State.SWITCHED_ON, DriveCommand.DISABLE_VOLTAGE): Transition(10, State.SWITCH_ON_DISABLED),
-    (State.SWITCHED_ON, DriveCommand.QUICK_STOP): Transition(10, State.SWITCH_ON_DISABLED),
-    (State.OPERATION_ENABLED, DriveCommand.SWITCH_ON): Transition(5, State.SWITCHED_ON),
-    (State.OPERATION_ENABLED, DriveCommand.SHUTDOWN): Transition(8, State.READY_TO_SWITCH_ON),
-    (State.OPERATION_ENABLED, DriveCommand.DISABLE_VOLTAGE): Transition(
-        9, State.SWITCH_ON_DISABLED
-    ),
-    (State.OPERATION_ENABLED, DriveCommand.QUICK_STOP): Transition(11, State.QUICK_STOP_ACTIVE),
-    (State.QUICK_STOP_ACTIVE, DriveCommand.DISABLE_VOLTAGE): Transition(
-        12, State.SWITCH_ON_DISABLED
-    ),
-    (State.QUICK_STOP_ACTIVE, DriveCommand.ENABLE_OPERATION): Transition(
-        16, State.OPERATION_ENABLED
-    ),
+    (state, command): Transition(number, target)
+    for number, state, command, target in (
+        (2, State.SWITCH_ON_DISABLED, DriveCommand.SHUTDOWN, State.READY_TO_SWITCH_ON),
+        (3, State.READY_TO_SWITCH_ON, DriveCommand.SWITCH_ON, State.SWITCHED_ON),
+        # "enable operation" passes Switched On by itself (table 26, note)
+        (3, State.READY_TO_SWITCH_ON, DriveCommand.ENABLE_OPERATION, State.SWITCHED_ON),
+        (7, State.READY_TO_SWITCH_ON, DriveCommand.DISABLE_VOLTAGE, State.SWITCH_ON_DISABLED),
+        (7, State.READY_TO_SWITCH_ON, DriveCommand.QUICK_STOP, State.SWITCH_ON_DISABLED),
+        (4, State.SWITCHED_ON, DriveCommand.ENABLE_OPERATION, State.OPERATION_ENABLED),
+        (6, State.SWITCHED_ON, DriveCommand.SHUTDOWN, State.READY_TO_SWITCH_ON),
+        (10, State.SWITCHED_ON, DriveCommand.DISABLE_VOLTAGE, State.SWITCH_ON_DISABLED),
+        (10, State.SWITCHED_ON, DriveCommand.QUICK_STOP, State.SWITCH_ON_DISABLED),
+        (5, State.OPERATION_ENABLED, DriveCommand.SWITCH_ON, State.SWITCHED_ON),
+        (8, State.OPERATION_ENABLED, DriveCommand.SHUTDOWN, State.READY_TO_SWITCH_ON),
+        (9, State.OPERATION_ENABLED, DriveCommand.DISABLE_VOLTAGE, State.SWITCH_ON_DISABLED),
+        (11, State.OPERATION_ENABLED, DriveCommand.QUICK_STOP, State.QUICK_STOP_ACTIVE),
+        (12, State.QUICK_STOP_ACTIVE, DriveCommand.DISABLE_VOLTAGE, State.SWITCH_ON_DISABLED),
+        (16, State.QUICK_STOP_ACTIVE, DriveCommand.ENABLE_OPERATION, State.OPERATION_ENABLED),
+    )
 }
 """Transitions that a controlword causes (CiA 402-2, figure 4 and table 26).
 
@@ -99,24 +94,14 @@ Those of themselves are 0 and 1 (start), 12 (quick stop done), 13 (fault) and 14
 
 
 class StopOption(Enum):
-    """Values of 0x605B to 0x605E that the drive can do; not every object has each (CiA 402-2).
+    """Values of 0x605A to 0x605E that the drive can do; not every object has each (CiA 402-2).
 
     "Current limit" and "voltage limit" brake as hard as the motor can: ramps of twice the quick
     stop deceleration. The vendor's value -1 of the fault reaction brakes half as hard as "slow
-    down".
+    down". Of 0x605A those above 4 brake in the same ways, and stay in Quick stop active.
     """
 
     VENDOR_SLOW = -1
-    DISABLE = 0
-    SLOW_DOWN = 1
-    QUICK_STOP = 2
-    CURRENT_LIMIT = 3
-    VOLTAGE_LIMIT = 4
-
-
-class QuickStopOption(Enum):
-    """Values of 0x605A that the drive can do (CiA 402-2, 0x605A)."""
-
     DISABLE = 0
     SLOW_DOWN = 1
     QUICK_STOP = 2
@@ -149,13 +134,6 @@ class AbortConnectionOption(Enum):
 
 POWERED_STATES = frozenset({State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE})
 LIMIT_FACTOR = 2.0  # of the quick stop ramp, where the motor brakes at its limit
-HALT_OPTIONS = (
-    StopOption.SLOW_DOWN,
-    StopOption.QUICK_STOP,
-    StopOption.CURRENT_LIMIT,
-    StopOption.VOLTAGE_LIMIT,
-)
-
 VOLTAGE_STATES = POWERED_STATES | {State.SWITCHED_ON}
 """States that need the voltage of the power stage."""
 
@@ -194,12 +172,14 @@ class StateMachine:
         self._causes = causes
         self._word = 0
         self._pending: Transition | None = None
-        stops = (StopOption.DISABLE, StopOption.SLOW_DOWN)
-        _restrict(objects.quick_stop_option, QuickStopOption)
-        _restrict(objects.shutdown_option, stops)
-        _restrict(objects.disable_option, stops)
-        _restrict(objects.fault_option, StopOption)
-        _restrict(objects.halt_option, HALT_OPTIONS)
+        for variable, options in (
+            (objects.quick_stop_option, range(9)),
+            (objects.shutdown_option, range(2)),
+            (objects.disable_option, range(2)),
+            (objects.fault_option, range(-1, 5)),
+            (objects.halt_option, range(1, 5)),
+        ):
+            variable.check = partial(_check, variable, options)
 
     @property
     def operating(self) -> bool:
@@ -214,9 +194,9 @@ class StateMachine:
         return self._pending is not None or self.state is State.FAULT_REACTION_ACTIVE
 
     @property
-    def quick_stop_option(self) -> QuickStopOption:
+    def quick_stop_option(self) -> StopOption:
         """What a quick stop does (0x605A)."""
-        return chosen(self._objects.quick_stop_option, QuickStopOption.QUICK_STOP)
+        return chosen(self._objects.quick_stop_option, StopOption.QUICK_STOP)
 
     def start(self) -> None:
         """Pass transitions 0 and 1: the drive has started."""
@@ -275,7 +255,7 @@ class StateMachine:
     def quick_stop(self) -> None:
         """Pass transition 11."""
         option = self.quick_stop_option
-        if option is QuickStopOption.DISABLE:
+        if option is StopOption.DISABLE:
             self._power_off(State.SWITCH_ON_DISABLED)
             return
         self._pending = None
@@ -370,11 +350,6 @@ def chosen(variable: Integer, default: Option) -> Option:
         return default
 
 
-def _restrict(variable: Integer, options: Iterable[Enum]) -> None:
-    """Let clients write no other options than these."""
-    variable.check = partial(_check, variable, frozenset(option.value for option in options))
-
-
-def _check(variable: Integer, allowed: frozenset[int], value: Value) -> None:
+def _check(variable: Integer, allowed: Container[Value], value: Value) -> None:
     if value not in allowed:
         raise refusal(AbortCode.VALUE_RANGE, variable.entry)

@@ -11,8 +11,7 @@ from arm_canopen.can import Frame
 from arm_canopen.standard import AbortCode, CAN_ID_MASK, COB_ID_INVALID, Emergency, Index
 from arm_canopen.standard.datatypes import Value
 
-from ..objects.cob_id_rules import check_cob_id
-from ..objects.object_store import Integer, ObjectStore, refusal
+from ..objects.object_store import check_cob_id, Integer, ObjectStore, refusal
 from ..timed import NEVER
 
 GENERIC_ERROR = 0x01

@@ -8,9 +8,8 @@ the error behaviour (CiA 301, 7.2.8.2.2 and 7.5.2.17 to 7.5.2.33).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
-from typing import Protocol
 
 from arm_canopen.can import Frame
 from arm_canopen.standard import (
@@ -36,13 +35,6 @@ ERROR_STATES: dict[int, NmtState] = {0: NmtState.PRE_OPERATIONAL, 2: NmtState.ST
 """Where a communication error leads from Operational, by 0x1029:01; 1 leads nowhere."""
 
 
-class Axis(Protocol):
-    """What stops when a connection is lost."""
-
-    def connection_lost(self, now: float) -> None:
-        """Stop as 0x6007 says."""
-
-
 class ErrorControl:
     """Error control of one device.
 
@@ -63,8 +55,8 @@ class ErrorControl:
         store: ObjectStore,
         nmt: NmtSlave,
         errors: EmcyProducer,
-        drives: Sequence[Axis],
         *,
+        lost: Callable[[float], None],
         send: Callable[[Frame], None],
         subscribe: Callable[[], None],
     ) -> None:
@@ -74,14 +66,14 @@ class ErrorControl:
             store: Objects of the device.
             nmt: Its NMT state.
             errors: Takes its errors.
-            drives: Its axes, which stop as 0x6007 selects.
+            lost: Called with the time of a loss; its axes stop as 0x6007 selects.
             send: Takes the frames.
             subscribe: Called when other identifiers are listened to.
         """
         self.node_id = nmt.node_id
         self._nmt = nmt
         self._errors = errors
-        self._drives = drives
+        self._lost = lost
         self._send = send
         self._subscribe = subscribe
         self._behaviour = store.integer(Index.ERROR_BEHAVIOUR, 1)
@@ -200,8 +192,7 @@ class ErrorControl:
         """React to a communication error as 0x1029:01 and 0x6007 of the drive select."""
         vendor = bytes((node_id, 0, 0, 0, 0))
         self._errors.report(HEARTBEAT_ERROR, now, source, vendor)
-        for drive in self._drives:
-            drive.connection_lost(now)
+        self._lost(now)
         target = ERROR_STATES.get(self._behaviour.value)
         if target is not None and self._nmt.state is NmtState.OPERATIONAL:
             self._nmt.enter(target, now)

@@ -30,8 +30,7 @@ from arm_canopen.standard import (
 )
 from arm_canopen.standard.datatypes import Value
 
-from ..objects.cob_id_rules import check_cob_id
-from ..objects.object_store import ObjectStore, refusal, Scalar, Variable
+from ..objects.object_store import check_cob_id, ObjectStore, refusal, Scalar, Variable
 
 TRANSMISSION_EVENT = (254, 255)
 INHIBIT_UNIT = 0.0001  # [s]

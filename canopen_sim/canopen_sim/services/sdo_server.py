@@ -33,8 +33,7 @@ from arm_canopen.standard import (
 )
 from arm_canopen.standard.sdo import Abort, CLIENT_DOWNLOAD, CLIENT_UPLOAD, Segment
 
-from ..objects.cob_id_rules import check_cob_id
-from ..objects.object_store import ObjectStore, refusal, STRING_BYTES_MAX
+from ..objects.object_store import check_cob_id, ObjectStore, refusal, STRING_BYTES_MAX
 from ..timed import NEVER
 from .sdo_block import BlockDownload, BlockUpload
 

@@ -10,8 +10,7 @@ from arm_canopen.can import Frame
 from arm_canopen.standard import AbortCode, CAN_ID_MASK, CobId, Index, SYNC_PRODUCER
 from arm_canopen.standard.datatypes import Value
 
-from ..objects.cob_id_rules import check_can_id
-from ..objects.object_store import ObjectStore, refusal
+from ..objects.object_store import check_can_id, ObjectStore, refusal
 
 MICROSECOND = 1e-6  # [s]
 PERIOD_WEIGHT = 0.125  # weight of a new interval in the measured period

@@ -20,8 +20,7 @@ from arm_canopen.standard import (
 )
 from arm_canopen.standard.datatypes import Value
 
-from ..objects.cob_id_rules import check_can_id, FRAME_BITS
-from ..objects.object_store import ObjectStore, refusal
+from ..objects.object_store import check_can_id, FRAME_BITS, ObjectStore, refusal
 
 
 class TimeConsumer:

@@ -10,11 +10,12 @@ import math
 from arm_canopen import OperationMode
 from arm_canopen.standard import Controlword, Statusword
 
+from ...services.sync_consumer import SyncConsumer
 from ...timed import NEVER
 from ..axis import Axis, Limits
 from ..objects import DriveObjects
 from ..switches import INDEX_METHODS, PRESENT_POSITION_METHODS, Reference, REFERENCES, Switches
-from .mode import Mode, SyncClock, TARGET_REACHED
+from .mode import Mode, TARGET_REACHED
 
 HOMING_START = int(Controlword.HOMING_START)
 ATTAINED = int(Statusword.HOMING_ATTAINED)
@@ -137,7 +138,7 @@ class Homing(Mode):
 
     number = OperationMode.HOMING
 
-    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
+    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncConsumer) -> None:
         super().__init__(objects, axis, clock)
         self._attained = False
         self._failed = False

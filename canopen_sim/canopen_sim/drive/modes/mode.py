@@ -4,27 +4,17 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 from arm_canopen import OperationMode
 from arm_canopen.standard import Statusword
 
+from ...services.sync_consumer import SyncConsumer
 from ...timed import NEVER
 from ..axis import Axis
 from ..objects import DriveObjects
 
 TARGET_REACHED = int(Statusword.TARGET_REACHED)
-
-
-class SyncClock(Protocol):
-    """What a drive knows of SYNC."""
-
-    @property
-    def period(self) -> float:
-        """Time between two SYNCs in [s], 0 when unknown."""
-
-    def alive(self, now: float) -> bool:
-        """Return whether SYNC comes regularly at this time."""
 
 
 class Mode:
@@ -42,7 +32,7 @@ class Mode:
 
     number: ClassVar[OperationMode]
 
-    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
+    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncConsumer) -> None:
         self.objects = objects
         self.axis = axis
         self.clock = clock

@@ -10,10 +10,11 @@ from typing import NamedTuple
 from arm_canopen import OperationMode
 from arm_canopen.standard import Controlword, Statusword
 
+from ...services.sync_consumer import SyncConsumer
 from ...timed import NEVER
 from ..axis import Axis, Limits
 from ..objects import DriveObjects, MILLISECOND, NO_WINDOW
-from .mode import Dwell, Mode, SyncClock, TARGET_REACHED
+from .mode import Dwell, Mode, TARGET_REACHED
 
 NEW_SET_POINT = int(Controlword.NEW_SET_POINT)
 CHANGE_IMMEDIATELY = int(Controlword.CHANGE_IMMEDIATELY)
@@ -54,7 +55,7 @@ class ProfilePosition(Mode):
 
     number = OperationMode.PROFILE_POSITION
 
-    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
+    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncConsumer) -> None:
         super().__init__(objects, axis, clock)
         self._active: SetPoint | None = None
         self._next: SetPoint | None = None

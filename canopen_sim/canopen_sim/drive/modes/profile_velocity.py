@@ -9,9 +9,10 @@ import math
 from arm_canopen import OperationMode
 from arm_canopen.standard import Statusword
 
+from ...services.sync_consumer import SyncConsumer
 from ..axis import Axis
 from ..objects import DriveObjects, MILLISECOND
-from .mode import Dwell, Mode, SyncClock, TARGET_REACHED
+from .mode import Dwell, Mode, TARGET_REACHED
 
 ZERO_SPEED = int(Statusword.ZERO_SPEED)
 SLIPPAGE_ERROR = 0x2000  # bit 13 of the statusword
@@ -22,7 +23,7 @@ class ProfileVelocity(Mode):
 
     number = OperationMode.PROFILE_VELOCITY
 
-    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
+    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncConsumer) -> None:
         super().__init__(objects, axis, clock)
         self._target = 0.0
         self._bounded = False  # the motion ends at a software limit

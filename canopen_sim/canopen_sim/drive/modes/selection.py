@@ -11,10 +11,11 @@ from arm_canopen.standard.datatypes import Value
 
 from ...deviations import Fault
 from ...objects.object_store import refusal
+from ...services.sync_consumer import SyncConsumer
 from ..axis import Axis
 from ..objects import DriveObjects
 from .homing import Homing
-from .mode import Mode, NoMode, SyncClock
+from .mode import Mode, NoMode
 from .profile_position import ProfilePosition
 from .profile_velocity import ProfileVelocity
 from .streamed import CyclicPosition, CyclicVelocity, InterpolatedPosition
@@ -47,7 +48,7 @@ class ModeSelection:
     """
 
     def __init__(
-        self, objects: DriveObjects, axis: Axis, clock: SyncClock, causes: Container[Fault] = ()
+        self, objects: DriveObjects, axis: Axis, clock: SyncConsumer, causes: Container[Fault] = ()
     ) -> None:
         self._objects = objects
         self._causes = causes

@@ -15,9 +15,10 @@ from collections import deque
 from arm_canopen import OperationMode
 from arm_canopen.standard import Controlword, Statusword
 
+from ...services.sync_consumer import SyncConsumer
 from ..axis import Axis, Limits
 from ..objects import DriveObjects, NO_WINDOW, PERIOD_MIN
-from .mode import Mode, SyncClock, TARGET_REACHED
+from .mode import Mode, TARGET_REACHED
 
 FOLLOWS_COMMAND = int(Statusword.FOLLOWS_COMMAND)
 ENABLE_INTERPOLATION = int(Controlword.ENABLE_INTERPOLATION)
@@ -31,7 +32,7 @@ class Streamed(Mode):
     object held before is no set-point.
     """
 
-    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
+    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncConsumer) -> None:
         super().__init__(objects, axis, clock)
         self._fresh = False  # written since the last SYNC
         self._streaming = False  # there was one for the SYNC before
@@ -141,7 +142,7 @@ class InterpolatedPosition(Streamed):
 
     number = OperationMode.INTERPOLATED_POSITION
 
-    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
+    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncConsumer) -> None:
         super().__init__(objects, axis, clock)
         self._enabled = False
         self._buffer: deque[int] = deque()

@@ -13,17 +13,18 @@ import math
 
 from arm_canopen import OperationMode
 
+from ...services.sync_consumer import SyncConsumer
 from ...timed import NEVER
 from ..axis import Axis, TORQUE_STEP
 from ..objects import DriveObjects
-from .mode import Mode, SyncClock, TARGET_REACHED
+from .mode import Mode, TARGET_REACHED
 from .streamed import Streamed
 
 
 class TorqueMode(Mode):
     """Applies a torque in steps, each of which begins exactly where the one before has ended."""
 
-    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
+    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncConsumer) -> None:
         super().__init__(objects, axis, clock)
         self._torque = 0.0
         self._acting = False
@@ -129,7 +130,7 @@ class CyclicTorque(TorqueMode, Streamed):
 
     number = OperationMode.CYCLIC_TORQUE
 
-    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
+    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncConsumer) -> None:
         super().__init__(objects, axis, clock)
         self._target = 0.0
 

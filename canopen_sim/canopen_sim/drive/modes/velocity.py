@@ -8,9 +8,10 @@ import math
 
 from arm_canopen import OperationMode
 
+from ...services.sync_consumer import SyncConsumer
 from ..axis import Axis
 from ..objects import DriveObjects
-from .mode import Mode, SyncClock, TARGET_REACHED
+from .mode import Mode, TARGET_REACHED
 
 ENABLE_RAMP = 0x10  # without it the drive slows down
 UNLOCK_RAMP = 0x20  # without it the velocity stays as it is
@@ -25,7 +26,7 @@ class Velocity(Mode):
 
     number = OperationMode.VELOCITY
 
-    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
+    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncConsumer) -> None:
         super().__init__(objects, axis, clock)
         self._word = 0
         self._wanted = 0.0
