@@ -29,8 +29,7 @@ from .drive.drive import Drive
 from .injector import FaultInjector
 from .line import FaultLine, Traffic
 from .objects.object_store import ObjectStore
-from .objects.parameter_memory import ParameterMemory
-from .objects.parameter_storage import ParameterStorage
+from .objects.parameter_storage import ParameterMemory, ParameterStorage
 from .services.emcy_producer import EmcyProducer
 from .services.error_control import ErrorControl
 from .services.lss_slave import LssSlave

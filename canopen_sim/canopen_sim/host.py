@@ -12,7 +12,7 @@ from arm_canopen.standard import ObjectDictionary, UNCONFIGURED
 
 from .device import Device, RateUnits
 from .drive.axis import ServoModel
-from .objects.parameter_memory import ParameterMemory
+from .objects.parameter_storage import ParameterMemory
 from .services.rpdo import Handler
 from .timed import NEVER
 

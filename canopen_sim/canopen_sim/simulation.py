@@ -13,7 +13,7 @@ from arm_canopen.config.model.checks.drive_units import rate_units, reported_inc
 
 from .host import DeviceHost
 from .node_id_check import NodeIdCheck
-from .objects.parameter_memory import ParameterMemory
+from .objects.parameter_storage import ParameterMemory
 from .runner import DeviceRunner
 
 NO_POSITIONS: Mapping[str, float] = {}

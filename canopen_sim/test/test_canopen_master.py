@@ -37,14 +37,12 @@ from arm_canopen import (
     ObjectError,
     open_bus,
     OperationMode,
-    OtherMasterError,
     Refusal,
     SdoAbortError,
     Severity,
 )
 from arm_canopen.can import Frame
 from arm_canopen.can.plugin import ArmCanopenBus
-from arm_canopen.master import other_master
 from arm_canopen.standard import ObjectDictionary
 from canopen_sim import DeviceRunner
 
@@ -352,20 +350,6 @@ def test_a_warning_on_the_way_does_not_end_a_boot(bus_yml: Path, bus: str) -> No
     assert online == [True, True]
     severities = {event.severity for event in booting if event.kind is EventKind.BOOT}
     assert severities == {Severity.WARNING, Severity.INFO}
-
-
-def test_a_second_master_is_refused(
-    master: CanopenMaster, bus_yml: Path, bus: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It says so before its first frame, and the first goes on."""
-    monkeypatch.setattr(other_master, 'LISTENING_TIME', 2.0)  # the first may be held up
-    master.drive('joint1').enable()
-    with (
-        CanopenMaster.from_bus_yml(bus_yml, bus) as second,
-        pytest.raises(OtherMasterError),
-    ):
-        second.boot(TIMEOUT)
-    assert master.drive('joint1').state is DriveState.OPERATION_ENABLED
 
 
 class Clinging:

@@ -15,16 +15,7 @@ from arm_canopen.standard import NmtState
 pytestmark = pytest.mark.slow
 
 FRAMES = 20_000
-OWN_IDS = [
-    0x000,
-    0x080,
-    0x080 + NODE_ID,
-    *(0x180 + 0x80 * k + NODE_ID for k in range(8)),
-    0x580 + NODE_ID,
-    0x600 + NODE_ID,
-    0x700 + NODE_ID,
-    0x701,
-]
+OWN_IDS = [0x000, 0x080, 0x701, *(0x080 + 0x80 * k + NODE_ID for k in range(14))]
 
 
 def random_frame(source: random.Random) -> Frame:
@@ -57,17 +48,15 @@ def likely_sdo(source: random.Random) -> Frame:
     return Frame(0x600 + NODE_ID, data)
 
 
-@pytest.mark.parametrize('seed', range(3))
-def test_any_frames_at_any_time(seed: int) -> None:
+def test_any_frames_at_any_time() -> None:
     """Random frames at random times: nothing raises, and afterwards the device works."""
-    source = random.Random(seed)
+    source = random.Random(1)
     rig = Rig()
     for _ in range(FRAMES):
         frame = likely_sdo(source) if source.random() < 0.4 else random_frame(source)
         rig.device.receive(frame, rig.now)
         rig.run(source.choice((0.0, 0.0, 0.0001, 0.003, 0.02)))
         rig.sent.clear()
-    rig.nmt_state  # noqa: B018
     rig.send(0, b'\x81\x00')
     assert rig.nmt_state is NmtState.PRE_OPERATIONAL
     assert rig.read(0x1000) == b'\x92\x01\x02\x00'

@@ -136,6 +136,16 @@ def test_without_a_home_switch_both_limits_end_the_search() -> None:
     assert abs(rig.velocity) < 0.1
 
 
+@pytest.mark.parametrize(('method', 'start'), [(33, -1100), (34, 1600)])
+def test_a_pulse_beyond_a_limit_switch_is_not_found(method: int, start: int) -> None:
+    """Where the limit switch ahead is active at the start, the search ends at once."""
+    rig = homing_rig(method, start)
+    rig.command(ENABLE | START)
+    rig.run(1.0)
+    assert rig.statusword & (REACHED | ATTAINED | ERROR) == REACHED | ERROR
+    assert rig.position == pytest.approx(start, abs=5.0)
+
+
 def test_speed_of_zero_is_an_error() -> None:
     """A search that cannot move is none."""
     rig = homing_rig(17)

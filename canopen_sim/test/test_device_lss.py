@@ -14,7 +14,7 @@ import pytest
 
 from arm_canopen.can import Frame
 from arm_canopen.standard import NmtCommand, NmtState
-from canopen_sim import DeviceHost, Fault, FaultInjection
+from canopen_sim import DeviceHost, Fault
 
 REQUEST, RESPONSE = 0x7E5, 0x7E4
 IDENTITY = (0x555, 0x1234, 0x10002, 0xCAFE)
@@ -94,33 +94,30 @@ def test_id_after_a_power_cut(stored: bool) -> None:
     if stored:
         assert query(rig, 0x17) == b'\x17' + bytes(7)
     rig.nmt(NmtCommand.RESET_COMMUNICATION)
-    rig.device.faults.inject(FaultInjection(Fault.REBOOT), rig.now)
+    rig.inject(Fault.REBOOT)
     rig.take()
     rig.run(0.1)
     assert [frame.can_id for _, frame in rig.sent] == [0x72A if stored else 0x700 + NODE_ID]
 
 
-def test_values_out_of_range() -> None:
-    """Node ids and bit rates that there are not are refused with error code 1."""
-    rig = make_rig()
-    query(rig, 0x04, 1)
-    for node_id in (0, 128, 254):
-        assert query(rig, 0x11, node_id) == b'\x11\x01' + bytes(6)
-    for table, rate, error in ((0, 0, 0), (0, 8, 0), (0, 5, 0), (0, 9, 1), (1, 0, 1)):
-        assert query(rig, 0x13, table, rate) == bytes((0x13, error)) + bytes(6)
-
-
-def test_waiting_device_applies_no_configuration() -> None:
-    """Only the selected device answers configuration and inquiry commands."""
+def test_only_a_selected_device_is_configured() -> None:
+    """A waiting one answers nothing; node ids and bit rates out of range are error code 1."""
     rig = make_rig()
     assert select(rig, (0x555, 0x1234, 0x10002, 0xBABE)) is None
     for command in (0x11, 0x13, 0x17, 0x5A, 0x5E):
         assert query(rig, command, 3) is None
+    for size in range(8):  # an LSS message has 8 bytes
+        rig.send(REQUEST, b'\x4c\0\0\0\0\0\0\0'[:size])
+    assert rig.take() == []
     query(rig, 0x04, 1)
     inquiries = [query(rig, command) for command in (0x5A, 0x5B, 0x5C, 0x5D)]
     assert inquiries == [
         struct.pack('<BI3x', 0x5A + part, number) for part, number in enumerate(IDENTITY)
     ]
+    for node_id in (0, 128, 254):
+        assert query(rig, 0x11, node_id) == b'\x11\x01' + bytes(6)
+    for table, rate, error in ((0, 0, 0), (0, 8, 0), (0, 5, 0), (0, 9, 1), (1, 0, 1)):
+        assert query(rig, 0x13, table, rate) == bytes((0x13, error)) + bytes(6)
 
 
 @pytest.mark.parametrize(
@@ -139,14 +136,6 @@ def test_identify(changed: dict[int, int], found: bool) -> None:
     assert (answers[5] is not None) is found
     assert query(rig, 0x4C) is None
     assert query(make_rig(), 0x4C) == b'\x50' + bytes(7)
-
-
-def test_frames_of_other_lengths_are_ignored() -> None:
-    """An LSS message has 8 bytes."""
-    rig = make_rig()
-    for size in range(8):
-        rig.send(REQUEST, b'\x4c\0\0\0\0\0\0\0'[:size])
-    assert rig.take() == []
 
 
 class Wire:

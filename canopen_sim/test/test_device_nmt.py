@@ -9,7 +9,6 @@ import pytest
 
 from arm_canopen.can import Frame
 from arm_canopen.standard import NmtCommand, NmtState, ObjectDictionary
-from canopen_sim import Device
 
 PRE, OP, STOP = NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL, NmtState.STOPPED
 START = NmtCommand.START
@@ -152,13 +151,6 @@ def test_reset_ends_a_transfer_and_the_heartbeat() -> None:
     rig.take()
     rig.run(5.0)
     assert rig.take() == []
-
-
-@pytest.mark.parametrize('node_id', [0, 128, -1])
-def test_node_id_out_of_range_is_refused(node_id: int) -> None:
-    """A device cannot be built with an id that CANopen does not have."""
-    with pytest.raises(ValueError, match='node id'):
-        Device(node_id, ObjectDictionary([]), lambda _frame: None)
 
 
 def test_device_without_any_object_lives() -> None:

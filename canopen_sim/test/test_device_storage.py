@@ -19,8 +19,7 @@ from arm_canopen.standard import (
     ObjectEntry,
 )
 from canopen_sim import Device, Fault
-from canopen_sim.objects.parameter_memory import ParameterFile, ParameterMemory
-from canopen_sim.objects.parameter_storage import LOAD, SAVE
+from canopen_sim.objects.parameter_storage import LOAD, ParameterFile, ParameterMemory, SAVE
 
 SIGNATURES = {0x1010: SAVE, 0x1011: LOAD}
 

@@ -28,7 +28,7 @@ from node_runner import (
 
 from ..host import DeviceHost
 from ..node_id_check import NodeIdCheck
-from ..objects.parameter_memory import ParameterFile, ParameterMemory
+from ..objects.parameter_storage import ParameterFile, ParameterMemory
 from ..runner import DeviceRunner
 from ..simulation import add_devices
 from .fault_services import FaultServices

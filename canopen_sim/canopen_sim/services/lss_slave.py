@@ -28,7 +28,7 @@ from arm_canopen.standard import (
 from arm_canopen.standard.lss import WHOLE_NUMBER
 
 from ..objects.object_store import ObjectStore
-from ..objects.parameter_memory import ParameterMemory
+from ..objects.parameter_storage import ParameterMemory
 
 
 class LssSlave:

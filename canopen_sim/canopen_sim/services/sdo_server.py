@@ -112,42 +112,32 @@ class SdoServer:
             self._send(Frame(self.response_id, abort.encode()))
 
     def _answer(self, data: bytes, now: float) -> list[bytes]:
-        index, subindex = self._subject(data)
+        """Return the answer; an abort names the object of the request, else of the transfer."""
+        transfer, specifier = self._transfer, data[0] >> 5
+        is_block = specifier in (CLIENT_UPLOAD, CLIENT_DOWNLOAD)
+        names_none = specifier in (0, 3) or (is_block and data[0] & 0x03)
+        index, subindex = struct.unpack_from('<xHB', data)
+        streams = isinstance(transfer, BlockDownload) and transfer.streaming
+        if names_none or streams:
+            index, subindex = (transfer.index, transfer.subindex) if transfer else (0, 0)
         try:
-            if self._is_block(data):
+            if isinstance(transfer, BlockDownload) and streams and data[0] != ABORT:
+                answer = transfer.segment(data)
+                return [answer] if answer is not None else []
+            if is_block:
                 return self._block(data, now)
-            answer = self._dispatch(data, now)
+            response = self._dispatch(data, now)
         except SdoAbortError as error:
             self._transfer = None
             return [Abort(index, subindex, error.code).encode()]
-        return [answer.encode()] if answer is not None else []
-
-    def _subject(self, data: bytes) -> tuple[int, int]:
-        """Return the object that an abort names: that of the transfer, else of the request."""
-        transfer = self._transfer
-        streaming = isinstance(transfer, BlockDownload) and transfer.streaming
-        names_none = data[0] >> 5 in (0, 3) or (self._is_block(data) and data[0] & 0x03)
-        if streaming or names_none:
-            return (transfer.index, transfer.subindex) if transfer else (0, 0)
-        index, subindex = struct.unpack_from('<xHB', data)
-        return int(index), int(subindex)
-
-    def _is_block(self, data: bytes) -> bool:
-        """Return whether a frame is of a block transfer; an abort is of any transfer."""
-        transfer = self._transfer
-        if isinstance(transfer, BlockDownload) and transfer.streaming:
-            return data[0] != ABORT
-        return data[0] >> 5 in (CLIENT_UPLOAD, CLIENT_DOWNLOAD)
+        return [response.encode()] if response is not None else []
 
     def _block(self, data: bytes, now: float) -> list[bytes]:
-        transfer = self._transfer
-        if isinstance(transfer, BlockDownload) and transfer.streaming:
-            answer = transfer.segment(data)
-            return [answer] if answer is not None else []
         if data[0] >> 5 == CLIENT_DOWNLOAD:
             return [self._block_download(data, now)]
         if not data[0] & 0x03:
             return [self._start_block_upload(data)]
+        transfer = self._transfer
         if not isinstance(transfer, BlockUpload):
             raise refusal(AbortCode.COMMAND_SPECIFIER, 'SDO')
         answers = transfer.proceed(data)
@@ -275,11 +265,7 @@ class SdoServers:
     ) -> None:
         """Bind 0x1201 and those after it, as far as the dictionary has them.
 
-        Args:
-            node_id: Id of the device.
-            store: Its objects.
-            send: Takes the frames.
-            changed: Called when requests have other identifiers from now on.
+        ``changed`` is called when requests have other identifiers from now on.
         """
         self._store = store
         self._send = send

@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from enum import auto, Enum
+from collections.abc import Generator
 import math
+from typing import NamedTuple
 
 from arm_canopen import OperationMode
 from arm_canopen.standard import Controlword, Statusword
@@ -14,7 +15,7 @@ from ...services.sync_consumer import SyncConsumer
 from ...timed import NEVER
 from ..axis import Axis, Limits
 from ..objects import DriveObjects
-from ..switches import INDEX_METHODS, PRESENT_POSITION_METHODS, Reference, REFERENCES, Switches
+from ..switches import INDEX_METHODS, PRESENT_POSITION_METHODS, REFERENCES, Switches
 from .mode import Mode, TARGET_REACHED
 
 HOMING_START = int(Controlword.HOMING_START)
@@ -25,107 +26,54 @@ NO_HOMING = 0
 STEP = 0.001  # [s] how often the switches are looked at; edges are latched exactly
 
 
-class Phase(Enum):
-    """What a search does."""
+class Move(NamedTuple):
+    """Where a search goes, and whether it looks for a switch, with the faster speed."""
 
-    SEARCH = auto()  # fast, until the switch is active
-    LEAVE = auto()  # slowly past the edge, out of the active range
-    RETURN = auto()  # slowly back over the edge
-    INDEX = auto()  # slowly to the index pulse
-    FOUND = auto()
-    FAILED = auto()
+    direction: int
+    fast: bool = False
 
 
-class HomingRun:
-    """One search for a switch and an index pulse, as a sequence of directions and speeds.
+Search = Generator[Move, float, float | None]
+"""Yields moves, gets the mechanical position in [inc] after each step, returns home or None."""
 
-    Attributes:
-        phase: What it does.
-        direction: Where it goes: -1, 1.
-        home: Mechanical position of home in [inc], once found.
+
+def search(method: int, switches: Switches, position: float) -> Search:
+    """Search for a switch and an index pulse; return None where both limit switches are met.
+
+    A search so fast that it runs over the whole home switch comes back.
     """
+    reference = REFERENCES.get(method)
+    if reference is None:
+        direction, start = INDEX_METHODS[method], position
+        position = yield Move(direction)
+        return (yield from _to_index(switches, position, start, direction))
+    switch, side, final, direction, to_index = reference
+    is_turned = False
+    position = yield Move(direction, fast=True)
+    while not switches.active(switch, position):
+        if switches.limit_ahead(direction, position):
+            if is_turned:
+                return None
+            direction, is_turned = -direction, True
+        position = yield Move(direction, fast=True)
+    edge = switches.edge(switch, side)
+    while (is_active := switches.active(switch, position)) or (position - edge) * side < 0.0:
+        if is_active and switches.limit_ahead(side, position):
+            return None
+        position = yield Move(side)
+    while final != side and not switches.active(switch, position):
+        position = yield Move(final)
+    return (yield from _to_index(switches, position, edge, final)) if to_index else edge
 
-    def __init__(self, method: int, switches: Switches, position: float) -> None:
-        """Begin a search.
 
-        Args:
-            method: A number of :data:`~.switches.REFERENCES` or
-                :data:`~.switches.INDEX_METHODS`.
-            switches: Where the switches are.
-            position: Mechanical position of the axis in [inc].
-        """
-        self.home = position
-        self._switches = switches
-        self._turned = False
-        self._reference: Reference | None = REFERENCES.get(method)
-        if self._reference is None:
-            self.direction = INDEX_METHODS[method]
-            self._seek_index(position, self.direction)
-        else:
-            self.phase = Phase.SEARCH
-            self.direction = self._reference.first
-
-    @property
-    def fast(self) -> bool:
-        """It moves with the speed of the search for a switch."""
-        return self.phase is Phase.SEARCH
-
-    @property
-    def done(self) -> bool:
-        """It has ended."""
-        return self.phase in (Phase.FOUND, Phase.FAILED)
-
-    def look(self, position: float) -> None:
-        """See where the axis is, mechanically in [inc]."""
-        if self._reference is None or self.phase is Phase.INDEX:
-            self._look_for_index(position)
-            return
-        active = self._switches.active(self._reference.switch, position)
-        if self.phase is Phase.SEARCH:
-            self._search(active, position)
-        elif self.phase is Phase.LEAVE:
-            self._leave(self._reference, active, position)
-        elif self.phase is Phase.RETURN and active:
-            self._pass_edge(self._reference)
-
-    def _search(self, active: bool, position: float) -> None:
-        if active and self._reference is not None:
-            self.phase, self.direction = Phase.LEAVE, self._reference.side
-        elif self._switches.limit_ahead(self.direction, position):
-            self.direction = -self.direction
-            if self._turned:
-                self.phase = Phase.FAILED
-            self._turned = True
-
-    def _leave(self, reference: Reference, active: bool, position: float) -> None:
-        if active:
-            if self._switches.limit_ahead(self.direction, position):
-                self.phase = Phase.FAILED
-            return
-        edge = self._switches.edge(reference.switch, reference.side)
-        if (position - edge) * self.direction < 0.0:
-            return  # it ran over the whole switch, and comes back
-        if reference.final == reference.side:
-            self._pass_edge(reference)
-        else:
-            self.phase, self.direction = Phase.RETURN, reference.final
-
-    def _pass_edge(self, reference: Reference) -> None:
-        edge = self._switches.edge(reference.switch, reference.side)
-        if reference.to_index:
-            self._seek_index(edge, reference.final)
-        else:
-            self.home, self.phase = edge, Phase.FOUND
-
-    def _seek_index(self, position: float, direction: int) -> None:
-        self.phase, self.direction = Phase.INDEX, direction
-        self.home = self._switches.next_index(position, direction)
-
-    def _look_for_index(self, position: float) -> None:
-        if (position - self.home) * self.direction >= 0.0:
-            self.phase = Phase.FOUND
-        elif self._switches.limit_ahead(self.direction, position):
-            self.phase = Phase.FAILED
+def _to_index(switches: Switches, position: float, start: float, direction: int) -> Search:
+    """Go to the index pulse that comes next after a start."""
+    pulse = switches.next_index(start, direction)
+    while (position - pulse) * direction < 0.0:
+        if switches.limit_ahead(direction, position):
+            return None
+        position = yield Move(direction)
+    return pulse
 
 
 class Homing(Mode):
@@ -142,12 +90,14 @@ class Homing(Mode):
         super().__init__(objects, axis, clock)
         self._attained = False
         self._failed = False
-        self._run: HomingRun | None = None
+        self._search: Search | None = None
+        self._move = Move(0)
+        self._home: float | None = None  # found; the axis has to stand
 
     @property
     def waiting(self) -> bool:
         """A search is under way."""
-        return self._run is not None
+        return self._search is not None or self._home is not None
 
     def reset(self) -> None:
         """Be not homed, as after switching on."""
@@ -162,7 +112,7 @@ class Homing(Mode):
 
     def command(self, word: int, previous: int, now: float) -> None:
         """Home at the rising edge of bit 4, stop at its falling edge."""
-        if not word & HOMING_START and self._run is not None:
+        if not word & HOMING_START and self.waiting:
             self._cancel()
             self.axis.stop(self.objects.homing_ramp)
         if not word & ~previous & HOMING_START or self.halted:
@@ -177,8 +127,12 @@ class Homing(Mode):
         elif method in PRESENT_POSITION_METHODS:
             self._attain(position)
         elif method in REFERENCES or method in INDEX_METHODS:
-            self._run = HomingRun(method, self.axis.switches, position)
-            self._move(self._run, now)
+            objects = self.objects
+            if objects.homing_speed_zero.value and objects.homing_speed_switch.value:
+                self._search = search(method, self.axis.switches, position)
+                self._go(next(self._search), now)
+            else:
+                self._failed = True
         else:
             self._failed = True
 
@@ -188,51 +142,47 @@ class Homing(Mode):
 
     def resume(self, now: float) -> None:
         """Go on with the search."""
-        if self._run is not None and not self._run.done:
-            self._move(self._run, now)
+        if self._search is not None:
+            self._go(self._move, now)
 
     def step(self, now: float) -> None:
         """Look at the switches; take home over when the axis stands."""
-        run, axis = self._run, self.axis
-        if run is None:
-            return
-        if now >= self.due:
-            before = (run.phase, run.direction)
-            run.look(axis.position - axis.origin)
-            self.due = NEVER if run.done else now + STEP
-            if run.done:
+        axis = self.axis
+        if self._search is not None and now >= self.due:
+            self.due = now + STEP
+            try:
+                move = self._search.send(axis.position - axis.origin)
+            except StopIteration as end:
+                self._cancel()
+                self._home = end.value
+                self._failed = end.value is None
                 axis.stop(self.objects.homing_ramp)
-                self._failed = run.phase is Phase.FAILED
-            elif before != (run.phase, run.direction):
-                self._move(run, now)
-        if run.done and axis.settled:
+            else:
+                if move != self._move:
+                    self._go(move, now)
+        if self._home is not None and axis.settled:
+            self._attain(self._home)
             self._cancel()
-            if run.phase is Phase.FOUND:
-                self._attain(run.home)
 
-    def _move(self, run: HomingRun, now: float) -> None:
+    def _go(self, move: Move, now: float) -> None:
         """Go where the search leads."""
         objects = self.objects
-        speeds = (objects.homing_speed_zero.value, objects.homing_speed_switch.value)
-        if not all(speeds):
-            self._failed = True
-            self._cancel()
-            return
+        self._move, self.due = move, now
+        speed = objects.homing_speed_switch if move.fast else objects.homing_speed_zero
         limits = Limits(objects.speed, objects.homing_ramp, objects.homing_ramp)
-        self.axis.ramp(math.copysign(speeds[run.fast], run.direction), limits)
-        self.due = now
+        self.axis.ramp(math.copysign(speed.value, move.direction), limits)
 
     def _attain(self, home: float) -> None:
         self.axis.shift(self.objects.home_offset.value - home - self.axis.origin)
         self._attained = True
 
     def _cancel(self) -> None:
-        self._run = None
+        self._search = self._home = None
         self.due = NEVER
 
     def status(self) -> int:
         """Return "target reached", "homing attained" and "homing error"."""
-        word = TARGET_REACHED if self.axis.settled and self._run is None else 0
+        word = TARGET_REACHED if self.axis.settled and not self.waiting else 0
         if self._attained:
             word |= ATTAINED
         return word | (HOMING_ERROR if self._failed else 0)
