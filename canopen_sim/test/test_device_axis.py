@@ -70,7 +70,11 @@ def test_a_move_keeps_its_limits_and_ends_at_its_target(
         passed = axis.time - time
         rounding = 1e-9 * (abs(start) + abs(target)) + 1e-9 * fastest + 1e-3
         assert abs(axis.demand_velocity) <= fastest
-        assert abs(axis.demand_velocity - before) <= steepest * passed * (1.0 + 1e-6) + 1e-3
+        grows = abs(axis.demand_velocity) > abs(before)
+        rate = bounds.acceleration if grows else bounds.deceleration
+        if before * axis.demand_velocity < 0.0:  # it has turned, by either
+            rate = steepest
+        assert abs(axis.demand_velocity - before) <= rate * passed * (1.0 + 1e-6) + 1e-3
         assert abs(axis.demand - place) <= fastest * passed + rounding
     # a look rounds times, and what is left of a distance is gone again at the lowest rate
     rest = (
@@ -135,8 +139,9 @@ def test_looking_changes_nothing(looks: list[float], speed: float) -> None:
         axis.advance(begin + 0.1)
         axis.advance(max(begin + 0.1, often.time))
     once.advance(often.time)
-    # the rate limiter works in steps of 1 ms, which begin where the looks are
-    slack = 1e-6 if math.isinf(speed) else 1.0
+    # the rate limiter works in steps of 1 ms, which begin where the looks are; at rest the motor
+    # is said to stand at its demand when it is nearer than 0.0001 inc
+    slack = 1e-4 if math.isinf(speed) else 1.0
     assert often.position == pytest.approx(once.position, abs=slack)
 
 

@@ -68,6 +68,9 @@ def test_every_fault_has_words_and_a_row_in_the_readme() -> None:
     assert {name: listed.get(name) for name in FAULTS} == {
         fault.label: set(fault.value.settings) for fault in Fault
     }
+    named = re.findall(r':=([\w/]+\.(?:yml|eds))', text)  # of commands to copy
+    assert named
+    assert [name for name in named if not (Path(__file__).parents[2] / name).is_file()] == []
 
 
 @pytest.mark.parametrize(

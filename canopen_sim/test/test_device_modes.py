@@ -14,8 +14,6 @@ from device_rig import (
     SWITCH_ON,
     with_defaults,
 )
-from hypothesis import given, settings
-from hypothesis import strategies as st
 import pytest
 
 from arm_canopen import OperationMode
@@ -503,32 +501,3 @@ def test_selecting_the_mode_in_motion_stops() -> None:
     rig.run(1.0)
     assert rig.get(0x606C) == 0
     assert rig.statusword & REACHED
-
-
-@settings(max_examples=40)
-@given(
-    targets=st.lists(st.integers(-3000, 3000), min_size=1, max_size=4),
-    pauses=st.lists(st.floats(0.0, 1.5), min_size=4, max_size=4),
-    velocity=st.integers(500, 5000),
-    acceleration=st.integers(500, 50_000),
-    deceleration=st.integers(500, 50_000),
-)
-def test_moves_keep_their_limits_and_arrive(
-    targets: list[int], pauses: list[float], velocity: int, acceleration: int, deceleration: int
-) -> None:
-    """Whatever targets come when: speed and accelerations are kept, and the last is reached."""
-    rates = ((0x6081, velocity), (0x6083, acceleration), (0x6084, deceleration))
-    rig = enabled(1, (0x6065, 0), *rates)
-    step, fastest = 0.01, max(acceleration, deceleration)
-    last = 0.0
-    for target, pause in zip(targets, pauses, strict=False):
-        offer(rig, target, IMMEDIATE)
-        for _ in range(round(pause / step)):
-            rig.run(step)
-            now = rig.velocity
-            assert abs(now) <= velocity + 1.0
-            assert abs(now - last) <= fastest * step + 1.0
-            last = now
-    arrival(rig, limit=400.0)
-    rig.run(0.2)
-    assert rig.get(0x6064) == targets[-1]

@@ -254,6 +254,7 @@ REFUSED_VALUES = [
     (0x6060, 0, -1, AbortCode.VALUE_RANGE),
     (0x605A, 0, 9, AbortCode.VALUE_RANGE),
     (0x605B, 0, 2, AbortCode.VALUE_RANGE),
+    (0x605D, 0, 0, AbortCode.VALUE_RANGE),
     (0x605E, 0, 5, AbortCode.VALUE_RANGE),
     (0x6083, 0, 0, AbortCode.VALUE_LOW),
     (0x607C, 0, 10, AbortCode.VALUE_HIGH),
