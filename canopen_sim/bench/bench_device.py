@@ -54,7 +54,7 @@ class Network:
         self.frames += 1
 
     def receive(self, can_id: int, data: bytes) -> None:
-        """Let the drives receive a frame."""
+        """Send a frame to the drives."""
         self.host.receive(Frame(can_id, data), self.now)
 
     def write(self, node_id: int, index: int, subindex: int, value: int, size: int) -> None:

@@ -60,9 +60,9 @@ class Device:
         store: Present values of all objects.
         drives: Its axes; none when the device is not a drive.
         clock: What it knows of the network's time.
-        faults: What it does wrong on purpose.
-        handlers: What it does with the frames of each identifier, in its present NMT state;
-            another mapping takes its place when that changes.
+        faults: Its deviations, which :class:`FaultInjector` begins and ends.
+        handlers: The handler of each identifier in the present NMT state; another mapping
+            replaces it when that changes.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class Device:
             boot_time: How long its start takes in [s].
             servo: Time constants of the motor.
             handlers_changed: Called when :attr:`handlers` is another mapping.
-            memory: What it keeps without power; by default what lasts as long as the object.
+            memory: Its non-volatile memory; by default one that lasts as long as the object.
             rate_units: Units of the axes that do not have those of the EDS.
 
         Raises:
@@ -187,7 +187,7 @@ class Device:
         return None if deadline == float('inf') else deadline
 
     def receive(self, frame: Frame, now: float) -> None:
-        """Take a frame from the bus; what is not for this device is ignored."""
+        """Process a frame from the bus; those for others are ignored."""
         if frame.is_extended or frame.is_error:
             return
         if frame.is_remote:
@@ -199,7 +199,7 @@ class Device:
             handler(frame, now)
 
     def advance(self, now: float) -> None:
-        """Do what is due at steady time ``now`` in [s]."""
+        """Process what is due at steady time ``now`` in [s]."""
         self._line.now = now
         if self.powered:
             self._refresh(now)
@@ -209,7 +209,7 @@ class Device:
         self._tpdos.poll(now)
 
     def postpone_watches(self, stalled: float) -> None:
-        """Leave out a time in [s] in which this computer stood still: others were not silent."""
+        """Postpone time-outs by the time in [s] for which this computer stood still."""
         self._error_control.postpone(stalled)
         self._rpdos.postpone(stalled)
 
@@ -232,7 +232,7 @@ class Device:
         self._subscribe()
 
     def switch_on(self, now: float, *, position_kept: bool = True) -> None:
-        """Give power again: the device starts, its objects with their defaults.
+        """Restore the power: the device starts, its objects with their defaults.
 
         Args:
             now: Steady time in [s].
@@ -252,7 +252,7 @@ class Device:
         self._errors.repeat(period, now)
 
     def faults_changed(self) -> None:
-        """Let frames pass through the faults of the line (from the injector)."""
+        """Pass frames through the faults of the line (from the injector)."""
         self._subscribe()
 
     def _reset(self, command: NmtCommand, now: float) -> None:
@@ -347,14 +347,14 @@ class Device:
         return Traffic(Service.PDO if number else Service.OTHER, outgoing, number)
 
     def _renumber(self, node_id: int) -> None:
-        """Take another node id; all that follows from it is read again by the reset."""
+        """Change the node id; the reset reads everything again that depends on it."""
         self.node_id = node_id
         self.store.renumber(self._dictionary.for_node(node_id))
         for part in (self._nmt, self._sdo, self._error_control, self._lss):
             part.node_id = node_id
 
     def _refresh(self, now: float) -> None:
-        """Let the objects hold the values of this time."""
+        """Update the objects to the values of this time."""
         for drive in self.drives:
             drive.advance(now)
 

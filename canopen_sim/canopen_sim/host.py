@@ -98,7 +98,7 @@ class DeviceHost:
         self._dispatch_echoes(now)
 
     def advance(self, now: float) -> None:
-        """Do what is due at steady time ``now`` in [s]."""
+        """Process what is due at steady time ``now`` in [s]."""
         for device in self.devices:
             if self._due(device) <= now:
                 self._resting.pop(device, None)
@@ -109,7 +109,7 @@ class DeviceHost:
         self._dispatch_echoes(now)
 
     def postpone_watches(self, stalled: float) -> None:
-        """Have all devices leave out a time in [s] in which this computer stood still."""
+        """Postpone time-outs by the time in [s] for which this computer stood still."""
         for device in self.devices:
             device.postpone_watches(stalled)
 

@@ -45,7 +45,7 @@ class Powered(Protocol):
         """Cut the power."""
 
     def switch_on(self, now: float, *, position_kept: bool) -> None:
-        """Give power."""
+        """Restore the power."""
 
     def repeat_emcy(self, period: float, now: float) -> None:
         """Send the last EMCY again and again; 0 ends that."""
@@ -114,7 +114,7 @@ class FaultInjector:
         self._update_line()
 
     def advance(self, now: float) -> None:
-        """Let late frames arrive, and end the faults whose time is over."""
+        """Deliver late frames, and end the faults whose time is over."""
         self._line.advance(now)
         over = [key for key, active in self._active.items() if active.end <= now]
         for key in over:

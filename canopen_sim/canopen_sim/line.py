@@ -129,14 +129,14 @@ class FaultLine:
         return self._late[0][0] if self._late else NEVER
 
     def send(self, frame: Frame) -> None:
-        """Take a frame of the device."""
+        """Pass on a frame of the device."""
         if self.faults:
             self._pass(frame, self._send_at, outgoing=True)
         else:
             self._send(frame)
 
     def receive(self, frame: Frame, now: float, deliver: Deliver) -> None:
-        """Take a frame for the device, and hand it over unless a fault is in the way."""
+        """Deliver a frame to the device unless a fault prevents it."""
         self.now = now
         self._pass(frame, deliver, outgoing=False)
 
@@ -149,7 +149,7 @@ class FaultLine:
         self._late.clear()
 
     def advance(self, now: float) -> None:
-        """Let late frames arrive."""
+        """Deliver late frames."""
         self.now = now
         while self._late and self._late[0][0] <= now:
             heapq.heappop(self._late)[2](now)

@@ -35,7 +35,7 @@ class NodeIdCheck:
         """Request an answer of each; what was received before counts, too.
 
         Args:
-            bus: An open bus that nobody else reads.
+            bus: An open bus without another reader.
             node_ids: Node ids of the devices; one without a node id cannot be there twice.
             clock: The steady clock in [s].
         """
@@ -73,7 +73,7 @@ class NodeIdCheck:
             )
 
     def _receive(self, timeout: float) -> bool:
-        """Take what is received; return whether the bus can be read."""
+        """Check received frames; return whether the bus can be read."""
         try:
             frames = self._bus.receive(timeout)
         except BusError:

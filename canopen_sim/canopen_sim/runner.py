@@ -64,7 +64,7 @@ class DeviceRunner:
         self._thread.stop()
 
     def call(self, function: Callable[[], Result]) -> Future[Result]:
-        """Have a function run in the thread of the devices, between two of their steps.
+        """Run a function in the thread of the devices, between two of their steps.
 
         Args:
             function: May use :attr:`host` and its devices; it must not wait for anything.
@@ -115,7 +115,7 @@ def _pass_over(frames: list[Frame], now: float) -> list[Frame]:
 
 
 def newest_process_data(frames: Sequence[Frame]) -> list[Frame]:
-    """Return what the mailboxes of a CAN controller hold of frames that nobody took in time.
+    """Return what the mailboxes of a CAN controller hold of frames that were not read in time.
 
     A device that stood still sees the newest set-point, and does not follow all those of the past.
     Of SDO, NMT and LSS, whose clients wait for their answers, all is kept.

@@ -17,4 +17,4 @@ class Timed(Protocol):
         """Steady time in [s] at which it wants to be advanced."""
 
     def advance(self, now: float) -> None:
-        """Do what is due at steady time ``now`` in [s]."""
+        """Process what is due at steady time ``now`` in [s]."""

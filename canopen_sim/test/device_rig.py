@@ -118,11 +118,11 @@ class Rig:
         return self.drive.velocity
 
     def send(self, can_id: int, data: bytes = b'') -> None:
-        """Let the device receive a frame."""
+        """Send a frame to the device."""
         self.device.receive(Frame(can_id, data), self.now)
 
     def run(self, duration: float) -> None:
-        """Let time pass, from deadline to deadline."""
+        """Advance the time, from deadline to deadline."""
         end = self.now + duration
         for _ in range(1_000_000):
             deadline = self.device.next_deadline()

@@ -34,7 +34,7 @@ def beat(rig: Rig, node_id: int = MASTER, state: int = 5) -> None:
 
 
 def watch(rig: Rig, milliseconds: int, node_id: int = MASTER, subindex: int = 1) -> None:
-    """Let the device watch another one."""
+    """Configure the device to watch another one."""
     rig.put(0x1016, node_id << 16 | milliseconds, subindex)
 
 
@@ -194,7 +194,7 @@ def test_several_devices_are_watched(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize('entry', [0x0000_012C, 0x0080_012C, 0x0001_0000])
-def test_entries_that_name_nobody(rig: Rig, entry: int) -> None:
+def test_entries_without_a_device(rig: Rig, entry: int) -> None:
     """Node id 0, one beyond 127 or time 0 switch an entry off."""
     rig.put(0x1016, entry, 1)
     beat(rig, entry >> 16 & 0x7F)
@@ -203,7 +203,7 @@ def test_entries_that_name_nobody(rig: Rig, entry: int) -> None:
 
 
 @pytest.mark.parametrize('data', [b'', b'\x05\x05', b'\x01'])
-def test_what_is_no_heartbeat_keeps_nobody_alive(rig: Rig, data: bytes) -> None:
+def test_other_frames_are_no_heartbeats(rig: Rig, data: bytes) -> None:
     """Frames of the wrong length or with an unknown state do not count."""
     watch(rig, 300)
     beat(rig)

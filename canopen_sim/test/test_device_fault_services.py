@@ -123,7 +123,7 @@ def test_faults_by_hand(services: Services) -> None:
 
 @pytest.mark.scenario
 def test_wrong_requests_say_what_there_is(services: Services) -> None:
-    """Unknown devices, faults and settings change nothing and are answered with what there is."""
+    """Unknown devices, faults and settings change nothing; the answer lists those that exist."""
     from arm_msgs.srv import InjectFault
 
     cases: list[tuple[dict[str, Any], str]] = [

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Frames that nobody should send: the device must live, and must not move unasked."""
+"""Random frames: the device must live, and must not move unasked."""
 
 from __future__ import annotations
 

@@ -151,7 +151,7 @@ class Wire:
         self._host, self._sent = host, sent
 
     def send(self, message: can.Message, timeout: float | None = None) -> None:
-        """Take a frame of python-canopen and deliver the answers."""
+        """Deliver a frame of python-canopen, and its answers."""
         del timeout
         self._host.receive(Frame(message.arbitration_id, bytes(message.data)), 1.0)
         while self._sent:

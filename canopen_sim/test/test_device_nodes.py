@@ -33,7 +33,7 @@ ARRIVAL = 30.0  # [s] a deadline, no measure
 
 @pytest.fixture(autouse=True)
 def own_domain(isolation: Isolation, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the processes have a ROS domain of their own."""
+    """Run the processes in a ROS domain of their own."""
     for name, value in isolation.env.items():
         monkeypatch.setenv(name, value)
 

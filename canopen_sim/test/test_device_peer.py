@@ -51,7 +51,7 @@ class Wire:
         self._delivered = 0
 
     def send(self, message: can.Message, timeout: float | None = None) -> None:
-        """Take a frame of python-canopen."""
+        """Deliver a frame of python-canopen."""
         del timeout
         frame = Frame(
             message.arbitration_id, bytes(message.data), is_remote=message.is_remote_frame
@@ -60,14 +60,14 @@ class Wire:
         self.deliver()
 
     def deliver(self) -> None:
-        """Give python-canopen what the device sent."""
+        """Deliver the frames of the device to python-canopen."""
         while self._delivered < len(self.rig.sent):
             moment, frame = self.rig.sent[self._delivered]
             self._delivered += 1
             self.network.notify(frame.can_id, bytearray(frame.data), moment)
 
     def run(self, duration: float) -> None:
-        """Let time pass."""
+        """Advance the time."""
         self.rig.run(duration)
         self.deliver()
 

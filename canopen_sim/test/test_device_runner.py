@@ -73,7 +73,7 @@ def test_a_device_that_stood_still_does_not_live_through_what_it_missed(
     ],
     ids=['longer', 'with a heartbeat', 'several'],
 )
-def test_a_device_that_stood_still_takes_nobody_for_silent(
+def test_a_device_that_stood_still_reports_no_silence(
     stalls: list[float], heartbeat: float
 ) -> None:
     """It received nothing meanwhile; a master that is silent while it runs is noticed in time."""

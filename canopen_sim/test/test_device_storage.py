@@ -51,7 +51,7 @@ class StoringRig(Rig):
         self.take()
 
     def order(self, index: int, group: int = 1) -> None:
-        """Let it store (0x1010) or restore (0x1011)."""
+        """Order it to store (0x1010) or restore (0x1011)."""
         self.put(index, SIGNATURES[index], group)
 
     def power_cycle(self) -> None:

@@ -219,7 +219,7 @@ class Axis:
         return place
 
     def push(self, torque: float) -> None:
-        """Let a torque act for :data:`TORQUE_STEP`; the velocity is kept then."""
+        """Apply a torque for :data:`TORQUE_STEP`; the velocity is kept then."""
         if self.blocked:
             self.demand, self.demand_velocity = self.position, 0.0
         velocity = self.demand_velocity
@@ -334,7 +334,7 @@ class Axis:
         self._constant()
 
     def _rest(self) -> None:
-        """Let the demand be where the motor is, so that nothing jumps when power comes."""
+        """Set the demand to the motor position, so that nothing jumps when power comes."""
         self._target = self.position
         self._stand()
 
@@ -362,7 +362,7 @@ class Axis:
         self.demand_velocity += change
 
     def _follow(self, duration: float) -> None:
-        """Let the motor follow the demand (see the module)."""
+        """Move the motor after the demand (see the module)."""
         lag, acceleration = self._model.lag, self._acceleration
         bend = lag * lag * acceleration
         offset = self.position - (self.demand - lag * self.demand_velocity + bend)
@@ -374,7 +374,7 @@ class Axis:
         self._halt_at_stops()
 
     def _limit_rate(self, duration: float) -> None:
-        """Let the motor follow the demand as far as its speed allows."""
+        """Move the motor after the demand as far as its speed allows."""
         self._advance_demand(duration)
         lag, reach = self._model.lag, self.speed * duration
         gap = self.demand - self._setpoint

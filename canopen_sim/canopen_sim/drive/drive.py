@@ -162,7 +162,7 @@ class Drive:
             self._publish(now)
 
     def sync(self, now: float) -> None:
-        """Take a set-point with SYNC; :meth:`advance` was called for this time before."""
+        """Apply a set-point with SYNC; :meth:`advance` was called for this time before."""
         if self._machine.operating and self._mode.sync(now):
             self._schedule(now)
 
@@ -196,7 +196,7 @@ class Drive:
             self.raise_fault(kind.code, now, at_once=kind.at_once)
 
     def clear(self, fault: Fault, now: float) -> None:
-        """Take the cause of a fault away; the drive then still waits for a fault reset."""
+        """Remove the cause of a fault; the drive then still waits for a fault reset."""
         self.causes.discard(fault)
         if fault is Fault.BLOCKED_MOTOR:
             self.release(now)
@@ -226,7 +226,7 @@ class Drive:
                 self._axis.set_stops(at, math.inf)
 
     def release(self, now: float | None = None) -> None:
-        """Take mechanical stops away."""
+        """Remove mechanical stops."""
         with self._at(now):
             self._axis.set_stops(-math.inf, math.inf)
 

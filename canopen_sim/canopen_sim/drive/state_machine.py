@@ -263,11 +263,11 @@ class StateMachine:
         self._axis.stop(self.deceleration(option.ramp))
 
     def disable(self) -> None:
-        """Take the torque away at once, as "disable voltage" does."""
+        """Remove the torque at once, as "disable voltage" does."""
         self._power_off(State.SWITCH_ON_DISABLED)
 
     def advance(self, now: float) -> None:
-        """Leave a state whose ramp has ended; the axis was advanced before."""
+        """Exit a state whose ramp has ended; the axis was advanced before."""
         if not self.transient or not self._axis.settled:
             return
         if self._pending is not None:

@@ -68,7 +68,7 @@ class Variable:
         return byte_length(self.entry.data_type)
 
     def restore(self) -> None:
-        """Take the default again, without telling the listener."""
+        """Restore the default, without a call of the listener."""
         self.value = default_value(self.entry)
 
     def decoded(self, data: bytes) -> Value:
@@ -206,7 +206,7 @@ class ObjectStore:
     def integer(self, index: int, subindex: int = 0, *, default: int = 0) -> Integer:
         """Bind an integer object, for the device's own use.
 
-        A device whose dictionary lacks it gets one that nobody outside can see.
+        A device whose dictionary lacks it gets one that is invisible outside.
 
         Args:
             index: Object index.
@@ -221,7 +221,7 @@ class ObjectStore:
         )
 
     def restore(self, first: int, last: int) -> None:
-        """Give the objects from one index to another (included) their saved or default values."""
+        """Restore saved or default values of objects from one index to another (included)."""
         for address, variable in self._variables.items():
             if first <= address[0] <= last:
                 variable.restore()
@@ -229,7 +229,7 @@ class ObjectStore:
                     variable.value = self.saved[address]
 
     def renumber(self, dictionary: ObjectDictionary) -> None:
-        """Take the defaults that the same objects have for another node id."""
+        """Use the defaults that the same objects have for another node id."""
         self.dictionary = dictionary
         for entry in dictionary:
             self._variables[entry.address].entry = entry

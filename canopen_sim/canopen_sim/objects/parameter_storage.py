@@ -148,7 +148,7 @@ class ParameterStorage:
                     variable.listener = partial(self._accept, variable, act)
 
     def load(self) -> None:
-        """Let the saved values take effect at the next restoring of the store."""
+        """Put the saved values in force at the next restoring of the store."""
         saved: dict[tuple[int, int], Value] = {}
         for address, data in self._memory.values.items():
             if address not in self._store:

@@ -84,7 +84,7 @@ class EmcyProducer:
         self._flush_at = NEVER
 
     def allow(self, allowed: bool, now: float) -> None:
-        """Let messages out, or hold them back (NMT Stopped)."""
+        """Allow messages, or hold them back (NMT Stopped)."""
         self._allowed = allowed
         self._flush(now)
 

@@ -125,7 +125,7 @@ class ErrorControl:
         self._next_heartbeat = NEVER
 
     def receive(self, frame: Frame, now: float) -> None:
-        """Take a heartbeat of another device."""
+        """Process a heartbeat of another device."""
         node_id = frame.can_id - CobId.HEARTBEAT
         period = self._periods.get(node_id)
         if period is None or parse_heartbeat(frame.data) is None:
@@ -165,7 +165,7 @@ class ErrorControl:
             self._lose(now, self)
 
     def postpone(self, stalled: float) -> None:
-        """Leave out a time in [s] in which nothing was received."""
+        """Postpone time-outs by a time in [s] in which nothing was received."""
         for node_id in self._watched:
             self._watched[node_id] += stalled
         self._first_loss += stalled

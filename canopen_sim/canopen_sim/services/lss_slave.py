@@ -74,7 +74,7 @@ class LssSlave:
         self._scan_position = 0
 
     def receive(self, frame: Frame, now: float) -> None:
-        """Take a request; what makes no sense is ignored."""
+        """Process a request; those without meaning are ignored."""
         message = decode_lss(frame.data)
         if message is None:
             return
@@ -157,7 +157,7 @@ class LssSlave:
                 self._answer(lss_bytes(LssCommand.IDENTIFIED))
 
     def _scan(self, step: FastScan) -> None:
-        """Take a step of fast scan, which only devices without a node id join (CiA 305, 6.6)."""
+        """Process a step of fast scan; only devices without a node id join (CiA 305, 6.6)."""
         if self.node_id != UNCONFIGURED or self.state is LssState.CONFIGURATION:
             return
         if step.bit == WHOLE_NUMBER:

@@ -65,7 +65,7 @@ class Rpdo(PdoChannel):
         self._short = self._late = False
 
     def receive(self, frame: Frame, now: float) -> None:
-        """Take a PDO: into the dictionary at once, or at the next SYNC."""
+        """Receive a PDO: into the dictionary at once, or at the next SYNC."""
         short = len(frame.data) < self.codec.size
         if short is not self._short:
             self._short = short
@@ -205,7 +205,7 @@ class RpdoEngine(PdoEngine[Rpdo]):
             rpdo.notify_listeners(now)
 
     def postpone(self, stalled: float) -> None:
-        """Leave out a time in [s] in which nothing was received."""
+        """Postpone time-outs by a time in [s] in which nothing was received."""
         for rpdo in self.active:
             rpdo.deadline += stalled
 

@@ -59,7 +59,7 @@ class BlockDownload:
         )
 
     def segment(self, frame: bytes) -> bytes | None:
-        """Take a segment; after the last one of a block return how far they came in order.
+        """Receive a segment; after the last one of a block return how far they came in order.
 
         Raises:
             SdoAbortError: The sequence number is 0, or the data are longer than announced.
@@ -82,7 +82,7 @@ class BlockDownload:
         return struct.pack('<BBB5x', DOWNLOAD_ACKNOWLEDGED, taken, BLOCK_SEGMENTS_MAX)
 
     def end(self, request: bytes) -> bytes:
-        """Take the client's end; check length and checksum, and return the answer.
+        """Process the client's end; check length and checksum, and return the answer.
 
         Raises:
             SdoAbortError: A check failed, or the client has not sent everything.

@@ -76,7 +76,7 @@ class SyncConsumer:
         self._paused = False
 
     def receive(self, frame: Frame, now: float) -> None:
-        """Take a SYNC; one of the wrong length is reported, and processed nevertheless."""
+        """Process a SYNC; one of the wrong length is reported as well."""
         self._length_error(len(frame.data) != bool(self._overflow.value), now)
         if not self._cycle.value:
             self._measure(now)

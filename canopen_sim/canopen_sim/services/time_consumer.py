@@ -56,7 +56,7 @@ class TimeConsumer:
         self._received = None
 
     def receive(self, frame: Frame, now: float) -> None:
-        """Take a TIME message; one of another length is none."""
+        """Process a TIME message; one of another length is ignored."""
         with contextlib.suppress(CodecError):
             self._received = decode_time_of_day(frame.data), now
 

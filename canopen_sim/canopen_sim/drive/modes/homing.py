@@ -100,7 +100,7 @@ class Homing(Mode):
         return self._search is not None or self._home is not None
 
     def reset(self) -> None:
-        """Be not homed, as after switching on."""
+        """Forget home, as after switching on."""
         self._attained = self._failed = False
         self._cancel()
 
@@ -146,7 +146,7 @@ class Homing(Mode):
             self._go(self._move, now)
 
     def step(self, now: float) -> None:
-        """Look at the switches; take home over when the axis stands."""
+        """Read the switches; apply home when the axis stands."""
         axis = self.axis
         if self._search is not None and now >= self.due:
             self.due = now + STEP

@@ -60,7 +60,7 @@ class Mode:
         self.axis.stop(self.objects.slow_down)
 
     def command(self, word: int, previous: int, now: float) -> None:
-        """See the controlword change in its mode-specific bits."""
+        """React to mode-specific bits of the controlword that changed."""
 
     def halt(self, now: float) -> None:
         """Halt was requested; the axis is ramping down already."""
@@ -69,18 +69,18 @@ class Mode:
         """Halt is over."""
 
     def load_changed(self, now: float) -> None:
-        """See another load torque."""
+        """React to another load torque."""
 
     def setpoint(self, now: float) -> bool:
-        """See a target object written, the axis at an earlier time; return whether it moves."""
+        """React to a written target, the axis at an earlier time; return whether it moves."""
         return False
 
     def sync(self, now: float) -> bool:
-        """See a SYNC, the axis at an earlier time; return whether the motion has changed."""
+        """React to SYNC, the axis at an earlier time; return whether the motion has changed."""
         return False
 
     def step(self, now: float) -> None:
-        """Look at the axis after a step of it."""
+        """Check the axis after a step of it."""
 
     def status(self) -> int:
         """Return bits 10, 12 and 13 of the statusword."""
@@ -111,7 +111,7 @@ class Dwell:
         self.reached = self.pending = False
 
     def update(self, condition: bool, duration: float, now: float) -> None:
-        """Look at the condition, which has to be met for a duration in [s]."""
+        """Check the condition, which has to be met for a duration in [s]."""
         if not condition:
             self.clear()
             return

@@ -77,7 +77,7 @@ class ProfilePosition(Mode):
         self._dwell.clear()
 
     def command(self, word: int, previous: int, now: float) -> None:
-        """Take a set-point at the rising edge of bit 4."""
+        """Accept a set-point at the rising edge of bit 4."""
         if word & ~previous & NEW_SET_POINT:
             self._offer(word, now)
         elif not word & NEW_SET_POINT:

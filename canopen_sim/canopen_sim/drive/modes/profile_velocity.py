@@ -61,7 +61,7 @@ class ProfileVelocity(Mode):
         return True
 
     def step(self, now: float) -> None:
-        """See whether the velocity is reached, and whether it is zero."""
+        """Check whether the velocity is reached, and whether it is zero."""
         objects, velocity = self.objects, self.axis.velocity
         self.limited = self._bounded and self.axis.arrived
         wanted = math.copysign(min(abs(self._target), objects.speed), self._target)

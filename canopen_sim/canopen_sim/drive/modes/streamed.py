@@ -52,7 +52,7 @@ class Streamed(Mode):
         self._fresh = self._streaming = False
 
     def setpoint(self, now: float) -> bool:
-        """Keep the set-point for the next SYNC, or take it."""
+        """Keep the set-point for the next SYNC, or apply it."""
         if not self.following:
             return False
         if self.clock.alive(now):
@@ -61,7 +61,7 @@ class Streamed(Mode):
         return self.take(self.objects.setpoint_period, now)
 
     def sync(self, now: float) -> bool:
-        """Take the set-point that came since the last SYNC."""
+        """Apply the set-point that came since the last SYNC."""
         fresh, self._fresh = self._fresh, False
         steady, self._streaming = self._streaming and fresh, fresh
         if not fresh:
@@ -164,7 +164,7 @@ class InterpolatedPosition(Streamed):
         return self.go(self.objects.interpolation_target.value, period, now)
 
     def setpoint(self, now: float) -> bool:
-        """Keep the set-point for its SYNC, or take it."""
+        """Keep the set-point for its SYNC, or apply it."""
         size = min(self.objects.buffer_size.value, self.objects.buffer_maximum.value)
         if not self.objects.buffer_clear.value:
             return False
@@ -175,7 +175,7 @@ class InterpolatedPosition(Streamed):
         return super().setpoint(now)
 
     def sync(self, now: float) -> bool:
-        """Take the oldest set-point of the buffer, or the one since the last SYNC."""
+        """Apply the oldest set-point of the buffer, or the one since the last SYNC."""
         if not self._buffer:
             return super().sync(now)
         if not self.following:

@@ -55,12 +55,12 @@ class TorqueMode(Mode):
         self._acting = False
 
     def halt(self, now: float) -> None:
-        """Let the axis be held."""
+        """Hold the axis."""
         self._acting = False
         self.due = NEVER
 
     def act(self, now: float) -> None:
-        """Let the torque act from now on."""
+        """Apply the torque from now on."""
         if not self._acting:
             self._acting = True
             self._torque = self.objects.held_torque(self.axis.torque)
@@ -69,7 +69,7 @@ class TorqueMode(Mode):
             self.due = now
 
     def load_changed(self, now: float) -> None:
-        """See another load, which may move a motor at rest."""
+        """React to another load, which may move a motor at rest."""
         if self._acting:
             self.act(now)
 
@@ -140,7 +140,7 @@ class CyclicTorque(TorqueMode, Streamed):
         return self._target
 
     def halt(self, now: float) -> None:
-        """Forget set-points and let the axis be held."""
+        """Forget set-points and hold the axis."""
         Streamed.halt(self, now)
         TorqueMode.halt(self, now)
 
