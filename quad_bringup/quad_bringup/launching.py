@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from .exceptions import ArgumentError
 
@@ -14,21 +14,13 @@ STOP_TIMEOUT = 30.0
 TRUE, FALSE = 'true', 'false'
 
 
-@dataclass(frozen=True, slots=True)
-class LaunchArgument:
-    """An argument as ``name:=value``.
+class LaunchArgument(NamedTuple):
+    """An argument as ``name:=value``."""
 
-    Attributes:
-        name: Its name; with two dashes in front, that of the bring-up's argument.
-        default: Its default; empty to leave it to the bring-up.
-        description: What ``ros2 launch --show-args`` says.
-        flag: It is true or false, and the bring-up's argument has no value.
-    """
-
-    name: str
-    default: str
-    description: str
-    flag: bool = False
+    name: str  # with two dashes in front, that of the bring-up's argument
+    default: str  # empty to leave it to the bring-up
+    description: str  # what ``ros2 launch --show-args`` prints
+    flag: bool = False  # it is true or false, and the bring-up's argument has no value
 
 
 LAUNCH_ARGUMENTS = (

@@ -103,26 +103,24 @@ def test_typed_key_times_out_in_two_stages() -> None:
     assert keys.current(0.58) is None
 
 
-def test_slow_repeat_delay_is_learned() -> None:
-    """A desktop that repeats after 0.66 s stutters once only."""
-    keys, auto_repeat = fed('0 type i, 0.66 type i, 0.69 type i, 0.72 type i')
-    assert auto_repeat.first > 0.66
-    keys.feed(KeyEvent('i', KeyAction.TYPED, 5.0))
-    assert keys.current(5.66) == 'i'
+TAPS = '0 type i, 0.3 type i, 0.6 type i, 0.75 type i, 1.1 type i, 1.3 type i'
 
 
-def test_fast_repeat_delay_is_learned() -> None:
-    """A keyboard that repeats after 0.25 s makes a tap end after that, not after the guess."""
-    keys, auto_repeat = fed('0 type i, 0.25 type i, 0.28 type i, 0.31 type i')
-    assert 0.25 < auto_repeat.first < 0.35
+@pytest.mark.parametrize(
+    ('events', 'least', 'most'),
+    [
+        ('0 type i, 0.66 type i, 0.69 type i, 0.72 type i', 0.66, 0.8),
+        ('0 type i, 0.25 type i, 0.28 type i, 0.31 type i', 0.25, 0.35),
+        (TAPS, AutoRepeat().first, AutoRepeat().first),
+    ],
+)
+def test_repeat_delay_of_the_keyboard_is_learned(events: str, least: float, most: float) -> None:
+    """A slow one stutters once only, a tap ends after a fast one; taps teach nothing."""
+    keys, auto_repeat = fed(events)
+    assert least <= auto_repeat.first <= most
     keys.feed(KeyEvent('i', KeyAction.TYPED, 5.0))
+    assert keys.current(5.0 + least - 1e-3) == 'i'
     assert keys.current(5.0 + auto_repeat.first) is None
-
-
-def test_taps_teach_nothing() -> None:
-    """Single taps, at whatever pace of a hand, leave the guess as it is."""
-    _, auto_repeat = fed('0 type i, 0.3 type i, 0.6 type i, 0.75 type i, 1.1 type i, 1.3 type i')
-    assert auto_repeat.first == AutoRepeat().first
 
 
 def test_second_tap_within_the_delay_gets_the_long_time_out() -> None:

@@ -9,9 +9,6 @@ import pytest
 from operator_input.key_decoder import Kitty, Report, ReportKind
 from operator_input.terminal import (
     POP,
-    PROBE,
-    PROBE_PERIOD,
-    PROBE_TIMEOUT,
     PUSH,
     Stage,
     TerminalDialogue,
@@ -52,12 +49,3 @@ def test_every_push_is_popped(reports: list[Report]) -> None:
     written += dialogue.stop()
     assert written.count(PUSH) == written.count(POP)
     assert written.count(PUSH) <= 1
-
-
-def test_silent_terminal_is_lost() -> None:
-    """A terminal that answers no probe is given up after the time-out, and not before."""
-    dialogue = TerminalDialogue()
-    assert dialogue.probe(10.0) == PROBE
-    assert not dialogue.probe(10.0 + PROBE_PERIOD / 2)
-    assert not dialogue.is_lost(10.0 + PROBE_TIMEOUT)
-    assert dialogue.is_lost(10.1 + PROBE_TIMEOUT)

@@ -116,18 +116,6 @@ def test_live_line_keeps_the_held_key() -> None:
     assert actions(events) == [('i', KeyAction.PRESSED)]
 
 
-def test_closed_window_is_reported() -> None:
-    """Reading from a window that was closed raises, instead of blocking."""
-    with (
-        ScriptedTerminal(kitty=False) as terminal,
-        TerminalKeyboard(terminal.path) as keyboard,
-    ):
-        negotiate(keyboard)
-        terminal.hang_up()
-        with pytest.raises(TerminalError, match='gone'):
-            read_until(keyboard, lambda _: False)
-
-
 def test_pause_gives_the_terminal_back() -> None:
     """During a pause the shell has its terminal; afterwards keys are read again."""
     with ScriptedTerminal(kitty=True) as terminal, TerminalKeyboard(terminal.path) as keyboard:
