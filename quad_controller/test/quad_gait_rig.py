@@ -8,7 +8,14 @@ from dataclasses import replace
 import math
 
 from quad_builds import Build, urdf
-from quad_controller import Controller, GaitParameters, State, StateParameters, Velocity
+from quad_controller import (
+    Controller,
+    GaitGenerator,
+    GaitParameters,
+    State,
+    StateParameters,
+    Velocity,
+)
 from quad_controller.policy.observation import Situation
 from quad_controller.policy.runner import PolicyRunner, PolicyStep
 from quad_description import ImuSample, JointSample, quadruped, RobotState, Targets
@@ -55,6 +62,30 @@ class StillPolicy(PolicyRunner):
         """Answer."""
         self.velocities.append(inputs.velocity)
         return PolicyStep(self.targets, '' if self.targets is not None else 'broken on purpose')
+
+
+STAND = GaitGenerator(ROBOT, GaitParameters()).stand_targets
+
+
+def standing(rig: Rig | None = None, mode: str = 'stand') -> Rig:
+    """Return a rig that has stood up, and has been in a mode for a while."""
+    rig = rig or Rig()
+    rig.step()
+    rig.ask('stand')
+    rig.run(3.0)
+    assert rig.is_in(State.STAND)
+    if mode != 'stand':
+        rig.ask(mode)
+        rig.run(1.0)
+    rig.log.clear()
+    return rig
+
+
+def policy_rig(policy: StillPolicy | None = None, **parameters: bool) -> tuple[Rig, StillPolicy]:
+    """Return a rig with a policy, one that stands by default."""
+    policy = policy or StillPolicy(STAND)
+    controller = Controller(ROBOT, GaitParameters(), StateParameters(**parameters), policy=policy)
+    return Rig(controller), policy
 
 
 class Rig:

@@ -15,7 +15,6 @@ from quad_controller import (
     Answer,
     BodyPose,
     Controller,
-    GaitGenerator,
     GaitParameters,
     MODES,
     ParameterError,
@@ -38,9 +37,12 @@ from quad_gait_rig import (
     FOLDED,
     LYING,
     PERIOD,
+    policy_rig,
     Rig,
     ROBOT,
+    STAND,
     STANDING,
+    standing,
     StillPolicy,
     tilted,
     UPRIGHT,
@@ -48,26 +50,8 @@ from quad_gait_rig import (
 
 pytestmark = pytest.mark.slow
 
-STAND = GaitGenerator(ROBOT, GaitParameters()).stand_targets
 FORWARD = Velocity(0.1)
 SPINNING = replace(UPRIGHT, angular_velocity=(0.0, 9.5, 0.0))
-
-
-def policy_rig(**parameters: bool) -> tuple[Rig, StillPolicy]:
-    """Return a rig with a policy that stands."""
-    policy = StillPolicy(STAND)
-    controller = Controller(ROBOT, GaitParameters(), StateParameters(**parameters), policy=policy)
-    return Rig(controller), policy
-
-
-def standing(rig: Rig | None = None) -> Rig:
-    """Return a rig that has stood up."""
-    rig = rig or Rig()
-    rig.step()
-    rig.ask('stand')
-    rig.run(3.0)
-    assert rig.is_in(State.STAND)
-    return rig
 
 
 def test_nothing_is_sent_before_the_joints_are_known() -> None:
@@ -139,7 +123,7 @@ def test_stands_up_walks_and_lies_down() -> None:
     feet = ROBOT.feet(rig.positions)
     assert feet[0][2] == pytest.approx(ROBOT.legs[0].hip[2] - 0.055, abs=1e-6)
     assert [line for line in rig.log if '->' in line] == [
-        'relax -> stand', 'stand -> walk', 'walk -> turn', 'turn -> lie', 'lie -> relax',
+        'stand -> walk', 'walk -> turn', 'turn -> lie', 'lie -> relax',
     ]  # fmt: skip
 
 

@@ -9,21 +9,18 @@ from dataclasses import replace
 import pytest
 
 from quad_controller import (
-    Controller,
     find_policy,
     GaitGenerator,
     GaitParameters,
     load_policy,
     PolicyOptions,
     State,
-    StateParameters,
     Velocity,
 )
 from quad_description import Targets
 from quad_gait_physics import MODEL, PhysicsRig
-from quad_gait_rig import PERIOD, Rig, ROBOT, StillPolicy, tilted
+from quad_gait_rig import PERIOD, policy_rig, STAND, standing, StillPolicy, tilted
 
-STAND = GaitGenerator(ROBOT, GaitParameters()).stand_targets
 CROUCHED = tuple(angle + 0.1 for angle in STAND)
 STANDING_LOW = tuple(angle + 0.05 for angle in STAND)
 FORWARD = Velocity(0.15)
@@ -34,16 +31,6 @@ def good(name: str = 'good', targets: Targets = CROUCHED) -> StillPolicy:
     policy = StillPolicy(targets)
     policy.name = name
     return policy
-
-
-def standing(policy: StillPolicy | None = None, mode: str = 'stand') -> Rig:
-    """Return a rig that stands, by a policy if there is one and the mode is its."""
-    rig = Rig(Controller(ROBOT, GaitParameters(), StateParameters(), policy=policy))
-    rig.step()
-    rig.ask(mode)
-    rig.run(4.0)
-    rig.log.clear()
-    return rig
 
 
 @pytest.mark.parametrize('mode', ['stand', 'walk', 'turn'])
@@ -69,7 +56,7 @@ def test_a_policy_takes_over_from_the_gait_standing(mode: str) -> None:
 def test_the_robot_stands_between_two_policies_and_the_gait() -> None:
     """The former one winds down without a velocity; the next one gets it again."""
     former, policy = good('former'), good('new', STANDING_LOW)
-    rig = standing(former, 'policy')
+    rig = standing(policy_rig(former)[0], 'policy')
     rig.run(1.0, FORWARD)
     assert rig.controller.follow(policy).accepted
     former.velocities.clear()
@@ -99,7 +86,7 @@ def test_the_robot_stands_between_two_policies_and_the_gait() -> None:
 def test_what_comes_between_ends_the_swap(end: str) -> None:
     """The robot does not walk off afterwards; the mode policy follows the new one."""
     former, policy = good('former'), good('new')
-    rig = standing(former, 'policy')
+    rig = standing(policy_rig(former)[0], 'policy')
     rig.run(1.0, FORWARD)
     assert rig.controller.follow(policy).accepted
     rig.run(0.1)
@@ -121,7 +108,7 @@ def test_what_comes_between_ends_the_swap(end: str) -> None:
 def test_a_policy_that_fails_is_no_obstacle() -> None:
     """The robot stands by the gait in between."""
     former, policy = good('former'), good('new')
-    rig = standing(former, 'policy')
+    rig = standing(policy_rig(former)[0], 'policy')
     rig.run(1.0, FORWARD)
     former.targets = None
     assert rig.controller.follow(policy).accepted

@@ -11,20 +11,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
-from quad_controller import (
-    Controller,
-    GaitGenerator,
-    GaitParameters,
-    State,
-    StateParameters,
-    Velocity,
-)
+from quad_controller import State, StateParameters, Velocity
 from quad_description import ImuSample
-from quad_gait_rig import PERIOD, Rig, ROBOT, StillPolicy, tilted, UPRIGHT
+from quad_gait_rig import (
+    PERIOD,
+    policy_rig,
+    Rig,
+    ROBOT,
+    STAND,
+    standing,
+    StillPolicy,
+    tilted,
+    UPRIGHT,
+)
 
 pytestmark = pytest.mark.slow
 
-STAND = GaitGenerator(ROBOT, GaitParameters()).stand_targets
 LYING = ROBOT.legs[0].hip[2] - StateParameters().lie_height  # [m] of the feet, below the body
 FORWARD = Velocity(0.1)
 SPINNING = replace(UPRIGHT, angular_velocity=(0.0, 20.0, 0.0))
@@ -34,13 +36,8 @@ NAN_TARGETS = (math.nan,) * 12
 
 def on_its_feet(mode: str, duration: float = 1.0) -> tuple[Rig, StillPolicy]:
     """Return a rig that does what a mode says [s]."""
-    policy = StillPolicy(STAND)
-    rig = Rig(Controller(ROBOT, GaitParameters(), StateParameters(), policy=policy))
-    rig.step()
-    rig.ask('stand')
-    rig.until(State.STAND)
-    rig.run(1.5)
-    rig.ask(mode)
+    rig, policy = policy_rig()
+    standing(rig).ask(mode)
     rig.run(duration, FORWARD)
     return rig, policy
 
