@@ -113,6 +113,19 @@ class JointLimits:
             jerk=frozen(self.jerk * acceleration),
         )
 
+    def beyond(self, positions: Array, tolerance: float) -> str:
+        """Return in words which joint is farthest beyond its limits; empty where none is."""
+        off = np.maximum(self.lower - positions, positions - self.upper)
+        joint = int(off.argmax())
+        return self.beyond_words(joint, float(positions[joint])) if off[joint] > tolerance else ''
+
+    def beyond_words(self, joint: int, position: float) -> str:
+        """Return in words that a joint, by its number, is beyond its limits."""
+        lower, upper = self.lower[joint], self.upper[joint]
+        return (
+            f'{self.names[joint]} at {position:.4f} is beyond its limits {lower:.4f}..{upper:.4f}'
+        )
+
     @property
     def continuous(self) -> Mask:
         """Mask of the joints that turn without end."""

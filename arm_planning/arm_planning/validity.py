@@ -112,7 +112,8 @@ class ValidityCheck:
         beyond = farthest_beyond(path, self._limits.lower, self._limits.upper)
         if beyond is not None:
             positions = path.at(beyond.time).position
-            return self._outside(beyond.joint, beyond.position, positions, beyond.time)
+            words = self._limits.beyond_words(beyond.joint, beyond.position)
+            return Violation(words, positions, time=beyond.time)
         return self.contact(path)
 
     def contact(self, path: Path) -> Violation | None:
@@ -199,25 +200,10 @@ class ValidityCheck:
 
     def _beyond(self, lower: Array, upper: Array) -> Violation | None:
         """Return which joint is beyond its limits between two bounds, if one is."""
-        limits = self._limits
         if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
             return Violation('joint positions must be finite numbers', lower)
-        beyond = np.maximum(limits.lower - lower, upper - limits.upper)
-        joint = int(beyond.argmax())
-        if beyond[joint] <= LIMIT_TOLERANCE:
-            return None
-        place = lower if lower[joint] < limits.lower[joint] else upper
-        return self._outside(joint, float(place[joint]), place)
-
-    def _outside(
-        self, joint: int, position: float, positions: Array, time: float = 0.0
-    ) -> Violation:
-        limits = self._limits
-        reason = (
-            f'{limits.names[joint]} at {position:.4f} is beyond its range'
-            f' {limits.lower[joint]:.4f}..{limits.upper[joint]:.4f}'
-        )
-        return Violation(reason, positions, time=time)
+        found = ((self._limits.beyond(each, LIMIT_TOLERANCE), each) for each in (lower, upper))
+        return next((Violation(words, each) for words, each in found if words), None)
 
     def _touching(self, positions: Array, time: float) -> Violation | None:
         contacts = self._clearances.contacts(positions)

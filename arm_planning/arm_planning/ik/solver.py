@@ -199,14 +199,8 @@ class IkSolver:
         return self._clearances
 
     def _at_limits(self, positions: Array) -> str:
-        limits = self._limits
-        beyond = np.maximum(limits.lower - positions, positions - limits.upper)
-        joint = int(beyond.argmax())
-        return (
-            f'every solution is beyond the limits; the nearest has {limits.names[joint]} at'
-            f' {positions[joint]:.3f}, its limits are {limits.lower[joint]:.3f}..'
-            f'{limits.upper[joint]:.3f}'
-        )
+        words = self._limits.beyond(positions, -math.inf)
+        return f'every solution is beyond the limits; of the nearest {words}'
 
     def _why_none(self, pose: Pose, best: Descent, starts: int) -> str:
         """Return why no start led to the pose: without limits one may."""

@@ -245,21 +245,16 @@ class _Tracer:
         return worst
 
     def _check_range(self, place: _Place) -> None:
-        limits, positions = self._limits, place.positions
-        beyond = np.maximum(limits.lower - positions, positions - limits.upper)
-        joint = int(beyond.argmax())
-        if beyond[joint] > RANGE_TOLERANCE:
+        if words := self._limits.beyond(place.positions, RANGE_TOLERANCE):
             raise self._refused(
-                f'at {place.share:.0%} of the way {limits.names[joint]} would be at'
-                f' {positions[joint]:.3f}, beyond its limits {limits.lower[joint]:.3f}..'
-                f'{limits.upper[joint]:.3f}; start in another configuration'
+                f'at {place.share:.0%} of the way {words}; start in another configuration'
             )
         ratio = np.abs(place.first) / self._speed
         joint = int(ratio.argmax())
         if ratio[joint] > MAX_SLOWDOWN:
             speed = place.first[joint] / self._duration
             self._refuse_singular(
-                place.share, f': {limits.names[joint]} would need {abs(speed):.0f} rad/s'
+                place.share, f': {self._limits.names[joint]} would need {abs(speed):.0f} rad/s'
             )
 
     def _refuse_singular(self, share: float, words: str) -> NoReturn:

@@ -87,7 +87,7 @@ def _files(config: Path) -> list[FlatYaml]:
     for names, prefix in FILES:
         path = next((config / name for name in names if (config / name).is_file()), None)
         if path is not None:
-            found.append(_unwrapped(read_flat(path, prefix), prefix))
+            found.append(read_flat(path, prefix))
     found += [
         read_flat(path, f'{path.name.removesuffix("_planning.yaml")}.')
         for path in sorted(config.glob('*_planning.yaml'))
@@ -96,17 +96,6 @@ def _files(config: Path) -> list[FlatYaml]:
     if controllers is not None:
         found.append(read_flat(controllers))
     return found
-
-
-def _unwrapped(flat: FlatYaml, prefix: str) -> FlatYaml:
-    """Return a file without the table that some wrap around all of it."""
-    twice = f'{prefix}{prefix}' if prefix else ''
-    if not twice or not any(name.startswith(twice) for name in flat.places):
-        return flat
-    return FlatYaml(
-        {name.replace(twice, prefix, 1): value for name, value in flat.values.items()},
-        {name.replace(twice, prefix, 1): place for name, place in flat.places.items()},
-    )
 
 
 def _controllers(config: Path) -> Path | None:

@@ -86,7 +86,9 @@ def _walk(
         name = f'{prefix}{key}'
         if isinstance(value_node, yaml.MappingNode):
             yield name, _Table(), line
-            yield from _walk(path, loader, value_node, f'{name}.')
+            # some files have the table of their prefix around all of it
+            inner = prefix if f'{key}.' == prefix else f'{name}.'
+            yield from _walk(path, loader, value_node, inner)
         else:
             yield name, _value(loader, value_node), line
 

@@ -20,6 +20,8 @@ MAX_POINTS = 5000
 """Points of a trajectory at most: they take a second to plan, for which others wait."""
 
 
+SPAN_TOLERANCE = 1e-6  # how far a point may be beyond a limit for rounding in [rad]
+
 MIN_JOIN_TIME = 0.05
 """Time in which a trajectory that has begun already must not be joined yet in [s]."""
 
@@ -86,7 +88,8 @@ def upcoming_points(
     points = _upcoming(_ordered(goal, limits, state, rules), goal.age)
     points = _by_the_short_way(points, limits, state)
     for number, positions in enumerate(points.positions):
-        _check_span(positions, limits, f'point {number}')
+        if words := limits.beyond(positions, SPAN_TOLERANCE):
+            raise refuse(f'point {number}: {words}')
     _check_end(points, limits, rules)
     return points
 
@@ -212,16 +215,6 @@ def _by_the_short_way(points: Points, limits: JointLimits, state: RobotState) ->
     turns = np.round((state.position - points.positions[0]) / turn) * turn
     shifted = points.positions + np.where(limits.continuous, turns, 0.0)
     return replace(points, positions=shifted)
-
-
-def _check_span(positions: Array, limits: JointLimits, place: str) -> None:
-    beyond = (positions < limits.lower - 1e-6) | (positions > limits.upper + 1e-6)
-    if beyond.any():
-        joint = int(np.argmax(beyond))
-        raise refuse(
-            f'{place}: {limits.names[joint]} at {positions[joint]:.4f} is beyond its limits'
-            f' {limits.lower[joint]:.4f}..{limits.upper[joint]:.4f}'
-        )
 
 
 def _check_end(points: Points, limits: JointLimits, rules: GoalRules) -> None:
