@@ -19,11 +19,9 @@ Public, besides the names below: the module :mod:`.rotations`.
 from urdf_reader import DescriptionError
 
 from .backend import Backend, RecordedBackend
-from .exceptions import PresetError
 from .kinematics.leg import FEET, foot_position, jacobian, LegGeometry, LEGS, LegSolution, solve
 from .kinematics.quadruped import Feet, FootPose, Quadruped, quadruped, raised_feet, Targets
-from .poses import Pose, pose_positions, STREAM_TIMEOUT
-from .presets import PRESETS, robot_urdf
+from .presets import Pose, pose_positions, PresetError, PRESETS, robot_urdf, STREAM_TIMEOUT
 from .state import ContactSource, ImuSample, JointSample, OdometryState, RobotState
 from .urdf import Joint, JointLimits, movable_joints
 

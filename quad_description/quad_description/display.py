@@ -19,8 +19,7 @@ from urdf_reader import DescriptionError
 from node_runner import destroyed_when_refused, LATCHED, ParameterReader, refuse_misspelt, run_node
 
 from .kinematics.quadruped import quadruped
-from .poses import Pose, pose_positions
-from .presets import PRESETS, robot_urdf
+from .presets import Pose, pose_positions, PRESETS, robot_urdf
 from .urdf import Joint, movable_joints
 
 SWEEP_DURATION: Final = 2.5  # [s] for one joint, there and back

@@ -18,9 +18,9 @@ from .board.servos import Mount, Plant
 from .exceptions import SetupError, SimulationError
 from .line.faults import FaultKind, FaultPlan, parse_fault, SETTINGS
 from .line.robot_line import RobotLine
-from .plant.noise import BOARD, NONE
 from .plant.plant import KinematicRobot
 from .plant.servo import ServoModel, ServoParameters
+from .plant.state import BOARD, NONE
 from .plant.terrain import Terrain
 
 DEFAULT_LINK = Path('/tmp/xgo')  # noqa: S108  the path that the documentation names

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..exceptions import SetupError
 from ..physics.variation import Variation
-from ..plant.noise import BOARD, Noise, NONE
+from ..plant.state import BOARD, Noise, NONE
 
 Range = tuple[float, float]
 _VARIED = ('friction', 'trunk_mass', 'stiffness', 'damping')  # as in Variation

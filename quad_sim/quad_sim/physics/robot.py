@@ -15,9 +15,8 @@ from quad_description import FEET, movable_joints
 from quad_description.rotations import IDENTITY, normalized, Quaternion, Vector
 
 from ..exceptions import SetupError, SimulationError
-from ..plant.noise import disturb, Noise, NONE
 from ..plant.servo import ServoModel, ServoParameters
-from ..plant.state import Array, BasePose, BaseVelocity, Imu, Measurement
+from ..plant.state import Array, BasePose, BaseVelocity, disturb, Imu, Measurement, Noise, NONE
 from ..plant.targets import TargetRamp, Targets
 from ..plant.terrain import FLAT, Terrain
 from .inertial import base_rotation, InertialUnit, vector

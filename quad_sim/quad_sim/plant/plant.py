@@ -12,8 +12,7 @@ from quad_description import movable_joints
 from quad_description.rotations import Vector
 
 from ..exceptions import SetupError, TargetError
-from .noise import disturb, Noise, NONE
-from .state import Array, BasePose, BaseVelocity, Imu, Measurement
+from .state import Array, BasePose, BaseVelocity, disturb, Imu, Measurement, Noise, NONE
 from .targets import TargetRamp, Targets
 
 TIMESTEP = 0.002  # [s]

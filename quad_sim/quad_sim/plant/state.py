@@ -1,10 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The state of a simulated robot as values; frames as in REP 103, quaternions (x, y, z, w)."""
+"""The state of a simulated robot as values, and what noisy sensors measure of it.
+
+Frames are as in REP 103, quaternions are (x, y, z, w).
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,3 +63,62 @@ class Measurement:
     velocities: Array  # [rad/s], [m/s]
     torques: Array  # [N m], [N]
     foot_forces: Array  # normal force on each foot, in the order of the legs [N]
+
+
+ENCODER_STEP = 2 * math.pi / 4096  # [rad] the servos' magnetic encoder has 12 bits
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Standard deviations of the sensors."""
+
+    attitude: float = 0.0  # of the fused roll, pitch and yaw [rad]
+    angular_velocity: float = 0.0  # of the gyro [rad/s]
+    specific_force: float = 0.0  # of the accelerometer [m/s2]
+    position: float = 0.0  # of a joint [rad]
+    velocity: float = 0.0  # of a joint's speed [rad/s]
+    encoder_step: float = 0.0  # least difference of two positions [rad]; 0 for none
+
+    @property
+    def silent(self) -> bool:
+        """Whether measurements are the truth."""
+        return not any(getattr(self, name) for name in self.__slots__)
+
+
+NONE = Noise()
+"""Sensors without noise."""
+
+BOARD = Noise(
+    attitude=math.radians(0.1),
+    angular_velocity=0.01,
+    specific_force=0.05,
+    position=math.radians(0.05),
+    velocity=math.radians(2.0),
+    encoder_step=ENCODER_STEP,
+)
+"""A board with a 9-axis IMU and 12-bit encoders; the figures are ours."""
+
+
+def disturb(truth: Measurement, noise: Noise, random: np.random.Generator) -> Measurement:
+    """Return what noisy sensors measure of a true state."""
+    if noise.silent:
+        return truth
+    count = len(truth.positions)
+    # one draw for everything: the generator costs more than the numbers
+    drawn = random.standard_normal(2 * count + 9)
+    positions: Array = truth.positions + noise.position * drawn[:count]
+    velocities: Array = truth.velocities + noise.velocity * drawn[count : 2 * count]
+    if noise.encoder_step:
+        positions = np.round(positions / noise.encoder_step) * noise.encoder_step
+    vectors = drawn[2 * count :].tolist()
+    imu = Imu(
+        _scatter(truth.imu.specific_force, noise.specific_force, vectors[:3]),
+        _scatter(truth.imu.angular_velocity, noise.angular_velocity, vectors[3:6]),
+        _scatter(truth.imu.roll_pitch_yaw, noise.attitude, vectors[6:]),
+    )
+    return replace(truth, imu=imu, positions=positions, velocities=velocities)
+
+
+def _scatter(vector: Vector, deviation: float, drawn: list[float]) -> Vector:
+    (x, y, z), (dx, dy, dz) = vector, drawn
+    return x + deviation * dx, y + deviation * dy, z + deviation * dz
