@@ -158,3 +158,11 @@ def test_states_are_not_made_up_for_after_a_pause() -> None:
     robot.run(0.1)
     robot.now += 5.0
     assert len(robot.run(0.1)) <= 7
+
+
+def test_the_rest_of_a_frame_is_not_waited_for() -> None:
+    """Half a frame that promises twenty bytes holds no later one back."""
+    robot = VirtualRobot(*KINEMATIC, protocol=V1)
+    robot.line.receive(bytes.fromhex('55 00 14 00 50 80 80'), robot.now)
+    robot.run(0.1)
+    assert robot.ask(Frame(Kind.READ, Register.BATTERY, b'\x01'))[0].payload == bytes((100,))
