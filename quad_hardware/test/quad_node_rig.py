@@ -194,9 +194,14 @@ class NodeRig(Rig):
     def begin_anew(self) -> None:
         """Put the robot to zero, without faults, and forget what was received."""
         self.peer.behaviour = Behaviour()
-        # after a way down, commands begin where the legs are
-        self.command(list(self.receive('/joint_states').position))
-        self.receive('/joint_states', 3)  # by then the last command has arrived
+        before = len(self.peer.commands)
+
+        def is_commanded() -> bool:  # after a way down, commands begin where the legs are
+            self.command(list(self.receive('/joint_states', 10).position))
+            self.receive('/joint_states', 3)
+            return len(self.peer.commands) > before
+
+        self.client.spin_until(is_commanded, TIMEOUT, 'the last command')
         self.peer.angles.update(dict.fromkeys(self.peer.angles, 0.0))
         self.peer.commands.clear()
         for messages in self.received.values():
