@@ -167,16 +167,6 @@ def test_of_immediate_moves_the_newest_counts() -> None:
     assert net.motor() == pytest.approx(0.2, abs=1e-3)
 
 
-def test_relative_moves_add_up() -> None:
-    """Bit 6: from the last set-point on, also from one that is not reached yet."""
-    net = with_modes()
-    net.enable(OperationMode.PROFILE_POSITION)
-    for _ in range(3):
-        assert 'to ' in net.commands[JOINT].move(Move(0.1, relative=True, immediate=False))
-    net.run(3.0)
-    assert net.motor() == pytest.approx(0.3, abs=1e-3)
-
-
 def test_moves_are_for_mode_1_and_within_the_limits() -> None:
     """Another mode, a limit and a full queue are refused in words."""
     limits = (*MOTION_WRITES, sdo_write(0x607D, 1, -5_000), sdo_write(0x607D, 2, 5_000))
@@ -247,18 +237,6 @@ def test_a_homing_method_that_fails_says_so() -> None:
         net.do(JOINT, 'home')
     with pytest.raises(DriveError, match=r'homing method 36|method 36'):
         net.result(net.commands[JOINT].run('home', net.commands[JOINT].home(36)))
-
-
-def test_homing_is_cancelled_by_a_halt() -> None:
-    """The command ends with the reason, bit 4 is taken back, the motor stands."""
-    net = with_modes()
-    running = net.home(17)
-    net.run(0.5)
-    assert not running.done
-    net.do(JOINT, 'quick_stop', preempt=True)
-    assert 'ended by quick_stop' in str(running.error)
-    net.run(1.0)
-    assert net.speed() == pytest.approx(0.0, abs=0.01)
 
 
 @pytest.mark.parametrize('requested', [True, False])

@@ -617,22 +617,6 @@ def test_rpdos_leave_when_the_tpdos_of_the_sync_have_come() -> None:
 PDOS = {0x180: 'tpdo', 0x280: 'tpdo', 0x200: 'rpdo', 0x300: 'rpdo', 0x400: 'rpdo'}
 
 
-def test_an_update_that_was_missed_is_done_in_the_next_cycle() -> None:
-    """A computer that is too slow for its period still leads its drives."""
-    net = network('a')
-    net.boot()
-    updates: list[float] = []
-    net.network.on_cycle = lambda now, period: updates.append(now)
-    master = net.network
-    for number in (1, 2):
-        now = net.now + number * PERIOD
-        master.sync()
-        master.cycle(now, PERIOD)  # ends after the next deadline, each time
-        if now >= master.next_update:
-            master.update(now, PERIOD)
-    assert len(updates) == 1
-
-
 GUARD_TIME = 0.05  # [s]
 
 
@@ -757,17 +741,6 @@ def test_an_error_that_is_over_or_old_is_not_of_now() -> None:
     assert log.since(5.1) is None
     log.receive(Frame(0x81, Emergency(0, 0).encode(), timestamp=6.0))
     assert log.since(4.9) is None
-
-
-def test_the_last_emergencies_are_remembered() -> None:
-    """With their times, also after their end."""
-    net = VirtualNetwork(bus_config(drive_config('a', 2)))
-    for second, code in enumerate(('10 23', '00 00', '10 43')):
-        data = bytes.fromhex(f'{code} 01 00 00 00 00 00')
-        net.network.receive(Frame(0x082, data, net.now + second))
-    history = net.network.nodes['a'].emergencies.history
-    assert [emergency.code for _, emergency in history] == [0x2310, 0x0000, 0x4310]
-    assert [time - net.now for time, _ in history] == [0.0, 1.0, 2.0]
 
 
 @pytest.mark.parametrize('code', [0x0000, 0x2310], ids='code before 0x{:04X}'.format)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""200,000 random frames into a whole network: nothing breaks, hangs or moves unasked."""
+"""100,000 random frames into a whole network: nothing breaks, hangs or moves unasked."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from arm_canopen.standard import ALL_NODES, NmtCommand, NmtState
 
 pytestmark = pytest.mark.slow
 
-FRAMES = 50_000  # for each seed
+FRAMES = 50_000  # for each test
 BURST = 100  # frames between two looks
 RECOVERY_TIME = 30.0  # [s] in which the master has booted the devices again
 TARGET = 0.4  # [rad]
@@ -65,14 +65,13 @@ def make_noise(network: VirtualNetwork, source: random.Random, *, commanding: bo
     del network.feedback_times[:]
 
 
-@pytest.mark.parametrize('seed', range(2))
-def test_anything_on_the_bus(seed: int) -> None:
+def test_anything_on_the_bus() -> None:
     """Frames at every identifier, NMT and SDO included: the master boots all again by itself.
 
     Nothing is enabled then. Parameters that the noise has written by SDO are in the devices until
     they are reset, as after any other master; then they move as on the first day.
     """
-    source = random.Random(seed)
+    source = random.Random(0)
     network = make_network()
     for _ in range(FRAMES // BURST):
         make_noise(network, source, commanding=True)
@@ -114,10 +113,9 @@ def assert_cyclic(network: VirtualNetwork) -> None:
         assert len(network.frames(can_id, since=begin)) == pytest.approx(1.0 / PERIOD, abs=2)
 
 
-@pytest.mark.parametrize('seed', range(2))
-def test_noise_moves_nothing(seed: int) -> None:
+def test_noise_moves_nothing() -> None:
     """Frames at all identifiers that command no drive: no drive is enabled, nothing moves."""
-    source = random.Random(100 + seed)
+    source = random.Random(100)
     network = make_network()
     states: set[NmtState] = set()
     for _ in range(FRAMES // BURST):
