@@ -6,16 +6,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-import math
 
 from quad_controller import Controller, GaitParameters, State, StateParameters, Velocity
 from quad_controller.gait.velocity import REST
 from quad_controller.policy.runner import PolicyRunner
-from quad_description import Quadruped, quadruped, robot_urdf, RobotState
-from quad_sim.physics import PhysicsBackend, Robot
+from quad_description import quadruped, robot_urdf, RobotState
+from quad_sim.physics import Meter, PhysicsBackend, Robot
 
 PERIOD = 0.02  # [s]
-MODEL = quadruped(robot_urdf())
+URDF = robot_urdf()
+MODEL = quadruped(URDF)
 
 
 @dataclass(frozen=True)
@@ -43,15 +43,15 @@ class PhysicsRig:
         robot: Robot | None = None,
         gait: GaitParameters | None = None,
         policy: PolicyRunner | None = None,
-        model: Quadruped = MODEL,
+        urdf: str = URDF,
         sense: Callable[[RobotState], RobotState] = lambda state: state,
     ) -> None:
         """Stand up, by what the robot's sensors say."""
         self._sense = sense
-        self.robot, self.model = robot or Robot(robot_urdf()), model
+        self.robot, self.model, self._urdf = robot or Robot(urdf), quadruped(urdf), urdf
         self._backend = PhysicsBackend(self.robot, PERIOD)
         self.controller = Controller(
-            model, gait or GaitParameters(), StateParameters(), policy=policy
+            self.model, gait or GaitParameters(), StateParameters(), policy=policy
         )
         self.tilt = 0.0
         self.step(REST)
@@ -78,18 +78,12 @@ class PhysicsRig:
     def travel(self, duration: float, velocity: Velocity) -> Travel:
         """Walk with a velocity and return how the robot went."""
         self.tilt = 0.0
-        x = y = turned = 0.0
-        before = self.robot.base_pose
+        meter = Meter(self.robot, self._urdf)
         for _ in range(round(duration / PERIOD)):
             self.step(velocity)
-            after = self.robot.base_pose
-            heading = before.roll_pitch_yaw[2]
-            dx, dy = (b - a for a, b in zip(before.position[:2], after.position[:2], strict=True))
-            x += dx * math.cos(heading) + dy * math.sin(heading)
-            y += dy * math.cos(heading) - dx * math.sin(heading)
-            turned += math.remainder(after.roll_pitch_yaw[2] - heading, math.tau)
-            before = after
-        return Travel(x / duration, y / duration, turned / duration, self.tilt)
+            meter.sample()
+        way = meter.read()
+        return Travel(way.x / duration, way.y / duration, way.yaw / duration, way.tilt)
 
     @property
     def state(self) -> str:

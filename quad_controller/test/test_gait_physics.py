@@ -19,7 +19,7 @@ from quad_controller import (
     Velocity,
 )
 from quad_controller.gait.parameters import AS_TUNED, LOW_AND_WIDE
-from quad_description import Backend, quadruped, RecordedBackend, robot_urdf, RobotState, Targets
+from quad_description import Backend, RecordedBackend, robot_urdf, RobotState, Targets
 from quad_description.rotations import about_z, multiply, roll_pitch_yaw
 from quad_gait_physics import MODEL, PhysicsRig
 from quad_hardware.estimation import ImuMounting
@@ -85,7 +85,7 @@ def test_short_silences_of_joint_states_do_not_let_a_soft_robot_creep_down() -> 
 def test_other_builds_of_the_robot_walk_too(preset: str, arm: bool) -> None:
     """What differs is read from the URDF: limits, and an arm's weight, which stays in place."""
     urdf = robot_urdf(preset, arm)
-    rig = PhysicsRig(Robot(urdf), model=quadruped(urdf))
+    rig = PhysicsRig(urdf=urdf)
     rig.mode('walk')
     rig.run(1.0, Velocity(0.2))
     travel = rig.travel(8.0, Velocity(0.2))

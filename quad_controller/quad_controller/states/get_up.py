@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
 import math
 
 from quad_description import ImuSample, Quadruped, Targets
@@ -51,14 +50,6 @@ WITH_AN_ARM = (
     'it lies on its back and its arm, and how it turns over there is not known; put it on its '
     'feet or on a side by hand, then request get_up again'
 )
-
-
-@dataclass(frozen=True, slots=True)
-class FinalPoses:
-    """Where every way up leads."""
-
-    folded: Targets  # targets of a robot that lies with its feet under its hips [rad]
-    standing: Targets  # targets of one that stands [rad]
 
 
 class StillnessWatch:
@@ -114,14 +105,23 @@ class GetUp(Motion):
     """Brings a robot to its feet by poses."""
 
     def __init__(
-        self, robot: Quadruped, last: Targets, final: FinalPoses, *, swings: bool
+        self,
+        robot: Quadruped,
+        last: Targets,
+        *,
+        folded: Targets,
+        standing: Targets,
+        swings: bool,
     ) -> None:
         """Begin with waiting for rest.
 
         Args:
+            folded: Targets of a robot that lies with its feet under its hips [rad].
+            standing: Targets of one that stands [rad].
             swings: Whether it may throw itself off its back.
         """
-        self._robot, self._last, self._final = robot, last, final
+        self._robot, self._last = robot, last
+        self._folded, self._standing = folded, standing
         self._swings = swings
         self._motion: Motion = Hold(last, math.inf)
         self._deadline = REST_DEADLINE
@@ -225,12 +225,12 @@ class GetUp(Motion):
     def _stand_up(self) -> Iterator[None]:
         """Gather the legs, and stand on them."""
         self.text = f'lies {Lying.BELLY.value}; folds its legs, try {self._tries[Lying.BELLY]}'
-        self._start_stage(self._final.folded, FOLD_SPEED)
+        self._start_stage(self._folded, FOLD_SPEED)
         yield
         if self._lying is not Lying.BELLY:
             return
         self.text, self._rises = 'stands up', True
-        self._start_stage(self._final.standing, STAND_SPEED)
+        self._start_stage(self._standing, STAND_SPEED)
         yield
         self._rises = False
         self._finished = self._lying is Lying.BELLY and self._tilt < LEVEL

@@ -22,7 +22,7 @@ from quad_description import Quadruped, Targets
 
 from ..exceptions import ParameterError
 from ..gait.generator import GaitGenerator
-from .get_up import FinalPoses, GetUp
+from .get_up import GetUp
 from .modes import GAIT_STATES, MOVING_STATES, Reaction, State
 from .motion import Blend, Hold, Motion, Walk
 from .parameters import StateParameters
@@ -279,8 +279,13 @@ class StateMachine:
 
     def _get_up(self, last: Targets) -> GetUp:
         self._generator.others = self._poses.with_arm(last)
-        final = FinalPoses(self._poses.lying(last), self._generator.stand_targets)
-        return GetUp(self._poses.robot, last, final, swings=self._parameters.get_up_swings)
+        return GetUp(
+            self._poses.robot,
+            last,
+            folded=self._poses.lying(last),
+            standing=self._generator.stand_targets,
+            swings=self._parameters.get_up_swings,
+        )
 
     def _stand(self, last: Targets) -> None:
         self._generator.others = self._poses.with_arm(last)
