@@ -7,8 +7,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 import math
 from pathlib import Path
+import time
 
 from can_addresses import free_virtual
 from config_samples import DRIVE_ROWS, eds_text, FACTOR_ROWS, Row
@@ -20,7 +22,7 @@ from tool_environment import Output
 from arm_canopen import CanopenMaster, load_bus, open_bus
 from arm_canopen.config import Identity, load_eds
 from arm_canopen.config.model.si_unit import position_unit, POSITIONS, TIMES, velocity_unit
-from canopen_sim import DeviceRunner
+from canopen_sim import DeviceRunner, Fault, FaultInjection
 from canopen_tools.cli.main import main
 from canopen_tools.eds_match import match_eds, NoMatchError, SeveralMatchError
 
@@ -179,13 +181,20 @@ def test_every_problem_is_said_with_its_remedy(tmp_path: Path, capsys: Output) -
 
 
 def test_two_devices_with_one_node_id(tmp_path: Path, capsys: Output) -> None:
-    """Both answer; by the scan itself, too."""
+    """Both answer; by the scan itself, too, and by a simulated device that stands for two."""
     path = written(tmp_path, 'drive.eds', SAMPLE)
     bus = free_virtual()
     with devices_on(bus, {2: path}), devices_on(bus, {2: path}):
         output = ['--output', str(tmp_path / 'bus.yml')]
         assert main(['new', '--scan', '--can', bus, *LISTEN, str(path), *output]) == 1
         assert 'several devices have this node id; switch' in capsys.readouterr().err
+        assert main(['scan', '--can', bus, *LISTEN]) == 1
+        assert 'node 2: several devices answer' in capsys.readouterr().err
+    with devices_on(bus, {2: path}) as runner:
+        inject = partial(
+            runner.host.device(2).faults.inject, FaultInjection(Fault.NODE_ID_CONFLICT)
+        )
+        runner.call(lambda: inject(time.monotonic())).result(DEADLINE)
         assert main(['scan', '--can', bus, *LISTEN]) == 1
         assert 'node 2: several devices answer' in capsys.readouterr().err
 
