@@ -1,13 +1,20 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Names of joints and frames without kinematics."""
+"""Names of joints and frames without kinematics; public names of the package in its README."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 from model_robots import chain_texts, robot, ROBOTS, texts
 import pytest
 
+import arm_model
 from arm_model import ModelError, names_of
+
+ARRAYS = {'Array', 'ArmNames', 'Mask', 'Native', 'Places', 'Shape', 'checked', 'frozen'}
+
+README = Path(__file__).parents[1] / 'README.md'
 
 
 @pytest.mark.parametrize('name', ROBOTS)
@@ -43,3 +50,10 @@ def test_loop_in_the_description() -> None:
     )
     with pytest.raises(ModelError, match='loop'):
         names_of(loop)
+
+
+def test_the_public_names_are_in_the_table() -> None:
+    """All but those of arrays."""
+    table = README.read_text(encoding='utf-8').partition('## Public API')[2].partition('\n## ')[0]
+    missing = {name for name in arm_model.__all__ if f'`{name}`' not in table}
+    assert missing == ARRAYS

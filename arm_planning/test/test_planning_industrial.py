@@ -114,6 +114,15 @@ def check_limits(model: RobotModel, path: Path, factor: float = 1.0) -> None:
         assert np.abs(left - right).max(initial=0.0) < tolerance
 
 
+def check_on(curve: Curve, name: str, path: Path, count: int) -> None:
+    """Look at how far the tip is off a curve, and at the limits of the joints."""
+    for positions in places(path, count):
+        way, turn = off(curve, tip(name), positions)
+        assert way < STRAIGHT
+        assert turn < TURNED
+    check_limits(robot(name), path)
+
+
 def planned(name: str, wanted: MotionRequest) -> MotionPlan | None:
     """Return a plan; None where it was refused in words that name the place or the joint."""
     try:
@@ -135,12 +144,7 @@ def test_lin_stays_on_its_line(name: str, seed: int, factor: float) -> None:
     found = planned(name, request(name, 'LIN', goal, velocity_scaling=factor))
     assume(found is not None)
     assert found is not None
-    line = Line(tip(name).pose(ready(name)), goal)
-    for positions in places(found.path, 300):
-        way, turn = off(line, tip(name), positions)
-        assert way < STRAIGHT
-        assert turn < TURNED
-    check_limits(robot(name), found.path)
+    check_on(Line(tip(name).pose(ready(name)), goal), name, found.path, 300)
     end = tip(name).pose(found.path.end.position)
     assert end.position == pytest.approx(goal.position, abs=1e-8)
     assert end.rotation == pytest.approx(goal.rotation, abs=1e-8)
@@ -178,13 +182,10 @@ def test_circ_stays_on_its_arc(name: str, seed: int, center: bool) -> None:
     assume(found is not None)
     assert found is not None
     assert arc.length == pytest.approx(radius * sweep, rel=1e-6)
-    for positions in places(found.path, 200):
-        way, turn = off(arc, tip(name), positions)
-        assert way < STRAIGHT
-        assert turn < TURNED
+    check_on(arc, name, found.path, 200)
+    for positions in places(found.path, 50):
         distance = np.linalg.norm(tip(name).pose(positions).position - middle)
         assert distance == pytest.approx(radius, abs=STRAIGHT)
-    check_limits(robot(name), found.path)
 
 
 @pytest.mark.parametrize('name', ROBOTS)
@@ -236,9 +237,7 @@ def test_a_line_gets_slower_instead_of_failing() -> None:
     goal = PoseGoal(Pose(pose.rotation, pose.position + np.array([0.0, 0.12, 0.0])))
     plan = motion(name, MotionRequest(start, [goal], 'LIN'))
     assert any('slowed to' in note and 'prbt_joint_' in note for note in plan.notes)
-    check_limits(robot(name), plan.path)
-    line = Line(pose, goal.pose)
-    assert max(off(line, tip(name), each)[0] for each in places(plan.path, 300)) < STRAIGHT
+    check_on(Line(pose, goal.pose), name, plan.path, 300)
 
 
 def test_a_line_through_a_singularity_is_refused_with_its_place() -> None:
