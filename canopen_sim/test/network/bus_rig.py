@@ -24,6 +24,7 @@ from arm_canopen import (
     AxisFeedback,
     BusError,
     CanopenMaster,
+    DriveState,
     Event,
     OperationMode,
     Refusal,
@@ -321,11 +322,26 @@ class VirtualNetwork:
 
     def keep_mode(self, mode: int) -> None:
         """Make the first drive keep a mode of operation, whatever 0x6060 says."""
-        word = 0x200 + self._config.nodes[0].node_id
+        word, before = 0x200 + self._config.nodes[0].node_id, self.wire.alters
 
         def alters(sender: str, frame: Frame) -> Frame:
+            frame = before(sender, frame)
             kept = frame.data[:2] + bytes((mode,))
             return frame._replace(data=kept) if frame.can_id == word else frame
+
+        self.wire.alters = alters
+
+    def droop(self, increments: int) -> None:
+        """Make the first drive hang so far below its set-points in [inc] while it has power."""
+        name = self._config.nodes[0].name
+        position = 0x280 + self._config.nodes[0].node_id
+        powered = {DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE}
+
+        def alters(sender: str, frame: Frame) -> Frame:
+            if frame.can_id != position or self.simulated(name).state not in powered:
+                return frame
+            shown, velocity = struct.unpack('<ii', frame.data)
+            return frame._replace(data=struct.pack('<ii', shown - increments, velocity))
 
         self.wire.alters = alters
 

@@ -36,7 +36,6 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen import BusConfig, CanopenError, DriveError, DriveState, OperationMode, Severity
-from arm_canopen.can import Frame
 from arm_canopen.config import load_bus, PdoConfig
 from arm_canopen.standard import CobId, NmtCommand, PdoCodec, rpdo_default, SYNCHRONOUS_MAX
 from canopen_sim import DeviceHost
@@ -66,19 +65,8 @@ class Loaded:
     def __init__(self, **changes: object) -> None:
         """Boot it."""
         self.net = VirtualNetwork(bus_config(drive_config(JOINT, NODE_ID, **changes)))
-        self.net.wire.alters = self._sag
+        self.net.droop(SAG_INC)
         self.net.boot()
-
-    def _sag(self, sender: str, frame: Frame) -> Frame:
-        if frame.can_id != POSITION_PDO or not self.powered:
-            return frame
-        position, velocity = struct.unpack('<ii', frame.data)
-        return frame._replace(data=struct.pack('<ii', position - SAG_INC, velocity))
-
-    @property
-    def powered(self) -> bool:
-        """The drive is enabled."""
-        return self.net.simulated().state is DriveState.OPERATION_ENABLED
 
     @property
     def position(self) -> float:
@@ -158,12 +146,7 @@ def test_a_mode_switch_that_the_drive_refuses_leaves_it_where_it_is(mode: Operat
     loaded.net.run(2.0)
     begin = loaded.net.now
 
-    def stuck(sender: str, frame: Frame) -> Frame:
-        if frame.can_id == COMMAND_PDO:
-            return frame._replace(data=frame.data[:2] + bytes((mode,)))
-        return loaded._sag(sender, frame)
-
-    loaded.net.wire.alters = stuck
+    loaded.net.keep_mode(mode)
     with pytest.raises(DriveError, match='did not reach mode Profile position in 0x6061'):
         loaded.net.select(JOINT, OperationMode.PROFILE_POSITION)
     loaded.net.run(0.5)
@@ -218,10 +201,8 @@ def test_a_drive_that_keeps_its_mode_does_not_jump_when_it_is_enabled() -> None:
     loaded.net.run(2.0)
     loaded.net.do(JOINT, 'disable')
 
-    def keep_mode_8(sender: str, frame: Frame) -> Frame:
-        return frame._replace(data=frame.data[:2] + b'\x08') if frame.can_id == 0x202 else frame
-
-    loaded.net.wire.alters = keep_mode_8
+    loaded.net.droop(0)
+    loaded.net.keep_mode(8)
     drive = loaded.net.simulated()
     loaded.net.drives[JOINT].control.select(
         loaded.net.drives[JOINT].control.modes[OperationMode.NO_MODE]

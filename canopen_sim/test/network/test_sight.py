@@ -184,68 +184,41 @@ def with_window(window_inc: int | None) -> NodeConfig:
     return replace(config, dictionary=ObjectDictionary(entries))
 
 
-class Loaded:
-    """A drive whose position droops below what it is commanded, while it has power."""
-
-    def __init__(self, config: NodeConfig, mode: OperationMode) -> None:
-        """Enable it without its load."""
-        self.droop_inc = 0
-        self.net = VirtualNetwork(bus_config(config))
-        self.net.wire.alters = self._droops
-        self.net.boot()
-        self.net.enable(mode)
-
-    def _droops(self, sender: str, frame: Frame) -> Frame:
-        powered = self.state in (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
-        if frame.can_id != POSITION_PDO or not powered:
-            return frame
-        position, velocity = struct.unpack('<ii', frame.data)
-        return frame._replace(data=struct.pack('<ii', position - self.droop_inc, velocity))
-
-    @property
-    def state(self) -> DriveState:
-        """State of the simulated drive."""
-        return self.net.simulated().state
-
-    @property
-    def demand(self) -> float:
-        """Where the simulated drive holds the axis in [rad]."""
-        return self.net.motor()
-
-    @property
-    def errors(self) -> list[str]:
-        """What was reported as an error."""
-        return self.net.reported(Severity.ERROR)
+def enabled(config: NodeConfig, mode: OperationMode) -> VirtualNetwork:
+    """Return a network with one drive that is enabled in a mode."""
+    net = booted(config)
+    net.enable(mode)
+    return net
 
 
 @STREAMED
 @pytest.mark.parametrize('window_inc', [1000, None, 0, 0xFFFF_FFFF])
 def test_a_droop_under_load_ends_in_one_stop(window_inc: int | None, mode: OperationMode) -> None:
     """Set-points that stand are not moved; the axis is stopped and disabled, named once."""
-    loaded = Loaded(with_window(window_inc), mode)
-    loaded.droop_inc = 1500
-    before = loaded.demand
-    loaded.net.run(10.0)
-    assert loaded.demand == pytest.approx(before, abs=1e-3)
-    assert loaded.state is DriveState.SWITCH_ON_DISABLED
-    assert len(loaded.errors) == 1, loaded.errors
-    assert 'does not follow its set-points' in loaded.errors[0]
+    net = enabled(with_window(window_inc), mode)
+    net.droop(1500)
+    before = net.motor()
+    net.run(10.0)
+    assert net.motor() == pytest.approx(before, abs=1e-3)
+    assert net.simulated().state is DriveState.SWITCH_ON_DISABLED
+    assert len(net.reported(Severity.ERROR)) == 1, net.reported(Severity.ERROR)
+    assert 'does not follow its set-points' in net.reported(Severity.ERROR)[0]
 
 
 @STREAMED
 def test_a_droop_within_the_window_of_the_drive_is_left_alone(mode: OperationMode) -> None:
     """0x6065 says how far it may be away; nothing creeps meanwhile."""
-    loaded = Loaded(with_window(2000), mode)
-    loaded.droop_inc = 1500
-    before = loaded.demand
-    loaded.net.run(5.0)
-    assert loaded.demand == pytest.approx(before, abs=1e-3)
-    assert loaded.state is DriveState.OPERATION_ENABLED
-    assert not loaded.errors
-    loaded.net.target(0.5)
-    loaded.net.run(3.0)
-    assert loaded.demand == pytest.approx(0.5, abs=1e-3)
-    assert not loaded.errors
+    net = enabled(with_window(2000), mode)
+    net.droop(1500)
+    before = net.motor()
+    net.run(5.0)
+    assert net.motor() == pytest.approx(before, abs=1e-3)
+    assert net.simulated().state is DriveState.OPERATION_ENABLED
+    assert not net.reported(Severity.ERROR)
+    net.target(0.5)
+    net.run(3.0)
+    assert net.motor() == pytest.approx(0.5, abs=1e-3)
+    assert not net.reported(Severity.ERROR)
 
 
 @STREAMED
@@ -253,40 +226,40 @@ def test_an_axis_that_droops_and_is_stopped_on_its_way_creeps_once_at_most(
     mode: OperationMode,
 ) -> None:
     """It is held where it is; the load may pull it from there once, and then it is disabled."""
-    loaded = Loaded(with_window(None), mode)
-    loaded.net.target(5.0)
-    loaded.net.run(0.5)
-    loaded.droop_inc = 1500
+    net = enabled(with_window(None), mode)
+    net.target(5.0)
+    net.run(0.5)
+    net.droop(1500)
     lost = {0x200 + NODE_ID, 0x300 + NODE_ID, 0x400 + NODE_ID}
-    loaded.net.wire.loses = lambda sender, frame: frame.can_id in lost
-    loaded.net.run(1.0)
-    assert len(loaded.errors) == 1
-    stood = loaded.demand
-    loaded.net.wire.loses = lambda sender, frame: False
-    loaded.net.run(5.0)
-    assert abs(loaded.demand - stood) < 0.15 + 0.01
-    assert loaded.state is DriveState.SWITCH_ON_DISABLED
-    assert len(loaded.errors) == 2
+    net.wire.loses = lambda sender, frame: frame.can_id in lost
+    net.run(1.0)
+    assert len(net.reported(Severity.ERROR)) == 1
+    stood = net.motor()
+    net.wire.loses = lambda sender, frame: False
+    net.run(5.0)
+    assert abs(net.motor() - stood) < 0.15 + 0.01
+    assert net.simulated().state is DriveState.SWITCH_ON_DISABLED
+    assert len(net.reported(Severity.ERROR)) == 2
 
 
 @pytest.mark.parametrize(('duration', 'stops'), [(0.3, False), (2.0, True)])
 def test_the_following_error_of_the_drive_counts(duration: float, *, stops: bool) -> None:
     """Bit 13 of mode 8, where it lasts; a drive may show it in passing."""
-    loaded = Loaded(with_window(None), OperationMode.CYCLIC_POSITION)
-    end = loaded.net.now + duration
+    net = enabled(with_window(None), OperationMode.CYCLIC_POSITION)
+    end = net.now + duration
 
     def show(sender: str, frame: Frame) -> Frame:
-        if frame.can_id != STATE_PDO or loaded.net.now > end:
+        if frame.can_id != STATE_PDO or net.now > end:
             return frame
         word, mode = struct.unpack('<Hb', frame.data)
         return frame._replace(data=struct.pack('<Hb', word | Statusword.FOLLOWING_ERROR, mode))
 
-    loaded.net.wire.alters = show
-    loaded.net.run(3.0)
-    assert (loaded.state is DriveState.SWITCH_ON_DISABLED) is stops
-    refusal = loaded.net.drives[JOINT].control.refusal
+    net.wire.alters = show
+    net.run(3.0)
+    assert (net.simulated().state is DriveState.SWITCH_ON_DISABLED) is stops
+    refusal = net.drives[JOINT].control.refusal
     assert (refusal is not None and refusal.cause is RefusalCause.NOT_ENABLED) is stops
-    assert len(loaded.errors) == stops
+    assert len(net.reported(Severity.ERROR)) == stops
 
 
 def judged(
