@@ -325,7 +325,7 @@ def test_the_speed_of_a_link_is_limited(planner_id: str, link: str) -> None:
 def test_a_speed_limit_that_is_none_is_refused(
     most: float, link: str, code: PlanningCode, words: str
 ) -> None:
-    """Neither planner ignores it."""
+    """Neither planner ignores it; a link without a speed limit has no effect."""
     start = ready('panda')
     for planner_id in ('', 'PTP'):
         asked = replace(
@@ -337,6 +337,7 @@ def test_a_speed_limit_that_is_none_is_refused(
         error = refusal(Planner(robot('panda')), asked)
         assert error.code is code
         assert words in str(error)
+        assert Planner(robot('panda')).plan(replace(asked, max_cartesian_speed=0.0)).path.duration
 
 
 def with_a_post(model: RobotModel, positions: Array) -> PlanningScene:
