@@ -91,7 +91,9 @@ def best(compared: Results) -> str:
     }
     most = min(falls.values()) / (1.0 - CHANCE) + 1.0
     equals = [name for name in compared if falls[name] <= most]
-    return min(equals, key=lambda name: sum(each.error for each in compared[name].values()))
+    return min(
+        equals, key=lambda name: sum(each.mean('error') for each in compared[name].values())
+    )
 
 
 def table(compared: Results) -> str:
@@ -101,7 +103,7 @@ def table(compared: Results) -> str:
         for title, each in grounds.items():
             turning = f'{each.mean("turning_error"):.3f}'
             rows.append(
-                (name, title, f'{each.error:.3f}', turning, f'{each.falls_per_minute:.1f}')
+                (name, title, f'{each.mean("error"):.3f}', turning, f'{each.falls_per_minute:.1f}')
             )
     return table_text(rows)
 

@@ -18,7 +18,7 @@ import numpy as np
 from quad_controller import BodyPose, Gait, GaitParameters, PolicyOptions, Velocity
 from quad_controller.gait.body import feet_in_body
 from quad_controller.gait.parameters import LOW_AND_WIDE
-from quad_controller.gait.stepping import arc, hermite, SwingLift
+from quad_controller.gait.stepping import arc, swing_way, SwingLift
 from quad_controller.policy.contract.document import document_of
 from quad_controller.policy.contract.mjlab import CONTRACT_KEY
 from quad_controller.policy.contract.model import build_contract, PolicyContract, Source
@@ -88,11 +88,7 @@ class GaitTeacher:
             time = schedule.stance_duration * (0.5 - part / schedule.duty)
             return place[0] + over_x * time, place[1] + over_y * time, place[2]
         part = (part - schedule.duty) / (1.0 - schedule.duty)
-        half, duration = 0.5 * schedule.stance_duration, schedule.swing_duration
-        x, y = (
-            hermite((-half * over, -duration * over), (half * over, -duration * over), part)
-            for over in (over_x, over_y)
-        )
+        x, y = (swing_way(over, part, schedule) for over in (over_x, over_y))
         scale = min(1.0, math.hypot(over_x, over_y) / 0.03)
         lift = self._lift.height(over_x, over_y) * scale * arc(part)
         return place[0] + x, place[1] + y, place[2] + lift

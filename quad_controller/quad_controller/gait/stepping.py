@@ -95,13 +95,9 @@ class SwingLift:
 
     def _swing(self, x: float, y: float, height: float) -> Iterator[Feet]:
         """Yield the feet along a swing, all at once."""
-        half, duration = 0.5 * self._schedule.stance_duration, self._schedule.swing_duration
         for sample in range(SAMPLES + 1):
             part = sample / SAMPLES
-            way_x, way_y = (
-                hermite((-half * v, -v * duration), (half * v, -v * duration), part)
-                for v in (x, y)
-            )
+            way_x, way_y = (swing_way(over, part, self._schedule) for over in (x, y))
             up = height * arc(part)
             one, two, three, four = ((a + way_x, b + way_y, c + up) for a, b, c in self._neutral)
             yield one, two, three, four
@@ -110,6 +106,17 @@ class SwingLift:
 def arc(part: float) -> float:
     """Return the height of a swing as a share of its greatest; part runs from 0 to 1."""
     return 0.5 * (1.0 - math.cos(math.tau * part))
+
+
+def swing_way(velocity: float, part: float, schedule: Schedule) -> float:
+    """Return how far a swing that goes on steadily is from the neutral place in [m].
+
+    Args:
+        velocity: Of the foot over the ground [m/s].
+        part: How much of the swing is done, 0 to 1.
+    """
+    half, slope = 0.5 * schedule.stance_duration * velocity, -velocity * schedule.swing_duration
+    return hermite((-half, slope), (half, slope), part)
 
 
 def hermite(start: tuple[float, float], end: tuple[float, float], part: float) -> float:

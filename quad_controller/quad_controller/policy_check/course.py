@@ -104,11 +104,6 @@ class CourseFigures:
         time = sum(each.time for each in self.passages)
         return 60.0 * self.falls / time if time > 0.0 else math.inf
 
-    @property
-    def error(self) -> float:
-        """Mean error of the velocity over the ground in [m/s]."""
-        return self.mean('error')
-
     def mean(self, name: str, axis: str | None = None) -> float:
         """Return the mean of an attribute of the passages, where there is one; else NaN.
 

@@ -225,7 +225,7 @@ def sweep_table(swept: Swept) -> Table:
     for value, result in zip(sweep.values, swept.results, strict=True):
         cells = [sweep.text(value)]
         for each in (result.policy, result.gait):
-            cells += [_number(each.falls_per_minute, '.1f'), _number(each.error, '.3f')]
+            cells += [_number(each.falls_per_minute, '.1f'), _number(each.mean('error'), '.3f')]
         table.append(tuple(cells))
     return table
 
