@@ -36,7 +36,7 @@ FENCE = re.compile(r'^( *)(```+).*?^\1\2$', re.MULTILINE | re.DOTALL)
 
 
 def on_files(files: Files, *, config: MkDocsConfig) -> Files:
-    """Give the pages of the manual their place in the checkout, and add the READMEs."""
+    """Move the pages of the manual to their place in the checkout, and add the READMEs."""
     found = Files([])
     for file in files:
         moved = File.generated(
@@ -58,7 +58,7 @@ def on_files(files: Files, *, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Let a link to a folder lead to its README; one to what the site lacks is its text."""
+    """Point links to folders to their READMEs; replace those to what the site lacks by text."""
     del config
 
     def corrected(match: re.Match[str]) -> str:
@@ -85,7 +85,7 @@ def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: 
 
 
 def on_page_content(html: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Leave the roles of Sphinx out, which docstrings have."""
+    """Remove the roles of Sphinx, which docstrings have."""
     del page, config, files
     return ROLE.sub('', html)
 

@@ -37,7 +37,7 @@ class FakeRunner(Runner):
 
 
 def imitate_builders(layout: Layout, arguments: list[str]) -> None:
-    """Leave behind what colcon, or the builder of interfaces, does for the packages it builds."""
+    """Make the files of colcon, or of the builder of interfaces, for the packages it builds."""
     if 'colcon' in arguments:
         begin, end = arguments.index('--packages-select') + 1, arguments.index('--cmake-args')
         for name in arguments[begin:end]:

@@ -192,7 +192,7 @@ def test_the_image_gets_the_sources_and_nothing_built() -> None:
 
 
 def test_every_name_of_gitignore_is_in_dockerignore() -> None:
-    """Whoever adds a folder of results to the one adds it to the other."""
+    """A folder of results is in both."""
     names = (ROOT / '.gitignore').read_text().split()
     assert [name for name in names if not is_left_out(name.strip('/').replace('*', 'x'))] == []
 

@@ -200,7 +200,7 @@ def test_colcon_test_runs_pytest(name: str, monkeypatch: pytest.MonkeyPatch) -> 
 def test_packages_of_the_checkout_are_taken_from_it(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Nobody gets a package of the same name from PyPI."""
+    """A package of the same name on PyPI is never installed."""
     for other, where in declared(name, monkeypatch).items():
         if other in PACKAGES:
             assert where == f'@ {PACKAGES[other].folder.as_uri()}'

@@ -75,6 +75,17 @@ def test_a_program_runs_the_function_that_it_names(add_package: Add, tmp_path: P
     assert done.stdout.startswith("1.2 EntryPoint(name='run', value='arm:main'")
 
 
+def test_programs_stay_below_the_name_that_setup_cfg_says(
+    add_package: Add, tmp_path: Path
+) -> None:
+    """`ros2 run` finds them by a former name of their package."""
+    folder = add_package('arm')
+    (folder / 'setup.cfg').write_text('[install]\ninstall_scripts=$base/lib/old_arm\n')
+    link_package(read_package(folder / 'package.xml'), tmp_path, Path(sys.executable))
+    assert [path.name for path in (tmp_path / 'lib').glob('*/run')] == ['run']
+    assert (tmp_path / 'lib' / 'old_arm' / 'run').is_file()
+
+
 def test_a_renamed_program_leaves_nothing_behind(
     environment: Environment, layout: Layout, add_package: Add, fake: Fake
 ) -> None:

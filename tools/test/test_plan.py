@@ -224,7 +224,7 @@ def test_old_tools_that_fail_do_not_keep_the_old_environment(
 
 
 def test_foreign_venv_is_not_touched(environment: Environment, layout: Layout, fake: Fake) -> None:
-    """A .venv that somebody else made is refused, and nothing in it is lost."""
+    """A .venv that the set-up did not make is refused, and nothing in it is lost."""
     theirs = layout.venv / 'their' / 'work'
     theirs.mkdir(parents=True)
     with pytest.raises(WorkspaceError, match='not made by this set-up'):

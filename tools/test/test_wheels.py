@@ -101,7 +101,7 @@ def test_a_dds_that_waits_rightly_is_left_alone(tmp_path: Path, dds_library: Pat
 def test_a_dds_that_the_patch_does_not_know_is_refused(
     tmp_path: Path, dds_library: Path, code: bytes
 ) -> None:
-    """Whoever changes the pins learns it before anything hangs."""
+    """A change of the pins is noticed before anything hangs."""
     dds_library.write_bytes(code)
     with pytest.raises(WorkspaceError, match='is not the Fast DDS that has to be patched'):
         patch_dds(tmp_path)

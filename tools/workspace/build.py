@@ -58,10 +58,10 @@ class Builder:
         Args:
             packages: Each after those that it needs.
         """
-        tools = (interfaces, link) if self._on_wheels else ()
-        how = fingerprint_files(Path(module.__file__ or '') for module in tools)
         hashes: dict[str, str] = {}
         for name, package in packages.items():
+            tools = [interfaces if package.is_interface else link] if self._on_wheels else []
+            how = fingerprint_files(Path(tool.__file__ or '') for tool in tools)
             below = [
                 hashes[other]
                 for other in sorted(package.dependencies & hashes.keys())

@@ -114,7 +114,7 @@ class Environment:
             self._reach_for_packages(runner)
 
     def _reach_for_packages(self, runner: Runner) -> None:
-        """Give an environment that works not up while the packages of the new one are far."""
+        """Keep an environment that works while the packages of the new one cannot be reached."""
         # only a missing network counts: that the old tools fail is no reason to keep them
         with contextlib.suppress(StepFailedError):
             self._pip(runner, 'download', '--dest', self.layout.venv / '.download')

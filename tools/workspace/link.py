@@ -8,6 +8,7 @@ colcon starts an interpreter two times for each package, which takes seconds; th
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+import configparser
 import fnmatch
 import os
 from pathlib import Path
@@ -100,6 +101,9 @@ def link_package(package: Package, install: Path, python: Path) -> None:
             raise WorkspaceError(
                 f'{source} is not there, and setup.py installs it.', 'Correct one of them.'
             )
+    setup = configparser.ConfigParser()
+    setup.read(package.folder / 'setup.cfg')
+    programs = setup.get('install', 'install_scripts', fallback=f'lib/{package.name}')
     entry_points: Mapping[str, Sequence[str]] = arguments.get('entry_points', {})
     for line in entry_points.get('console_scripts', ()):
         program, target = (part.strip() for part in line.split('=', 1))
@@ -111,7 +115,7 @@ def link_package(package: Package, install: Path, python: Path) -> None:
             name=attribute.partition('.')[0],
             attribute=attribute,
         )
-        path = install / 'lib' / package.name / program
+        path = install / programs.removeprefix('$base/') / program
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
         path.chmod(0o755)

@@ -88,7 +88,7 @@ def needed_packages(
     *,
     tests: bool = False,
 ) -> dict[str, Package]:
-    """Take the targets and what they need, each after what it needs itself.
+    """Return the targets and what they need, each after what it needs itself.
 
     Args:
         packages: All packages of the workspace.

@@ -20,7 +20,7 @@ class PublicApiContract(Contract):
     families = fields.SetField(subfield=fields.StringField())
 
     def check(self, graph: ImportGraph, verbose: bool) -> ContractCheck:
-        """Look at every import of another package."""
+        """Check every import of another package."""
         families = cast('set[str]', self.families)
         gone = sorted({name.removesuffix('.*') for name in families} - graph.modules)
 

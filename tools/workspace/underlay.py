@@ -62,7 +62,7 @@ class Underlay:
 
 
 def find_underlay(environ: Mapping[str, str], venv: Path) -> Underlay:
-    """Take the system's ROS when it is there, else the wheels.
+    """Choose the system's ROS when it is there, else the wheels.
 
     Args:
         environ: Environment; `WORKSPACE_ROS_PREFIX` replaces /opt/ros/jazzy, and empty it stands

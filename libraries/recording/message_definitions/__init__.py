@@ -8,13 +8,11 @@ from .installed import (
     message_definition,
     nested_type,
     service_definitions,
-    ServiceDefinitions,
 )
 from .type_support import load_type_support
 
 __all__ = [
     'DefinitionError',
-    'ServiceDefinitions',
     'concatenated',
     'load_type_support',
     'message_definition',

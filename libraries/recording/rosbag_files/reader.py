@@ -69,7 +69,7 @@ class BagReader:
     """
 
     def __init__(self, path: Path) -> None:
-        """Look at a recording.
+        """Open a recording.
 
         Raises:
             BagError: There is none, or it is not written as MCAP.

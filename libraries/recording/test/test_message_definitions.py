@@ -88,7 +88,7 @@ def test_what_is_not_installed_is_named(prefix: Path, name: str, reason: str) ->
 
 
 def test_half_a_service_is_refused(prefix: Path) -> None:
-    """Nobody could call it."""
+    """It could not be called."""
     assert prefix.is_dir()
     with pytest.raises(DefinitionError, match='no line ---'):
         service_definitions('demo/srv/Half')

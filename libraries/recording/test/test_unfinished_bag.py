@@ -126,7 +126,7 @@ def test_a_folder_without_a_recording(tmp_path: Path) -> None:
 
 
 def test_a_file_that_is_being_compressed_counts_once(tmp_path: Path) -> None:
-    """Whoever is killed meanwhile leaves both; the one that is whole is read."""
+    """A recorder that is killed meanwhile leaves both; the one that is whole is read."""
     for name in ('bag_0.mcap', 'bag_0.mcap.zstd', 'bag_1.mcap.zstd'):
         (tmp_path / name).touch()
     names = [path.name for path in recording_files(tmp_path)]

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which network interfaces DDS uses: loopback, and those that a person names.
 
-DDS of Fast DDS has no authentication: whoever reaches its sockets can call every service. So a
+DDS of Fast DDS has no authentication: all who reach its sockets can call every service. So a
 process of this workspace opens UDP sockets on the loopback interface only, unless the variable
 ``DDS_NETWORK``, or the option ``--network`` of a bring-up, names interfaces or peers.
 

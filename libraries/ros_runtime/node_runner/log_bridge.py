@@ -105,7 +105,7 @@ class RosLogBridge(logging.Handler):
         self._thread = threading.Thread(target=self._run, name='log bridge', daemon=True)
 
     def start(self) -> None:
-        """Take the records of all loggers."""
+        """Receive the records of all loggers."""
         self._thread.start()
         logging.getLogger().addHandler(self)
 
@@ -160,7 +160,7 @@ class RosLogBridge(logging.Handler):
 
 
 def log_as(node: Node) -> None:
-    """Let the records of this process's ``logging`` appear as those of a node.
+    """Log the records of this process's ``logging`` as those of a node.
 
     Only the first node of a process counts. Without :func:`.run_program` nothing happens.
     """

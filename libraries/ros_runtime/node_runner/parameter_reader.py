@@ -240,7 +240,7 @@ def given_values(node: Node) -> dict[str, object]:
 
 
 def give_defaults(node: Node, values: Mapping[str, object]) -> None:
-    """Give a node parameters that nobody gave it, as if they came from outside.
+    """Set parameters of a node that were not given, as if they came from outside.
 
     Args:
         node: The node; it has not declared them yet.
@@ -257,7 +257,7 @@ def give_defaults(node: Node, values: Mapping[str, object]) -> None:
 
 
 def declare_given(node: Node, names: Iterable[str], meaning: str) -> None:
-    """Declare parameters that were given and that nobody has declared, as they are.
+    """Declare parameters that were given and are not declared yet, as they are.
 
     Args:
         node: The node.

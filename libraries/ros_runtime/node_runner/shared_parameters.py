@@ -43,7 +43,7 @@ def declare_thread_priority(read: ParameterReader, default: int) -> int:
 
 
 def raise_thread_priority(node: Node, priority: int, what: str) -> None:
-    """Give the calling thread its priority; a refusal is a warning with the remedy."""
+    """Raise the priority of the calling thread; a refusal is a warning with the remedy."""
     outcome = raise_priority(priority, what)
     if outcome.granted:
         node.get_logger().info(outcome.text)

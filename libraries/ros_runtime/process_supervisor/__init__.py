@@ -26,7 +26,6 @@ from .nodes import (
     Executable,
     find_executable,
     FindExecutable,
-    LOG_FORMAT,
     namespaced_parameters,
     node_argv,
     parameters_by_node,
@@ -44,7 +43,6 @@ __version__ = '0.1.0'
 
 __all__ = [
     'EVERY_NODE',
-    'LOG_FORMAT',
     'USAGE_ERROR',
     'CallError',
     'Executable',

@@ -17,7 +17,7 @@ import struct
 import tempfile
 
 from .exceptions import StartError
-from .nodes import Executable, FindExecutable, first_found, LOG_FORMAT, node_argv, ros_domain
+from .nodes import Executable, FindExecutable, LOG_FORMAT, node_argv, ros_domain
 from .ros_options import RosOptions
 from .spec import ProcessSpec, StopStep
 
@@ -149,7 +149,8 @@ def state_publisher(
     Returns:
         The process; None where neither program is installed.
     """
-    executable = first_found(STATE_PUBLISHERS, find)
+    installed = (each for each in STATE_PUBLISHERS if find(each.package, each.name) is not None)
+    executable = next(installed, None)
     if executable is None:
         return None
     values = {'publish_frequency': f'{TF_RATE}', **ros.frame_parameters}

@@ -11,7 +11,6 @@ import os
 import sys
 from tempfile import TemporaryFile
 import threading
-from typing import Protocol
 
 from .readiness import ServiceManager
 from .runner import Runner
@@ -60,16 +59,12 @@ REPORTED_STATES = {Phase.RUNNING: 'READY=1', Phase.STOPPING: 'STOPPING=1'}
 """What is reported to the service manager of a bring-up, as in sd_notify(3)."""
 
 
-class Shutdown(Protocol):
-    """What is done at the first Ctrl-C, while all processes still run."""
+Shutdown = Callable[[Callable[[str], None], Callable[[], bool]], None]
+"""Done at the first Ctrl-C, while all processes still run; everything is stopped when it returns.
 
-    def __call__(self, log: Callable[[str], None], given_up: Callable[[], bool], /) -> None:
-        """Do it; everything is stopped when this returns.
-
-        Args:
-            log: Shows the user a message.
-            given_up: True when it is no longer wanted: Ctrl-C again, or a process has ended.
-        """
+It gets a function that shows the user a message, and one that returns True when it is no longer
+wanted: Ctrl-C again, or a process has ended.
+"""
 
 
 def supervise(
@@ -77,7 +72,7 @@ def supervise(
 ) -> Outcome:
     """Run processes with their output on standard output, until Ctrl-C or one ends.
 
-    That all are ready, and that all are stopped, is reported to systemd or whoever else
+    That all are ready, and that all are stopped, is reported to systemd, or what else
     ``NOTIFY_SOCKET`` names, as in sd_notify(3).
 
     Args:

@@ -241,7 +241,7 @@ class _Screen:
         self._refresh()
 
     def close(self) -> None:
-        """Leave the last table where it is, without what can no longer be tried."""
+        """Keep the last table on the screen, without commands that no longer work."""
         if self.live is not None:
             self._commands, self._notes = [], {}
             self.enter('ended')
@@ -317,7 +317,7 @@ def run_demo(demo: Demo[ClientT], processes: Sequence[ProcessSpec], *, endless: 
     Args:
         demo: The demo.
         processes: What runs.
-        endless: It ends at Ctrl-C; whoever has seen its table needs no summary then.
+        endless: It ends at Ctrl-C; after a table there is no summary then.
 
     Returns:
         0, or 1 when something went wrong.

@@ -48,7 +48,7 @@ class GraphClient:
         self._executor.add_node(self.node)
 
     def close(self) -> None:
-        """Leave the ROS graph."""
+        """Destroy the node and its context."""
         self._executor.shutdown()
         self.node.destroy_node()
         self._context.try_shutdown()

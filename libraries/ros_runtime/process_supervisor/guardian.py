@@ -46,7 +46,7 @@ class Guardian:
         self.dismissed = False
 
     def take(self, message: Mapping[str, Any]) -> None:
-        """Take in a message of the supervisor."""
+        """Process a message of the supervisor."""
         if 'pid' in message:
             self._watch(message)
         elif 'gone' in message:
@@ -73,7 +73,7 @@ class Guardian:
             os.killpg(self._pids[name], number)
 
     def stop_all(self) -> None:
-        """Stop everybody in order; returns when they are gone."""
+        """Stop all processes in order; return when they have ended."""
         while not self._sequence.finished:
             self._sequence.advance(time.monotonic())
             self._wait()

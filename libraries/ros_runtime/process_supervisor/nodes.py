@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import json
 import os
@@ -62,18 +62,6 @@ def find_executable(package: str, name: str) -> Path | None:
         return Path(get_package_prefix(package)) / 'lib' / package / name
     except PackageNotFoundError:
         return None
-
-
-def first_found(candidates: Iterable[Executable], find: FindExecutable) -> Executable | None:
-    """Choose an executable out of several that do the same.
-
-    Returns:
-        The first whose package exists; None when none does.
-    """
-    for candidate in candidates:
-        if find(candidate.package, candidate.name) is not None:
-            return candidate
-    return None
 
 
 def node_argv(

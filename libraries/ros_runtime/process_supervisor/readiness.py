@@ -56,7 +56,7 @@ class ReadinessSocket:
 
 
 class ServiceManager:
-    """Whoever started this process and waits for its readiness: systemd for ``Type=notify``."""
+    """What started this process and waits for its readiness: systemd for ``Type=notify``."""
 
     def __init__(self) -> None:
         """Find it; the processes that this one starts will not."""

@@ -29,13 +29,13 @@ LONGEST_LINE = 16384
 
 
 class LineSplitter:
-    """Collects bytes and gives back whole lines."""
+    """Collects bytes and returns whole lines."""
 
     def __init__(self) -> None:
         self._rest = b''
 
     def feed(self, data: bytes) -> list[str]:
-        """Take in bytes.
+        """Split bytes into lines.
 
         Args:
             data: As they were read; may end anywhere, also inside a character.
@@ -48,7 +48,7 @@ class LineSplitter:
         return [_decode(line) for line in lines]
 
     def flush(self) -> list[str]:
-        """Give back what is left when the pipe has ended: a line without an end, or nothing."""
+        """Return what is left when the pipe has ended: a line without an end, or nothing."""
         rest, self._rest = self._rest, b''
         return [_decode(rest)] if rest else []
 
@@ -136,7 +136,7 @@ class Runner:
         on_interrupt: Callable[[], bool] | None = None,
         on_phase: Callable[[Phase], None] = lambda _: None,
     ) -> None:
-        """Take the plan; nothing is started yet.
+        """Plan the run; nothing is started yet.
 
         Args:
             specs: The processes.

@@ -40,7 +40,7 @@ class StopSequence:
         self.abandoned: list[str] = []
 
     def add(self, name: str, order: int, steps: Iterable[tuple[Signals, float]]) -> None:
-        """Take in a running process.
+        """Add a running process.
 
         Args:
             name: Its name.
@@ -61,7 +61,7 @@ class StopSequence:
         return [name for name, member in self._members.items() if member.order == lowest]
 
     def exited(self, name: str) -> None:
-        """Strike off a process that has ended."""
+        """Remove a process that has ended."""
         self._members.pop(name, None)
 
     def advance(self, now: float) -> None:
@@ -93,7 +93,7 @@ class StopSequence:
         return min(deadlines, default=None)
 
     def force(self, now: float) -> None:
-        """Kill everybody at once, in no order."""
+        """Kill all processes at once, in no order."""
         for name, member in self._members.items():
             member.order = 0
             member.steps = ((Signals.SIGKILL, 2.0),)

@@ -116,7 +116,7 @@ class Supervision:
         on_interrupt: Callable[[], bool] | None = None,
         on_phase: Callable[[Phase], None] = lambda _: None,
     ) -> None:
-        """Take the plan; nothing is started yet.
+        """Plan the run; nothing is started yet.
 
         Args:
             specs: The processes, started in this order.
@@ -181,11 +181,11 @@ class Supervision:
         return ''
 
     def line(self, name: str, text: str) -> None:
-        """Take in a line of output."""
+        """Process a line of output."""
         self._children[name].lines.append(text)
 
     def ready(self, name: str, now: float, status: str = '') -> None:
-        """Take in that a process is ready."""
+        """Process that a process is ready."""
         child = self._children[name]
         if child.reported:
             return
@@ -202,7 +202,7 @@ class Supervision:
             self._say(f'all is ready ({now - self._begun:.1f} s)')
 
     def exited(self, name: str, returncode: int, now: float) -> None:
-        """Take in the end of a process.
+        """Process the end of a process.
 
         Args:
             name: Its name.

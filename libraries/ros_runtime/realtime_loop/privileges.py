@@ -34,7 +34,7 @@ class Outcome(NamedTuple):
 
 
 def raise_priority(priority: int, what: str) -> Outcome:
-    """Give the calling thread a real-time priority; threads that it starts do not inherit it."""
+    """Raise the calling thread to a real-time priority, which its threads do not inherit."""
     if not priority:
         return Outcome(granted=False, text='')
     try:
@@ -70,7 +70,7 @@ def settle_memory() -> Outcome:
 
 
 def unsettle_memory() -> None:
-    """Let the garbage collector have what :func:`settle_memory` kept from it; for the end.
+    """Return to the garbage collector what :func:`settle_memory` kept from it; for the end.
 
     Libraries list on standard error what is still there when the interpreter ends.
     """

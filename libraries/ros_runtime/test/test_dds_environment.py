@@ -64,7 +64,7 @@ def test_an_open_profile_adds_interfaces_and_peers() -> None:
 def test_profiles_are_written_for_this_user_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A folder that somebody else could have prepared is refused."""
+    """A folder that another user could have prepared is refused."""
     monkeypatch.setattr(tempfile, 'tempdir', str(tmp_path))
     file = profile_file(OPEN)
     assert file == profile_file(OPEN)
@@ -91,7 +91,7 @@ def test_the_option_goes_before_the_variable() -> None:
     'own', [{PROFILE_VARIABLE: '/home/me/dds.xml'}, {'RMW_IMPLEMENTATION': 'rmw_cyclonedds_cpp'}]
 )
 def test_transports_of_a_person_are_left_alone(own: dict[str, str]) -> None:
-    """He decides, and nobody claims that DDS stays on this host."""
+    """It decides, and nothing reports that DDS stays on this host."""
     environ = dict(own)
     restrict_dds(environ)
     assert environ == own
@@ -103,7 +103,7 @@ def test_transports_of_a_person_are_left_alone(own: dict[str, str]) -> None:
     'own', [{PROFILE_VARIABLE: '/home/me/dds.xml'}, {'RMW_IMPLEMENTATION': 'rmw_cyclonedds_cpp'}]
 )
 def test_a_choice_that_would_be_ignored_is_refused(own: dict[str, str], named: str) -> None:
-    """By the variable or by --network: nobody believes that it counts, not that it is closed."""
+    """By the variable or by --network, which would have no effect."""
     environ = {NETWORK_VARIABLE: named, **own}
     (decider,) = own.items()
     for call in (restrict_dds, selected_reach, is_this_host, lambda env: open_dds(env, None)):

@@ -62,7 +62,7 @@ def test_what_does_not_exist_is_refused(text: str) -> None:
 
 
 def test_an_interface_without_link_is_left_out() -> None:
-    """With the peers behind it, and with words: nobody comes in when it is connected later."""
+    """With the peers behind it; it is reported, as connecting it later opens nothing."""
 
     def is_wlan(name: str) -> bool:
         return name == 'wlan0'

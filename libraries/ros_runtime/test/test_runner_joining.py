@@ -39,7 +39,7 @@ def test_a_process_that_others_can_reach_says_so(
 def test_a_profile_of_a_person_is_named(
     unset: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """Nobody knows how far it reaches."""
+    """Its reach is unknown."""
     unset.setenv(PROFILE_VARIABLE, '/home/me/dds.xml')
     init_ros()
     assert '/home/me/dds.xml decides' in capfd.readouterr().err

@@ -71,7 +71,7 @@ begin = used()
 made += [node.create_service(Trigger, f'~/service_{number}', print) for number in range(40)]
 memory = (used() - begin) / 40 / 1000
 generator = 'rosidl_generator_py.generate_py_impl' in sys.modules
-importlib.import_module('rosidl_generator_py.generate_py_impl')  # whoever needs it gets it
+importlib.import_module('rosidl_generator_py.generate_py_impl')  # importable where needed
 print(memory, generator)
 node.destroy_node()
 """

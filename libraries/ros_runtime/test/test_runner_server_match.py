@@ -35,7 +35,7 @@ def test_a_server_that_is_served_matches(isolation: Isolation, *, with_parameter
         match = ServerMatch(client.node, ['do'])
         client.spin_until(lambda: match.advance() or True, TIMEOUT, 'a first look')
         client.spin_for(0.5)
-        assert match.advance() is not with_parameters, 'nobody has served it'
+        assert match.advance() is not with_parameters, 'it was not served yet'
 
         def both() -> bool:
             served.spin_once(0.0)
@@ -43,7 +43,7 @@ def test_a_server_that_is_served_matches(isolation: Isolation, *, with_parameter
 
         client.spin_until(both, TIMEOUT, 'the match')
         assert list(client.node.clients) == [caller], 'the probe is gone'
-        assert not ServerMatch(client.node, ['do', 'not_there']).advance(), 'nobody offers it'
+        assert not ServerMatch(client.node, ['do', 'not_there']).advance(), 'no node offers it'
     served.shutdown()
     server.destroy_node()
     rclpy.shutdown(context=context)

@@ -24,7 +24,6 @@ from process_supervisor import (
 )
 from process_supervisor.arguments import seconds_from
 from process_supervisor.exceptions import no_answer
-from process_supervisor.nodes import first_found
 
 NODE = Executable('some_package', 'some_node')
 
@@ -43,17 +42,6 @@ def test_a_workspace_that_is_not_built_is_reported(tmp_path: Path) -> None:
         node_argv(NODE, lambda package, name: None)
     with pytest.raises(StartError, match=r'some_node does not exist.*make build'):
         node_argv(NODE, lambda package, name: tmp_path / name)
-
-
-def test_the_first_that_exists_is_taken(tmp_path: Path) -> None:
-    """The best first; none when there is none."""
-    other = Executable('other', 'some_node')
-    assert first_found([NODE, other], lambda package, name: tmp_path) is NODE
-    found = first_found(
-        [NODE, other], lambda package, name: tmp_path if package == 'other' else None
-    )
-    assert found is other
-    assert first_found([NODE, other], lambda package, name: None) is None
 
 
 @pytest.mark.parametrize('urdf', ['<a b="c: d"/>', '# no comment\n\t<x/>', "it's ü \\ \u2028"])

@@ -189,7 +189,7 @@ def test_parameters_for_one_node_reach_it(word: str) -> None:
 def test_parameters_for_one_node_in_a_namespace_belong_into_a_file(
     word: str, tmp_path: Path
 ) -> None:
-    """By -p rcl finds nodes of the root namespace only: it would say so, or find nobody."""
+    """By -p rcl finds nodes of the root namespace only: an error, or no effect."""
     with pytest.raises(StartError, match='--params-file'):
         assert RosOptions('left', ('-p', word)).node_arguments
     file = tmp_path / 'rates.yaml'

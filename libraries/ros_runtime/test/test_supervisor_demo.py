@@ -46,7 +46,7 @@ class Client:
         """Nothing comes in."""
 
     def close(self) -> None:
-        """Leave."""
+        """Close."""
         Client.closed = True
 
 

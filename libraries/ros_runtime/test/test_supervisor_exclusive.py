@@ -37,7 +37,7 @@ def bus() -> str:
 
 @contextmanager
 def another_process(bus: str, user: int) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """Let a process take a bus; yield it and what it says, and kill it."""
+    """Start a process that holds a bus; yield it and what it prints, and kill it."""
     with subprocess.Popen(
         [sys.executable, '-c', HOLD.format(bus=bus, user=user)],
         env=os.environ | {'PYTHONPATH': os.pathsep.join(sys.path)},
@@ -77,7 +77,7 @@ def test_the_second_on_a_bus_is_refused_with_the_first_ones_process(bus: str) ->
 
 @pytest.mark.skipif(os.geteuid() != 0, reason='becomes another user')
 def test_another_user_is_refused_too(bus: str) -> None:
-    """Bus and domain are those of the host, whoever is on them."""
+    """Bus and domain are those of the host, for all users."""
     nobody = 65534
     with exclusive(bus, REMEDY), another_process(bus, nobody) as (_, said):
         assert f'process {os.getpid()} of user 0' in said

@@ -55,7 +55,7 @@ def ctrl_c(_: Runner) -> None:
 
 
 def nothing(_: Runner) -> None:
-    """Leave it to the processes."""
+    """Do nothing."""
 
 
 def test_each_process_has_a_session_of_its_own() -> None:

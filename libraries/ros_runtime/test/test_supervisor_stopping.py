@@ -34,7 +34,7 @@ class Play:
             self.dying[name] = self.now + delay
 
     def run(self, orders: dict[str, int], steps: Sequence[tuple[Signals, float]]) -> StopSequence:
-        """Play until nobody is left."""
+        """Play until all processes have ended."""
         sequence = StopSequence(self.send)
         for name, order in orders.items():
             sequence.add(name, order, steps)

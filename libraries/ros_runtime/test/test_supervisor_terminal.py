@@ -18,7 +18,7 @@ class Terminal(io.StringIO):
     """Says that it is one."""
 
     def isatty(self) -> bool:
-        """Say so."""
+        """Return True."""
         return True
 
 
@@ -75,7 +75,7 @@ def test_what_is_no_log_line_is_a_warning(line: str, severity: Severity) -> None
 
 
 def test_a_closed_output_is_no_error() -> None:
-    """Nobody reads any more, but the drives still have to be stopped."""
+    """The reader has gone, but the drives still have to be stopped."""
     stream = io.StringIO()
     write = LineWriter(stream)
     write('seen')

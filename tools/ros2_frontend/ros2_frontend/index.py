@@ -47,7 +47,7 @@ def prefix_of(package: str, message: str = "Package '{0}' not found") -> Path:
 
 
 def _remedy(package: str, workspace: Path) -> str:
-    """Say what is to be done about a package whose sources are in the workspace."""
+    """Return the remedy for a package whose sources are in the workspace."""
     folders = ('.', 'libraries', 'interfaces')
     if not any((workspace / folder / package / 'package.xml').is_file() for folder in folders):
         return ''

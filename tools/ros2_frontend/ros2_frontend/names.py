@@ -44,7 +44,7 @@ class NodeName:
 
 
 def absolute(name: str) -> str:
-    """Give the name of a node, topic, service or action its leading slash."""
+    """Return the name of a node, topic, service or action with its leading slash."""
     return name if name.startswith('/') else f'/{name}'
 
 

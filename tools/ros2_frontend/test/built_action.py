@@ -85,7 +85,7 @@ def _run_cmake(folder: Path) -> None:
 
 
 def with_package(prefix: Path, env: Mapping[str, str]) -> dict[str, str]:
-    """Give an environment in which the package can be imported.
+    """Return an environment in which the package can be imported.
 
     Args:
         prefix: Where it is installed.

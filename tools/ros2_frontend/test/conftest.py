@@ -16,7 +16,7 @@ import pytest
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Let one worker have the zoo: its nodes publish all the time."""
+    """Run all tests of the zoo in one worker: its nodes publish all the time."""
     for item in items:
         if 'zoo' in getattr(item, 'fixturenames', ()):
             item.add_marker(pytest.mark.xdist_group('zoo'))
@@ -30,7 +30,7 @@ def ros2(capsys: pytest.CaptureFixture[str]) -> Ros2:
 
 @pytest.fixture(scope='module')
 def zoo_env() -> Iterator[Mapping[str, str]]:
-    """Give the environment of a domain in which the zoo lives; no longer than it is looked at."""
+    """Yield the environment of a domain in which the zoo runs."""
     with reserve() as isolation:
         env = with_frontend(isolation.env)
         zoo_program = str(Path(__file__).with_name('frontend_zoo.py'))

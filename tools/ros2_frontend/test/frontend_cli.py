@@ -39,7 +39,7 @@ class Outcome:
 
 
 def with_frontend(env: Mapping[str, str]) -> dict[str, str]:
-    """Give an environment in which Python finds the front-end."""
+    """Return an environment in which Python finds the front-end."""
     path = os.pathsep.join([str(FRONTEND), env.get('PYTHONPATH', '')])
     return {**env, 'PYTHONPATH': path}
 

@@ -12,8 +12,6 @@ import time
 
 from frontend_cli import PROGRAM, Ros2, with_frontend
 from isolation import reserve
-from mcap.reader import make_reader
-from mcap_ros2.decoder import DecoderFactory
 from processes import RunningProcess
 import pytest
 from rosbags.highlevel import AnyReader
@@ -31,7 +29,7 @@ TIMEOUT = 30.0  # [s]
 
 @pytest.fixture
 def env(monkeypatch: pytest.MonkeyPatch) -> Iterator[Mapping[str, str]]:
-    """Give an environment with a ROS domain of its own; this process is in it, too."""
+    """Return an environment with a ROS domain of its own; this process is in it, too."""
     with reserve() as isolation:
         monkeypatch.setenv('ROS_DOMAIN_ID', str(isolation.domain_id))
         yield with_frontend(isolation.env)
@@ -75,9 +73,10 @@ def read(folder: Path) -> dict[str, list[object]]:
 
 
 def test_every_message_is_recorded(env: Mapping[str, str], tmp_path: Path) -> None:
-    """Of topics that appear later, and what a latched one kept: as many as were published."""
+    """Of topics that appear later, and what a latched one kept; in several compressed files."""
     folder = tmp_path / 'bag'
-    with record(env, folder, '-a') as recorder:
+    words = ['-a', '--max-bag-size', '20000', '--storage-preset-profile', 'zstd_fast']
+    with record(env, folder, *words) as recorder:
         recorder.wait_for(RECORDING)
         with source(env, 3000) as publisher:
             publisher.wait_for('published')
@@ -88,10 +87,7 @@ def test_every_message_is_recorded(env: Mapping[str, str], tmp_path: Path) -> No
     assert found['/latched'] == ['kept']
     assert 'lost' not in recorder.output
     assert f'Recording stopped: {sum(map(len, found.values()))} messages' in recorder.output
-    with (folder / 'bag_0.mcap').open('rb') as stream:
-        decoded = make_reader(stream, decoder_factories=[DecoderFactory()])
-        numbers = [each.decoded_message.data for each in decoded.iter_decoded_messages('/numbers')]
-    assert numbers == list(range(3000))
+    assert len(list(folder.glob('*.mcap'))) > 2
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
@@ -126,6 +122,7 @@ def test_after_a_kill_all_but_the_last_second_is_there(
     assert outcome.code == 0
     assert 'Topic: /numbers | Type: std_msgs/msg/UInt32 | Count: ' in outcome.out
     assert 'was not finished' in outcome.err
+    assert '/numbers' in ros2('bag', 'info', '-t', str(folder)).lines
     assert ros2('bag', 'reindex', str(folder)).code == 0
     numbers = read(folder)['/numbers']
     assert numbers == list(range(len(numbers)))
@@ -189,23 +186,6 @@ def test_play_chooses_a_part_and_a_rate(
     # also while it waits: a node with `use_sim_time` would see a jump of years
     start = BagReader(first).metadata.start // 1_000_000_000
     assert min(each.sec for each in found['/clock']) > start  # type: ignore[attr-defined]
-
-
-def test_a_split_recording_with_compression(
-    env: Mapping[str, str], tmp_path: Path, ros2: Ros2
-) -> None:
-    """Several files, which is one recording for a reader."""
-    folder = tmp_path / 'bag'
-    words = ['--topics', '/numbers', '/loose', '--max-bag-size', '20000']
-    words += ['--storage-preset-profile', 'zstd_fast']
-    with record(env, folder, *words) as recorder:
-        recorder.wait_for(RECORDING)
-        with source(env, 1000) as publisher:
-            publisher.wait_for('published')
-            recorder.stop()
-    assert len(list(folder.glob('*.mcap'))) > 2
-    assert read(folder)['/numbers'] == list(range(1000))
-    assert ros2('bag', 'info', '-t', str(folder)).lines == ['/loose', '/numbers']
 
 
 def test_messages_that_do_not_arrive_are_counted(env: Mapping[str, str], tmp_path: Path) -> None:

@@ -22,13 +22,13 @@ class Clock:
         return self.now
 
     def sleep(self, duration: float) -> None:
-        """Let it pass."""
+        """Advance by a duration."""
         self.now += duration
 
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
-    """Give the module virtual time."""
+    """Replace the time of the module by a virtual one."""
     clock = Clock()
     monkeypatch.setattr(graph, 'time', clock)
     return clock

@@ -193,7 +193,7 @@ def test_service_info(ros2: Ros2) -> None:
 
 
 def test_an_empty_list_of_actions(ros2: Ros2) -> None:
-    """Nothing and exit code 0; `info` counts nobody, `type` has exit code 1."""
+    """Nothing and exit code 0; `info` counts none, `type` has exit code 1."""
     assert ros2('action', 'list').out == ''
     info = ros2('action', 'info', '/nothing', '--spin-time', '0.2')
     assert (info.code, info.out) == (

@@ -15,7 +15,7 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 @contextlib.contextmanager
 def signals_interrupt() -> Iterator[None]:
-    """Let SIGINT and SIGTERM unwind the stack, so that no ghost node stays in the graph.
+    """Unwind the stack at SIGINT and SIGTERM, so that no ghost node stays in the graph.
 
     SIGINT, too: a script's shell starts background jobs with SIGINT ignored.
     """

@@ -34,7 +34,7 @@ def flag(*names: str, **options: object) -> Argument:
 
 
 def exclusive(*arguments: Argument) -> Argument:
-    """Let at most one of several be given."""
+    """Allow at most one of several."""
 
     def add(parser: Any) -> None:  # noqa: ANN401  # as in argparse
         group = parser.add_mutually_exclusive_group()

@@ -18,12 +18,12 @@ import itertools
 import threading
 import time
 
-from message_definitions import concatenated
+from message_definitions import DefinitionError, message_definition
 from rosbag_files import BagError, BagWriter, OfferedQos, Topic
 
 from ..bag import Accepts
 from ..cli.errors import FrontendError
-from ..index import class_of, definition_path, Kind
+from ..index import class_of, Kind
 from ..names import Handle
 from .bag_qos import for_recording, is_compatible, offered, overridden, RECORD_DEPTH, to_profile
 from .graph import Graph
@@ -165,8 +165,8 @@ class Recorder:
 
     def _definition(self, type_: str) -> str:
         try:
-            return concatenated(type_, lambda name: definition_path(name).read_text('utf-8'))
-        except (FrontendError, OSError) as error:
+            return message_definition(type_)
+        except (DefinitionError, OSError) as error:
             self._log.warning(f'{type_} is recorded without its definition: {error}')
             return ''
 
@@ -234,7 +234,7 @@ class _Subscribed:
     publishers: AbstractSet[bytes] = frozenset()
 
     def receive(self, sequence: int | None) -> None:
-        """Take the number of a message; None where the middleware has none."""
+        """Process the number of a message; None where the middleware has none."""
         if sequence is not None and self.last is not None:
             self.gap += max(sequence - self.last - 1, 0)
         self.last = sequence

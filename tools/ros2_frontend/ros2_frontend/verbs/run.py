@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """`ros2 run`: become an executable of a package.
 
-This process is replaced by the executable. So every signal reaches it, once, whoever sends it and
-however; its exit code is ours; and there is one process less per node. (ros2cli keeps a parent,
+This process is replaced by the executable. So every signal reaches it, once, wherever it comes
+from; its exit code is ours; and there is one process less per node. (ros2cli keeps a parent,
 which leaves the node running when only the parent is killed.)
 """
 
