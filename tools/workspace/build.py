@@ -53,11 +53,7 @@ class Builder:
         return self.kind is UnderlayKind.WHEELS
 
     def fingerprints(self, packages: Mapping[str, Package]) -> dict[str, str]:
-        """Hash each package with the environment and with the interfaces that it is built on.
-
-        Args:
-            packages: Each after those that it needs.
-        """
+        """Hash each package with the environment and with the interfaces that it is built on."""
         hashes: dict[str, str] = {}
         for name, package in packages.items():
             tools = [interfaces if package.is_interface else link] if self._on_wheels else []

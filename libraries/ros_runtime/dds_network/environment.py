@@ -90,10 +90,6 @@ def restrict_dds(environ: MutableMapping[str, str]) -> Reach:
 def open_dds(environ: MutableMapping[str, str], names: str | None) -> str:
     """Do the same for a program with the option ``--network``, which goes before the variable.
 
-    Args:
-        environ: As of :func:`restrict_dds`.
-        names: Argument of the option; None without it.
-
     Raises:
         NetworkChoiceError: As of :func:`selected_reach`.
     """

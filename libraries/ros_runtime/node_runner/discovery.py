@@ -30,14 +30,7 @@ def other_nodes(node: Node, names: Iterable[str], own: Sequence[str]) -> list[st
 def discover_other_nodes(
     node: Node, names: Iterable[str], own: Sequence[str], stop: threading.Event
 ) -> list[str]:
-    """Wait for as long as discovery takes; return what is found as soon as there is any.
-
-    Args:
-        node: As of :func:`other_nodes`.
-        names: As of :func:`other_nodes`.
-        own: As of :func:`other_nodes`.
-        stop: Ends it.
-    """
+    """Wait for as long as discovery takes; return what is found as soon as there is any."""
     wanted, deadline = set(names), time.monotonic() + DISCOVERY_TIME
     while time.monotonic() < deadline and not stop.wait(_LOOK_PERIOD):
         if found := other_nodes(node, wanted, own):

@@ -65,13 +65,7 @@ def refuse_similar(unknown: Iterable[str], known: Iterable[str]) -> None:
 
 
 def closest(name: str, names: Iterable[str], alike: float = ALIKE) -> str:
-    """Return the one of some names that is most like another one; empty when none is.
-
-    Args:
-        name: What was written.
-        names: What there is.
-        alike: Least likeness, 0 to 1.
-    """
+    """Return the name that is most like another one, at least `alike` (0 to 1); empty for none."""
     return next(iter(difflib.get_close_matches(name, list(names), n=1, cutoff=alike)), '')
 
 
@@ -257,13 +251,7 @@ def give_defaults(node: Node, values: Mapping[str, object]) -> None:
 
 
 def declare_given(node: Node, names: Iterable[str], meaning: str) -> None:
-    """Declare parameters that were given and are not declared yet, as they are.
-
-    Args:
-        node: The node.
-        names: Their names; those that are declared already are passed over.
-        meaning: Of all of them.
-    """
+    """Declare parameters that were given and are not declared yet, as they are."""
     given = node._parameter_overrides  # noqa: SLF001
     for name in names:
         if name in given and not node.has_parameter(name):

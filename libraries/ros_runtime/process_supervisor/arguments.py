@@ -61,9 +61,6 @@ def add_network(parser: argparse.ArgumentParser) -> None:
 def apply_network(arguments: argparse.Namespace) -> None:
     """Keep DDS of this process and those that it starts to what a person opened; print it.
 
-    Args:
-        arguments: What :func:`add_network` parsed.
-
     Raises:
         StartError: There is no such interface or peer.
     """

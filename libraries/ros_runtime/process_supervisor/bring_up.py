@@ -100,17 +100,6 @@ def node_process(
 ) -> ProcessSpec:
     """Return the process of a node that reports when it is ready.
 
-    Args:
-        name: As in :class:`.ProcessSpec`, as the last two.
-        executable: As in :func:`.node_argv`, as the next four.
-        find: Finds executables.
-        ros: Options of all nodes.
-        values: ROS parameters.
-        parameters: ROS parameter files.
-        options: Arguments in front of those of ROS.
-        ready_timeout: How long it may take to be ready in [s].
-        stop_order: Those with a lower number are stopped before.
-
     Raises:
         StartError: The executable is missing.
     """
@@ -138,13 +127,6 @@ def state_publisher(
     parameters: Path, find: FindExecutable, ros: RosOptions, *, ready_timeout: float, order: int
 ) -> ProcessSpec | None:
     """Return the process; the bring-up goes on without it when it ends.
-
-    Args:
-        parameters: File of :func:`.write_parameters`, with the description.
-        find: Finds executables.
-        ros: Options of all nodes.
-        ready_timeout: How long it may take to be ready in [s].
-        order: Its ``stop_order``.
 
     Returns:
         The process; None where neither program is installed.

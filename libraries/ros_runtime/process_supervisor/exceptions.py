@@ -36,12 +36,7 @@ class CallError(SupervisorError):
 
 
 def no_answer(what: str, waited: float) -> CallError:
-    """Return the error for something that did not come in time.
-
-    Args:
-        what: What was waited for.
-        waited: For how long in [s].
-    """
+    """Return the error for something that did not come in time, in [s]."""
     return CallError(
         f'waited {round(waited, 1):g} s in vain for {what}; is this machine too busy? '
         'If not, the log above says why'

@@ -30,13 +30,7 @@ class GraphClient:
     """
 
     def __init__(self, name: str, given_up: Callable[[], bool], namespace: str = '') -> None:
-        """Join the ROS graph.
-
-        Args:
-            name: Name of the node.
-            given_up: True when nothing shall be waited for any more.
-            namespace: Its namespace; relative names are meant in it.
-        """
+        """Join the ROS graph; ``given_up`` returns True when no wait shall go on."""
         self._given_up = given_up
         self._known = set[str]()  # services of which the nodes know this one's clients
         self._context = Context()
@@ -54,22 +48,13 @@ class GraphClient:
         self._context.try_shutdown()
 
     def listen(self, duration: float) -> None:
-        """Process what comes in.
-
-        Args:
-            duration: For how long in [s].
-        """
+        """Process what comes in, for a duration in [s]."""
         end = time.monotonic() + duration
         while (left := end - time.monotonic()) > 0:
             self._executor.spin_once(timeout_sec=left)
 
     def wait_until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
-        """Wait for something.
-
-        Args:
-            condition: True when it is there; checked after whatever comes in.
-            timeout: Longest time in [s].
-            what: What is waited for, for the message.
+        """Wait for a condition, which is checked after whatever comes in; times in [s].
 
         Raises:
             CallError: It did not come in time.
@@ -85,10 +70,6 @@ class GraphClient:
 
     def wait_until_known(self, services: Collection[str], timeout: float) -> None:
         """Wait until the nodes of services know the clients of this one, or answers are lost.
-
-        Args:
-            services: Names of which clients were made.
-            timeout: Longest time in [s].
 
         Raises:
             CallError: They did not in time.

@@ -128,14 +128,7 @@ class GuardianLink:
                 self._process.stdin.write(json.dumps(message) + '\n')
 
     def watch(self, name: str, pid: int, order: int, steps: list[tuple[Signals, float]]) -> None:
-        """Report a process that has been started as the leader of its own group.
-
-        Args:
-            name: Its name.
-            pid: Its process id.
-            order: Place in the order of stopping.
-            steps: Signals and the time in [s] that each is given.
-        """
+        """Report a process that has been started as the leader of its own group."""
         self._send(pid=pid, name=name, order=order, steps=steps)
 
     def gone(self, name: str) -> None:

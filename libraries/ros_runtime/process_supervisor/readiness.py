@@ -65,11 +65,7 @@ class ServiceManager:
         self._reported = ''
 
     def report(self, state: str) -> None:
-        """Report a state, if there is a service manager, once.
-
-        Args:
-            state: One of sd_notify(3), such as ``READY=1``.
-        """
+        """Report a state of sd_notify(3) once, if there is a service manager."""
         if not self._address or state == self._reported:
             return
         self._reported = state

@@ -107,10 +107,6 @@ def parse_with_ros(
 ) -> tuple[argparse.Namespace, RosOptions]:
     """Parse a command line that may have ROS arguments.
 
-    Args:
-        parser: With the option of :func:`add_namespace`.
-        argv: The command line without the program.
-
     Returns:
         What the parser found, and the options of the nodes.
     """

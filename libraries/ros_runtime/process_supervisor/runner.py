@@ -35,11 +35,7 @@ class LineSplitter:
         self._rest = b''
 
     def feed(self, data: bytes) -> list[str]:
-        """Split bytes into lines.
-
-        Args:
-            data: As they were read; may end anywhere, also inside a character.
-        """
+        """Split bytes into lines; they may end anywhere, also inside a character."""
         *lines, rest = (self._rest + data).split(b'\n')
         while len(rest) > LONGEST_LINE:
             lines.append(rest[:LONGEST_LINE])
@@ -136,15 +132,7 @@ class Runner:
         on_interrupt: Callable[[], bool] | None = None,
         on_phase: Callable[[Phase], None] = lambda _: None,
     ) -> None:
-        """Plan the run; nothing is started yet.
-
-        Args:
-            specs: The processes.
-            write: Takes each line of output, with the name of the process first.
-            notify: Takes each notice of the supervision.
-            on_interrupt: As in :class:`.Supervision`.
-            on_phase: As in :class:`.Supervision`.
-        """
+        """Plan the run; nothing is started yet. ``write`` gets a process and each line of it."""
         self._write = write
         self._children: dict[str, _Child] = {}
         self._guardian: GuardianLink | None = None

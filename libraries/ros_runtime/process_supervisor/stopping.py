@@ -40,13 +40,7 @@ class StopSequence:
         self.abandoned: list[str] = []
 
     def add(self, name: str, order: int, steps: Iterable[tuple[Signals, float]]) -> None:
-        """Add a running process.
-
-        Args:
-            name: Its name.
-            order: Lower ones are stopped first.
-            steps: Signals, each with the time in [s] that it is given.
-        """
+        """Add a running process, and the signals with the time in [s] that each is given."""
         self._members[name] = _Member(order, tuple(steps))
 
     @property

@@ -202,13 +202,7 @@ class Supervision:
             self._say(f'all is ready ({now - self._begun:.1f} s)')
 
     def exited(self, name: str, returncode: int, now: float) -> None:
-        """Process the end of a process.
-
-        Args:
-            name: Its name.
-            returncode: Exit code; negative for the signal that killed it.
-            now: Steady time in [s].
-        """
+        """Process the end of a process; a negative code is the signal that killed it."""
         child = self._children[name]
         child.running = False
         how = describe_exit(returncode)

@@ -48,15 +48,7 @@ class Recorder:
         overrides: Mapping[str, OfferedQos],
         args: Namespace,
     ) -> None:
-        """Subscribe to nothing yet.
-
-        Args:
-            graph: Its node subscribes.
-            writer: Where messages go.
-            wanted: Which topics.
-            overrides: QoS to subscribe with, by topic.
-            args: Parsed arguments of `ros2 bag record`.
-        """
+        """Subscribe to nothing yet."""
         self.paused = False
         self._graph = graph
         self._node = graph.session.node
@@ -72,10 +64,7 @@ class Recorder:
         self._clock = self._subscribe_clock() if args.sim_time else None
 
     def run(self, poll: Callable[[], None]) -> None:
-        """Record until an exception, which is how Ctrl-C arrives.
-
-        Args:
-            poll: Called between two rounds.
+        """Record until an exception, which is how Ctrl-C arrives; poll between two rounds.
 
         Raises:
             FrontendError: The recording cannot be written.
