@@ -14,6 +14,9 @@ from .layout import Layout
 from .packages import find_packages
 from .process import clean_environment
 
+BESIDE = ('test', 'bench', 'training')  # folders of a package beside its modules
+COMPOSE_SCHEMA = ('--builtin-schema', 'vendor.compose-spec')  # of the Compose Specification
+
 
 def mkdocs_command(layout: Layout) -> list[str | Path]:
     """Return the command that builds the site in build/site, a warning being an error."""
@@ -31,10 +34,6 @@ def build_manual(layout: Layout, environ: Mapping[str, str]) -> int:
     print(f'The manual: {site / "index.html"}')
     print(f'With a search field: python3 -m http.server --bind 127.0.0.1 --directory {site}')
     return 0
-
-
-BESIDE = ('test', 'bench', 'training')  # folders of a package beside its modules
-COMPOSE_SCHEMA = ('--builtin-schema', 'vendor.compose-spec')  # of the Compose Specification
 
 
 def type_check_units(root: Path) -> dict[str, list[Path]]:

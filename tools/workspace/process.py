@@ -17,6 +17,20 @@ from typing import TypeAlias
 
 from .errors import NetworkError, StepFailedError
 
+TAIL_LINES = 25
+_UNREACHABLE = re.compile(
+    'dns error|failed to lookup address|name resolution|Name or service not known'
+    '|Network is unreachable|No route to host|Connection refused|Connection reset'
+    '|NewConnectionError|ConnectTimeout|Failed to connect|tcp connect error|Max retries exceeded',
+    re.IGNORECASE,
+)
+# of another ROS, another environment or an outer make: must not leak into what we build
+_FOREIGN = re.compile(
+    'AMENT_|COLCON_|CMAKE_PREFIX_PATH|PYTHONPATH|PYTHONHOME|PYTHONSAFEPATH|VIRTUAL_ENV|ROS_DISTRO'
+    '|ROS_VERSION|ROS_PYTHON_VERSION|LD_LIBRARY_PATH|_ROS_WHEELS|MAKEFLAGS|MFLAGS|MAKELEVEL'
+)
+Argument: TypeAlias = str | Path
+
 
 @contextlib.contextmanager
 def exclusive(path: Path) -> Iterator[int]:
@@ -35,22 +49,6 @@ def exclusive(path: Path) -> Iterator[int]:
         yield descriptor
     finally:
         os.close(descriptor)
-
-
-TAIL_LINES = 25
-_UNREACHABLE = re.compile(
-    'dns error|failed to lookup address|name resolution|Name or service not known'
-    '|Network is unreachable|No route to host|Connection refused|Connection reset'
-    '|NewConnectionError|ConnectTimeout|Failed to connect|tcp connect error|Max retries exceeded',
-    re.IGNORECASE,
-)
-# of another ROS, another environment or an outer make: must not leak into what we build
-_FOREIGN = re.compile(
-    'AMENT_|COLCON_|CMAKE_PREFIX_PATH|PYTHONPATH|PYTHONHOME|PYTHONSAFEPATH|VIRTUAL_ENV|ROS_DISTRO'
-    '|ROS_VERSION|ROS_PYTHON_VERSION|LD_LIBRARY_PATH|_ROS_WHEELS|MAKEFLAGS|MFLAGS|MAKELEVEL'
-)
-
-Argument: TypeAlias = str | Path
 
 
 def clean_environment(environ: Mapping[str, str]) -> dict[str, str]:

@@ -29,6 +29,27 @@ print(json.dumps([
 ]))
 """  # the fields of Interpreter in their order
 
+PYTHON_OLDEST = (3, 10)
+PYTHON_NEWEST = (3, 14)
+WHEEL_MACHINE = 'x86_64'  # the wheels exist for no other
+# any one of the programs does; the apt package that brings the usual one
+PROGRAMS: tuple[tuple[tuple[str, ...], str], ...] = (
+    (COMPILERS, 'g++'),
+    (('git',), 'git'),
+)
+# of the system's ROS, what the packages and their build use directly
+SYSTEM_ROS_PACKAGES: tuple[str, ...] = (
+    'ament_cmake',
+    'diagnostic_msgs',
+    'geometry_msgs',
+    'rclpy',
+    'rosidl_default_generators',
+    'sensor_msgs',
+    'std_msgs',
+    'std_srvs',
+    'trajectory_msgs',
+)
+
 
 @dataclass(frozen=True, slots=True)
 class Interpreter:
@@ -75,30 +96,6 @@ def probe(program: str) -> Interpreter:
         ) from error
     path, (major, minor), *rest = json.loads(answer)
     return Interpreter(path, (major, minor), *rest)
-
-
-PYTHON_OLDEST = (3, 10)
-PYTHON_NEWEST = (3, 14)
-WHEEL_MACHINE = 'x86_64'  # the wheels exist for no other
-
-# any one of the programs does; the apt package that brings the usual one
-PROGRAMS: tuple[tuple[tuple[str, ...], str], ...] = (
-    (COMPILERS, 'g++'),
-    (('git',), 'git'),
-)
-
-# of the system's ROS, what the packages and their build use directly
-SYSTEM_ROS_PACKAGES: tuple[str, ...] = (
-    'ament_cmake',
-    'diagnostic_msgs',
-    'geometry_msgs',
-    'rclpy',
-    'rosidl_default_generators',
-    'sensor_msgs',
-    'std_msgs',
-    'std_srvs',
-    'trajectory_msgs',
-)
 
 
 def check_supported(underlay: Underlay, python: Interpreter, root: Path) -> None:

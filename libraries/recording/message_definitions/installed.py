@@ -16,6 +16,8 @@ _FIELD = re.compile(r'(?:(?P<package>[a-z]\w*)/)?(?:msg/)?(?P<name>[A-Z]\w*)(?:\
 
 _NESTED = '=' * 80  # before each nested definition
 
+_SEPARATOR = '---'  # between request and response of a service
+
 
 def nested_type(line: str, package: str) -> str | None:
     """The message type of the field that a line declares.
@@ -51,9 +53,6 @@ def concatenated(name: str, read: Callable[[str], str]) -> str:
         wanted += [type_ for type_ in nested if type_ is not None]
     top, *others = found.items()
     return '\n'.join([top[1], *(f'{_NESTED}\nMSG: {type_}\n{text}' for type_, text in others)])
-
-
-_SEPARATOR = '---'  # between request and response of a service
 
 
 class DefinitionError(LookupError):

@@ -12,17 +12,17 @@ import re
 import socket
 import struct
 
-
-class NetworkChoiceError(ValueError):
-    """An interface or a peer does not exist, or its profile cannot be written."""
-
-
 _SIOCGIFFLAGS = 0x8913
 _SIOCGIFADDR = 0x8915  # linux/sockios.h: the first IPv4 address of an interface
 _IFREQ_SIZE = 40  # [byte] struct ifreq
 _NAME_SIZE = 16  # [byte] IFNAMSIZ
 _RUNNING = 0x40  # linux/if.h: IFF_RUNNING, what Fast DDS asks for
 _ANY_PORT = 7400  # connecting a UDP socket sends nothing; the port does not matter
+_LOOPBACK = '127.'
+
+
+class NetworkChoiceError(ValueError):
+    """An interface or a peer does not exist, or its profile cannot be written."""
 
 
 def read_interfaces() -> dict[str, str]:
@@ -75,9 +75,6 @@ def source_address(peer: str) -> str:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.connect((peer, _ANY_PORT))
         return str(probe.getsockname()[0])
-
-
-_LOOPBACK = '127.'
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,11 @@ from rclpy.task import Future
 DISCOVERY_TIME = 2.0  # [s] in which nodes that run are discovered
 _LOOK_PERIOD = 0.1  # [s]
 
+PROBE = 'get_parameter_types'
+"""A service of nearly every node that changes nothing."""
+PROBE_PERIOD = 1.0
+"""Time after which the answer of a probe counts as lost, in [s]."""
+
 
 def other_nodes(node: Node, names: Iterable[str], own: Sequence[str]) -> list[str]:
     """Return the nodes of some names that others run."""
@@ -36,12 +41,6 @@ def discover_other_nodes(
         if found := other_nodes(node, wanted, own):
             return found
     return []
-
-
-PROBE = 'get_parameter_types'
-"""A service of nearly every node that changes nothing."""
-PROBE_PERIOD = 1.0
-"""Time after which the answer of a probe counts as lost, in [s]."""
 
 
 class ServerMatch:

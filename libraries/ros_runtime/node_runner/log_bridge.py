@@ -24,6 +24,9 @@ from rclpy.node import Node
 BURST = 10  # records of one source within a window
 WINDOW = 1.0  # [s]
 
+QUEUE_LENGTH = 500
+"""Records that wait for the thread that logs; more than these are counted and dropped."""
+
 
 @dataclass(slots=True)
 class _Window:
@@ -66,10 +69,6 @@ class LogRateLimit:
     def idle(self) -> bool:
         """Whether no window is open."""
         return not self._windows
-
-
-QUEUE_LENGTH = 500
-"""Records that wait for the thread that logs; more than these are counted and dropped."""
 
 
 class RosLogBridge(logging.Handler):

@@ -14,16 +14,19 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+ALIKE = 0.8  # of SequenceMatcher: one letter in five; short names for other nodes pass
+RCLPY_PREFIX = 'qos_overrides.'  # declared with a topic, so some of them later than our look
+Choice = TypeVar('Choice')
+Number = TypeVar('Number', int, float)
+Value = TypeVar('Value')
+_ALIKE = 0.6  # what is chosen from is known, so the suggestion may be a bold one
+
 
 class ParameterError(ValueError):
     """A parameter of a node is misspelt, or its value makes no sense.
 
     Scenarios: a text where a number belongs, a rate beyond its range, a choice that there is not.
     """
-
-
-ALIKE = 0.8  # of SequenceMatcher: one letter in five; short names for other nodes pass
-RCLPY_PREFIX = 'qos_overrides.'  # declared with a topic, so some of them later than our look
 
 
 def refuse_misspelt(node: Node, similar: Collection[str] = ()) -> list[str]:
@@ -67,13 +70,6 @@ def refuse_similar(unknown: Iterable[str], known: Iterable[str]) -> None:
 def closest(name: str, names: Iterable[str], alike: float = ALIKE) -> str:
     """Return the name that is most like another one, at least `alike` (0 to 1); empty for none."""
     return next(iter(difflib.get_close_matches(name, list(names), n=1, cutoff=alike)), '')
-
-
-Choice = TypeVar('Choice')
-Number = TypeVar('Number', int, float)
-Value = TypeVar('Value')
-
-_ALIKE = 0.6  # what is chosen from is known, so the suggestion may be a bold one
 
 
 class ParameterReader:

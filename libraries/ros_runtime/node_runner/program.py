@@ -30,6 +30,25 @@ from .log_bridge import log_as, RosLogBridge
 from .parameter_reader import ParameterError
 from .spinning import spin
 
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""Ctrl-C, what stops services, and the closing of the terminal."""
+ECHO_TIME = 0.5
+"""A SIGINT this soon after the first signal in [s] is its echo: a key that bounces, or a signal to
+a process and to its group."""
+NOTIFY_VARIABLE = 'NOTIFY_SOCKET'
+"""Names the socket of the supervisor, as in sd_notify(3)."""
+REFUSED = 1
+"""Exit code of a program that could not begin."""
+HELP_OPTIONS = frozenset({'-h', '--help'})
+PLAIN_HELP = """\
+usage: {name} --ros-args -p PARAMETER:=VALUE --params-file FILE
+
+The README of its package has its parameters; `ros2 param list /{name}` and
+`ros2 param describe /{name} PARAMETER` show them while it runs.
+"""
+"""What ``--help`` prints of a program that has no other help."""
+Body = Callable[[threading.Event], int | None]
+
 
 def init_ros(args: Sequence[str] | None = None, context: Context | None = None) -> None:
     """Initialise rclpy without its signal handlers, with DDS on the networks that are open.
@@ -53,14 +72,6 @@ def init_ros(args: Sequence[str] | None = None, context: Context | None = None) 
     )
     if reach.without_link or not reach.is_this_host:
         get_logger('dds_network').warning(reach.describe())
-
-
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""Ctrl-C, what stops services, and the closing of the terminal."""
-
-ECHO_TIME = 0.5
-"""A SIGINT this soon after the first signal in [s] is its echo: a key that bounces, or a signal to
-a process and to its group."""
 
 
 def stop_on_signals(
@@ -98,10 +109,6 @@ def stop_on_signals(
     return stop
 
 
-VARIABLE = 'NOTIFY_SOCKET'
-"""Names the socket of the supervisor, as in sd_notify(3)."""
-
-
 def notify_ready(status: str = '') -> None:
     """Report ``READY=1`` to the supervisor of this process, if it has one that wants to know.
 
@@ -111,7 +118,7 @@ def notify_ready(status: str = '') -> None:
     Args:
         status: What the supervisor shall show the user about this process, in one line.
     """
-    address = os.environ.pop(VARIABLE, '')
+    address = os.environ.pop(NOTIFY_VARIABLE, '')
     if not address:
         return
     if address.startswith('@'):  # no file: a name in the abstract namespace of Linux
@@ -119,22 +126,6 @@ def notify_ready(status: str = '') -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as supervisor, suppress(OSError):
         said = f'\nSTATUS={status}' if status else ''
         supervisor.sendto(f'READY=1{said}'.encode(), address)
-
-
-REFUSED = 1
-"""Exit code of a program that could not begin."""
-
-HELP_OPTIONS = frozenset({'-h', '--help'})
-
-PLAIN_HELP = """\
-usage: {name} --ros-args -p PARAMETER:=VALUE --params-file FILE
-
-The README of its package has its parameters; `ros2 param list /{name}` and
-`ros2 param describe /{name} PARAMETER` show them while it runs.
-"""
-"""What ``--help`` prints of a program that has no other help."""
-
-Body = Callable[[threading.Event], int | None]
 
 
 def run_program(

@@ -22,7 +22,27 @@ from .ros_options import RosOptions
 from .spec import ProcessSpec, StopStep
 
 _CREDENTIALS = struct.Struct('3i')  # struct ucred: process, user, group
-_LONGEST = 100  # [byte] of the 107 that an abstract name may have
+_LONGEST_NAME = 100  # [byte] of the 107 that an abstract name may have
+
+STATE_PUBLISHERS = (
+    Executable('robot_state_publisher', 'robot_state_publisher', notifies_ready=False),
+    Executable('robot_viewer', 'robot_state_publisher'),
+)
+"""The public one where ROS has it, else ours."""
+TF_RATE = 100.0
+"""Greatest rate of /tf in [Hz]; its default of 20 would halve what /joint_states has."""
+VIEWER = Executable('robot_viewer', 'web_viewer')
+"""Serves the page, and says its URL when it is ready."""
+NO_VIEW = 'NO_VIEW'
+"""Variable that leaves the page out, where it is neither empty nor 0."""
+VIEWER_NICENESS = ('nice', '-n', '5')
+"""Whatever moves the robot comes first, from the start of the program on."""
+VIEWER_STOP_STEPS = (
+    StopStep(Signals.SIGTERM, 3.0),
+    StopStep(Signals.SIGABRT, 1.0),
+    StopStep(Signals.SIGKILL, 1.0),
+)
+"""The viewer holds nothing that would have to be put down."""
 
 
 @contextlib.contextmanager
@@ -52,10 +72,10 @@ def exclusive(thing: str, remedy: str) -> Iterator[None]:
 
 def _abstract_name(thing: str) -> bytes:
     name = f'\0bringup {thing}'.encode()
-    if len(name) <= _LONGEST:
+    if len(name) <= _LONGEST_NAME:
         return name
     digest = hashlib.blake2b(name, digest_size=16).hexdigest().encode()
-    return name[: _LONGEST - len(digest)] + digest
+    return name[: _LONGEST_NAME - len(digest)] + digest
 
 
 def _process_of(name: bytes) -> str:
@@ -114,15 +134,6 @@ def node_process(
     )
 
 
-STATE_PUBLISHERS = (
-    Executable('robot_state_publisher', 'robot_state_publisher', notifies_ready=False),
-    Executable('robot_viewer', 'robot_state_publisher'),
-)
-"""The public one where ROS has it, else ours."""
-TF_RATE = 100.0
-"""Greatest rate of /tf in [Hz]; its default of 20 would halve what /joint_states has."""
-
-
 def state_publisher(
     parameters: Path, find: FindExecutable, ros: RosOptions, *, ready_timeout: float, order: int
 ) -> ProcessSpec | None:
@@ -147,29 +158,15 @@ def state_publisher(
     )
 
 
-VIEWER = Executable('robot_viewer', 'web_viewer')
-"""Serves the page, and says its URL when it is ready."""
-OFF = 'NO_VIEW'
-"""Variable that leaves the page out, where it is neither empty nor 0."""
-POLITE = ('nice', '-n', '5')
-"""Whatever moves the robot comes first, from the start of the program on."""
-STOP_STEPS = (
-    StopStep(Signals.SIGTERM, 3.0),
-    StopStep(Signals.SIGABRT, 1.0),
-    StopStep(Signals.SIGKILL, 1.0),
-)
-"""It holds nothing that would have to be put down."""
-
-
 def add_view(parser: argparse.ArgumentParser) -> None:
     """Declare ``--no-view``."""
     parser.add_argument(
         '--no-view',
         dest='view',
         action='store_false',
-        default=os.environ.get(OFF, '') in {'', '0'},
+        default=os.environ.get(NO_VIEW, '') in {'', '0'},
         help='without the page on which the robot is seen, whose URL is printed (default: with '
-        f'it, but where the variable {OFF} is 1)',
+        f'it, but where the variable {NO_VIEW} is 1)',
     )
 
 
@@ -184,12 +181,12 @@ def view_process(
         return None
     return ProcessSpec(
         name='viewer',
-        argv=(*POLITE, *node_argv(VIEWER, find, ros.frame_parameters, ros=ros)),
+        argv=(*VIEWER_NICENESS, *node_argv(VIEWER, find, ros.frame_parameters, ros=ros)),
         environment=LOG_FORMAT,
         notifies_ready=True,
         ready_timeout=ready_timeout,
         required=False,
         awaited=False,
         stop_order=stop_order,
-        stop_steps=STOP_STEPS,
+        stop_steps=VIEWER_STOP_STEPS,
     )

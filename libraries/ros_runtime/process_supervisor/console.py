@@ -21,6 +21,17 @@ from .terminal import LineWriter, Painter, wants_colour
 ENDING_TIMEOUT = 10.0
 """Time in [s] in which a thread that was asked to has to end."""
 
+USAGE_ERROR = 2
+"""Exit code of a bring-up when nothing was started."""
+REPORTED_STATES = {Phase.RUNNING: 'READY=1', Phase.STOPPING: 'STOPPING=1'}
+"""What is reported to the service manager of a bring-up, as in sd_notify(3)."""
+Shutdown = Callable[[Callable[[str], None], Callable[[], bool]], None]
+"""Done at the first Ctrl-C, while all processes still run; everything is stopped when it returns.
+
+It gets a function that shows the user a message, and one that returns True when it is no longer
+wanted: Ctrl-C again, or a process has ended.
+"""
+
 
 def join_in_time(thread: threading.Thread) -> str:
     """Wait for a thread that was asked to end; when it does not, the program ends without it.
@@ -50,21 +61,6 @@ def leave() -> None:
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(1)
-
-
-USAGE_ERROR = 2
-"""Exit code of a bring-up when nothing was started."""
-
-REPORTED_STATES = {Phase.RUNNING: 'READY=1', Phase.STOPPING: 'STOPPING=1'}
-"""What is reported to the service manager of a bring-up, as in sd_notify(3)."""
-
-
-Shutdown = Callable[[Callable[[str], None], Callable[[], bool]], None]
-"""Done at the first Ctrl-C, while all processes still run; everything is stopped when it returns.
-
-It gets a function that shows the user a message, and one that returns True when it is no longer
-wanted: Ctrl-C again, or a process has ended.
-"""
 
 
 def supervise(

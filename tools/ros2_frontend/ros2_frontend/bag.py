@@ -16,6 +16,9 @@ from rosbag_files import BagError, BagReader, OfferedQos, read_qos
 from .cli.errors import FrontendError
 from .names import absolute, is_hidden
 
+Accepts = Callable[[str, str], bool]
+"""Whether a topic, by its name and type, is chosen."""
+
 
 @contextlib.contextmanager
 def bag_errors() -> Iterator[None]:
@@ -59,10 +62,6 @@ def load_overrides(path: str | None) -> dict[str, OfferedQos]:
         return {
             str(name): read_qos(values, f'{path}: {name}') for name, values in document.items()
         }
-
-
-Accepts = Callable[[str, str], bool]
-"""Whether a topic, by its name and type, is chosen."""
 
 
 def topic_filter(args: Namespace, everything: bool, hidden: bool) -> Accepts:

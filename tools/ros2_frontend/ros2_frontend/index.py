@@ -16,6 +16,8 @@ from message_definitions import nested_type
 from .cli.errors import BadTypeError, FrontendError, hint, UnknownNameError
 from .names import InterfaceClass
 
+_RESOURCE = 'rosidl_interfaces'
+
 
 def package_prefixes() -> Mapping[str, str]:
     """Return the prefix path of each installed package by its name, sorted.
@@ -64,9 +66,6 @@ def executables(package: str) -> list[Path]:
         folders[:] = [name for name in folders if not name.startswith('.')]
         found += [Path(base, name) for name in files if os.access(Path(base, name), os.X_OK)]
     return sorted(found)
-
-
-_RESOURCE = 'rosidl_interfaces'
 
 
 class Kind(Enum):

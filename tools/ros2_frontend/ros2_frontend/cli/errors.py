@@ -17,6 +17,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+_ALIKE = 0.75  # types of two packages are 0.6 alike in their middle parts
+
 
 class FrontendError(RuntimeError):
     """A failure that ends the command with exit code 1 and this message."""
@@ -36,9 +38,6 @@ class FieldValueError(FrontendError, ValueError):
 
 class NoAnswerError(FrontendError, TimeoutError):
     """A service that did not appear or did not answer in time."""
-
-
-_ALIKE = 0.75  # types of two packages are 0.6 alike in their middle parts
 
 
 def hint(name: str, known: Iterable[str]) -> str:

@@ -23,6 +23,9 @@ Main = Callable[[Namespace], 'int | None']
 """Does the verb; the exit code, of which None is 0. Raises FrontendError, for the user."""
 
 
+N = TypeVar('N', int, float)
+
+
 def argument(*names: str, **options: object) -> Argument:
     """Declare an argument as argparse does."""
     return lambda parser: parser.add_argument(*names, **options)
@@ -55,9 +58,6 @@ class Verb:
 def verb(*arguments: Argument) -> Callable[[Main], Verb]:
     """Make a verb of a function."""
     return lambda main: Verb(arguments, main)
-
-
-N = TypeVar('N', int, float)
 
 
 def _number(

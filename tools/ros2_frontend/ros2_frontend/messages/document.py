@@ -18,6 +18,8 @@ from ..names import Message
 _ELLIPSIS = '...'
 _SCALARS = (bool, int, float)
 
+_ESCAPES = ('\\U', '\\N')
+
 
 @dataclass(frozen=True, slots=True)
 class Abbreviation:
@@ -120,9 +122,6 @@ def _cell(value: Any, slot: Any, cut: Abbreviation) -> str:  # noqa: ANN401  # o
         rest: Any = b'...' if isinstance(value, bytes) else '...'
         value = value[: cut.length] + rest
     return str(value)
-
-
-_ESCAPES = ('\\U', '\\N')
 
 
 def to_yaml(document: object, flow_style: bool = False) -> str:

@@ -18,6 +18,13 @@ from typing import Any
 from ..cli.errors import FieldValueError, hint, UnknownNameError
 from ..names import Message
 
+_HEADER = ('std_msgs', 'msg', 'Header')
+_TIME = ('builtin_interfaces', 'msg', 'Time')
+_FLOATS = ('float', 'double', 'long double')
+_SECTION = 'ros__parameters'
+_ALL_NODES = '/**'
+_SEPARATOR = '.'
+
 
 def parse_mapping(text: str) -> dict[str, Any]:
     """Read YAML that gives values by name, e.g. `{ target: 10.0 }`; an empty text is none.
@@ -39,11 +46,6 @@ def parse_mapping(text: str) -> dict[str, Any]:
             f'The passed value needs to be a dictionary in YAML format{slip}: {text}'
         )
     return values
-
-
-_HEADER = ('std_msgs', 'msg', 'Header')
-_TIME = ('builtin_interfaces', 'msg', 'Time')
-_FLOATS = ('float', 'double', 'long double')
 
 
 @dataclass(slots=True)
@@ -161,11 +163,6 @@ def filled(
     except FieldValueError as error:
         raise FieldValueError(f'Failed to populate {what}: {error}') from None
     return message
-
-
-_SECTION = 'ros__parameters'
-_ALL_NODES = '/**'
-_SEPARATOR = '.'
 
 
 def dump(node: str, values: Mapping[str, object]) -> str:

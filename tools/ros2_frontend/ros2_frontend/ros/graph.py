@@ -37,6 +37,8 @@ _POLL = 0.01  # [s]; one look costs below 1 ms with 30 topics
 _MAX_POLL = 0.25  # [s]
 _POLL_SHARE = 0.02  # of the time waited so far: a wait of minutes shall not burn a core
 
+_TIMEOUT = 5.0  # [s] for a service of a node that exists to show up, and to answer
+
 
 class Graph:
     """What is in the ROS graph.
@@ -130,9 +132,6 @@ def graph_verb(*arguments: Argument) -> Callable[[Callable[[Graph, Namespace], i
         return Verb((*GRAPH_ARGUMENTS, *arguments), main)
 
     return declare
-
-
-_TIMEOUT = 5.0  # [s] for a service of a node that exists to show up, and to answer
 
 
 def request(

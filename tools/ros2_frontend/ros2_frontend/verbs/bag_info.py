@@ -17,6 +17,9 @@ _INDENT = 19
 _NANO = 1_000_000_000
 _UNITS = ('B', 'KiB', 'MiB', 'GiB', 'TiB')
 
+_BAG = argument('bag_path', help='Bag to open')
+_STORAGE = argument('-s', '--storage', choices=['mcap'], help='Storage identifier: mcap')
+
 
 def info_text(metadata: BagMetadata, size: int) -> str:
     """Return the text for a recording whose files have a size in [byte]."""
@@ -63,10 +66,6 @@ def _moment(nanoseconds: int) -> str:
     seconds, rest = divmod(nanoseconds, _NANO)
     day = time.strftime('%b %e %Y %H:%M:%S', time.localtime(seconds))
     return f'{day}.{rest:09d} ({_seconds(nanoseconds)})'
-
-
-_BAG = argument('bag_path', help='Bag to open')
-_STORAGE = argument('-s', '--storage', choices=['mcap'], help='Storage identifier: mcap')
 
 
 @verb(_BAG, _STORAGE, flag('-t', '--topic-name', help='Only display topic names.'))

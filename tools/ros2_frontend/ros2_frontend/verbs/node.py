@@ -20,6 +20,11 @@ OPTIONAL_NODE = (argument('node_name', nargs='?', help='Name of the ROS node'), 
 
 NodeMain = Callable[[Graph, NodeName, Namespace], 'int | None']
 
+LIST_ARGUMENTS = (
+    flag('-a', '--all', help='Display all nodes even hidden ones'),
+    flag('-c', '--count-nodes', help='Only display the number of nodes discovered'),
+)
+
 
 def node_verb(*arguments: Argument) -> Callable[[NodeMain], Verb]:
     """Make a verb of a function that talks to one node; it gets the node's name, too."""
@@ -46,12 +51,6 @@ def find_node(name: str, graph: Graph, hidden: bool, message: str = 'Node not fo
         known = [node.full_name for node in graph.nodes(hidden=hidden or wanted.hidden)]
         raise UnknownNameError(message + hint(wanted.full_name, known))
     return wanted
-
-
-LIST_ARGUMENTS = (
-    flag('-a', '--all', help='Display all nodes even hidden ones'),
-    flag('-c', '--count-nodes', help='Only display the number of nodes discovered'),
-)
 
 
 @graph_verb(*LIST_ARGUMENTS)

@@ -20,6 +20,10 @@ from ..cli.errors import FrontendError, hint, UnknownNameError
 from ..cli.verb import argument, verb
 from ..index import executables
 
+_MISSING = """\
+This ROS was installed from wheels, which have no launch. {0}
+Launch files run where ROS 2 Jazzy is installed (https://docs.ros.org/en/jazzy)."""
+
 
 @verb(
     argument(
@@ -58,11 +62,6 @@ def run(args: Namespace) -> NoReturn:
         os.execvp(command[0], command)  # noqa: S606
     except OSError as error:
         raise FrontendError(f'Cannot run {command[0]}: {error.strerror}') from error
-
-
-_MISSING = """\
-This ROS was installed from wheels, which have no launch. {0}
-Launch files run where ROS 2 Jazzy is installed (https://docs.ros.org/en/jazzy)."""
 
 
 @verb(

@@ -15,6 +15,8 @@ from ..names import absolute, InterfaceClass, is_hidden, NamesAndTypes
 from ..ros.graph import Graph, graph_verb
 from .names import Names
 
+TOPICS = Names('topic', Graph.topics)
+
 
 def message_class(name: str) -> InterfaceClass:
     """Import a message class, by `package/msg/Name` or `package/Name`."""
@@ -47,9 +49,6 @@ def class_of_topic(topic: str, graph: Graph, *, forever: bool = False) -> Interf
             f"Cannot echo topic '{topic}', as it contains more than one type: [{', '.join(types)}]"
         )
     return message_class(types[0])
-
-
-TOPICS = Names('topic', Graph.topics)
 
 
 @graph_verb(

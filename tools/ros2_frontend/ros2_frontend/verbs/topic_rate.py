@@ -21,6 +21,10 @@ from .topic import class_of_topic
 NANOSECONDS = 1_000_000_000  # in a second
 _KILO = 1000
 
+_REPORT_PERIOD = 1.0  # [s]
+_LONG_WINDOW = 10_000
+_SHORT_WINDOW = 100
+
 
 def spread(values: Collection[int]) -> str:
     """Return the second line of `topic hz` and `topic delay`, of values in [ns]."""
@@ -88,11 +92,6 @@ def bandwidth(samples: Collection[tuple[float, int]], now: float) -> str | None:
         f'{texts[0]}/s from {len(sizes)} messages\n'
         f'\tMessage size mean: {texts[1]} min: {texts[2]} max: {texts[3]}'
     )
-
-
-_REPORT_PERIOD = 1.0  # [s]
-_LONG_WINDOW = 10_000
-_SHORT_WINDOW = 100
 
 
 def _arguments(topic_help: str, window: int) -> tuple[Argument, ...]:
