@@ -4,11 +4,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import math
 from pathlib import Path
 from statistics import median
 import threading
+from typing import NamedTuple
 
 import pytest
 
@@ -41,40 +42,30 @@ def settings_at(port: Path, log: Path) -> RobotSettings:
     )
 
 
-@dataclass(frozen=True)
-class Seen:
-    """What was published of a robot, live or replayed.
-
-    Attributes:
-        states: All states.
-        sources: How the contacts of each are known.
-        commands: How many commands were sent.
-    """
+class Seen(NamedTuple):
+    """What was published of a robot, live or replayed."""
 
     states: list[RobotState]
-    sources: list[ContactSource]
-    commands: int
+    commands: int  # how many were sent
 
     def contact_ratios(self) -> list[float]:
         """Return the ratio of the states in which each foot stands."""
-        contacts = [state.foot_contacts for state in self.states if state.foot_contacts]
+        contacts = [state.foot_contacts or () for state in self.states]
         return [sum(foot) / len(contacts) for foot in zip(*contacts, strict=True)]
 
     def ratio_of(self, source: ContactSource) -> float:
         """Return the ratio of the states whose contacts are known so."""
-        return self.sources.count(source) / len(self.sources)
+        ways = [state.odometry for state in self.states if state.odometry]
+        return sum(way.contact_source is source for way in ways) / len(ways)
 
 
 def session(peer: PtyPeer, log: Path) -> Seen:
     """Have a robot swing its legs in turn, while its body turns."""
     states: list[RobotState] = []
-    sources: list[ContactSource] = []
     arrived = threading.Condition()
 
     def take(state: RobotState) -> None:
-        assert state.odometry is not None
         with arrived:
-            sources.append(state.odometry.contact_source)
             states.append(state)
             arrived.notify_all()
 
@@ -102,7 +93,7 @@ def session(peer: PtyPeer, log: Path) -> Seen:
             robot.command(targets)
     finally:
         robot.end(lambda loss: None)
-    return Seen(states, sources, robot.status().commands)
+    return Seen(states, robot.status().commands)
 
 
 def comparable(state: RobotState) -> tuple[object, ...]:
@@ -149,24 +140,18 @@ def test_the_states_of_a_log_are_those_of_the_robot(
 
 def fed(path: Path, *, pause: float = 0.0) -> tuple[ReplayedRobot, list[LinkState], Seen]:
     """Replay a log; return the robot, the states of its link, and what was published."""
-    seen = Seen([], [], 0)
+    states: list[RobotState] = []
     changes: list[LinkState] = []
-
-    def take(state: RobotState) -> None:
-        assert state.odometry is not None
-        seen.sources.append(state.odometry.contact_source)
-        seen.states.append(state)
-
     robot = ReplayedRobot(
         replace(settings_at(path, path), serial_log=None),
-        on_state=take,
+        on_state=states.append,
         on_change=lambda state, _: changes.append(state),
         on_refusal=lambda reason: None,
     )
     for entry in read_serial_log(path):
         robot.take(entry, entry.time)
     robot.advance(entry.time + pause)
-    return robot, changes, replace(seen, commands=robot.status().commands)
+    return robot, changes, Seen(states, robot.status().commands)
 
 
 @pytest.mark.slow

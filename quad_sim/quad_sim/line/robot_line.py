@@ -60,9 +60,9 @@ class RobotLine:
         self._board = board
         self._functions, self._registers = Functions(board), Registers(board)
         self._by_baud = dict(speeds or {V2.baud: V2, V1.baud: V1})
-        self._forget_partial_frames()
         self._command_gap = command_gap
         self._baud = next(iter(self._by_baud))
+        self._forget_partial_frames()
         self._received_at = self._frame_end = -math.inf
         self._battery_fault: Fault | None = None
         self._powered = self._plugged = True
@@ -130,8 +130,7 @@ class RobotLine:
             self._send(frame, V2, now)
 
     def _receive(self, arrived: Arrival) -> None:
-        baud = self._baud
-        protocol, parser = self._by_baud.get(baud), self._parsers.get(baud)
+        protocol, parser = self._by_baud.get(self._baud), self._parser
         if protocol is None or parser is None:
             return
         self._board.advance(arrived.end)
@@ -163,15 +162,13 @@ class RobotLine:
             self._send(answer, protocol, now)
 
     def _forget_partial_frames(self) -> None:
-        self._parsers = {
-            baud: StreamParser(protocol, HOST_KINDS) for baud, protocol in self._by_baud.items()
-        }
+        protocol = self._by_baud.get(self._baud)
+        self._parser = None if protocol is None else StreamParser(protocol, HOST_KINDS)
 
     def _give_up_waiting(self, now: float) -> None:
-        parser = self._parsers.get(self._baud)
-        if parser is not None and parser.pending:
+        if self._parser is not None and self._parser.pending:
             protocol = self._by_baud[self._baud]
-            for frame in parser.expire():
+            for frame in self._parser.expire():
                 self._handle(frame, protocol, now, now, now)
 
     def _send(self, frame: Frame, protocol: Protocol, now: float) -> None:
