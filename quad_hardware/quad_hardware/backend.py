@@ -56,12 +56,8 @@ def recorded_in(log: Path, urdf: str, *, imu_checked: bool = False) -> RecordedB
         OSError: It cannot be read.
     """
     states: list[RobotState] = []
-    robot = ReplayedRobot(
-        _settings_of(LinkOptions(str(log)), urdf, imu_checked=imu_checked),
-        on_state=states.append,
-        on_change=lambda state, detail: _log.info('%s: %s', state.value, detail),
-        on_refusal=_log.warning,
-    )
+    robot = ReplayedRobot(_settings_of(LinkOptions(str(log)), urdf, imu_checked=imu_checked))
+    robot.on_state, robot.on_change, robot.on_refusal = states.append, _log_link, _log.warning
     for entry in read_serial_log(log):
         robot.take(entry, entry.time)
     if not states:
@@ -83,13 +79,9 @@ class SerialBackend(Backend):
         Raises:
             CommandError: The legs of the URDF cannot be read.
         """
-        self._robot = SerialRobot(
-            settings,
-            on_state=self._take,
-            on_change=self._change,
-            on_refusal=_log.warning,
-            warn=_log.warning,
-        )
+        self._robot = SerialRobot(settings)
+        self._robot.on_state, self._robot.on_change = self._take, self._change
+        self._robot.on_refusal = self._robot.on_warning = _log.warning
         self.names, self.period = self._robot.names, 1.0 / settings.link.rate
         self._arrived = threading.Condition()
         self._state: RobotState | None = None
@@ -176,10 +168,14 @@ class SerialBackend(Backend):
             if not self._running:
                 self._state = None
             self._arrived.notify_all()
-        _log.info('%s: %s', state.value, detail)
+        _log_link(state, detail)
 
 
 def _settings_of(link: LinkOptions, urdf: str, *, imu_checked: bool) -> RobotSettings:
     joints = JointMap(map(servo_of, movable_joints(urdf)))
     mounting = ImuMounting(checked=imu_checked, rates_checked=imu_checked)
     return RobotSettings(link, urdf, joints, estimator=EstimatorSettings(mounting=mounting))
+
+
+def _log_link(state: LinkState, detail: str) -> None:
+    _log.info('%s: %s', state.value, detail)

@@ -4,11 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 import math
-
-from quad_description import RobotState
 
 from .exceptions import RecordingError
 from .link import Dialect, LinkState, LinkStatus, make_dialect, QUIET_TIME
@@ -25,15 +22,8 @@ class ReplayedRobot(ObservedRobot):
     were not sent. Times are those of the log [s].
     """
 
-    def __init__(
-        self,
-        settings: RobotSettings,
-        *,
-        on_state: Callable[[RobotState], None],
-        on_change: Callable[[LinkState, str], None],
-        on_refusal: Callable[[str], None],
-    ) -> None:
-        super().__init__(settings, on_state=on_state, on_change=on_change, on_refusal=on_refusal)
+    def __init__(self, settings: RobotSettings) -> None:
+        super().__init__(settings)
         self._status = LinkStatus(detail='the log begins')
         self._dialect: Dialect | None = None  # how the robot was talked to
         self._now = self._bytes_at = 0.0
@@ -98,7 +88,7 @@ class ReplayedRobot(ObservedRobot):
         self._status.state, self._status.detail = state, detail
         if state is not LinkState.RUNNING:
             self.latest = None
-        self._on_change(state, detail)
+        self.on_change(state, detail)
 
     def _transfer(self, transfer: Transfer) -> None:
         if self._dialect is None:

@@ -50,22 +50,16 @@ class RobotSettings:
 
 
 class ObservedRobot:
-    """A robot whose reports become states; on a serial line, or in the log of one."""
+    """A robot whose reports become states; on a serial line, or in the log of one.
 
-    def __init__(
-        self,
-        settings: RobotSettings,
-        *,
-        on_state: Callable[[RobotState], None],
-        on_change: Callable[[LinkState, str], None],
-        on_refusal: Callable[[str], None],
-    ) -> None:
+    Attributes:
+        on_state: Called with each report as a state in SI units.
+        on_change: Called with the state of the link when it changes, and its detail.
+        on_refusal: Called with the reason why a report cannot be.
+    """
+
+    def __init__(self, settings: RobotSettings) -> None:
         """Begin without a report.
-
-        Args:
-            on_state: Takes each report as a state in SI units.
-            on_change: Takes the state of the link when it changes, and its detail.
-            on_refusal: Takes why a report cannot be.
 
         Raises:
             CommandError: The legs of the URDF cannot be read.
@@ -73,9 +67,10 @@ class ObservedRobot:
         self.names = settings.joints.names  # joints in the order of the URDF
         # the newest state, None while the link does not run
         self.latest: RobotState | None = None
+        self.on_state: Callable[[RobotState], None] = lambda _: None
+        self.on_change: Callable[[LinkState, str], None] = lambda *_: None
+        self.on_refusal: Callable[[str], None] = lambda _: None
         self._settings = settings
-        self._on_state, self._on_change = on_state, on_change
-        self._on_refusal = on_refusal
         self._begin()
 
     def _begin(self) -> None:
@@ -95,39 +90,32 @@ class ObservedRobot:
         """Process a report; return why it cannot be."""
         state = self._estimator.step(report)
         if state is None:
-            self._on_refusal(self._estimator.refusal)
+            self.on_refusal(self._estimator.refusal)
             return self._estimator.refusal
         self.latest = state
-        self._on_state(state)
+        self.on_state(state)
         return ''
 
 
 class SerialRobot(ObservedRobot):
     """Composes driver, estimation and the watch over joint commands.
 
-    The callbacks are called in the thread of the driver, except ``warn``; everything else may be
-    called in one other thread. Times are on the monotonic clock [s].
+    The callbacks are called in the thread of the driver, except ``on_warning``; everything else
+    may be called in one other thread. Times are on the monotonic clock [s].
+
+    Attributes:
+        on_warning: Called with what is wrong with a command.
     """
 
-    def __init__(
-        self,
-        settings: RobotSettings,
-        *,
-        on_state: Callable[[RobotState], None],
-        on_change: Callable[[LinkState, str], None],
-        on_refusal: Callable[[str], None],
-        warn: Callable[[str], None],
-    ) -> None:
+    def __init__(self, settings: RobotSettings) -> None:
         """Prepare; :meth:`start` opens the port.
-
-        Args:
-            warn: Takes what is the matter with a command.
 
         Raises:
             CommandError: The legs of the URDF cannot be read.
             RecordingError: The serial log cannot be written.
         """
-        super().__init__(settings, on_state=on_state, on_change=on_change, on_refusal=on_refusal)
+        super().__init__(settings)
+        self.on_warning: Callable[[str], None] = lambda _: None
         self._arrived_at = -math.inf  # [s] when the latest report did
         self._joints = settings.joints
         self._commander = JointCommander(
@@ -140,7 +128,6 @@ class SerialRobot(ObservedRobot):
             warn=self._warn,
         )
         self.counters = self._commander.counters  # what became of joint commands
-        self._warning = warn
         self._last_note = ''
         self._recorders: list[SerialMemory | SerialLogFile] = []
         self._log_file: SerialLogFile | None = None
@@ -261,7 +248,7 @@ class SerialRobot(ObservedRobot):
 
     def _warn(self, text: str) -> None:
         self._note(COMMANDS, text)
-        self._warning(text)
+        self.on_warning(text)
 
     # -- in the thread of the driver
 
@@ -293,7 +280,7 @@ class SerialRobot(ObservedRobot):
         if state is not LinkState.RUNNING:
             self.latest = None  # the robot may be moved while it is not seen
             self._commander.lose()
-        self._on_change(state, detail)
+        self.on_change(state, detail)
 
     # -- for the commander
 

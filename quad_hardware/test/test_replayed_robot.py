@@ -69,13 +69,8 @@ def session(peer: PtyPeer, log: Path) -> Seen:
             states.append(state)
             arrived.notify_all()
 
-    robot = SerialRobot(
-        settings_at(peer.link, log),
-        on_state=take,
-        on_change=lambda state, detail: None,
-        on_refusal=lambda reason: None,
-        warn=lambda reason: None,
-    )
+    robot = SerialRobot(settings_at(peer.link, log))
+    robot.on_state = take
     robot.start()
     try:
         for turn in range(50):
@@ -142,12 +137,8 @@ def fed(path: Path, *, pause: float = 0.0) -> tuple[ReplayedRobot, list[LinkStat
     """Replay a log; return the robot, the states of its link, and what was published."""
     states: list[RobotState] = []
     changes: list[LinkState] = []
-    robot = ReplayedRobot(
-        replace(settings_at(path, path), serial_log=None),
-        on_state=states.append,
-        on_change=lambda state, _: changes.append(state),
-        on_refusal=lambda reason: None,
-    )
+    robot = ReplayedRobot(replace(settings_at(path, path), serial_log=None))
+    robot.on_state, robot.on_change = states.append, lambda state, _: changes.append(state)
     for entry in read_serial_log(path):
         robot.take(entry, entry.time)
     robot.advance(entry.time + pause)

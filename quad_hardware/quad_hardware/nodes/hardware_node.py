@@ -25,7 +25,6 @@ from node_runner import (
     settle_process_memory,
     spin,
 )
-from quad_description import RobotState
 from quad_msgs.msg import JointCommand
 
 from ..exceptions import CommandError, HardwareError
@@ -59,14 +58,10 @@ class HardwareNode(Node):
         """
         super().__init__('hardware_node')
         self._settings = settings = declare_parameters(self)
-        self._robot = SerialRobot(
-            settings.robot,
-            on_state=self._publish,
-            on_change=self._link_changed,
-            on_refusal=self._report_refused,
-            warn=self._warn,
-        )
+        self._robot = robot = SerialRobot(settings.robot)
         self._topics = RobotTopics(self, self._robot, settings.frames, settings.deviations)
+        robot.on_state, robot.on_change = self._topics.publish, self._link_changed
+        robot.on_refusal, robot.on_warning = self._report_refused, self._warn
         self._damage = ''
         self._reader = FastReader(JointCommand, 'position', 'velocity', 'effort')
         self.create_subscription(JointCommand, 'joint_command', self._take, COMMAND_QOS, raw=True)
@@ -92,10 +87,6 @@ class HardwareNode(Node):
 
     def _report_refused(self, reason: str) -> None:
         self.get_logger().warning(f'report refused: {reason}', throttle_duration_sec=WARN_PERIOD)
-
-    def _publish(self, state: RobotState) -> None:
-        """Publish a report. Runs in the thread of the driver."""
-        self._topics.publish(state)
 
     def _link_changed(self, state: LinkState, detail: str) -> None:
         """Log how the link is; runs in the thread of the driver."""

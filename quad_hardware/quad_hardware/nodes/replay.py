@@ -85,12 +85,9 @@ class Replay:
         )
         if calibration:
             give_defaults(node, dict(_calibrated(Path(calibration).expanduser())))
-        self._robot = ReplayedRobot(
-            declare_robot(read, LinkOptions(log)),
-            on_state=self._publish,
-            on_change=self._log_change,
-            on_refusal=self._log_refusal,
-        )
+        self._robot = robot = ReplayedRobot(declare_robot(read, LinkOptions(log)))
+        robot.on_state, robot.on_change = self._publish, self._log_change
+        robot.on_refusal = self._log_refusal
         frames, deviations = declare_frames(read), declare_deviations(read)
         self._diagnostics_period = read.number(
             'diagnostics_period', 1.0, (0.05, 60.0), 'time between two /diagnostics messages [s]'
