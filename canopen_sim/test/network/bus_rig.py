@@ -45,6 +45,18 @@ START = 100.0  # [s] of virtual steady time; not 0, which means "never" in place
 BOOT_TIME_MAX = 5.0  # [s]
 NEVER = float('inf')
 JOINT = 'joint1'  # the drive of tests with one drive
+POSITION_MODES = (
+    OperationMode.PROFILE_POSITION,
+    OperationMode.INTERPOLATED_POSITION,
+    OperationMode.CYCLIC_POSITION,
+)
+VELOCITY_MODES = (
+    OperationMode.VELOCITY,
+    OperationMode.PROFILE_VELOCITY,
+    OperationMode.CYCLIC_VELOCITY,
+)
+TORQUE_MODES = (OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE)
+MODES = (*POSITION_MODES, *VELOCITY_MODES, *TORQUE_MODES)
 
 
 class Station(Protocol):

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 import struct
 
-from bus_rig import VirtualNetwork
+from bus_rig import JOINT, VirtualNetwork
 from drive_samples import bus_config, drive_config, MOTION_WRITES, PERIOD, SCALE, sdo_write
 import pytest
 
@@ -15,7 +15,7 @@ from arm_canopen import DriveState, OperationMode, Severity
 from arm_canopen.config.model.drive import RecoveryPolicy
 from canopen_sim import Drive as SimulatedDrive
 
-JOINT, NODE_ID = 'joint1', 2
+NODE_ID = 2
 RAMP = 1.0  # [s] of a quick stop from full speed to rest
 STANDING = 0.03  # [rad/s]
 

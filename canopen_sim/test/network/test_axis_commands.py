@@ -9,7 +9,16 @@ import math
 import struct
 from typing import Any
 
-from bus_rig import booted, Leader, VirtualNetwork
+from bus_rig import (
+    booted,
+    JOINT,
+    Leader,
+    MODES,
+    POSITION_MODES,
+    TORQUE_MODES,
+    VELOCITY_MODES,
+    VirtualNetwork,
+)
 from drive_samples import (
     bus_config,
     drive_config,
@@ -40,23 +49,8 @@ from canopen_sim import Fault, FaultInjection, ServoModel
 
 pytestmark = pytest.mark.slow
 
-JOINT = 'joint1'
-
 CLEAR = b'\xc4\x60\x06'  # 0x60C4:06 in an SDO
-
 NODE_ID = 2
-
-SPEEDS = [OperationMode.VELOCITY, OperationMode.PROFILE_VELOCITY, OperationMode.CYCLIC_VELOCITY]
-
-TORQUES = [OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE]
-
-POSITIONS = [
-    OperationMode.PROFILE_POSITION,
-    OperationMode.INTERPOLATED_POSITION,
-    OperationMode.CYCLIC_POSITION,
-]
-
-ALL = [*POSITIONS, *SPEEDS, *TORQUES]
 
 
 def by_name(value: object) -> str:
@@ -70,20 +64,18 @@ def full_drive(**changes: Any) -> NodeConfig:
 
 
 def with_modes(**changes: Any) -> VirtualNetwork:
-    """Return a network with such a drive, with_modes."""
-    net = VirtualNetwork(bus_config(full_drive(**changes)))
-    net.boot()
-    return net
+    """Return a network with such a drive, booted."""
+    return booted(full_drive(**changes))
 
 
 def target_of(mode: OperationMode) -> float:
     """Return a target that sets the drive in motion for a second."""
-    if mode in TORQUES:
+    if mode in TORQUE_MODES:
         return 200.0
-    return 0.4 if mode in SPEEDS else 0.9
+    return 0.4 if mode in VELOCITY_MODES else 0.9
 
 
-@pytest.mark.parametrize('mode', ALL, ids=by_name)
+@pytest.mark.parametrize('mode', MODES, ids=by_name)
 def test_every_mode_moves_as_it_is_commanded(mode: OperationMode) -> None:
     """Selected it moves nothing; a target is reached and held; a quick stop disables."""
     net = with_modes()
@@ -94,23 +86,23 @@ def test_every_mode_moves_as_it_is_commanded(mode: OperationMode) -> None:
     assert 'already in mode' in net.select(JOINT, mode)
     for target in (-target_of(mode), target_of(mode)):
         net.target(target)
-        net.run(3.0 if mode in POSITIONS else 1.5)
+        net.run(3.0 if mode in POSITION_MODES else 1.5)
         shown = net.drives[JOINT].view
-        if mode in POSITIONS:
+        if mode in POSITION_MODES:
             assert shown.position == pytest.approx(target, abs=2 / SCALE)
-        elif mode in SPEEDS:
+        elif mode in VELOCITY_MODES:
             assert shown.velocity == pytest.approx(target, rel=0.05)
         else:
             assert struct.unpack('<h', net.frames(0x400 + NODE_ID)[-1][4:6]) == (target,)
             assert net.speed() * target > 0.0
-    if mode in POSITIONS:
+    if mode in POSITION_MODES:
         net.target(-target_of(mode))
         net.run(0.5)
     else:
         net.target(0.0)
         before = abs(net.speed())
         net.run(1.5)
-        assert abs(net.speed()) < (0.8 * before if mode in TORQUES else 0.01)
+        assert abs(net.speed()) < (0.8 * before if mode in TORQUE_MODES else 0.01)
         net.target(target_of(mode))
         net.run(0.5)
     assert abs(net.speed()) > 0.05
@@ -186,7 +178,7 @@ def test_moves_are_for_mode_1_and_within_the_limits() -> None:
         net.commands[JOINT].move(Move(0.1, immediate=False))
 
 
-@pytest.mark.parametrize('mode', ALL, ids=by_name)
+@pytest.mark.parametrize('mode', MODES, ids=by_name)
 @pytest.mark.parametrize('value', [math.nan, math.inf, 1e12], ids=str)
 def test_what_is_no_target_is_refused(mode: OperationMode, value: float) -> None:
     """Nothing leaves: neither by service nor by stream."""
@@ -405,7 +397,7 @@ def modes_sent(net: VirtualNetwork, *, mapped: bool, since: float = 0.0) -> set[
 
 
 def deviating(*faults: Fault, **scales: Any) -> VirtualNetwork:
-    """Return a with_modes network whose drive deviates from the standard."""
+    """Return a booted network whose drive deviates from the standard."""
     net = VirtualNetwork(bus_config(full_drive(scales=scales)))
     for fault in faults:
         net.devices[JOINT].faults.inject(FaultInjection(fault), net.now)
@@ -508,7 +500,7 @@ def test_a_drive_that_ignores_its_mode_under_halt_is_switched_at_rest(before: in
     assert bool(reported) is (mode in (1, 2, 3, 6) or other == 1)
 
 
-@pytest.mark.parametrize('mode', TORQUES, ids=by_name)
+@pytest.mark.parametrize('mode', TORQUE_MODES, ids=by_name)
 def test_a_halted_torque_is_not_let_go_to_switch_the_mode(mode: OperationMode) -> None:
     """Such a drive stays halted in its mode, and the message says what helps."""
     net = deviating(Fault.MODE_HELD_UNDER_HALT)
@@ -720,7 +712,6 @@ def test_bits_of_an_earlier_homing_do_not_count() -> None:
 
 
 LAG = 0.05  # [s] of a motor that comes after its set-points
-
 WAITED_FOR = pytest.mark.parametrize(
     'mode',
     [

@@ -35,13 +35,9 @@ from arm_canopen.master.remote_node import BootPhase, LONGEST_PAUSE, RemoteNode,
 from arm_canopen.standard import AccessType, NmtCommand, NmtState, ObjectDictionary
 
 NODE = 'io'
-
 NODE_ID = 9
-
 INVALID = 0x8000_0000
-
 ABORT = 0x80  # command specifier of an SDO abort
-
 IDENTITY = Identity(
     device_type=0x0002_0192,
     vendor_id=0x555,
@@ -475,13 +471,9 @@ def test_nothing_is_an_error_in_a_boot_that_goes_well() -> None:
 
 
 TOO_HIGH = 0x0609_0031  # Elmo's answer to 0x1016
-
 NO_SUBINDEX = 0x0609_0011  # node-canopen's
-
 READ_ONLY = 0x0601_0002  # ElmoSimplIQ's to 0x1400:01
-
 OUT_OF_RANGE = 0x0609_0030
-
 WATCHED: dict[str, Any] = {'node_id': 3, 'heartbeat_producer': 0.1, 'heartbeat_timeout': 0.25}
 WATCHING = io_config(heartbeat_consumer=True)
 WITHOUT_TPDOS = io_config(tpdos=())
@@ -802,7 +794,6 @@ def test_a_master_that_shall_not_start_waits_for_its_command() -> None:
 
 
 OPERATING_TIME = 0.15  # [s] before it falls back
-
 EMCY = bytes((0x30, 0x81, 0x11, 0, 0, 0, 0, 0))  # 0x8130: life guard or heartbeat error
 
 

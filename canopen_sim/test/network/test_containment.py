@@ -34,7 +34,6 @@ from arm_canopen.standard import DataType
 pytestmark = pytest.mark.slow
 
 JOINTS = ('joint1', 'joint2', 'joint3')
-
 SPEED = 0.2  # [rad/s]
 
 
@@ -182,9 +181,7 @@ def test_a_value_that_cannot_be_packed_keeps_nothing_else_from_being_sent() -> N
 
 
 GOOD, ODD = 'joint1', 'joint2'
-
 NODE_IDS = {GOOD: 2, ODD: 3}
-
 INTEGER32_MIN = -(2**31)  # smallest INTEGER32; many encoders say so while they have no reference
 
 

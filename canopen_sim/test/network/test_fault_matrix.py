@@ -15,7 +15,7 @@ import random
 import re
 from typing import Any
 
-from bus_rig import VirtualNetwork
+from bus_rig import MODES, POSITION_MODES, TORQUE_MODES, VELOCITY_MODES, VirtualNetwork
 from drive_samples import (
     bus_config,
     drive_config,
@@ -57,18 +57,6 @@ SETTLING = 1.0  # [s] for a fault to be noticed and every ramp to end
 STANDING = 0.03  # [rad/s]
 CREEP = 0.002  # [rad] that a motor without torque may still roll
 TORQUE = 200.0  # [per mille] of the rated one
-POSITION_MODES = [
-    OperationMode.PROFILE_POSITION,
-    OperationMode.INTERPOLATED_POSITION,
-    OperationMode.CYCLIC_POSITION,
-]
-VELOCITY_MODES = [
-    OperationMode.VELOCITY,
-    OperationMode.PROFILE_VELOCITY,
-    OperationMode.CYCLIC_VELOCITY,
-]
-TORQUE_MODES = [OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE]
-MODES = [*POSITION_MODES, *VELOCITY_MODES, *TORQUE_MODES]
 HALTED_BY_DRIVE = [OperationMode.PROFILE_POSITION, *TORQUE_MODES]
 
 

@@ -10,7 +10,7 @@ from functools import partial
 import math
 import struct
 
-from bus_rig import booted, JOINT, VirtualNetwork
+from bus_rig import booted, JOINT, MODES, TORQUE_MODES, VELOCITY_MODES, VirtualNetwork
 from drive_samples import (
     bus_config,
     drive_config,
@@ -39,15 +39,10 @@ pytestmark = pytest.mark.slow
 
 
 NODE_ID = 2
-
 COMMAND_PDO = 0x200 + NODE_ID
-
 STATUS_PDO = 0x180 + NODE_ID
 RESTS_AFTER = 0.7  # [s] without a motion; longer than a set-point waits under a halt
 STANDING = 0.02  # [rad/s]
-SPEEDS = [OperationMode.VELOCITY, OperationMode.PROFILE_VELOCITY, OperationMode.CYCLIC_VELOCITY]
-TORQUES = [OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE]
-ALL = [mode for mode in OperationMode if mode not in {0, OperationMode.HOMING}]
 
 
 def running_in(mode: OperationMode, **changes: object) -> VirtualNetwork:
@@ -82,12 +77,12 @@ def assert_rests(net: VirtualNetwork, duration: float = 0.5) -> None:
     assert net.motor() == pytest.approx(begin, abs=2e-3)
 
 
-@pytest.mark.parametrize('mode', ALL, ids=lambda mode: mode.name)
+@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
 def test_halt_brakes_and_the_next_target_goes_on(mode: OperationMode) -> None:
     """The drive stays enabled, and holds in torque modes; nothing of the old target comes back."""
     net = running_in(mode)
-    there, back = (0.4, -0.3) if mode in SPEEDS else (0.9, -0.3)
-    if mode in TORQUES:
+    there, back = (0.4, -0.3) if mode in VELOCITY_MODES else (0.9, -0.3)
+    if mode in TORQUE_MODES:
         there, back = 200.0, -200.0
     net.target(there)
     net.run(0.6)
@@ -103,9 +98,9 @@ def test_halt_brakes_and_the_next_target_goes_on(mode: OperationMode) -> None:
         net.run(PERIOD)
         fastest = max(fastest, net.speed())
     assert fastest < 0.05, 'it went on with the old target'
-    if mode in SPEEDS:
+    if mode in VELOCITY_MODES:
         assert net.speed() == pytest.approx(-0.3, rel=0.05)
-    elif mode in TORQUES:
+    elif mode in TORQUE_MODES:
         assert net.speed() < -0.05
     else:
         assert net.motor() == pytest.approx(-0.3, abs=2e-3)
@@ -424,15 +419,10 @@ def test_recovery_does_not_undo_a_stop(verb: str) -> None:
 
 
 OLD = 3.0  # [rad] the target that a halt gives up; the axis never gets there
-
 BRAKING = 0.1  # [rad] from the profile velocity, 1 rad/s, at 5 rad/s^2
-
 ACCURACY = 5e-3  # [rad]
-
 ANSWER_MAX = 3.5  # [s] to the answer and the end of the move
-
 ANSWERED_FOR = 0.3  # [s] without a motion after the answer
-
 HALT_OPTION = 0x605D
 
 
@@ -668,7 +658,6 @@ def test_the_velocity_is_that_of_the_position_where_no_pdo_carries_it() -> None:
 
 
 METRE = 1_000_000.0  # [inc/m]
-
 METRES = {
     f'scale_{what}_{way}_dev': METRE if way == 'to' else 1 / METRE
     for what in ('pos', 'vel')

@@ -57,7 +57,6 @@ from canopen_sim import Fault, FaultInjection
 pytestmark = pytest.mark.slow
 
 SYNC, EMCY, HEARTBEAT = 0x080, 0x080, 0x700
-
 CONSUMER_TIME = 0.3  # [s] of the sample drives
 
 
@@ -868,7 +867,6 @@ def test_a_time_that_does_not_fit_is_refused() -> None:
 
 
 NODE = 'a'
-
 NODE_ID = 2
 
 

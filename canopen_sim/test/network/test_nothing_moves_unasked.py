@@ -19,7 +19,7 @@ import math
 from pathlib import Path
 import struct
 
-from bus_rig import booted, Sent, START, VirtualNetwork
+from bus_rig import booted, JOINT, Sent, START, VirtualNetwork
 from drive_samples import (
     bus_config,
     drive_config,
@@ -43,19 +43,12 @@ from canopen_sim.simulation import add_devices
 
 pytestmark = pytest.mark.slow
 
-JOINT = 'joint1'
-
 NODE_ID = 2
-
 STATE_PDO, POSITION_PDO = 0x180 + NODE_ID, 0x280 + NODE_ID
-
 COMMAND_PDO, TARGET_PDO, STREAM_PDO = 0x200 + NODE_ID, 0x300 + NODE_ID, 0x400 + NODE_ID
-
 SAG_INC = 40
 PLACE = -1.25  # [rad] of a drive at power-on
-
 STREAMED = [OperationMode.CYCLIC_POSITION, OperationMode.INTERPOLATED_POSITION]
-
 MODES = [OperationMode.PROFILE_POSITION, OperationMode.PROFILE_VELOCITY, *STREAMED]
 
 
@@ -264,27 +257,20 @@ def test_an_offset_of_the_drive_moves_nothing(
 
 
 CONTROLWORD, MODE, POSITION, VELOCITY, INTERPOLATION = 0x6040, 0x6060, 0x607A, 0x60FF, 0x60C1
-
 NEW_SET_POINT, HALT, ENABLED = 0x10, 0x100, 0x0F
-
 TARGETS = {
     OperationMode.PROFILE_POSITION: POSITION,
     OperationMode.CYCLIC_POSITION: POSITION,
     OperationMode.PROFILE_VELOCITY: VELOCITY,
     OperationMode.INTERPOLATED_POSITION: INTERPOLATION,
 }
-
 OBJECTS = ((CONTROLWORD, 0), (MODE, 0), (POSITION, 0), (VELOCITY, 0), (INTERPOLATION, 1))
-
 BITS = {CONTROLWORD: 16, MODE: 8, POSITION: 32, VELOCITY: 32, INTERPOLATION: 32}
-
 STANDS_AFTER = 0.3  # [s] more than a drive takes to begin a move
-
 UNSHRUNK = (Phase.explicit, Phase.reuse, Phase.generate)
 """Each example takes half a second; a search for the smallest that fails takes minutes."""
 
 Mapping = tuple[tuple[tuple[tuple[int, int], ...], int], ...]
-
 CIA_402_DEFAULT: Mapping = (
     (((CONTROLWORD, 0),), 255),
     (((CONTROLWORD, 0), (MODE, 0)), 255),
@@ -465,7 +451,6 @@ def positions(net: VirtualNetwork) -> list[int]:
 
 
 LOAD = 0.2  # share of the rated torque
-
 CYCLIC = [OperationMode.CYCLIC_POSITION, OperationMode.INTERPOLATED_POSITION]
 
 

@@ -26,12 +26,9 @@ from canopen_sim.objects.object_store import ObjectStore
 from canopen_sim.services.sdo_server import SdoServer
 
 NODE = 5
-
 REQUEST, RESPONSE = 0x600 + NODE, 0x580 + NODE
-
 TIMEOUT = 0.05  # [s]
 BLOB = 0x2002
-
 ABORTED = '80 {place} 00 00 04 05'  # SDO protocol timed out
 
 

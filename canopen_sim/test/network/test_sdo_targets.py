@@ -44,20 +44,15 @@ from canopen_sim import Fault, FaultInjection
 pytestmark = pytest.mark.slow
 
 JOINT, NODE_ID = 'joint1', 2
-
 REQUEST, ANSWER = 0x600 + NODE_ID, 0x580 + NODE_ID
-
 DOWNLOADS = frozenset({0x22, 0x23, 0x27, 0x2B, 0x2F})
-
 POSITION, VELOCITY, VL_VELOCITY, TORQUE = 0x607A, 0x60FF, 0x6042, 0x6071
-
 TARGETS = {
     OperationMode.PROFILE_POSITION: POSITION,
     OperationMode.VELOCITY: VL_VELOCITY,
     OperationMode.PROFILE_VELOCITY: VELOCITY,
     OperationMode.PROFILE_TORQUE: TORQUE,
 }
-
 SIZES = {POSITION: 4, VELOCITY: 4, VL_VELOCITY: 2, TORQUE: 2}
 
 

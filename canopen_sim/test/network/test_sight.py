@@ -10,7 +10,7 @@ from pathlib import Path
 import re
 import struct
 
-from bus_rig import booted, Leader, VirtualNetwork
+from bus_rig import booted, JOINT, Leader, VirtualNetwork
 from drive_samples import (
     bus_config,
     drive_config,
@@ -43,7 +43,7 @@ from canopen_sim import Fault, FaultInjection
 pytestmark = pytest.mark.slow
 
 TIME_OUT = 0.5  # [s] of silence
-JOINT, NODE_ID = 'joint1', 2
+NODE_ID = 2
 STATE_PDO, POSITION_PDO = TPDOS = (0x180 + NODE_ID, 0x280 + NODE_ID)
 STREAMED = pytest.mark.parametrize(
     'mode',

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from itertools import count
 
-from bus_rig import booted, VirtualNetwork
+from bus_rig import booted, JOINT, VirtualNetwork
 from diagnostic_msgs.msg import DiagnosticStatus
 from drive_samples import (
     bus_config,
@@ -16,7 +16,7 @@ from drive_samples import (
     SCALE,
     sdo_write,
 )
-from moving_drive import JOINT, MovingDrive, NODE_ID, RAMP, STANDING
+from moving_drive import MovingDrive, NODE_ID, RAMP, STANDING
 import pytest
 
 from arm_canopen import DriveError, DriveState, EventKind, OperationMode, Severity
@@ -34,7 +34,6 @@ from arm_canopen.standard import NmtCommand
 pytestmark = pytest.mark.slow
 
 QUICK_STOP_ON_LOSS = (0x6007, 0, 3)  # the drive makes a quick stop when it misses the master
-
 SLOW_DISABLE = (0x6084, 0, round(SCALE / RAMP))  # [inc/s^2]: the ramp of 0x605C = 1
 
 
@@ -121,7 +120,6 @@ def test_a_new_master_waits_for_the_quick_stop_that_it_finds(option: int) -> Non
 
 
 RPDOS = {0x200 + NODE_ID, 0x300 + NODE_ID, 0x400 + NODE_ID}
-
 OPTIONS = pytest.mark.parametrize('option', [2, 6], ids=['605A=2', '605A=6'])
 
 

@@ -13,7 +13,7 @@ from itertools import pairwise
 import math
 import struct
 
-from bus_rig import booted, Leader, VirtualNetwork
+from bus_rig import booted, JOINT, Leader, MODES, POSITION_MODES, TORQUE_MODES, VirtualNetwork
 from drive_samples import bus_config, drive_config, every_mode, pdo, PERIOD, SCALE, sdo_write
 import pytest
 
@@ -29,8 +29,6 @@ from arm_canopen.config.model.drive import RecoveryPolicy
 from arm_canopen.master.scheduler import Promise
 
 pytestmark = pytest.mark.slow
-
-JOINT = 'joint1'
 
 STEP = 0.005  # [rad] of the stream in each cycle: 0.5 rad/s
 
@@ -98,7 +96,6 @@ def test_a_command_wins_over_a_stream(mode: OperationMode, name: str) -> None:
 
 
 STOPS = ['halt', 'quick_stop', 'disable']
-
 PAUSES = [0.25, 0.7, 3.0]  # [s] of a stalled publisher or network; the stream ends after 0.2 s
 
 
@@ -211,15 +208,11 @@ def test_no_target_is_taken_while_a_command_runs(name: str) -> None:
     client.net.result(running)
 
 
-@pytest.mark.parametrize(
-    'mode',
-    [mode for mode in OperationMode if mode not in {0, OperationMode.HOMING}],
-    ids=lambda mode: mode.name,
-)
+@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
 def test_nothing_is_called_stopped_that_moves(mode: OperationMode) -> None:
     """A pause of the stream is reported once, as what it is at that moment."""
     client = Publisher(mode)
-    value = 3.0 if mode in POSITIONS else 100.0 if mode in TORQUES else 0.8
+    value = 3.0 if mode in POSITION_MODES else 100.0 if mode in TORQUE_MODES else 0.8
     for _ in range(60):
         client.commands.stream_target(value)
         client.net.run(PERIOD)
@@ -266,19 +259,9 @@ def test_an_axis_that_does_not_stop_is_stopped_by_sdo() -> None:
 
 
 NODE_ID = 2
-
-POSITIONS = {
-    OperationMode.PROFILE_POSITION,
-    OperationMode.INTERPOLATED_POSITION,
-    OperationMode.CYCLIC_POSITION,
-}
-TORQUES = {OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE}
 OFFSET_PDO = 0x500 + NODE_ID
-
 SPEED = 0.4  # [rad/s]
-
 EFFORT = 30.0  # per mille of the rated torque
-
 CYCLIC = OperationMode.CYCLIC_POSITION
 
 
