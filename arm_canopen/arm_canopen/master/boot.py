@@ -31,33 +31,26 @@ RESTORE_SIGNATURE = b'load'  # CiA 301, 7.5.2.14
 
 
 class BootFault(Enum):
-    """A reason why a boot failed, by its letter in CiA 302-2."""
+    """A reason why a boot failed, by its letter in CiA 302-2.
+
+    Where the identity differs it has the name of the attribute of Identity.
+    """
 
     NO_ANSWER = 'B', 'no answer to the read of 0x1000'
     DEVICE_TYPE = 'C', 'device type 0x1000 differs'
-    VENDOR = 'D', 'vendor id 0x1018:01 differs'
+    VENDOR_ID = 'D', 'vendor id 0x1018:01 differs'
     NO_GUARDING = 'F', 'no answer to node guarding'
     CONFIGURATION = 'J', 'configuration failed'
     NO_HEARTBEAT = 'K', 'no heartbeat'
     RUNNING = 'L', 'was operational already'
-    PRODUCT = 'M', 'product code 0x1018:02 differs'
-    REVISION = 'N', 'revision number 0x1018:03 differs'
-    SERIAL = 'O', 'serial number 0x1018:04 differs'
+    PRODUCT_CODE = 'M', 'product code 0x1018:02 differs'
+    REVISION_NUMBER = 'N', 'revision number 0x1018:03 differs'
+    SERIAL_NUMBER = 'O', 'serial number 0x1018:04 differs'
 
     def __str__(self) -> str:
         """Return the letter with where it is from, as manuals of masters list it."""
         letter, text = self.value
         return f'CiA 302-2 boot error {letter}: {text}'
-
-
-IDENTITY_FAULTS = {
-    'device_type': BootFault.DEVICE_TYPE,
-    'vendor_id': BootFault.VENDOR,
-    'product_code': BootFault.PRODUCT,
-    'revision_number': BootFault.REVISION,
-    'serial_number': BootFault.SERIAL,
-}
-"""The fault of each attribute of Identity that differs."""
 
 
 class BootProcess:
@@ -272,7 +265,7 @@ class BootProcess:
     async def _check_identity(self, expected: Identity) -> None:
         await self._check_alone()
         for attribute, index, subindex, wanted in expected.objects:
-            self._fault = IDENTITY_FAULTS[attribute]
+            self._fault = BootFault[attribute.upper()]
             found = await self._configurator.read_number(index, subindex)
             if found != wanted:
                 title = attribute.replace('_', ' ')

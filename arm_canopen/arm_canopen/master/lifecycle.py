@@ -76,6 +76,8 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition(7, Verb.SHUTDOWN, _S.ACTIVE, _S.SHUTTING_DOWN, _S.FINALIZED, _S.FINALIZED),
 )
 
+WAY_DOWN = ((_S.ACTIVE, Verb.DEACTIVATE), (_S.INACTIVE, Verb.CLEANUP))
+
 MANAGER = 'lifecycle_manager'
 """Name of the node that brings the others up and down."""
 Work: TypeAlias = Callable[[Verb], Coroutine[Promise[Any], None, None]]
@@ -174,23 +176,16 @@ class Supervisor:
     async def _up(self) -> None:
         await self._master.go(Verb.CONFIGURE, Verb.ACTIVATE)
         try:
-            await self._all(Verb.CONFIGURE, Verb.ACTIVATE)
+            await self._all(self._devices, Verb.CONFIGURE, Verb.ACTIVATE)
         except CanopenError:
             await self._down()
             raise
 
     async def _down(self) -> None:
-        active = [d for d in self._devices if d.state is LifecycleState.ACTIVE]
-        await self._scheduler.gather([self._spawn(d, Verb.DEACTIVATE) for d in active])
-        inactive = [d for d in self._devices if d.state is LifecycleState.INACTIVE]
-        await self._scheduler.gather([self._spawn(d, Verb.CLEANUP) for d in inactive])
-        if self._master.state is LifecycleState.ACTIVE:
-            await self._master.go(Verb.DEACTIVATE)
-        if self._master.state is LifecycleState.INACTIVE:
-            await self._master.go(Verb.CLEANUP)
+        for entities in (self._devices, (self._master,)):
+            for state, verb in WAY_DOWN:
+                await self._all([each for each in entities if each.state is state], verb)
 
-    async def _all(self, *verbs: Verb) -> None:
-        await self._scheduler.gather([self._spawn(d, *verbs) for d in self._devices])
-
-    def _spawn(self, device: Managed, *verbs: Verb) -> Promise[None]:
-        return self._scheduler.spawn(device.go(*verbs))
+    async def _all(self, entities: Sequence[Managed], *verbs: Verb) -> None:
+        ends = [self._scheduler.spawn(each.go(*verbs)) for each in entities]
+        await self._scheduler.gather(ends)
