@@ -36,6 +36,7 @@ from .switches import Switches
 
 LIMITER_STEP = 0.001  # [s] of the rate limiter
 SETTLED = 1e-4  # [inc] a smaller distance is none
+CRUISE_MIN = 1e-6  # [s] so that no phase is shorter than the resolution of a steady clock
 ROUNDING = 1e-6  # [inc] a smaller gap between demand and limiter is rounding
 TORQUE_STEP = 0.002  # [s] how long a torque is taken as constant
 
@@ -274,13 +275,17 @@ class Axis:
             else:
                 self._follow(duration)
             self.time = until
-        while self.phase_end <= self.time:
-            self.demand_velocity = self._phase_velocity
-            self._plan()
+        self._end_phases()
 
     def _begin(self, plan: Callable[[], None]) -> None:
         self._plan = plan
         plan()
+        self._end_phases()
+
+    def _end_phases(self) -> None:
+        while self.phase_end <= self.time:
+            self.demand_velocity = self._phase_velocity
+            self._plan()
 
     def _ramp_phase(self) -> None:
         velocity, wanted, limits = self.demand_velocity, self._wanted, self._limits
@@ -310,10 +315,10 @@ class Axis:
             self._accelerate(sign * top, down)
         elif velocity < peak * (1.0 - 1e-9):
             self._accelerate(sign * peak, up)
-        elif way - braking > SETTLED:
+        elif way - braking > max(SETTLED, velocity * CRUISE_MIN):
             self._cruise((way - braking) / velocity)
-        else:
-            self._accelerate(0.0, down)
+        else:  # a little softer, where that is what ends at the target
+            self._accelerate(0.0, min(down, velocity * velocity / (2.0 * way)) if way else down)
 
     def _accelerate(self, velocity: float, rate: float) -> None:
         change = velocity - self.demand_velocity
