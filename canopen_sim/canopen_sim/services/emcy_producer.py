@@ -70,11 +70,6 @@ class EmcyProducer:
         """Steady time in [s] at which a message is due."""
         return min(self._flush_at, self._repeat_at)
 
-    @property
-    def active(self) -> frozenset[int]:
-        """Codes of the errors that are there."""
-        return frozenset(self._active)
-
     def reset(self) -> None:
         """Forget every error, as after switching on."""
         self._active.clear()
