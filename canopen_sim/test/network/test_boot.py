@@ -618,54 +618,41 @@ def test_a_device_in_operation_is_taken_over_without_a_word() -> None:
     assert any('taken over' in text and 'error L' in text for text in network.net.reported())
 
 
-def test_a_device_with_other_pdos_is_left_alone() -> None:
-    """The difference is named, and nothing is sent that could disturb it; a reset corrects it."""
+OTHER_PDOS = ('0x1A00:02 is 0x606C0020 instead of 0x60640020', 'to have it configured')
+NO_STATE = ('boot error K: no heartbeat', 'does not send its NMT state', 'once, or remove reset_')
+
+
+@pytest.mark.parametrize('words', [OTHER_PDOS, NO_STATE], ids=['other PDOs', 'no NMT state'])
+def test_a_device_that_may_run_otherwise_is_left_alone(words: tuple[str, ...]) -> None:
+    """Nothing is sent that could disturb it; reason and remedy are reported, and a reset helps."""
     network, device = running(reset_communication=False)
-    device.values[0x1A00, 2] = (0x606C_0020).to_bytes(4, 'little')
-    network.start(3.0)
+    if words is OTHER_PDOS:
+        device.values[0x1A00, 2] = (0x606C_0020).to_bytes(4, 'little')
+    else:
+        device.guarded = False
+    network.start(5.0)
     assert device.commands == []
     assert network.net.frames(0x205) == []
     (reported,) = network.net.reported(Severity.WARNING)
-    assert '0x1A00:02 is 0x606C0020 instead of 0x60640020' in reported
-    assert 'Call ~/nmt_reset_node to have it configured' in reported
+    assert all(word in reported for word in (*words, 'Call ~/nmt_reset_node')), reported
     network.net.network.send_nmt(NmtCommand.RESET_NODE, NODE_ID)
     network.net.run(3.0)
     assert network.node.online
     assert device.commands == [RESET_NODE, PRE_OPERATIONAL, START]
 
 
-def test_a_device_that_does_not_report_its_state_is_left_alone() -> None:
-    """It might be in operation; the reason and the remedy are reported."""
-    network, device = running(reset_communication=False)
-    device.guarded = False
-    network.start(5.0)
-    assert device.commands == []
-    (reported,) = network.net.reported(Severity.WARNING)
-    assert 'boot failed while' in reported
-    assert 'boot error K: no heartbeat' in reported
-    assert 'does not send its NMT state' in reported
-    assert 'Call ~/nmt_reset_node once, or remove reset_communication: false' in reported
-    network.net.network.send_nmt(NmtCommand.RESET_NODE, NODE_ID)
-    network.net.run(3.0)
-    assert network.node.online
-
-
-def test_a_device_that_is_kept_alive_but_does_not_run_is_configured() -> None:
-    """Without a reset."""
-    network, device = running(reset_communication=False)
+@pytest.mark.parametrize(
+    ('key', 'commands'), [('reset_communication', [PRE_OPERATIONAL, START]), ('boot', [])]
+)
+def test_a_device_that_does_not_run_is_configured_where_the_master_may(
+    key: str, commands: list[int]
+) -> None:
+    """Kept alive it is not reset; with `boot: false` it is taken as it is, whatever its state."""
+    network, device = running(**{key: False})
     device.state = NmtState.PRE_OPERATIONAL
     network.start(2.0)
-    assert device.commands == [PRE_OPERATIONAL, START]
-    assert network.node.online
-
-
-def test_a_device_that_the_master_shall_not_boot_is_taken_as_it_is() -> None:
-    """`boot: false`: neither reset nor configured nor started, whatever its state."""
-    network, device = running(boot=False)
-    device.state = NmtState.PRE_OPERATIONAL
-    network.start(1.0)
-    assert device.commands == []
-    assert device.writes == []
+    assert device.commands == commands
+    assert bool(device.writes) is bool(commands)
     assert network.node.online
 
 
