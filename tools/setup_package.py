@@ -18,6 +18,7 @@ REQUIREMENTS: Mapping[str, Sequence[str]] = {
     'coal': ['coal>=3'],
     'pinocchio': ['pin>=3.3'],
     'python3-can': ['python-can>=4.3'],
+    'python3-coacd-pip': ['coacd>=1.0.7'],
     'python3-daqp-pip': ['daqp>=0.5'],
     'python3-evdev': ['evdev>=1.6; sys_platform == "linux"'],
     'python3-gymnasium-pip': ['gymnasium>=1.1'],

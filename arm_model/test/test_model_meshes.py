@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from arm_model import Clearances, CollisionObject, combined, ModelError, Pose, RobotModel, Sphere
-from arm_model.scene import meshes
+from arm_model.scene import meshes, pieces
 
 CORNERS = list(product((-0.5, 0.5), repeat=3))
 """Of a cube with edges of one, in the order of their coordinates."""
@@ -313,14 +313,95 @@ def test_the_other_links_are_checked_all_the_same() -> None:
     assert 'link_1: an empty <geometry>' in model.notes[0]
 
 
-def test_a_hull_that_is_far_too_large_is_named(tmp_path: Path) -> None:
-    """A shell is filled by its hull: who cares can give convex parts."""
+def test_a_hull_that_is_far_too_large_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A shell fills little of its hull, and CoACD takes too long for it: give convex parts."""
+    monkeypatch.setattr(pieces, 'TIME_LIMIT', 0.01)
     ring = '\n'.join(f'v {x} {y} {z}' for scale in (1, 0.9) for x, y, z in _scaled(scale))
     outside = [f'f {a + 1} {b + 1} {c + 1}' for a, b, c in TRIANGLES]
     inside = [f'f {c + 9} {b + 9} {a + 9}' for a, b, c in TRIANGLES]
     (tmp_path / 'hollow.obj').write_text('\n'.join([ring, *outside, *inside]), encoding='utf-8')
     model = arm('<mesh filename="hollow.obj" scale="0.1 0.1 0.1"/>', tmp_path)
     assert any('link_1 (27 %)' in note and 'convex parts' in note for note in model.notes)
+
+
+def _extruded(outline: list[tuple[int, int]], flat: list[tuple[int, int, int]]) -> str:
+    """Return a prism of height 1 as OBJ; `flat` are the triangles of its outline."""
+    count = len(outline)
+    walls = [(k, (k + 1) % count) for k in range(count)]
+    faces = [each[::-1] for each in flat]
+    faces += [(a + count, b + count, c + count) for a, b, c in flat]
+    faces += [each for a, b in walls for each in ((a, b, b + count), (a, b + count, a + count))]
+    corners = [f'v {x} {y} {z}' for z in (0, 1) for x, y in outline]
+    return '\n'.join(corners + [f'f {a + 1} {b + 1} {c + 1}' for a, b, c in faces])
+
+
+def _ring(around: int = 24, across: int = 12) -> str:
+    """Return a torus of radii 1 and 0.2 as OBJ."""
+    turns = 2 * math.pi * np.arange(around) / around
+    tube = 2 * math.pi * np.arange(across) / across
+    corners = [
+        f'v {(1 + 0.2 * math.cos(b)) * math.cos(a)} {(1 + 0.2 * math.cos(b)) * math.sin(a)}'
+        f' {0.2 * math.sin(b)}'
+        for a, b in product(turns.tolist(), tube.tolist())
+    ]
+    faces = []
+    for i, j in product(range(around), range(across)):
+        at = [
+            (i + di) % around * across + (j + dj) % across + 1
+            for di, dj in ((0, 0), (1, 0), (1, 1), (0, 1))
+        ]
+        faces += [f'f {at[0]} {at[1]} {at[2]}', f'f {at[0]} {at[2]} {at[3]}']
+    return '\n'.join(corners + faces)
+
+
+FORK = _extruded(
+    [(0, 0), (6, 0), (6, 6), (5, 6), (5, 1), (1, 1), (1, 6), (0, 6)],
+    [(0, 1, 4), (0, 4, 5), (1, 2, 4), (2, 3, 4), (0, 5, 7), (5, 6, 7)],
+)
+
+
+@pytest.mark.parametrize(
+    ('mesh', 'free'),
+    [
+        (FORK, (3.0, 4.0, 0.5)),
+        (_extruded([(0, 0), (8, 0), (1, 1), (0, 8)], [(0, 1, 2), (0, 2, 3)]), (3.0, 3.0, 0.5)),
+        (_ring(), (0.0, 0.0, 0.0)),
+    ],
+    ids=['fork', 'boomerang', 'ring'],
+)
+def test_pieces_of_a_body_hold_it_and_leave_its_gap_free(
+    mesh: str, free: tuple[float, float, float], tmp_path: Path
+) -> None:
+    """Corners of a body stand out of the pieces of CoACD: no contact may be missed for it."""
+    (tmp_path / 'link.obj').write_text(mesh, encoding='utf-8')
+    hulls = [meshes.convex(each.points) for each in meshes.load_hulls(tmp_path / 'link.obj')]
+    assert 1 < len(hulls) <= 16
+    rows = [line.split() for line in mesh.splitlines()]
+    corners = np.array([row[1:] for row in rows if row[0] == 'v'], dtype=np.float32)  # assimp's
+    faces = np.array([row[1:] for row in rows if row[0] == 'f'], dtype=int) - 1
+    weights = np.random.default_rng(1).dirichlet((1.0, 1.0, 1.0), (20, len(faces)))
+    surface = np.einsum('stk,tkx->stx', weights, corners[faces]).reshape(-1, 3)
+
+    def outside(points: np.ndarray) -> np.ndarray:
+        """Return how far each point is outside of the piece that is nearest."""
+        walls = ((np.array(hull.normals()), np.array(hull.offsets())) for hull in hulls)
+        return np.min([(points @ n.T + d).max(axis=1) for n, d in walls], axis=0)
+
+    assert outside(np.concatenate([corners, surface])).max() < 1e-9
+    assert outside(np.array([free]))[0] > 0.1
+    model = arm('<mesh filename="link.obj" scale="0.02 0.02 0.02"/>', tmp_path)
+    assert not any('convex parts' in note for note in model.notes)
+
+
+def test_a_body_that_cannot_be_cut_keeps_its_hull_and_is_named(tmp_path: Path) -> None:
+    """A fork without one triangle is no body: CoACD would take minutes for it."""
+    (tmp_path / 'link.obj').write_text(FORK.rsplit('\n', 1)[0], encoding='utf-8')
+    (hull,) = meshes.load_hulls(tmp_path / 'link.obj')
+    assert len(hull.points) == 8
+    model = arm('<mesh filename="link.obj" scale="0.02 0.02 0.02"/>', tmp_path)
+    assert any('link_1 (' in note and 'not closed' in note for note in model.notes)
 
 
 def _scaled(scale: float) -> list[tuple[float, float, float]]:

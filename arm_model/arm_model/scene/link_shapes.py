@@ -15,13 +15,11 @@ from urdf_reader import DescriptionError, find_mesh, KinematicTree, MeshFileErro
 from ..arrays import Array
 from ..exceptions import SceneError
 from ..pose import Pose
-from .meshes import load_hulls, MeshError
+from .meshes import load_hulls, MeshError, MIN_FULLNESS
 from .shapes import Box, Capsule, Cylinder, Mesh, native, PlacedShape, Shape, Sphere
 
 CAPSULE_TOLERANCE = 1e-6
 """How exactly spheres must sit on a cylinder's ends in [m] to make a capsule of it."""
-
-MIN_FULLNESS = 0.4  # share of its hull that a mesh fills at least without a note
 
 PRIMITIVES = {
     'box': (Box, ('size',)),
@@ -82,7 +80,8 @@ def _loose(fullness: Mapping[str, float]) -> Sequence[str]:
         return ()
     links = ', '.join(f'{link} ({100 * share:.0f} %)' for link, share in fullness.items())
     note = (
-        f'meshes are checked as convex hulls, which these links fill in part only: {links};'
+        f'meshes are checked as convex hulls, which these links fill in part only: {links}, and'
+        ' which could not be cut into pieces (not closed, hollow or too intricate);'
         ' where that refuses too much, give them several <collision> of convex parts'
     )
     return (note,)

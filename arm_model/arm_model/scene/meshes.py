@@ -3,9 +3,10 @@
 """Meshes as convex hulls: found by their name in a URDF, made once, cached by their content.
 
 STL, DAE, OBJ and what else assimp reads. A raw mesh is only read to make its hulls: one for each
-body that lies apart from the others. Their points are kept in ``$XDG_CACHE_HOME/arm_model/hulls``
-(``~/.cache/arm_model/hulls``), one small file for each content of a mesh file; the folder may be
-deleted at any time, and nothing that is wrong with it ends a program.
+body that lies apart from the others, or several for one that fills little of its hull. Their
+points are kept in ``$XDG_CACHE_HOME/arm_model/hulls`` (``~/.cache/arm_model/hulls``), one small
+file for each content of a mesh file; the folder may be deleted at any time, and nothing that is
+wrong with it ends a program.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ import numpy as np
 from urdf_reader import mesh_unit
 
 from ..arrays import Array, frozen, Native, Places
+from .pieces import cut
 
 MIN_THICKNESS = 1e-3  # thickness that a flat mesh is given in [m]: a hull needs a volume
 
@@ -41,7 +43,13 @@ MAX_PARTS = 500  # parts of a mesh without a common corner of which bodies are m
 APART = 1e-3
 """Distance between the bounds of two bodies at least, as a share of the size of the mesh."""
 
-FORMAT = 'v2'  # version of the files in the cache: part of their names
+MIN_FULLNESS = 0.5
+"""Share of its hull that a body fills at least; one that fills less is cut into pieces."""
+
+FAR_OUT, MAX_HALVINGS = 0.005, 8
+"""Triangles that stand out of a piece by this share of the body are halved, so many times."""
+
+FORMAT = 'v3'  # version of the files in the cache: part of their names
 
 
 class MeshError(ValueError):
@@ -50,10 +58,11 @@ class MeshError(ValueError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hull:
-    """The convex hull of a body."""
+    """The convex hull of a body, or of a piece of one."""
 
     points: Array  # its corners (m, 3), in the unit of the mesh
-    fullness: float  # volume of the body as a share of the hull's; 1 where it has no inside
+    # volume of the body as a share of its hull's, or of its pieces'; 1 where it has no inside
+    fullness: float
 
 
 def load_hulls(path: Path) -> Sequence[Hull]:
@@ -150,21 +159,64 @@ def hulls_of_file(path: Path) -> Sequence[Hull]:
     triangles = np.array([[face[0], face[1], face[2]] for face in faces], dtype=int)
     if not len(triangles):
         return (Hull(frozen(convex(corners).points()), 1.0),)
-    return tuple(_hull(corners[triangles[body]]) for body in _bodies(corners, triangles))
-
-
-def _hull(triangles: Array) -> Hull:
-    """Return the hull of the triangles (m, 3, 3) of a body."""
-    hull = convex(triangles.reshape(-1, 3))
-    a, b, c = triangles.transpose(1, 0, 2)
-    whole, solid = hull.computeVolume(), abs(float((a * np.cross(b, c)).sum()) / 6.0)
-    return Hull(frozen(hull.points()), min(solid / whole, 1.0) if solid else 1.0)
-
-
-def _bodies(corners: Array, triangles: Places) -> Sequence[Places]:
-    """Return the triangles of each body that lies apart; all of them where bodies are many."""
     points, same = np.unique(corners, axis=0, return_inverse=True)
     triangles = same.reshape(-1)[triangles]
+    bodies = _bodies(points, triangles)
+    return tuple(hull for body in bodies for hull in _hulls_of_body(points, triangles[body]))
+
+
+def _hulls_of_body(points: Array, triangles: Places) -> Sequence[Hull]:
+    """Return the hull of a body, or those of its pieces where it fills little of its hull."""
+    corners = points[triangles]
+    a, b, c = corners.transpose(1, 0, 2)
+    solid = abs(float((a * np.cross(b, c)).sum()) / 6.0)
+    hull = convex(corners.reshape(-1, 3))
+    whole = hull.computeVolume()
+    if 0.0 < solid < MIN_FULLNESS * whole:
+        used, places = np.unique(triangles, return_inverse=True)
+        pieces = _around_triangles(corners, cut(points[used], places.reshape(-1, 3)))
+        volume = sum(piece.computeVolume() for piece in pieces)
+        if pieces and volume < whole:
+            return [Hull(frozen(each.points()), min(solid / volume, 1.0)) for each in pieces]
+    return (Hull(frozen(hull.points()), min(solid / whole, 1.0) if solid else 1.0),)
+
+
+def _around_triangles(triangles: Array, pieces: Sequence[Array]) -> Sequence[Native]:
+    """Return a hull for each piece of a body that no point of the body's surface is outside of.
+
+    The corners of a body stand out of the pieces that CoACD makes, by micrometres to millimetres,
+    and no check of contacts may rest on those. So each triangle (n, 3, 3) goes whole to the piece
+    that it stands out of least, and the hulls are made again, of triangles. One that stands out
+    far, such as a long one across several pieces, is halved first.
+    """
+    walls = [(np.array(each.normals()), np.array(each.offsets())) for each in map(convex, pieces)]
+    far = FAR_OUT * np.ptp(triangles.reshape(-1, 3), axis=0).max()
+    parts: list[list[Array]] = [[] for _ in walls]
+    for halvings in range(MAX_HALVINGS + 1 if walls else 0):
+        beyond = np.array([(triangles @ n.T + d).max(axis=(1, 2)) for n, d in walls])
+        nearest = beyond.argmin(axis=0)
+        if halvings == MAX_HALVINGS:
+            far = np.inf
+        for place, part in enumerate(parts):
+            mine = (nearest == place) & (beyond[place] <= far)
+            part.append(triangles[mine].reshape(-1, 3))
+        triangles = _halved(triangles[beyond.min(axis=0) > far])
+    points = [np.concatenate(part) for part in parts]
+    return [convex(each) for each in points if len(each)]
+
+
+def _halved(triangles: Array) -> Array:
+    """Cut triangles (n, 3, 3) in two at the middle of their longest edges."""
+    lengths = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
+    row, longest = np.arange(len(triangles)), lengths.argmax(axis=1)
+    start, end, tip = (triangles[row, (longest + step) % 3] for step in range(3))
+    middle = 0.5 * (start + end)
+    halves = np.stack((start, middle, tip), axis=1), np.stack((middle, end, tip), axis=1)
+    return np.concatenate(halves)
+
+
+def _bodies(points: Array, triangles: Places) -> Sequence[Places]:
+    """Return the triangles of each body that lies apart; all of them where bodies are many."""
     labels, before = np.arange(len(points)), np.arange(0)
     while not np.array_equal(labels, before):
         before = labels.copy()
