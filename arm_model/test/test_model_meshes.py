@@ -18,7 +18,16 @@ from model_robots import chain_texts
 import numpy as np
 import pytest
 
-from arm_model import Clearances, CollisionObject, combined, ModelError, Pose, RobotModel, Sphere
+from arm_model import (
+    Array,
+    Clearances,
+    CollisionObject,
+    combined,
+    ModelError,
+    Pose,
+    RobotModel,
+    Sphere,
+)
 from arm_model.scene import meshes, pieces
 
 CORNERS = list(product((-0.5, 0.5), repeat=3))
@@ -384,10 +393,11 @@ def test_pieces_of_a_body_hold_it_and_leave_its_gap_free(
     weights = np.random.default_rng(1).dirichlet((1.0, 1.0, 1.0), (20, len(faces)))
     surface = np.einsum('stk,tkx->stx', weights, corners[faces]).reshape(-1, 3)
 
-    def outside(points: np.ndarray) -> np.ndarray:
+    def outside(points: Array) -> Array:
         """Return how far each point is outside of the piece that is nearest."""
         walls = ((np.array(hull.normals()), np.array(hull.offsets())) for hull in hulls)
-        return np.min([(points @ n.T + d).max(axis=1) for n, d in walls], axis=0)
+        distances: Array = np.min([(points @ n.T + d).max(axis=1) for n, d in walls], axis=0)
+        return distances
 
     assert outside(np.concatenate([corners, surface])).max() < 1e-9
     assert outside(np.array([free]))[0] > 0.1
