@@ -87,7 +87,7 @@ def test_a_missing_interface_names_what_exists_and_how_to_make_it(name: str, sai
     [
         (errno.ENETDOWN, 'ip link set up can0'),
         (errno.ENOBUFS, 'txqueuelen 1000'),
-        (errno.EAGAIN, 'nobody acknowledges'),
+        (errno.EAGAIN, 'no device acknowledges'),
         (errno.ENODEV, 'plug the adapter in'),
         (errno.ENXIO, 'reopen the bus'),
         (errno.EPERM, 'not permitted'),

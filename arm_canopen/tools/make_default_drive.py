@@ -74,7 +74,7 @@ def _is_general(part: str) -> bool:
 
 
 def _general(part: str) -> str:
-    """Take out of an object what only the device knows, and what is said of the simulation."""
+    """Remove from an object what only the device knows, and what is said of the simulation."""
     index = _index(part)
     part = '\n'.join(line for line in part.splitlines() if not line.startswith(';'))
     if index in PROFILE:

@@ -167,7 +167,7 @@ class EdsReport:
 
 
 def lint_eds(path: str | os.PathLike[str]) -> EdsReport:
-    """Look for everything that is wrong with an EDS or DCF file."""
+    """Find everything that is wrong with an EDS or DCF file."""
     path = Path(path)
     findings = Findings()
     try:
@@ -196,7 +196,7 @@ class _Linter:
         self._findings = findings
 
     def check(self) -> None:
-        """Look at everything."""
+        """Check everything."""
         for address, title in MANDATORY.items():
             if address not in self._dictionary:
                 self._findings.error(

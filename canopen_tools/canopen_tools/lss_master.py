@@ -62,7 +62,7 @@ class LssMaster:
         self._last = 0.0
 
     def receive(self, frame: Frame) -> None:
-        """Take a frame from the bus; others than LSS answers are passed over."""
+        """Process a frame from the bus; others than LSS answers are ignored."""
         if frame.can_id != LSS_RESPONSE or frame.is_extended or frame.is_remote:
             return
         message = decode_lss(frame.data)
@@ -71,7 +71,7 @@ class LssMaster:
             self._last = max(self._scheduler.now, frame.timestamp)
 
     def switch_all(self, state: LssState) -> None:
-        """Switch every device to a state; nobody answers."""
+        """Switch every device to a state; none answers."""
         self._put(lss_bytes(LssCommand.SWITCH_GLOBAL, state))
 
     async def select(self, address: LssAddress) -> None:
@@ -178,7 +178,7 @@ class LssMaster:
         raise LssError(f'{bit_rate / 1000:g} kbit/s is no bit rate of LSS; take {known}')
 
     async def store(self) -> None:
-        """Have the device in the configuration state keep its settings without power.
+        """Store the settings of the device in the configuration state.
 
         Raises:
             LssError: It cannot, or none answers, or several do.
@@ -186,7 +186,7 @@ class LssMaster:
         await self._configure(lss_bytes(LssCommand.STORE), 'storing')
 
     def activate_bit_rate(self, delay: float) -> None:
-        """Have all devices in the configuration state take their new bit rate; nobody answers.
+        """Activate the new bit rate of all devices in the configuration state; none answers.
 
         They are silent for delay [s] before and again after the switch, so that all others can
         switch, too.

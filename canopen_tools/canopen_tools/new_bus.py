@@ -61,8 +61,8 @@ class _Wanted:
 
 
 FEEDBACK = (
-    _Wanted(Index.STATUSWORD, lack='nobody sees its state in the cycle'),
-    _Wanted(Index.POSITION_ACTUAL, lack='nobody sees where it is in the cycle'),
+    _Wanted(Index.STATUSWORD, lack='its state is not seen in the cycle'),
+    _Wanted(Index.POSITION_ACTUAL, lack='its position is not seen in the cycle'),
     _Wanted(Index.MODE_OF_OPERATION_DISPLAY),
     _Wanted(Index.VELOCITY_ACTUAL),
     _Wanted(Index.ERROR_CODE),

@@ -80,7 +80,7 @@ class NewDevice:
 
     @property
     def open_velocity(self) -> str:
-        """What nobody says about its velocities, with the remedy; empty where nothing is open."""
+        """What is unknown about its velocities, with the remedy; empty where nothing is open."""
         named, units = self.velocity_unit, _position_units(self) if self.is_drive else None
         if named is None or units is None or self.rpm is not None or _is_of_joint(self, units):
             return ''
@@ -96,7 +96,7 @@ class NewDevice:
         )
 
     def number(self, index: int, subindex: int = 0) -> int:
-        """Return what an object holds, by the device or else the EDS; 0 where nobody says it."""
+        """Return what an object holds, by the device or else the EDS; 0 where unknown."""
         default = self.eds.dictionary.number(index, subindex) or 0
         return self.values.get((index, subindex), default)
 

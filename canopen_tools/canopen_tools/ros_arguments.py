@@ -28,7 +28,7 @@ class Arguments:
 
 
 def split_ros_arguments(argv: Sequence[str]) -> Arguments:
-    """Take the ROS arguments out of a command line without the program.
+    """Split the ROS arguments from a command line without the program.
 
     Raises:
         ValueError: A parameter has no value, or an option nothing behind it.

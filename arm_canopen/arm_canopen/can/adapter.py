@@ -179,7 +179,7 @@ class AdapterBus(Bus):
         return from_message(message, self._last)
 
     def wake(self) -> None:
-        """Let a waiting :meth:`receive` return within 20 ms."""
+        """Wake a waiting :meth:`receive` within 20 ms."""
         self._woken.set()
 
     def close(self) -> None:

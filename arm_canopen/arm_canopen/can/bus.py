@@ -62,7 +62,7 @@ class Bus(AbstractContextManager['Bus']):
 
     @abstractmethod
     def wake(self) -> None:
-        """Let a :meth:`receive` that waits in another thread return at once."""
+        """Wake a :meth:`receive` that waits in another thread."""
 
     @abstractmethod
     def close(self) -> None:

@@ -141,7 +141,7 @@ class BusThread:
             self._bus.wake()
 
     def _refuse_work(self) -> None:
-        """Leave nobody waiting for what will not be done any more; several threads may do so."""
+        """Fail all queued calls. Thread-safe."""
         while True:
             try:
                 future, _ = self._work.popleft()

@@ -89,7 +89,7 @@ def is_unacknowledged(frame: Frame) -> bool:
 
 
 def error_text(frame: Frame) -> str:
-    """Say an error frame in words, e.g. ``controller problem (transmit error passive)``."""
+    """Describe an error frame, e.g. ``controller problem (transmit error passive)``."""
     data = frame.data.ljust(8, b'\0')
     parts = []
     for bit, text in ERROR_CLASSES:

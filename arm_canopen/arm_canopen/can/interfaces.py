@@ -51,7 +51,7 @@ def _request(probe: socket.socket, request: int, name: str, layout: str) -> int:
 
 
 def missing_interface_text(name: str, existing: dict[str, CanInterface]) -> str:
-    """Say that an interface does not exist, which do, and how to make it; or suggest a name."""
+    """Explain that an interface does not exist: which do, how to make it, or a similar name."""
     have = ', '.join(sorted(existing)) or 'none'
     if not is_interface_name(name):
         close = difflib.get_close_matches(name, (*existing, 'can0', 'vcan0', *_OTHER_BUSES), n=1)

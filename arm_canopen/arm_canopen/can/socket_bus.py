@@ -123,7 +123,7 @@ class SocketBus(Bus):
 
     @abstractmethod
     def _explain(self, error: OSError) -> BusError:
-        """Say what a failed system call means for the user, and what to do."""
+        """Explain what a failed system call means for the user, and what to do."""
 
     def fileno(self) -> int:
         """Return the descriptor that is readable when there are frames."""
@@ -198,7 +198,7 @@ class SocketBus(Bus):
         return frames
 
     def wake(self) -> None:
-        """Let a waiting :meth:`receive` return at once."""
+        """Wake a waiting :meth:`receive`."""
         with self._wake_lock:
             if not self._closed:
                 os.eventfd_write(self._wake_fd, 1)

@@ -65,7 +65,7 @@ class SocketCanBus(SocketBus):
         return pack(frame)
 
     def limit_queue(self, frames: int) -> None:
-        """Let no more frames wait in the transmit queue; see :meth:`Bus.limit_queue`."""
+        """Limit the transmit queue; see :meth:`Bus.limit_queue`."""
         with self._send_lock:
             self._queue_limit = frames
             _limit_sending(self._receiver, frames)
@@ -172,7 +172,7 @@ def _check_interface(name: str) -> None:
 
 
 def no_can_text(name: str, error: OSError) -> str:
-    """Say that the kernel has no CAN, and what works without it."""
+    """Explain that the kernel has no CAN, and what works without it."""
     return (
         f'this kernel has no CAN, so {name} cannot be opened ({error.strerror or error}); '
         'try `modprobe can_raw`, or take the bus udp_multicast, which needs no kernel support'
@@ -180,7 +180,7 @@ def no_can_text(name: str, error: OSError) -> str:
 
 
 def failure_text(name: str, error: OSError) -> str:
-    """Say what a failed system call on an open interface means, and what to do."""
+    """Explain what a failed system call on an open interface means, and what to do."""
     if error.errno == errno.ENETDOWN:
         return f'CAN interface {name} is down; {bring_up_text(name)}'
     if error.errno in (errno.ENODEV, errno.ENXIO):
@@ -188,7 +188,7 @@ def failure_text(name: str, error: OSError) -> str:
     if error.errno in (errno.ENOBUFS, errno.EAGAIN):
         return (
             f'the transmit queue of {name} is full; either frames are sent faster than the bus '
-            f'carries them (`ip link set {name} txqueuelen 1000` absorbs bursts), or nobody '
+            f'carries them (`ip link set {name} txqueuelen 1000` absorbs bursts), or no device '
             'acknowledges them (cable, bit rate, termination, device switched off)'
         )
     return f'{name}: {error.strerror or error}'

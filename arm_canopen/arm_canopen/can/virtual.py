@@ -76,7 +76,7 @@ class VirtualBus(Bus):
         return frames
 
     def wake(self) -> None:
-        """Let a waiting :meth:`receive` return at once."""
+        """Wake a waiting :meth:`receive`."""
         with self._arrived:
             self._woken = True
             self._arrived.notify()

@@ -78,7 +78,7 @@ class CyclicPosition(Mode):
         return self._profile.velocity == 0.0
 
     def stream(self, setpoint: float) -> None:
-        """Take the set-point of a motion source for this cycle.
+        """Set the set-point of a motion source for this cycle.
 
         Raises:
             DriveError: It is not finite or does not fit the object.

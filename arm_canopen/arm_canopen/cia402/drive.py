@@ -124,7 +124,7 @@ class Drive:
         )
 
     def read(self) -> None:
-        """Take the state from the process image."""
+        """Read the state from the process image."""
         if not self._begun and self.node.operational:
             self._begun = True
             self.view.cache.begin()
@@ -184,7 +184,7 @@ class Drive:
         try:
             self.control.send(self._command())
             self.feed_forward.end()
-        except Exception:  # noqa: BLE001  # what keeps it from being led may keep this from it, too
+        except Exception:  # noqa: BLE001  # its cause may hinder this, too
             self.stop.use_sdo()
         if output is not None and self.objects.is_controlled_by(output):
             self.stop.use_sdo()

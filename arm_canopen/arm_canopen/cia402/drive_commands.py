@@ -250,7 +250,7 @@ class DriveCommands:
         return drive.describe()
 
     def stream_target(self, target: float) -> None:
-        """Take one of a stream of targets; when it pauses for too long, the drive stops."""
+        """Follow a stream of targets; when it pauses for too long, the drive stops."""
         self._stream.admit()
         self._set(self.drive.control.mode.follow_target, target)
         self._stream.follow(self._delivery)

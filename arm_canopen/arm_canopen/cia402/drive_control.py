@@ -177,7 +177,7 @@ class DriveControl:
         self.mode = mode
 
     def preload(self, mode: Mode) -> Promise[None]:
-        """Let the target of a mode be where the drive is, or where it is held.
+        """Set the target of a mode to where the drive is, or where it is held.
 
         Returns:
             Done when the drive has it.
@@ -246,7 +246,7 @@ class DriveControl:
         return bits | halt
 
     def _lead_targets(self, command: Command) -> tuple[Command, bool]:
-        """Let targets leave a cycle before the mode and the command that make them act.
+        """Send targets a cycle before the mode and the command that make them act.
 
         RPDOs carry objects in any distribution, so that of one cycle a drive may see the edge
         before the target. The flag: this command, or the mode, makes targets act that have left.
@@ -275,7 +275,7 @@ class DriveControl:
         return self.halt.bits(held)
 
     def _preload_all(self) -> None:
-        """Let every target in an RPDO be where the drive is, also of modes that are not selected.
+        """Set every target in an RPDO to where the drive is, also of modes that are not selected.
 
         A drive may stay in the mode that it had, whatever was selected; of two modes with one
         target object the selected one writes last.

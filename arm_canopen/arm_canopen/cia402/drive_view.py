@@ -259,7 +259,7 @@ class DriveView:
         self.error = error_code_text(int(code)) if isinstance(code, int) else ''
 
     def observe(self) -> None:
-        """Take state and position from the process image, or from the last look by SDO."""
+        """Read state and position from the process image, or from the last look by SDO."""
         objects, now = self.objects, self._scheduler.now
         shown = objects.observe() if self.node.operational else None
         self.fresh = shown is not None and objects.fresh(now)
@@ -303,7 +303,7 @@ class DriveView:
 
     @contextmanager
     def looking(self) -> Iterator[None]:
-        """Look again and again while TPDOs do not show the state."""
+        """Read by SDO periodically while TPDOs do not show the state."""
         task = self._scheduler.background(self._look_on())
         try:
             yield

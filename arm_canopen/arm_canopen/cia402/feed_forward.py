@@ -45,7 +45,7 @@ class FeedForward:
             self.end()
 
     def end(self) -> None:
-        """Take back what was written."""
+        """Reset the offsets that were written."""
         if self._acts:
             self._acts = False
             self._write(0, 0)

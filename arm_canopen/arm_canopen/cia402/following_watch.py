@@ -58,7 +58,7 @@ class FollowingWatch:
         window: float,
         error: bool,
     ) -> Following:
-        """Take set-point and position of this cycle and judge whether the axis follows.
+        """Judge by set-point and position of this cycle whether the axis follows.
 
         Args:
             now: Steady time in [s].

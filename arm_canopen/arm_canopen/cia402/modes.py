@@ -72,7 +72,7 @@ class Mode(ABC):
 
     @abstractmethod
     def set_target(self, target: float) -> Promise[None]:
-        """Take a single target in user units.
+        """Accept a single target in user units.
 
         Returns:
             Done when the drive has it; rejected when it has refused it, or was stopped before.
@@ -82,7 +82,7 @@ class Mode(ABC):
         """
 
     def follow_target(self, target: float) -> Promise[None]:
-        """Take one of a stream of targets; as :meth:`set_target` where the drive itself leads."""
+        """Accept one of a stream of targets; :meth:`set_target` where the drive itself leads."""
         return self.set_target(target)
 
     @abstractmethod
@@ -90,7 +90,7 @@ class Mode(ABC):
         """Advance a cycle in which the drive accepts targets; return the bits of this mode."""
 
     def withdraw(self, delivery: Promise[None], error: DriveError) -> bool:
-        """Take back a target that the drive does not have yet, and reject its promise.
+        """Withdraw a target that the drive does not have yet, and reject its promise.
 
         Returns:
             Whether that was possible; else it is on its way.
@@ -120,7 +120,7 @@ class Mode(ABC):
         return False
 
     def offer_again(self) -> None:  # noqa: B027  # most modes have nothing to acknowledge
-        """Take a target back that is not acknowledged, and show it anew."""
+        """Withdraw a target that is not acknowledged, and present it anew."""
 
     def goes_on_unanswered(self) -> bool:
         """Conclude from an acknowledge that does not come, though nothing was in its way.
@@ -142,7 +142,7 @@ class NoMode(Mode):
     number = OperationMode.NO_MODE
 
     def preload(self, actual: Actual) -> Promise[None]:
-        """Have nothing to preload."""
+        """Preload nothing."""
         return completed()
 
     def set_target(self, target: float) -> Promise[None]:
@@ -163,7 +163,7 @@ class Homing(Mode):
         self.started = False  # whether bit 4 is set
 
     def preload(self, actual: Actual) -> Promise[None]:
-        """Have nothing to preload: without bit 4 nothing moves."""
+        """Preload nothing: without bit 4 nothing moves."""
         self.started = False
         return completed()
 

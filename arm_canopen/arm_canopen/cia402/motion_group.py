@@ -53,7 +53,7 @@ class MotionGroup:
             drive.released = partial(self._release, drive)
 
     def attach(self, source: MotionSource) -> None:
-        """Let a source command its axes from the next cycle on.
+        """Attach a source, which commands its axes from the next cycle on.
 
         Attached again, it gets back what it had lost; the axes that it still has go on.
 
@@ -98,7 +98,7 @@ class MotionGroup:
         feedback = [_feedback(drive) for drive in attachment.drives]
         try:
             setpoints = list(attachment.source.update(now, period, feedback))
-        except Exception as error:  # noqa: BLE001  # a source must not stop the cycle of the others
+        except Exception as error:  # noqa: BLE001  # a source must not stop the others
             self._fail(attachment, f'raised {type(error).__name__}: {error}')
             return
         if len(setpoints) != len(feedback):
@@ -138,7 +138,7 @@ class MotionGroup:
         drive.stream(setpoint)
 
     def _release(self, drive: Drive, refusal: Refusal) -> None:
-        """Take a drive away; a source that has not got it back yet must not do so any more."""
+        """Release a drive; a source that waits for it does not get it back."""
         for attachment in self._attachments:
             if drive in attachment.owned:
                 attachment.owned.remove(drive)

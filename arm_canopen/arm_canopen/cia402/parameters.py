@@ -245,7 +245,7 @@ class ParameterCache:
         return abs(self._units.acceleration.from_device(value)) if value else default
 
     async def _read_units(self) -> str:
-        """Take the units of the factor group (CiA 402-2, clause 8); report where they are from."""
+        """Use the units of the factor group (CiA 402-2, clause 8); report where they are from."""
         config, source = self._config, 'bus.yml'
         if not config.scale_from_factor_group and config.scale_acc_from_dev is not None:
             return source

@@ -49,7 +49,7 @@ class DriveRamped(Mode):
         self._deliver(0)
 
     def step(self, now: float, period: float, statusword: int) -> int:
-        """Leave all to the drive."""
+        """Do nothing: the drive leads."""
         return self.bits
 
     def _deliver(self, value: int) -> Promise[None]:
@@ -84,7 +84,7 @@ class ProfileTorque(DriveRamped):
         return self._deliver(actual.torque)
 
     def brake(self) -> None:
-        """Leave it to bit 8: no torque at all would drop a load."""
+        """Rely on bit 8: no torque at all would drop a load."""
 
 
 class MasterRamped(Mode):
@@ -152,7 +152,7 @@ class CyclicTorque(MasterRamped):
     number = OperationMode.CYCLIC_TORQUE
 
     def brake(self) -> None:
-        """Leave it to bit 8."""
+        """Rely on bit 8."""
 
     def preload(self, actual: Actual) -> Promise[None]:
         """Keep the torque that the drive has, so that it drops no load."""

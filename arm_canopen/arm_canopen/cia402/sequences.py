@@ -101,12 +101,12 @@ class DriveSequences:
                 goal.title,
                 slow,
             )
-        except BaseException:  # also when it is cancelled: nobody waits for the rest of the way
+        except BaseException:  # also when it is cancelled: the rest of the way is not awaited
             drive.leave_operation()
             raise
 
     async def _begin_enabling(self) -> None:
-        """Leave what stopped it before behind, and have it hold where it is."""
+        """Clear what stopped it before, and hold it where it is."""
         drive = self.drive
         if drive.stop.running:
             raise self.refused('is being stopped')
@@ -294,7 +294,7 @@ class DriveSequences:
             )
 
     async def _end_halt_at_rest(self, acting: Mode) -> None:
-        """Take bit 8 back where the drive stands; no older target acts then."""
+        """Clear bit 8 where the drive stands; no older target acts then."""
         control = self.drive.control
         if acting.number in TORQUE_MODES:
             raise self.refused(
@@ -347,7 +347,7 @@ class DriveSequences:
         await self.pause(SETTLE_CYCLES * self.drive.period)
 
     async def pause(self, duration: float) -> None:
-        """Let time pass in [s]."""
+        """Wait for a time in [s]."""
         await self._scheduler.timer(duration)
 
     async def until(

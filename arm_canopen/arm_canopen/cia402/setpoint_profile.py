@@ -46,7 +46,7 @@ class TargetLine:
         self._interval: float | None = None  # [s]
 
     def extend(self, target: float) -> None:
-        """Take the next target."""
+        """Begin with the next target."""
         before = self._since if self._interval is None else self._interval
         self._interval = before + LEARNING * (self._since - before)
         self._left, self._since = SPREAD * self._interval, 0.0
@@ -90,7 +90,7 @@ class SetpointProfile:
             self._line.extend(target)
 
     def follow(self, position: float, period: float) -> None:
-        """Take the set-point of a stream, and remember its rate for a smooth stop."""
+        """Follow the set-point of a stream, and remember its rate for a smooth stop."""
         self.velocity = (position - self.position) / period
         self.position = position
         self.go(None)

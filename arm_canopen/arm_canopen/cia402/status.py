@@ -59,7 +59,7 @@ def axis_status(
     failure: str = '',
     summary: str = '',
 ) -> DriveStatus:
-    """Take a snapshot of an axis, whoever commands it."""
+    """Take a snapshot of an axis."""
     word = view.statusword
     return DriveStatus(
         name=view.name,

@@ -119,7 +119,7 @@ class StopCommands:
             raise self._steps.refused('is not known to stand, as it was never booted')
 
     async def _ready_to_stop(self, reason: str) -> bool:
-        """Take the drive from what moves it, now or later; True where PDOs can brake it."""
+        """End what moves the drive, now or later; True where PDOs can brake it."""
         drive = self._drive
         drive.interrupted = None
         drive.released(Refusal(RefusalCause.COMMANDED, reason))
@@ -134,7 +134,7 @@ class StopCommands:
         return True
 
     async def _stay_disabled(self) -> None:
-        """Have it enabled no more, also where the command for that is on its way already."""
+        """Prevent enabling, also where the command for it is on its way."""
         drive, steps = self._drive, self._steps
         drive.leave_operation()
         await drive.stop.ended()

@@ -34,7 +34,7 @@ class TargetStream:
         self._watch: Task[None] | None = None
 
     def admit(self) -> None:
-        """Take note of a target of a stream."""
+        """Record a target of a stream."""
         self._came = self._scheduler.now
         if self._ended_by:
             raise DriveError(
@@ -62,7 +62,7 @@ class TargetStream:
             self.end(by)
 
     def renew(self, by: str) -> None:
-        """Let a stream in that begins from now on, but not one that comes already."""
+        """Admit a stream that begins from now on, but not one that comes already."""
         silence = self._scheduler.now - self._came
         if silence <= self._drive.config.target_timeout:
             self.end(by)

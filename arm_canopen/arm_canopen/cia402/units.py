@@ -85,7 +85,7 @@ class Units:
         self.use(config)
 
     def use(self, config: DriveConfig) -> None:
-        """Take the factors of bus.yml, or those of the drive itself."""
+        """Use the factors of bus.yml, or those of the drive itself."""
         self.config = config
         scales = config.scale_pos_to_dev, config.scale_pos_from_dev
         self.position.set(*scales, config.offset_pos_to_dev, config.offset_pos_from_dev)

@@ -72,7 +72,7 @@ class JointAggregator:
         return ready
 
     def silent(self, now: float) -> list[str]:
-        """Name the joints that nobody reports, or not any more."""
+        """Name the joints that are not reported, or not any more."""
         return [
             joint.name
             for joint in self._joints

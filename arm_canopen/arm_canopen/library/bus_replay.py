@@ -40,13 +40,13 @@ class ReplayedAxis:
     """
 
     def __init__(self, view: DriveView) -> None:
-        """Take the view."""
+        """Bind to the view."""
         self.view = view
         self.setpoint = self.following_error = math.nan
         self._commanded = False
 
     def note_command(self) -> None:
-        """Take the target of an RPDO."""
+        """Store the target of an RPDO."""
         self._commanded = True
 
     def forget(self) -> None:
@@ -57,7 +57,7 @@ class ReplayedAxis:
         self._commanded = False
 
     def observe(self, report: Callable[[Severity, str], None]) -> None:
-        """Take state and position of this cycle; report a fault that is new."""
+        """Read state and position of this cycle; report a new fault."""
         view = self.view
         before = view.state
         view.observe()
@@ -147,11 +147,11 @@ class BusReplay:
         return self.network.scheduler.now
 
     def take(self, frame: Frame, now: float) -> None:
-        """Take the next frame, as if it had come now."""
+        """Feed the next frame, as if it had come now."""
         self.receive(frame._replace(timestamp=now))
 
     def receive(self, frame: Frame) -> None:
-        """Take the next frame of the log."""
+        """Feed the next frame of the log."""
         if not self._begun:
             self._begun = True
             self.network.scheduler.set_time(frame.timestamp)
@@ -170,7 +170,7 @@ class BusReplay:
         self._update_when_due(frame.timestamp)
 
     def advance(self, now: float) -> None:
-        """Let time pass to ``now`` of the log in [s], so that what is silent is missed."""
+        """Advance to ``now`` of the log in [s], so that silent devices are missed."""
         while self.now < now:
             step = min(now, self.now + STEP)
             self.network.advance(step)
@@ -227,7 +227,7 @@ class BusReplay:
             axis.note_command()
 
     def _note_answer(self, node: RemoteNode, frame: Frame) -> None:
-        """Take what an SDO has read, where it is part of the state."""
+        """Store what an SDO has read, where it is part of the state."""
         try:
             answer = decode_response(frame.data)
         except CodecError:
@@ -242,7 +242,7 @@ class BusReplay:
 
 
 def _go_online(node: RemoteNode, now: float) -> None:
-    """Take a device for one in operation, because it sends what only such a device sends."""
+    """Mark a device as operational, because it sends what only such a device sends."""
     node.wanted = node.wanted or NmtState.OPERATIONAL
     node.phase, node.phase_detail = BootPhase.OPERATIONAL, ''
     if node.is_mute:

@@ -97,7 +97,7 @@ class CanopenDrive:
         return self._run('mode', partial(self._commands.select_mode, _operation_mode(mode)))
 
     def disable(self) -> str:
-        """Take the torque away (Switched On); return when it stands."""
+        """Disable the torque (Switched On); return when the axis stands."""
         return self._request('disable')
 
     def halt(self) -> str:

@@ -296,7 +296,7 @@ class CanopenMaster:
         return self.device(name).sdo
 
     def attach(self, source: MotionSource) -> None:
-        """Let a motion source command its axes in each cycle from now on.
+        """Attach a motion source, which commands its axes in each cycle from now on.
 
         Raises:
             KeyError: An axis is no drive of this bus.
@@ -316,7 +316,7 @@ class CanopenMaster:
         """Stop and disable all drives, end the cycle, close the bus; again is no error.
 
         Raises:
-            DriveError: A drive did not stop, or nobody can know; all else is done.
+            DriveError: A drive did not stop, or that is unknown; all else is done.
         """
         if self._closed:
             return
@@ -383,7 +383,7 @@ class CanopenMaster:
         """Bring every drive to quick stop and disable it; the cycle goes on.
 
         Raises:
-            DriveError: They did not all stop, or nobody can know.
+            DriveError: They did not all stop, or that is unknown.
         """
         scheduler = self.network.scheduler
 
@@ -408,7 +408,7 @@ class CanopenMaster:
             raise DriveError('the drives did not all stop in time') from None
 
     def begin_attach(self, source: MotionSource) -> Future[None]:
-        """Let a motion source command its axes, from any thread; nothing waits.
+        """Attach a motion source from any thread, without waiting.
 
         Returns:
             Done before the next cycle; or KeyError: an axis is no drive of this bus, BusError: the
@@ -431,7 +431,7 @@ class CanopenMaster:
         return self.thread.call(lambda: self._group.detach(source))
 
     def _stop_without_cycle(self) -> str:
-        """Send a quick stop to each drive that may have power; nobody waits for an answer.
+        """Send a quick stop to each drive that may have power, without waiting for answers.
 
         Return what was sent, to which drives it is all that stops them, and which did not get it.
         """

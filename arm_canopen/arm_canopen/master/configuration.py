@@ -75,7 +75,7 @@ class Configurator:
                 )
 
     async def write_error_control(self) -> None:
-        """Have the device be watched, its TPDOs come, and the device watch the master."""
+        """Configure error control, TPDOs, and that the device watches the master."""
         for write in await self._writes():
             if write.index in ERROR_CONTROL or write.key == WATCH_KEY or write.is_own_timer:
                 await self._bring(write)
@@ -179,7 +179,7 @@ class Configurator:
             return False
 
     async def _writes(self) -> list[BootWrite]:
-        """Return the plan; the device watches the master where it watches nobody else."""
+        """Return the plan; the device watches the master unless it watches another node."""
         node = self._node
         node.watch_slot = 0
         writes = boot_writes(self._bus, node.config, await self._consumers())

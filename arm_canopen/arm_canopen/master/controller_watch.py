@@ -46,7 +46,7 @@ class ControllerWatch:
         self._alone = False
 
     def receive(self, frame: Frame) -> None:
-        """Take an error frame."""
+        """Process an error frame."""
         self.error_frames += 1
         self.last_error = error_text(frame)
         counters = error_counters(frame)
@@ -54,7 +54,7 @@ class ControllerWatch:
             self.transmit_errors, self.receive_errors = counters
         if is_unacknowledged(frame) and not self._alone:
             self._alone = True
-            text = 'nobody on the bus acknowledges frames: is any device powered and connected?'
+            text = 'no device on the bus acknowledges frames: is any device powered and connected?'
             self._log(Severity.WARNING, text)
         state = controller_state(frame)
         if state is not None and state is not self.state:

@@ -53,7 +53,7 @@ class EmergencyLog:
         self._newest = ''
 
     def receive(self, frame: Frame) -> None:
-        """Take an EMCY message."""
+        """Store an EMCY message."""
         try:
             emergency = Emergency.decode(frame.data)
         except CodecError as error:

@@ -42,7 +42,7 @@ class Guarding:
         self._due = None
 
     def receive(self, data: bytes) -> bool:
-        """Take an answer; return whether its toggle bit makes it a new one."""
+        """Process an answer; return whether its toggle bit makes it a new one."""
         toggle = data[0] & TOGGLE
         if toggle == self._toggle:
             return False
@@ -104,7 +104,7 @@ class LifeSigns:
             self._guarding.stop()
 
     def take(self, state: NmtState, frame: Frame, *, supervised: bool) -> bool:
-        """Take a sign; return whether it is a new one, by the toggle bit of node guarding.
+        """Process a life sign; return whether it is new, by the toggle bit of node guarding.
 
         The toggle bit counts for a supervised device only, which is online.
         """

@@ -143,7 +143,7 @@ class Network:
             )
 
     def receive(self, frame: Frame) -> None:
-        """Take a frame from the bus."""
+        """Process a frame from the bus."""
         self.on_frame(frame)
         self.scheduler.set_time(frame.timestamp)
         if frame.is_error:
@@ -156,7 +156,7 @@ class Network:
         handler(frame)
 
     def advance(self, now: float) -> None:
-        """Let time pass: timers, conditions, heartbeats that are overdue."""
+        """Advance the time: timers, conditions, overdue heartbeats."""
         self._contain(partial(self.scheduler.advance, now))
         if now < self._watch_at:
             return
@@ -231,7 +231,7 @@ class Network:
                 node.fail(error, output)
 
     def _contain(self, step: Callable[[], object]) -> bool:
-        """Let a step of the cycle that fails keep no other one from being done."""
+        """Contain a step of the cycle that fails, so that the others are done."""
         try:
             step()
         except Exception as error:  # noqa: BLE001
@@ -333,7 +333,7 @@ class Network:
     def _connect(
         self, other_master: OtherMasterWatch
     ) -> Iterator[tuple[int, Callable[[Frame], None]]]:
-        """Say who takes the frames of which identifier."""
+        """Map each COB-ID to its handler."""
         yield CobId.NMT, self._receive_nmt
         yield CobId.HEARTBEAT + self.config.master.node_id, other_master.receive
         yield CobId.SYNC, other_master.receive

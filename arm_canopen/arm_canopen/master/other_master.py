@@ -93,7 +93,7 @@ class OtherMasterWatch:
         self._reported: set[MasterFrame] = set()
 
     def receive(self, frame: Frame) -> None:
-        """Take a frame of somebody else."""
+        """Process a frame of another participant."""
         kind = self._frames.read(frame)
         if kind is not None and kind not in self._reported:
             self._reported.add(kind)
@@ -105,7 +105,7 @@ class OtherMasterWatch:
 
 
 def listen(bus: Bus, config: BusConfig, clock: Callable[[], float]) -> Counter[MasterFrame]:
-    """Listen for another master on a bus that nobody else reads, without a word.
+    """Listen for another master on a bus that is not read elsewhere, without sending.
 
     Returns:
         Its frames by kind, and how many of each; empty when there is none.

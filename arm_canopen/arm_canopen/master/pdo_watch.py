@@ -45,7 +45,7 @@ class PdoWatch:
         before, self._may_get_lost = self._may_get_lost, numbers
         if numbers and numbers != before:
             self._warn(
-                f'TPDO {numbers}: nobody notices when it gets lost, and the drive is led by what '
+                f'TPDO {numbers}: its loss goes unnoticed, and the drive is led by what '
                 'it sent before. Write transmission: 1 (with SYNC), or 255 and event_timer: 100 '
                 'where the device has it'
             )

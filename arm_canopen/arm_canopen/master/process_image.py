@@ -117,7 +117,7 @@ class ReceivedTpdo:
         self._sync.pending += self.awaited
 
     def receive(self, frame: Frame) -> None:
-        """Take a PDO from the bus."""
+        """Store a PDO from the bus."""
         try:
             self.values = self._unpack(frame.data)
         except CodecError:
@@ -196,7 +196,7 @@ class Writer(Protocol):
         """Whether it goes by SDO, because no RPDO carries it."""
 
     def write(self, value: Number) -> None:
-        """Have the device hold a value, cycle by cycle; by SDO it leaves when it changed.
+        """Hold a value in the device, cycle by cycle; by SDO it is sent when it changed.
 
         Raises:
             CodecError: The object cannot hold it; the one before is kept.
@@ -316,7 +316,7 @@ class ProcessImage:
             output.reset()
 
     def store(self, index: int, subindex: int, value: Number) -> list[SentRpdo]:
-        """Let the RPDOs carry a value of an object; return those that do."""
+        """Write a value of an object to the RPDOs that carry it; return those."""
         places = self._places.get((index, subindex), ())
         for output, position in places:
             output.values[position] = value

@@ -126,7 +126,7 @@ class RemoteNode:
 
     @property
     def operational(self) -> bool:
-        """Online, and nobody stopped it or sent it to pre-operational."""
+        """Online, and neither stopped nor sent to pre-operational."""
         return self.online and not self.left_operational
 
     @property
@@ -158,7 +158,7 @@ class RemoteNode:
         return self.pdos.count_missed()
 
     def receive_heartbeat(self, frame: Frame) -> None:
-        """Take a heartbeat or boot-up message."""
+        """Process a heartbeat or boot-up message."""
         state = parse_heartbeat(frame.data)
         if state is None or not self.life.take(state, frame, supervised=self.online):
             return
@@ -199,7 +199,7 @@ class RemoteNode:
             self.pdos.warn_of_losses()
 
     def watch(self, now: float) -> bool:
-        """Look for life signs and PDOs that are overdue; return whether it was lost now."""
+        """Check for overdue life signs and PDOs; return whether it was lost now."""
         self.emergencies.look(now)
         missing = self.life.overdue(now)
         if missing:
@@ -220,7 +220,7 @@ class RemoteNode:
         return recent and self.operational and not self.life.silent
 
     def _miss(self, missing: str, now: float) -> None:
-        """Have a device led to rest before it is lost, as its configuration would let it coast.
+        """Lead a device to rest before it counts as lost, as its configuration would let it coast.
 
         Only when a life sign is missing twice in a row; the TPDOs show as much. From then on it is
         lost, even if one comes again: its drivers have no power any more.
@@ -284,7 +284,7 @@ class RemoteNode:
         self.objects.forget(reason)
 
     async def unwatch(self) -> None:
-        """Have the device watch the master no longer, before the master ends; never raises."""
+        """Stop the device watching the master, before the master ends; never raises."""
         if not self.online or not self.watch_slot:
             return
         try:

@@ -106,7 +106,7 @@ class SdoWriter:
         return self._objects.limits(*self._address)
 
     def write(self, value: Number) -> None:
-        """Have the device hold a value, cycle by cycle; each change of it is sent.
+        """Hold a value in the device, cycle by cycle; each change of it is sent.
 
         What was lost is sent again at once, and what was refused ever less often.
         """
@@ -272,7 +272,7 @@ class RemoteObjects:
             await self._scheduler.timer(period)
 
     def note_value(self, index: int, subindex: int, data: bytes) -> None:
-        """Take the value of an object that somebody else has read; of use where it is polled."""
+        """Store the value of an object that was read elsewhere; of use where it is polled."""
         entry = self._polled.get((index, subindex))
         listed = self.config.dictionary.get(index, subindex)
         if entry is None or listed is None:

@@ -168,7 +168,7 @@ class NetworkThread:
         return min(self._timer.deadline, timer, self.network.next_update)
 
     def step(self) -> None:
-        """Take what comes until something is due, and do that; SYNC comes before all else."""
+        """Receive until something is due, and do that; SYNC comes before all else."""
         now = self.now()
         if now < self._timer.deadline:
             self._take(self._thread.receive(max(0.0, self.next_due - now)))
@@ -217,7 +217,7 @@ class NetworkThread:
         self._thread.do_work()
 
     def _log_defects(self, work: Callable[[], object]) -> None:
-        """Let no defect in one cycle end the cycles that keep the drives under control."""
+        """Contain a defect in one cycle, so that the drives stay under control."""
         try:
             work()
         except Exception:

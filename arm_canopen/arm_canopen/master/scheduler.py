@@ -35,7 +35,7 @@ class Promise(Generic[T]):
         self._finish(None, error)
 
     def follow(self, other: Promise[T]) -> None:
-        """Have the result that another promise gets."""
+        """Adopt the result of another promise."""
 
         def finish(done: Promise[T]) -> None:
             if done.error is None:
@@ -46,7 +46,7 @@ class Promise(Generic[T]):
         other.when_done(finish)
 
     def abandon(self) -> None:
-        """Be done without a result, and without a call of those who wait; nobody does any more."""
+        """End without a result and without callbacks: no one waits any more."""
         self.done = True
         self._callbacks.clear()
 
@@ -172,7 +172,7 @@ class Scheduler:
         return Task(coroutine)
 
     def background(self, coroutine: Coroutine[Promise[Any], None, None]) -> Task[None]:
-        """Start a coroutine that nobody awaits; an error in it is a defect and is reported."""
+        """Start a coroutine that is not awaited; an error in it is a defect and is reported."""
         task = Task(coroutine)
         task.when_done(self._check_background)
         return task

@@ -104,7 +104,7 @@ class SdoChannel:
         self._restarted = False
 
     def receive(self, data: bytes) -> None:
-        """Take a frame of the server.
+        """Process a frame of the server.
 
         What does not answer the open question is passed over: it is the late answer to one that
         timed out, or meant for another client.
@@ -237,7 +237,7 @@ class SdoChannel:
         )
 
     async def _settle(self, index: int, subindex: int, timeout: float) -> None:
-        """Let the outstanding answers pass, by reading an object that none of them is of."""
+        """Flush outstanding answers by reading an object that none of them is of."""
         marker = next(
             (place for place in MARKERS if place not in self._pending_replies), MARKERS[0]
         )

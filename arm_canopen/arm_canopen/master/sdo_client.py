@@ -163,7 +163,7 @@ class SdoClient:
         self._channel.restarted()
 
     def receive(self, frame: Frame) -> None:
-        """Take an answer of the device."""
+        """Process an answer of the device."""
         self._channel.receive(frame.data)
 
     def receive_request(self, _frame: Frame) -> None:

@@ -42,7 +42,7 @@ class Startup:
                 node.on_gone = partial(self._lost, node)
 
     async def watch(self) -> None:
-        """Say it when mandatory devices are not there within `boot_time`."""
+        """Report mandatory devices that are not there within `boot_time`."""
         if self._config.boot_time <= 0.0 or self.complete:
             return
         await self._scheduler.timer(self._config.boot_time)

@@ -26,7 +26,7 @@ POSITION_TARGETS = {
 
 
 async def preset_outputs(node: RemoteNode) -> None:
-    """Let each RPDO of a device in operation carry what the device has in the mapped objects now.
+    """Set each RPDO of a device in operation to what the mapped objects hold now.
 
     Raises:
         BootError: A mapped object cannot be read, so that the RPDO would bring something new.
@@ -43,7 +43,7 @@ async def preset_outputs(node: RemoteNode) -> None:
 
 
 async def read_outputs(node: RemoteNode, timeout: float) -> None:
-    """Let each RPDO of a device that was configured carry what the device has.
+    """Set each RPDO of a configured device to what the device holds.
 
     What its driver commands is left to the driver, except for the mode of operation, as the drive
     may be one that must not be sent mode 0, and for the position targets: they are where the drive

@@ -39,7 +39,7 @@ class DriveJointStates:
         ]
 
     def update_listeners(self) -> None:
-        """Look who listens."""
+        """Check for subscribers."""
         self.listened = any(publisher.get_subscription_count() for publisher, _, _ in self._topics)
 
     def sample(self) -> list[JointSample] | None:
@@ -71,11 +71,11 @@ class RobotJointStates:
         self.aggregator = JointAggregator(joints)
 
     def update_listeners(self) -> None:
-        """Look who listens."""
+        """Check for subscribers."""
         self.listened = self._publisher.get_subscription_count() > 0
 
     def update(self, joint: str, stamp: int, sample: JointSample) -> None:
-        """Take the state of a joint at a time in [ns], and publish what is complete."""
+        """Store the state of a joint at a time in [ns], and publish what is complete."""
         for ready in self.aggregator.update(joint, stamp, sample, time.monotonic()):
             if ready.samples:
                 self._publish(ready)
@@ -138,7 +138,7 @@ class BusJointStates:
         self._robot = robot
 
     def update_listeners(self) -> None:
-        """Look who listens, so that only what is received is published."""
+        """Check for subscribers, so that only what is received is published."""
         for drive in self._drives:
             drive.update_listeners()
         if self._robot is not None:

@@ -144,7 +144,7 @@ class MasterProcess:
         self._joint_states.publish_robot(description)
 
     def attach(self, source: MotionSource) -> Future[None]:
-        """Let a motion source command its axes, from any thread; nothing waits.
+        """Attach a motion source from any thread, without waiting.
 
         Returns:
             Done before the next cycle; or KeyError: an axis is no drive of this bus, BusError: the

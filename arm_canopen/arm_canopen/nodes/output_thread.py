@@ -51,14 +51,14 @@ class OutputThread:
             self._thread.join()
 
     def post(self, work: Callable[[], None]) -> None:
-        """Have a function run soon; returns at once.
+        """Queue a function; returns at once.
 
         For what somebody waits for, such as answers of services: it is never left out.
         """
         self._queue.put(work)
 
     def post_stream(self, key: Hashable, work: Callable[[], None]) -> None:
-        """Have a function run soon that belongs to a stream; returns at once.
+        """Queue a function of a stream; returns at once.
 
         While ROS takes less than what comes, only the newest of each stream is kept.
         """

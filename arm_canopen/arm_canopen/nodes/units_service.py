@@ -41,7 +41,7 @@ class BusFile:
 
     @classmethod
     def at(cls, path: Path) -> BusFile:
-        """Look at a file that was just read."""
+        """Remember a file that was just read."""
         try:
             stat = path.stat()
         except OSError:

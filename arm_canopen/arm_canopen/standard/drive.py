@@ -144,7 +144,7 @@ STATUS_TEXTS: tuple[tuple[Statusword, str], ...] = (
 
 
 def statusword_text(statusword: int) -> str:
-    """Say a statusword in words: its state and the bits that are set beside it."""
+    """Describe a statusword: its state and the bits that are set beside it."""
     bits = [text for bit, text in STATUS_TEXTS if statusword & bit]
     extra = f' ({", ".join(bits)})' if bits else ''
     return f'0x{statusword:04X} {drive_state(statusword).title}{extra}'

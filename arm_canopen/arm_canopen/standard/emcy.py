@@ -148,7 +148,7 @@ ERROR_REGISTER_BITS: tuple[str, ...] = (
 
 
 def error_code_text(code: int) -> str:
-    """Say an error code of 0x603F or EMCY in words."""
+    """Describe an error code of 0x603F or EMCY."""
     known = ERROR_CODES.get(code)
     if known is None:
         family = ERROR_CLASSES.get(code >> 8) or ERROR_CLASSES.get(code >> 8 & 0xF0)
@@ -191,7 +191,7 @@ class Emergency:
         return cls(*struct.unpack('<HB5s', data))
 
     def __str__(self) -> str:
-        """Say it in words."""
+        """Describe it."""
         vendor = f', vendor {self.vendor.hex()}' if any(self.vendor) else ''
         register = error_register_text(self.register)
         return f'{error_code_text(self.code)} (register: {register}{vendor})'

@@ -44,7 +44,7 @@ class AbortCode(CodeWithText):
 
 
 def abort_text(code: int) -> str:
-    """Say an abort code in words."""
+    """Describe an abort code."""
     try:
         return f'{AbortCode(code).text} (0x{code:08X})'
     except ValueError:

@@ -353,7 +353,7 @@ def test_a_drive_whose_tpdos_stop_to_come_on_change_is_not_fresh(mode: Operation
     led.lose()
     led.net.run(3.0)
     assert led.net.drives[JOINT].control.accepts_targets
-    assert not [text for text in led.net.reported(Severity.WARNING) if 'nobody notices' in text]
+    assert not [text for text in led.net.reported(Severity.WARNING) if 'goes unnoticed' in text]
 
 
 @STREAMED
@@ -365,7 +365,7 @@ def test_an_axis_is_not_held_at_a_position_of_unknown_age(
 ) -> None:
     """Where nothing shows that it is old, the drive is stopped by its own ramp, and disabled."""
     led = Led(mode, Leader(), config)
-    (warning,) = [text for text in led.net.reported(Severity.WARNING) if 'nobody notices' in text]
+    (warning,) = [text for text in led.net.reported(Severity.WARNING) if 'goes unnoticed' in text]
     assert 'TPDO 1, 2' in warning
     led.lose(*TPDOS)
     velocities = led.velocities()
@@ -383,13 +383,13 @@ def test_a_device_that_refuses_its_event_timer_is_named() -> None:
     net.boot()
     net.run(2.0)
     assert net.drives[JOINT].view.fresh
-    warnings = [text for text in net.reported(Severity.WARNING) if 'nobody notices' in text]
+    warnings = [text for text in net.reported(Severity.WARNING) if 'goes unnoticed' in text]
     assert len(warnings) == 1
     net.power_off(JOINT)
     net.run(0.5)
     net.power_on(JOINT)
     net.run_until(net.all_ready)
-    assert len([text for text in net.reported() if 'nobody notices' in text]) == 1
+    assert len([text for text in net.reported() if 'goes unnoticed' in text]) == 1
 
 
 def test_a_timer_that_is_taken_at_the_next_boot_counts_again() -> None:
@@ -406,7 +406,7 @@ def test_a_timer_that_is_taken_at_the_next_boot_counts_again() -> None:
             device.faults.inject(refused, net.now)
         net.run_until(net.all_ready)
         reported = net.reported(Severity.WARNING)[begin:]
-        assert any('TPDO 1: nobody notices' in text for text in reported) is refuses
+        assert any('TPDO 1: its loss goes unnoticed' in text for text in reported) is refuses
         net.run(2.0)
         assert net.drives[JOINT].view.fresh
         net.wire.loses = lambda sender, frame: frame.can_id == 0x180 + NODE_ID
@@ -508,6 +508,6 @@ def test_check_and_boot_name_what_may_get_lost(
         bus = bus_with(tmp_path, f'  tpdo:\n    1: {{{keys}}}\n', sync_period)
     found = [str(problem) for problem in check_bus(bus).warnings]
     expected = lossy if sync_period else lossy_without_sync
-    assert any('when TPDO 1 gets lost' in text for text in found) is expected
+    assert any('the loss of TPDO 1' in text for text in found) is expected
     sync = SyncRound(lambda: None, period=bus.master.sync_period)
     assert ReceivedTpdo(bus.nodes[0].tpdos[0], sync).loss_unnoticed is expected

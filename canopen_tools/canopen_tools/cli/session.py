@@ -103,7 +103,7 @@ class Session:
         return self.run(upload())
 
     def await_quiet(self, node_id: int) -> None:
-        """Wait until nobody else talks to the SDO server of a device, for a while at most."""
+        """Wait until no one else talks to the SDO server of a device, for a while at most."""
         self._step(0.0)
         self.listen(QUIET_WAIT, lambda: monotonic() - self._sdo_times.get(node_id, 0.0) > QUIET)
 

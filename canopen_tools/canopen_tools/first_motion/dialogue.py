@@ -49,7 +49,7 @@ def ask_seen(kind: JointKind, reported: float) -> Seen:
 
 
 def choose(causes: Sequence[Cause]) -> Cause | None:
-    """Let the person choose one of several causes; None for none of them."""
+    """Ask for one of several causes; None for none of them."""
     numbers = {str(number): cause for number, cause in enumerate(causes, 1)}
     while True:
         answer = _asked(f'which of them is it, 1 to {len(causes)} (Enter: none): ')

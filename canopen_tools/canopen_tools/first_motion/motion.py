@@ -290,7 +290,7 @@ class _GuardedMotion:
         return status_text([state, (way, Style.PLAIN)], colour=self._colour)
 
     def _important(self) -> Iterable[Event]:
-        """Take what matters of the drive, or of the bus, out of the queue."""
+        """Handle queued events of the drive and the bus."""
         while self._events:
             event = self._events.popleft()
             if event.severity is not Severity.INFO and event.node in {'', self._drive.name}:

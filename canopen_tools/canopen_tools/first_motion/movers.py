@@ -48,7 +48,7 @@ class SlowMotion:
         self._permitted_until = -math.inf
 
     def permit(self, until: float) -> None:
-        """Let it move until a steady time in [s]; one that has passed ends the motion."""
+        """Allow motion until a steady time in [s]; one that has passed ends the motion."""
         with self._lock:
             self._permitted_until = until
 

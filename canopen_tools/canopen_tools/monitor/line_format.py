@@ -56,7 +56,7 @@ class LineFormat:
         self._reference: float | None = None
 
     def begin(self, stamp: float) -> None:
-        """Let the time since the first frame begin, so that it is the same by any filter."""
+        """Start the time at the first frame, so that it is the same with any filter."""
         if self._reference is None and self._style is TimeStyle.ZERO:
             self._reference = stamp
 

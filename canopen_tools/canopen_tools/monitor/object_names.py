@@ -25,7 +25,7 @@ class ObjectNames:
         self._dictionary = dictionary
 
     def name(self, index: int, subindex: int) -> str:
-        """Return the name of an object, empty when nobody gives it one."""
+        """Return the name of an object, empty when it has none."""
         entry = self._dictionary.get(index, subindex) if self._dictionary else None
         return entry.name if entry else _standard_name(index)
 

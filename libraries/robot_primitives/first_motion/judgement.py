@@ -29,7 +29,7 @@ class Verdict(Enum):
     WRONG_SCALE = 'wrong scale: it moved another distance'
     WRONG_SIGN_AND_SCALE = 'wrong sign and wrong scale'
     NO_MOTION = 'nothing moved'
-    ENCODER_ONLY = 'the drive reports a motion that nobody saw'
+    ENCODER_ONLY = 'the drive reports a motion that was not seen'
     NOT_REPORTED = 'a motion was seen that the drive does not report'
     OTHER_JOINT = 'another joint moved'
 

@@ -208,7 +208,7 @@ def _writes(
 def _watch(
     bus: BusConfig, node: NodeConfig, consumers: HeldConsumers | None
 ) -> Iterator[BootWrite]:
-    """Have the device watch the master, or no longer, in the first entry that is free."""
+    """Make the device watch the master, or stop it, in the first entry that is free."""
     master_id, index = bus.master.node_id, Index.CONSUMER_HEARTBEAT
     slots = _watch_slots(bus, node)
     if consumers is None:

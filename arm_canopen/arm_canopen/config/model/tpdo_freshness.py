@@ -26,7 +26,7 @@ EVENT_TIMER_SUBINDEX = 5
 
 
 def with_event_timer(pdo: PdoConfig, dictionary: ObjectDictionary) -> PdoConfig:
-    """Return a TPDO of a drive with an event timer, if it needs one and nobody has chosen."""
+    """Return a TPDO of a drive with an event timer, if it needs one and has none."""
     index = Index.TPDO_COMMUNICATION + pdo.number - 1
     entry = dictionary.get(index, EVENT_TIMER_SUBINDEX)
     chosen = pdo.event_time is not None or pdo.transmission < EVENT_DRIVEN

@@ -214,7 +214,7 @@ class _Converter:
         own[name] = self.convert(value, where)
 
     def _merge(self, value: yaml.Node, place: Place, merged: dict[str, Item]) -> None:
-        """Take over a merge key's mappings; of a list the earlier one counts."""
+        """Merge the mappings of a merge key; of a list the earlier one counts."""
         sources = value.value if isinstance(value, yaml.SequenceNode) else [value]
         for source in sources:
             where = self._place(source, f'{place.key}.<<')

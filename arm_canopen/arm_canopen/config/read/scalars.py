@@ -22,7 +22,7 @@ NUMBER_LENGTH_MAX = 80  # longer than any 64-bit number in any notation
 
 
 def describe(item: Item) -> str:
-    """Say what a value is, for messages."""
+    """Describe a value for messages."""
     if isinstance(item, YamlList):
         return 'a list'
     if not isinstance(item, Scalar):

@@ -54,7 +54,7 @@ def lay_out(root: YamlMap, findings: Findings) -> Layout:
 
 
 def _lifted(root: YamlMap, findings: Findings) -> YamlMap:
-    """Take sections that are indented below ``options`` as sections of their own."""
+    """Treat sections that are indented below ``options`` as top-level sections."""
     options = root.entries.get('options')
     if not isinstance(options, YamlMap):
         return root
@@ -128,7 +128,7 @@ def _devices(nodes: YamlMap, defaults: YamlMap, findings: Findings) -> dict[str,
 
 
 def _with_dcf(section: YamlMap, findings: Findings) -> YamlMap:
-    """Take ``eds`` for ``dcf``, as many people write it; ros2_canopen knows the latter only."""
+    """Accept ``eds`` for ``dcf``, a common spelling; ros2_canopen knows the latter only."""
     item = section.entries.get('eds')
     if item is None:
         return section

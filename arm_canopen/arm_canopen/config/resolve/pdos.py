@@ -195,7 +195,7 @@ class PdoReader:
 def _no_such_pdo(
     direction: Direction, name: str, number: int | None, numbers: list[int]
 ) -> RefusedError:
-    """Say why a key below ``tpdo`` or ``rpdo`` is no PDO of the device."""
+    """Explain why a key below ``tpdo`` or ``rpdo`` is no PDO of the device."""
     if any(key.name == name for key in PDO_KEYS[direction.name]):
         return RefusedError(
             f'{name!r} is no PDO number', f"indent {name!r} below a PDO number, such as '1:'"

@@ -195,7 +195,7 @@ def _check_coarse(subject: Subject, units: AxisUnits) -> None:
 
 
 def _check_velocity_default(subject: Subject, axis: DriveConfig, units: AxisUnits) -> None:
-    """Say when only positions have a scale; where none has, the two fit each other."""
+    """Warn when only positions have a scale; where none has, the two fit each other."""
     position, velocity = axis.scale_pos_to_dev, axis.scale_vel_to_dev
     default = DriveConfig().scale_vel_to_dev
     if units.rule is not UnitRule.BUS_YML or velocity != default or position == default:
@@ -213,7 +213,7 @@ def _check_velocity_default(subject: Subject, axis: DriveConfig, units: AxisUnit
 
 
 def _check_acceleration(subject: Subject, units: AxisUnits) -> None:
-    """Say when neither bus.yml nor the EDS says in what the drive counts accelerations."""
+    """Warn when neither bus.yml nor the EDS gives the unit of accelerations."""
     if units.acceleration_by or units.rule is UnitRule.UPSTREAM:
         return  # the default of ros2_canopen assumes all of them
     subject.findings.warning(
@@ -227,7 +227,7 @@ def _check_acceleration(subject: Subject, units: AxisUnits) -> None:
 
 
 def _check_offsets(subject: Subject, axis: DriveConfig, units: AxisUnits) -> None:
-    """Say when a target at the position that is shown would move the axis."""
+    """Warn when a target at the position that is shown would move the axis."""
     if not units.increments:
         return
     to_dev, from_dev = axis.offset_pos_to_dev, axis.offset_pos_from_dev
@@ -250,7 +250,7 @@ def is_coarse(scale: float) -> bool:
 
 
 def _check_against_factors(subject: Subject, units: AxisUnits) -> None:
-    """Say when the default of ros2_canopen is not what the drive takes for a radian."""
+    """Warn when the default of ros2_canopen is not the drive's increments per radian."""
     if units.rule is UnitRule.UPSTREAM and units.radians is not None:
         if math.isclose(units.radians, 1.0, rel_tol=SAME_SCALE):
             return

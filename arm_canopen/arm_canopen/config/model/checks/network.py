@@ -47,7 +47,7 @@ def check_heartbeats(subject: Subject) -> None:
     if not producer and not node.uses_node_guarding:
         subject.findings.warning(
             subject.place('heartbeat_producer'),
-            'the device sends no heartbeat, and has no guard_time: nobody notices its loss',
+            'the device sends no heartbeat, and has no guard_time: its loss goes unnoticed',
             'write heartbeat_producer: 100',
         )
     elif producer and not node.heartbeat_timeout:
@@ -89,7 +89,7 @@ def _check_watches_master(subject: Subject) -> None:
 
 
 def _check_first_boot(subject: Subject) -> None:
-    """Say when a device that was switched on before the master would wait for a reset."""
+    """Warn when a device that was switched on before the master would wait for a reset."""
     node = subject.node
     producer = node.dictionary.get(Index.PRODUCER_HEARTBEAT)
     says_state = node.uses_node_guarding or node.dictionary.get(Index.GUARD_TIME) is not None
@@ -98,7 +98,7 @@ def _check_first_boot(subject: Subject) -> None:
     subject.findings.warning(
         subject.place('reset_communication'),
         'a device that is switched on before the master does not boot this way: its EDS has 0 in '
-        '0x1017 and no node guarding, so nobody knows whether it is in operation, and it is left '
+        '0x1017 and no node guarding, so its state is unknown, and it is left '
         'alone',
         'call ~/nmt_reset_node once after it was switched on, or remove reset_communication: '
         'false',

@@ -38,7 +38,7 @@ def _check_loss(subject: Subject, pdo: PdoConfig) -> None:
     if loss_unnoticed(pdo, longest_silence(pdo, subject.bus.master.sync_period)):
         subject.findings.warning(
             subject.pdo_place(TPDO, pdo, 'transmission'),
-            f'nobody notices when TPDO {pdo.number} gets lost (transmission {pdo.transmission}, '
+            f'the loss of TPDO {pdo.number} goes unnoticed (transmission {pdo.transmission}, '
             'no event timer or SYNC), and the drive is led by what it sent before',
             "write 'transmission: 1' (with SYNC), or 255 and 'event_timer: 100'",
         )

@@ -149,7 +149,7 @@ def _rate(subject: Subject, direction: Direction, pdo: PdoConfig) -> tuple[float
             'with SYNC on change, taken as every SYNC'
         )
     if pdo.transmission < 254:
-        return 0.0, 'on remote frames, which nobody sends'
+        return 0.0, 'on remote frames, which the master does not send'
     return _event_rate(subject, pdo)
 
 
