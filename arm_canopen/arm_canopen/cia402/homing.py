@@ -98,6 +98,7 @@ async def _run(steps: DriveSequences, homing: Homing, what: str) -> None:
         )
     finally:
         homing.started = False
+    steps.drive.view.observe()  # its bits came after the last cycle
     if _is_cut(steps):
         raise steps.refused('was cut off while it homed, and is not homed')
 

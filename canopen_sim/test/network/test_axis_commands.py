@@ -693,8 +693,9 @@ def test_a_homing_that_was_cut_off_has_not_succeeded(end: str, *, bits: bool) ->
         device.faults.inject(FaultInjection(Fault.STO), net.now)
     else:
         net.network.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, 2)
-    with pytest.raises(DriveError, match='was cut off while it homed, and is not homed'):
+    with pytest.raises(DriveError, match='was cut off while it homed, and is not homed') as cut:
         net.result(task, 0.5)
+    assert 'Operation enabled' not in str(cut.value)
     device.faults.end(net.now, Fault.STO)
     net.network.send_nmt(NmtCommand.START, 2)
     net.run(1.0)  # what homed on meanwhile is led to rest
