@@ -15,9 +15,9 @@ from servo_drives import Drives, PERIOD
 from arm_canopen import Refusal, RefusalCause
 from arm_servo import JogRequest, JointCommand, NotReadyError, Source
 from arm_servo.core.commands import by_joint
-from arm_servo.core.hold_to_run import BEGIN_MARGIN, GONE_AFTER, HoldToRun
+from arm_servo.core.hold_to_run import BEGIN_MARGIN, GONE_AFTER, HoldToRun, LET_GO_MARGIN
 
-PAUSES = st.floats(0.0, GONE_AFTER - 0.1)
+PAUSES = st.floats(0.0, GONE_AFTER - LET_GO_MARGIN - 0.1)
 
 
 class Stick:
@@ -140,9 +140,9 @@ def test_others_need_not_let_go() -> None:
     assert stick.position > rest + 0.02
 
 
-@given(PAUSES, st.lists(PAUSES, max_size=20))
+@given(st.floats(0.0, LET_GO_MARGIN), st.lists(PAUSES, max_size=20))
 def test_no_pause_is_letting_go(before: float, pauses: list[float]) -> None:
-    """Whatever the pauses, before and after the stop: only a zero, or a person's request."""
+    """Whatever the pauses after the stop, and short ones before: a zero, or a person's request."""
     holds, now = HoldToRun(), 100.0
     holds.command('stick', now, is_zero=False)
     now += before
@@ -164,13 +164,42 @@ def test_a_person_lets_everybody_in() -> None:
     holds.command('keys', 3.0, is_zero=False)
 
 
-def test_who_is_long_gone_holds_nothing() -> None:
-    """A program that ended without a zero, and begins again another day."""
+@pytest.mark.parametrize('pause', [1.0, 3.0, 6.0])
+@pytest.mark.parametrize('happens', [halt, is_enabled, faults])
+def test_who_was_silent_before_a_stop_moves_the_arm_after_it(
+    happens: Callable[[Stick], None], pause: float
+) -> None:
+    """A client that lets go by silence, as those of moveit_servo do, held nothing."""
+    stick = Stick()
+    stick.push(0.2, 50)
+    stick.wait(5.0)
+    happens(stick)
+    stick.wait(pause)
+    rest = stick.position
+    stick.push(0.2, 50)
+    assert stick.refusals == []
+    assert stick.position > rest + 0.02
+
+
+def test_silence_is_letting_go_in_the_end() -> None:
+    """A program that ended without a zero while the arm was stopped, and begins another day."""
     holds = HoldToRun()
     holds.command('keys', 1.0, is_zero=False)
-    holds.interrupt('halted', 1.1 + GONE_AFTER)
-    holds.begin(1.2 + GONE_AFTER)
-    holds.command('keys', 2.0 + GONE_AFTER, is_zero=False)
+    holds.interrupt('halted', 1.1)
+    with pytest.raises(NotReadyError, match='silence counts after 10 s only'):
+        holds.command('keys', 1.2, is_zero=False)
+    holds.begin(1.3 + GONE_AFTER)
+    holds.command('keys', 1.3 + GONE_AFTER, is_zero=False)
+
+
+@given(st.floats(0.0, 10.0))
+def test_silence_counts_from_when_a_command_has_expired(lasts: float) -> None:
+    """A command that counts for long moves the arm for as long."""
+    for late, held in ((-0.1, True), (0.1, False)):
+        holds = HoldToRun()
+        holds.command('keys', 1.0, is_zero=False, expires=1.0 + lasts)
+        holds.interrupt('halted', 1.0 + lasts + LET_GO_MARGIN + late)
+        assert holds.begin(1.0 + lasts + LET_GO_MARGIN + late) is held
 
 
 @given(st.floats(0.0, 1.0).filter(lambda ahead: abs(ahead - BEGIN_MARGIN) > 1e-9))

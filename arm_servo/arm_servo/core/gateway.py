@@ -110,7 +110,12 @@ class CommandGateway:
             if isinstance(request, JogRequest) and len(self._orders) >= MAX_QUEUED_JOGS:
                 raise NotReadyError(f'{MAX_QUEUED_JOGS} commands wait for the cycle')
             if isinstance(request, JogRequest):
-                self.holds.command(request.client, self._clock(), is_zero=request.is_zero)
+                self.holds.command(
+                    request.client,
+                    self._clock(),
+                    is_zero=request.is_zero,
+                    expires=request.expires,
+                )
             get_ready()
         except ArmError as error:
             future.set_exception(error)
