@@ -118,6 +118,7 @@ class WebViewer(Node):
         self._trigger_clients: dict[str, Client] = {}
         self._drives: dict[str, list[str]] = {}
         self._stops: set[str] = set()
+        self._own_stops: set[str] = set()  # of them those that a robot was seen to offer
         self._positions: dict[str, float] = {}
         self._drawn: dict[str, float] = {}
         self._received_at: float | None = None
@@ -302,6 +303,8 @@ class WebViewer(Node):
         self._drives.update(drives)
         stops = {self.resolve_service_name(STOP), *map(_stop_beside, self._drives)}
         self._stops |= stops & set(triggers)
+        with self.border.around('who offers STOP is not known'):
+            self._doubtful_stops(self._stops - self._own_stops)
         for service in (*self._stops, *(f'{drive}/halt' for drive in self._drives)):
             self._client(service)  # it takes time to find its server, which a STOP has not
         self.page.offer_drives(self._drives)
@@ -396,6 +399,7 @@ class WebViewer(Node):
         self._orders.append(order)
 
     def _stop(self, answer: concurrent.futures.Future[StopAnswer]) -> None:
+        self.page.say('STOP: no answer from the robot yet', failed=None)
         calls = {service: self._call(service) for service in sorted(self._stops)}
         called = {service for service, call in calls.items() if call is not None}
         for part in (self._controllers, self._grippers, self._first_motion, self._planning):
@@ -422,8 +426,14 @@ class WebViewer(Node):
         _StopCalls(counted, answer)
 
     def _doubtful_stops(self, services: Collection[str]) -> dict[str, list[str]]:
-        """Return those that are not a robot's own alone, with the other nodes that offer them."""
-        own, others = set[str](), {service: list[str]() for service in services}
+        """Return those that are not a robot's own alone, with the other nodes that offer them.
+
+        What was a robot's own stays so while the graph shows no other node that offers it: after
+        a stall that is longer than its lease, it shows the services of a node without the node.
+        """
+        others = {service: list[str]() for service in services}
+        if not others:
+            return {}
         for name, namespace in self.get_node_names_and_namespaces():
             node = f'{namespace.rstrip("/")}/{name}'
             with suppress(NodeNameNonExistentError):  # it has just gone
@@ -432,10 +442,12 @@ class WebViewer(Node):
                     if TRIGGER not in offered[service]:
                         continue  # it is not asked
                     if stops_robot(node, offered):
-                        own.add(service)
+                        self._own_stops.add(service)
                     else:
                         others[service].append(node)
-        return {name: nodes for name, nodes in others.items() if nodes or name not in own}
+        return {
+            name: nodes for name, nodes in others.items() if nodes or name not in self._own_stops
+        }
 
     def _client(self, service: str) -> Client:
         if service not in self._trigger_clients:

@@ -413,9 +413,9 @@ class RobotPage:
             answer = self._actions.stop()
         return answer
 
-    def say(self, text: str, *, failed: bool = False) -> None:
-        """Show what became of the last request."""
-        color = COLORS[2] if failed else COLORS[0]
+    def say(self, text: str, *, failed: bool | None = False) -> None:
+        """Show what became of the last request; with None that is not known yet."""
+        color = COLORS[1 if failed is None else 2 if failed else 0]
         self._answer.content = _line(text, color)
         self._log.add(time.time(), 'page', text, color)
 
