@@ -160,7 +160,7 @@ class Drive:
         command, bits = Command.DISABLE_VOLTAGE, NO_BITS
         view = self.view
         known = view.state is not DriveState.UNKNOWN
-        if known and (view.fresh or self.node.operational):
+        if known and (view.fresh or (self.node.operational and not self._unknown)):
             command, bits = self.control.step(self._command(), now, period)
         elif self.node.taken_over:
             return  # its RPDOs go on to carry what another master had commanded
@@ -195,7 +195,7 @@ class Drive:
         if self.view.state in POWERED and not self.view.stands:
             self.stop.begin()
 
-    async def lead_to_rest(self, reason: str) -> None:
+    async def lead_to_rest(self, reason: str, severity: Severity = Severity.ERROR) -> None:
         """Bring it to rest and take its power away, before its device is configured.
 
         What TPDOs do not show is read by SDO; one that does not answer is left as it is.
@@ -204,12 +204,12 @@ class Drive:
         state = self.view.state if self.view.fresh else await self.view.look()
         if state in (*POWERED, DriveState.FAULT_REACTION_ACTIVE):
             self._note_interruption()
-            self._take_out(Refusal(RefusalCause.OFFLINE, reason), reason)
+            self._take_out(Refusal(RefusalCause.OFFLINE, reason), reason, severity)
             await self.stop.ended()
         if not self.node.operational:
             self.view.lose_sight()
 
-    def _take_out(self, refusal: Refusal, text: str) -> None:
+    def _take_out(self, refusal: Refusal, text: str, severity: Severity = Severity.ERROR) -> None:
         """Stop and disable it; only the first cause is reported until it is enabled again."""
         if self.control.goal is not None:
             self.control.goal = DriveState.SWITCH_ON_DISABLED
@@ -219,7 +219,7 @@ class Drive:
         if not first:
             return
         self.released(refusal)
-        self.report(Severity.ERROR, f'stopping: {text}')
+        self.report(severity, f'stopping: {text}')
 
     def stream(self, setpoint: Setpoint) -> None:
         """Follow a motion source in this cycle.
@@ -420,7 +420,7 @@ class Drive:
         if self._polling is not None:
             self._polling.cancel(SdoError(reason))
         by_itself = self.node.left_by_itself
-        moves = by_itself and view.state in POWERED
+        powered = view.state in POWERED
         if not self.node.left_operational:
             self._note_interruption()
         elif not by_itself:
@@ -438,5 +438,15 @@ class Drive:
         if self.node.left_operational:
             cause = RefusalCause.NOT_OPERATIONAL
         self.released(Refusal(cause, reason))
-        if moves:  # it may receive what it does not answer
+        if powered and by_itself:  # it may receive what it does not answer
             self.stop.begin(quiet=True)
+        elif powered and self.node.online:
+            self._scheduler.background(self._brake_without_pdos(reason))
+
+    async def _brake_without_pdos(self, reason: str) -> None:
+        """Stop an axis that goes on without its master, as a command took its device from PDOs."""
+        self.failure = failure = f'{reason}, and it is not seen to stand'
+        self.warn(f'stopping by SDO: {reason}')
+        await self.stop.run()
+        if self.stop.disabled and self.stop.rests and self.failure == failure:
+            self.failure = ''

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 import math
 
-from ..master.process_image import SentRpdo, Writer
+from ..master.process_image import ReceivedTpdo, SentRpdo, Writer
 from ..master.remote_node import RemoteNode
 from ..standard.drive import drive_state, DriveState, OperationMode, TARGET_OBJECTS
 from ..standard.objects import AXIS_OFFSET, Index
@@ -148,6 +148,12 @@ class DriveObjects:
     def position_is_polled(self) -> bool:
         """Whether 0x6064 comes by SDO, because no PDO carries it."""
         return self._node.image.reader(self.at(Index.POSITION_ACTUAL)) is None
+
+    @property
+    def position_comes_on_change(self) -> bool:
+        """Whether a TPDO carries 0x6064 when it changes, so that silence shows rest."""
+        source = self._position.source
+        return isinstance(source, ReceivedTpdo) and not source.synchronous
 
     @property
     def torque(self) -> float:

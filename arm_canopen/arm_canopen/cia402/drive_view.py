@@ -39,21 +39,27 @@ FLICKER_INC = 1  # [inc] by which an encoder at rest may change
 class VelocityEstimate:
     """The rate of 0x6064 over a short window."""
 
-    def __init__(self, poll_period: float = 0.0) -> None:
-        """``poll_period`` of positions that are read by SDO in [s]; 0 where a PDO carries them."""
+    def __init__(self, poll_period: float = 0.0, *, on_change: bool = False) -> None:
+        """Estimate over a window of its own length.
+
+        Args:
+            poll_period: Of positions that are read by SDO in [s]; 0 where a PDO carries them.
+            on_change: They come when they change, so that one which has not come is still true.
+        """
         self.window = max(WINDOW, 2.5 * poll_period)  # its length in [s]
+        self._on_change = on_change
         self._positions: deque[tuple[float, float]] = deque()
 
     def note(self, now: float, position_inc: float, stamp: float | None = None) -> None:
         """Add a position in [inc] at a steady time in [s].
 
-        One whose ``stamp`` has not changed for a window counts as still there.
+        Where they come on change, one whose ``stamp`` is as old as the window is still true.
         """
         positions = self._positions
         if stamp is not None:
             if not positions or stamp > positions[-1][0]:
                 now = stamp
-            elif now - positions[-1][0] <= self.window:
+            elif not self._on_change or now - positions[-1][0] <= self.window:
                 return
         positions.append((now, position_inc))
         while len(positions) > 2 and positions[1][0] <= now - self.window:
@@ -120,8 +126,10 @@ class DriveView:
         self._looked_at = -math.inf
         self._scheduler = scheduler
         self.cache = ParameterCache(node, config, self.units, scheduler, warn)
-        polled = self.objects.position_is_polled
-        self._estimate = VelocityEstimate(node.config.poll_period if polled else 0.0)
+        self._estimate = VelocityEstimate(
+            node.config.poll_period if self.objects.position_is_polled else 0.0,
+            on_change=self.objects.position_comes_on_change,
+        )
 
     @property
     def parameters(self) -> DriveParameters:
@@ -228,7 +236,7 @@ class DriveView:
             loss = f'; lost before: {node.loss}' if node.loss else ''
             shown = f'{statusword_text(self.statusword)} by SDO; ' if self._looks else ''
             return f'{shown}offline: {node.phase.value}{detail}{loss}'
-        parts = ['no statusword yet']
+        parts = ['no statusword' if node.left_operational else 'no statusword yet']
         if self.state is not DriveState.UNKNOWN:
             parts = [statusword_text(self.statusword)]
             if node.operational:

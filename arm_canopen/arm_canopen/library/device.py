@@ -86,11 +86,13 @@ class CanopenDevice:
     def send_nmt(self, command: NmtCommand) -> None:
         """Send an NMT command to the device; return when the bus has taken it.
 
+        Axes that move are brought to rest before it leaves, except by START.
+
         Raises:
             BusError: The bus has not taken it, or the master has ended.
         """
         network, node_id = self._thread.network, self._device.config.node_id
-        self._thread.run(lambda: network.send_nmt(command, node_id)).result()
+        self._thread.run_coroutine(lambda: network.command_nmt(command, node_id)).result()
 
 
 def _path(target: int | str, subindex: int) -> str:

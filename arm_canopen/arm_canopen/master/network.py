@@ -264,6 +264,24 @@ class Network:
             return self.scheduler.spawn(self._all(each))
         return self._nmt.send(command, node_id)
 
+    async def command_nmt(self, command: NmtCommand, node_id: int) -> None:
+        """Send a command of a client, as :meth:`send_nmt`.
+
+        Axes that it would take from the master while they move are brought to rest before.
+
+        Raises:
+            BusError: The bus has not taken the command.
+        """
+        if command is not NmtCommand.START:
+            everyone = node_id in (ALL_NODES, self.config.master.node_id)
+            ends = [
+                node.bring_to_rest(f'NMT {command.name} was commanded', Severity.WARNING)
+                for node in self.nodes.values()
+                if node.operational and (everyone or node.config.node_id == node_id)
+            ]
+            await self.scheduler.gather(ends)
+        await self.send_nmt(command, node_id)
+
     async def _all(self, sent: Sequence[Promise[None]]) -> None:
         await self.scheduler.gather(sent)
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
 from enum import Enum
-from typing import Any
+from typing import Any, TypeAlias
 
 from ..can.frame import Frame
 from ..config.model import NodeConfig
@@ -27,6 +27,9 @@ LIVE_SHARE = 0.5  # of the consumer time of its life signs, in which a TPDO show
 RESET_TIME = 10.0  # [s] in which a device that was reset has sent its boot-up message
 FIRST_PAUSE, LONGEST_PAUSE = 0.5, 30.0  # [s] before a device that drops out is booted again
 STABLE_TIME = 10.0  # [s] in operation after which a drop is the first one again
+
+
+LeadToRest: TypeAlias = Callable[[str, Severity], Coroutine[Promise[Any], None, None]]
 
 
 class BootPhase(Enum):
@@ -85,8 +88,8 @@ class RemoteNode:
         )
         self.image = self.objects.image  # its process image
         self.sdo = self.objects.sdo  # its SDO client
-        # NMT state as received, None before the first heartbeat or boot-up and after a loss; of a
-        # device without heartbeat and guarding the commanded one
+        # NMT state as received, None before the first heartbeat or boot-up and after a loss; the
+        # commanded one of a device without heartbeat and guarding, and where it leaves Operational
         self.nmt_state: NmtState | None = None
         self.phase = BootPhase.WAITING  # how far it has booted
         self.phase_detail = ''  # what it is doing in that phase, or why it failed
@@ -108,9 +111,9 @@ class RemoteNode:
         self.on_lost: list[Callable[[str], None]] = []
         # called when it was lost by itself; what an NMT command does to it is no loss
         self.on_gone: Callable[[], None] = lambda: None
-        # its drivers, which bring what moves to rest and take its power away, for a reason; each
-        # returns when that has ended, well or not
-        self.lead_to_rest: list[Callable[[str], Coroutine[Promise[Any], None, None]]] = []
+        # its drivers, which bring what moves to rest and take its power away, for a reason that
+        # is reported with a severity; each returns when that has ended, well or not
+        self.lead_to_rest: list[LeadToRest] = []
         self._missing = ''  # the life sign, in words
         self._resting: Promise[list[None]] | None = None
         # its drivers, which stop because a step of the cycle failed for this device; each gets the
@@ -162,7 +165,7 @@ class RemoteNode:
         state = parse_heartbeat(frame.data)
         if state is None or not self.life.take(state, frame, supervised=self.online):
             return
-        if state is not self.nmt_state:
+        if state is not self.nmt_state and not self._is_outdated(state, frame.timestamp):
             self._nmt_state_changed(state)
         if state is NmtState.BOOT_UP:
             self.emergencies.restarted()
@@ -177,11 +180,28 @@ class RemoteNode:
 
     def note_command(self, command: NmtCommand) -> None:
         """An NMT command for this device is on the bus, from this master or from another."""
+        ran = self.left_operational or NmtState.OPERATIONAL in (self.wanted, self.nmt_state)
         self.wanted = COMMANDED_STATES.get(command)
         self._commanded = command
         self._commanded_at = self._scheduler.now
-        if self.wanted is not None and self.wanted is not self.nmt_state and self.is_mute:
-            self._nmt_state_changed(self.wanted)
+        if self.wanted is None:
+            return
+        if self.is_mute:
+            if self.wanted is not self.nmt_state:
+                self._nmt_state_changed(self.wanted)
+        elif self.wanted is not NmtState.OPERATIONAL:
+            if self.online and ran:
+                self._commanded_away(self.wanted)
+        elif self.left_operational:  # its TPDOs and life signs show whether it starts
+            self.image.clear()  # what came after it was commanded away
+            self.left_operational = False
+
+    def _commanded_away(self, state: NmtState) -> None:
+        """Act at once on a command to leave Operational; its next life sign may be far away."""
+        now = self._scheduler.now
+        if self.life.missed and self._lives(now):
+            self.life.start(now)  # the TPDOs that have shown that it lives end now
+        self._nmt_state_changed(state, ran=True)
 
     def go_online(self, now: float, *, taken_over: bool = False) -> None:
         """The device is booted: talk to it, and await its first life sign from ``now`` on.
@@ -234,9 +254,11 @@ class RemoteNode:
         elif self._resting is None:
             self._resting = self.bring_to_rest(missing)
 
-    def bring_to_rest(self, reason: str) -> Promise[list[None]]:
+    def bring_to_rest(
+        self, reason: str, severity: Severity = Severity.ERROR
+    ) -> Promise[list[None]]:
         """Bring all its axes to rest at the same time; done when the last one has ended."""
-        ends = [self._scheduler.spawn(lead(reason)) for lead in self.lead_to_rest]
+        ends = [self._scheduler.spawn(lead(reason, severity)) for lead in self.lead_to_rest]
         return self._scheduler.spawn(self._scheduler.gather(ends))
 
     def fail(self, error: Exception, output: SentRpdo | None = None) -> None:
@@ -316,18 +338,24 @@ class RemoteNode:
         drops = self._backoff.drops
         return f', as it has done so {drops} times in a row' if drops > 1 else ''
 
+    def _is_outdated(self, state: NmtState, now: float) -> bool:
+        """Whether it was sent before the device had got the command to leave Operational."""
+        recent = now - self._commanded_at <= START_TIME
+        return self.left_operational and state is NmtState.OPERATIONAL and recent
+
     def _dropped_out(self, state: NmtState, now: float) -> bool:
         followed = now - self._commanded_at > START_TIME
         started = self.online and self.wanted is NmtState.OPERATIONAL
         return started and followed and state is not NmtState.OPERATIONAL
 
-    def _nmt_state_changed(self, state: NmtState) -> None:
+    def _nmt_state_changed(self, state: NmtState, *, ran: bool = False) -> None:
+        """Note a state that it shows or, in ``ran`` Operational before, was commanded to enter."""
         before, self.nmt_state = self.nmt_state, state
         left_before = self.left_operational
         self.left_operational = (
             self.online
             and state is not NmtState.OPERATIONAL
-            and (left_before or before is NmtState.OPERATIONAL)
+            and (ran or left_before or before is NmtState.OPERATIONAL)
         )
         was_reset = state is NmtState.BOOT_UP and self._being_reset
         severity = Severity.WARNING if self.left_operational and not was_reset else Severity.INFO

@@ -20,6 +20,7 @@ class NodeStatus:
     node_id: int  # CANopen node id
     online: bool  # booted, and not lost since
     nmt_state: NmtState | None  # NMT state as received, None before the first
+    left_operational: bool  # online, but an NMT command took it out of Operational
     phase: BootPhase  # how far it has booted
     phase_detail: str  # what it is doing in that phase, or why it failed
     # time since the last heartbeat in [s]; None when there was none or none is supervised
@@ -38,6 +39,7 @@ def node_status(node: RemoteNode, now: float) -> NodeStatus:
         node_id=node.config.node_id,
         online=node.online,
         nmt_state=node.nmt_state,
+        left_operational=node.left_operational,
         phase=node.phase,
         phase_detail=node.phase_detail,
         heartbeat_age=now - node.life.last if seen else None,

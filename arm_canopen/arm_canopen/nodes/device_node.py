@@ -127,7 +127,7 @@ class DeviceNode(Node):
         node_id = self.device.config.node_id
 
         async def send() -> str:
-            await self._thread.network.send_nmt(command, node_id)
+            await self._thread.network.command_nmt(command, node_id)
             return f'NMT {command.name} sent to node {node_id}'
 
         self.offer_trigger(f'~/{name}', lambda: self._thread.run_coroutine(send))

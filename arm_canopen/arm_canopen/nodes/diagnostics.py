@@ -90,7 +90,7 @@ def device_diagnostic(bus: str, status: NodeStatus, recording: str = '') -> Diag
 def drive_diagnostic(bus: str, status: DriveStatus, recording: str = '') -> DiagnosticStatus:
     """Describe a drive; arguments as of :func:`device_diagnostic`."""
     level, message = _device_level(status.node)
-    if level == DiagnosticStatus.OK:
+    if level in (DiagnosticStatus.OK, DiagnosticStatus.WARN):
         message = status.summary
     stale = status.state is not DriveState.UNKNOWN and not status.fresh
     if status.faulted or status.failure or stale:
@@ -189,6 +189,8 @@ def _device_level(status: NodeStatus) -> tuple[bytes, str]:
         return DiagnosticStatus.ERROR, f'offline, {status.phase.value}{detail}'
     if status.emergency is not None:
         return DiagnosticStatus.ERROR, f'EMCY {status.emergency}'
+    if status.left_operational and status.nmt_state is not None:
+        return DiagnosticStatus.WARN, f'NMT state {status.nmt_state.name}: start it by NMT'
     return DiagnosticStatus.OK, status.phase.value
 
 

@@ -80,12 +80,12 @@ class MasterServices:
         return self._thread.run(write)
 
     def _set_nmt(self, request: CONmtID.Request) -> Future[None]:
-        def send() -> Promise[None]:
+        async def send() -> None:
             self.admit()
             node_id = request.nodeid if request.nodeid == ALL_NODES else _node_id(request.nodeid)
-            return self._thread.network.send_nmt(_nmt_command(request.nmtcommand), node_id)
+            await self._thread.network.command_nmt(_nmt_command(request.nmtcommand), node_id)
 
-        return self._thread.run(send)
+        return self._thread.run_coroutine(send)
 
 
 def _data_type(number: int) -> DataType:

@@ -16,12 +16,14 @@ import re
 from typing import Any
 
 from bus_rig import MODES, POSITION_MODES, TORQUE_MODES, VELOCITY_MODES, VirtualNetwork
+from diagnostic_msgs.msg import DiagnosticStatus
 from drive_samples import (
     bus_config,
     drive_config,
     drive_dictionary,
     every_mode,
     MOTION_WRITES,
+    pdo,
     SCALE,
     sdo_write,
     with_defaults,
@@ -40,8 +42,11 @@ from arm_canopen import (
     Severity,
 )
 from arm_canopen.can import Frame
+from arm_canopen.cia402.status import drive_status, DriveStatus
 from arm_canopen.config import Identity, SdoWrite
+from arm_canopen.nodes.diagnostics import drive_diagnostic
 from arm_canopen.standard import DataType, NmtCommand, ObjectDictionary, ObjectEntry
+from arm_canopen.standard.nmt import COMMANDED_STATES
 from canopen_sim import Device, FaultInjection
 from canopen_sim import Drive as SimulatedDrive
 from canopen_sim import Fault as Deviation
@@ -477,6 +482,7 @@ UNITS: dict[str, tuple[FaultInjection, dict[str, Any], int]] = {
 }
 """How a drive deviates, how its bus.yml says it, and where its 0 is in [inc]."""
 DECELERATION, QUICK_STOP_DECELERATION = 5.0, 10.0  # [rad/s^2]
+SLOWEST_DECELERATION = 2.0  # [rad/s^2] that of mode 2
 LATE = 4.0 * CYCLE  # [s] between the command and the beginning of the ramp
 
 
@@ -642,20 +648,126 @@ def test_a_stop_that_the_drive_ignores(
     assert arm.state(WITNESS) is DriveState.OPERATION_ENABLED
 
 
+PRE_OPERATIONAL, STOP = NmtCommand.ENTER_PRE_OPERATIONAL, NmtCommand.STOP
+IN_PRE_OPERATIONAL = [(0.1, 0.3), (1.0, 0.05), (1.0, 0.3), (1.0, 1.2)]
+"""Period of the heartbeat, and time from the NMT command to the stop, in [s]."""
+
+
+def slow_heartbeat(period: float, **faulty: Any) -> Arm:
+    """Return an arm of a device that goes on when NMT takes it from the master (0x6007).
+
+    It sends its heartbeat with a ``period`` in [s].
+    """
+    writes = (*MOTION_WRITES, sdo_write(0x60C2, 1, round(1000 * CYCLE)), sdo_write(0x6007, 0, 0))
+    return Arm(3.0 * period, heartbeat_producer=period, sdo_writes=writes, **faulty)
+
+
 @pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
 @pytest.mark.parametrize('stop', ['halt', 'quick_stop', 'disable', 'shutdown'])
-def test_a_stop_in_pre_operational(stop: str, mode: OperationMode) -> None:
-    """The device takes SDOs, so its motor stands when the answer comes."""
-    arm = Arm()
+@pytest.mark.parametrize(('period', 'wait'), IN_PRE_OPERATIONAL)
+def test_a_stop_in_pre_operational(
+    period: float, wait: float, stop: str, mode: OperationMode
+) -> None:
+    """The device takes SDOs, so its motor stands when the answer comes, whenever that is."""
+    arm = slow_heartbeat(period)
     arm.move(mode)
-    arm.net.network.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, NODE_ID)
-    arm.net.run(0.3)
-    assert arm.state() is DriveState.OPERATION_ENABLED
+    arm.net.send_as('tool', Frame(0, bytes((PRE_OPERATIONAL, NODE_ID))))
+    arm.net.run(wait)
     answer = arm.net.do(FAULTY, stop, preempt=True)
     assert abs(arm.net.speed()) < STANDING
     assert SWITCHED_OFF.title in answer
     assert arm.state() is SWITCHED_OFF
     arm.stands(FAULTY)
+
+
+@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
+@pytest.mark.parametrize('stop', ['halt', 'disable'])
+@pytest.mark.parametrize('wait', [0.05, 0.3])
+def test_a_stop_while_no_pdos_pass_and_nothing_says_why(
+    wait: float, stop: str, mode: OperationMode
+) -> None:
+    """A device that left Operational unseen: TPDOs are gone, its heartbeat comes each second.
+
+    What its positions were for the last time is no standstill, also where no PDO has 0x606C.
+    """
+    no_velocity = (
+        pdo(1, 0x180 + NODE_ID, (0x6041, 0), (0x6061, 0)),
+        pdo(2, 0x280 + NODE_ID, (0x6064, 0)),
+    )
+    arm = slow_heartbeat(1.0, tpdos=no_velocity)
+    move_far(arm, mode)
+    arm.net.run_until(lambda: arm.net.now - arm.net.network.nodes[FAULTY].life.last < 2 * CYCLE)
+    leave = Frame(0, bytes((PRE_OPERATIONAL, NODE_ID)))
+    arm.net.devices[FAULTY].receive(leave, arm.net.now)
+    arm.net.run(wait)
+    arm.net.do(FAULTY, stop, preempt=True)
+    assert abs(arm.net.simulated(FAULTY).velocity) / SCALE < STANDING
+    arm.stands(FAULTY)
+
+
+@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
+@pytest.mark.parametrize(('command', 'period'), [(PRE_OPERATIONAL, 1.0), (STOP, 0.1)])
+def test_an_axis_is_led_to_rest_when_its_device_leaves_operational(
+    command: NmtCommand, period: float, mode: OperationMode
+) -> None:
+    """By SDO and at once, as the master sees the command of a tool; diagnostics are true."""
+    arm = slow_heartbeat(period)
+    move_far(arm, mode)
+    speed, place = abs(arm.net.simulated(FAULTY).velocity) / SCALE, arm.net.motor(FAULTY)
+    arm.net.send_as('tool', Frame(0, bytes((command, NODE_ID))))
+    arm.net.run(2.0 * CYCLE)
+    assert drive_diagnostic('bus', status_of(arm)).level == DiagnosticStatus.ERROR
+    assert 'not seen to stand' in status_of(arm).summary
+    arm.net.run(SETTLING)
+    assert arm.net.motor(FAULTY) - place < speed**2 / 2.0 / SLOWEST_DECELERATION + LATE * speed
+    assert arm.state() is SWITCHED_OFF
+    assert arm.coasted < STANDING
+    assert drive_diagnostic('bus', status_of(arm)).level == DiagnosticStatus.WARN
+    assert 'start it by NMT' in status_of(arm).summary
+    arm.net.send_as('tool', Frame(0, bytes((NmtCommand.START, NODE_ID))))
+    arm.net.run(0.05)
+    arm.net.do(FAULTY, 'recover')
+    arm.net.select(FAULTY, mode)
+    assert_accepts_targets(arm, mode)
+
+
+@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
+@pytest.mark.parametrize('command', [PRE_OPERATIONAL, STOP, NmtCommand.RESET_NODE])
+def test_an_nmt_command_of_a_client_leaves_when_the_axis_stands(
+    command: NmtCommand, mode: OperationMode
+) -> None:
+    """Stopped, a device would take no SDO, and one that is reset would coast."""
+    arm = slow_heartbeat(0.1)
+    move_far(arm, mode)
+    begin = arm.net.now
+    arm.net.master.device(FAULTY).send_nmt(command)
+    (sent,) = [each.time for each in arm.net.wire.log if each.frame.can_id == 0][-1:]
+    assert begin < sent < begin + 1.0
+    assert arm.coasted < STANDING
+    arm.net.run(SETTLING)
+    assert arm.state() is SWITCHED_OFF
+    assert arm.net.reported(Severity.ERROR) == []
+    node = arm.net.network.nodes[FAULTY]
+    if command is NmtCommand.RESET_NODE:
+        arm.net.run_until(arm.net.all_ready)
+    else:
+        assert node.nmt_state is COMMANDED_STATES[command]
+        assert drive_diagnostic('bus', status_of(arm)).level == DiagnosticStatus.WARN
+        arm.net.master.device(FAULTY).send_nmt(NmtCommand.START)
+    arm.net.do(FAULTY, 'enable')
+
+
+def move_far(arm: Arm, mode: OperationMode) -> None:
+    """Set both drives in a motion that does not end by itself."""
+    arm.move(mode)
+    if mode in POSITION_MODES:
+        arm.net.commands[FAULTY].set_target(50.0)
+        arm.net.run(0.1)
+
+
+def status_of(arm: Arm) -> DriveStatus:
+    """Return what diagnostics say of the faulty drive."""
+    return drive_status(arm.net.drives[FAULTY], arm.net.now)
 
 
 @pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)

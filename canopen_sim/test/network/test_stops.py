@@ -298,10 +298,10 @@ def test_a_device_watches_the_master_until_its_motor_was_seen_to_stand(
     moving = turning(6)
     net, node = moving.net, moving.net.network.nodes[JOINT]
     node.watch_slot = 1
+    lose(moving, *([*RPDOS, 0x600 + NODE_ID] if lost else []))
     net.network.send_nmt(nmt, NODE_ID)
     moving.run(0.3)
-    lose(moving, *([*RPDOS, 0x600 + NODE_ID] if lost else []))
-    assert abs(net.speed()) == pytest.approx(1.0, rel=0.05)
+    assert abs(net.speed()) > 0.5
 
     def unwatched() -> bool:
         requests = net.frames(0x600 + NODE_ID, since=moving.began)
@@ -467,16 +467,19 @@ def test_all_drives_stand_and_it_says_what_became_of_each() -> None:
 @pytest.mark.parametrize('nmt', [NmtCommand.ENTER_PRE_OPERATIONAL, NmtCommand.STOP])
 @pytest.mark.parametrize('lost', [(), (0x582,)], ids=['SDO', 'no SDO'])
 def test_a_device_without_pdos_is_stopped_by_sdo(nmt: NmtCommand, lost: tuple[int, ...]) -> None:
-    """Stopped it takes none before it is pre-operational; unanswered, its rest is unknown."""
+    """Stopped it takes none before it is pre-operational; unanswered, its rest is unknown.
+
+    The NMT command has begun to stop and disable it; the robot's stop waits for the end of that.
+    """
     writes = (*MOTION_WRITES, sdo_write(0x6007, 0, 0), sdo_write(0x605A, 0, 6))
     net = booted(drive_config(MOVES, 2, sdo_writes=writes))
     net.enable(OperationMode.PROFILE_VELOCITY, MOVES)
     net.target(0.5, MOVES)
     net.run(0.5)
-    net.network.send_nmt(nmt, 2)
-    net.run(0.3)
-    assert abs(net.speed(MOVES)) == pytest.approx(0.5)
     net.wire.loses = lambda sender, frame: frame.can_id in lost
+    net.network.send_nmt(nmt, 2)
+    net.run(3 * PERIOD)
+    assert abs(net.speed(MOVES)) > 0.1
     report = stop(net)
     assert abs(net.speed(MOVES)) < STANDING
     if lost:
@@ -484,8 +487,8 @@ def test_a_device_without_pdos_is_stopped_by_sdo(nmt: NmtCommand, lost: tuple[in
         assert report.failed[0].startswith(f'{MOVES} is not seen to come to rest; ')
         assert 'NMT state PRE_OPERATIONAL' in report.failed[0]
         return
-    assert report == StopReport((MOVES,), (), (), ())
-    assert net.simulated(MOVES).state is DriveState.QUICK_STOP_ACTIVE
+    assert report == StopReport((), (), (MOVES,), ())
+    assert net.simulated(MOVES).state is DriveState.SWITCH_ON_DISABLED
 
 
 def test_a_second_stop_does_not_spoil_the_answer_of_the_first() -> None:
@@ -666,7 +669,7 @@ def test_an_axis_that_turns_when_its_device_starts_is_braked(begins: str, option
         moving.net.wire.loses = lambda sender, frame: True
         moving.run(0.5)
         lose(moving)
-    moving.net.run_until(lambda: not moving.net.network.nodes[JOINT].operational)
+        moving.net.run_until(lambda: not moving.net.network.nodes[JOINT].operational)
     moving.run(RAMP + 3.0)
     assert moving.fastest < STANDING
     assert moving.states[1:] == [DriveState.QUICK_STOP_ACTIVE, DriveState.SWITCH_ON_DISABLED]
