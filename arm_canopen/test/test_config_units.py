@@ -9,7 +9,16 @@ import re
 from types import SimpleNamespace
 from typing import cast
 
-from config_samples import added, DRIVE_ROWS, eds_text, FACTOR_ROWS, load_text, Row, write_bus
+from config_samples import (
+    added,
+    ARTICLE_BUS,
+    DRIVE_ROWS,
+    eds_text,
+    FACTOR_ROWS,
+    load_text,
+    Row,
+    write_bus,
+)
 from drive_samples import SCALE
 import pytest
 
@@ -65,6 +74,16 @@ def test_what_one_means(
     assert units.rule is rule
     assert units.increments == pytest.approx(increments, rel=1e-6)
     assert units.radians == pytest.approx(radians, rel=1e-6)
+
+
+def test_a_key_of_defaults_is_warned_of_once_with_all_its_drives(tmp_path: Path) -> None:
+    """Also where a key is missing beside it."""
+    (tmp_path / 'cia402_slave.eds').write_text(eds_text())
+    scales = 'scale_pos_to_dev: 4000\nscale_pos_from_dev: 0.00025'
+    bus = write_bus(tmp_path, added('defaults', scales, ARTICLE_BUS.read_text()))
+    of_scales = [each for each in check_file(bus).warnings if 'scale_pos' in each.key]
+    drives = ', '.join(f'panda_joint{n}' for n in range(1, 8))
+    assert [each.message.partition(': ')[0] for each in of_scales] == 2 * [drives]
 
 
 def test_an_eds_without_factor_group_has_no_radians(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..exceptions import ConfigError, Problem
@@ -32,12 +32,13 @@ class RefusedError(Exception):
 class Findings:
     """Errors and warnings in the order in which they were found, each once.
 
-    A value in ``defaults`` is read again for every device; what is wrong with it counts once.
+    A value in ``defaults`` is read again for every device; what is wrong with it counts once, with
+    the names of all that it is about.
     """
 
     def __init__(self) -> None:
         self._errors: dict[tuple[Place, str], Problem] = {}
-        self._warnings: dict[tuple[Place, str], Problem] = {}
+        self._warnings: dict[tuple[Place, str], tuple[Problem, list[str]]] = {}
 
     def error(self, place: Place, message: str, remedy: str) -> None:
         """Add something that cannot be accepted."""
@@ -48,10 +49,12 @@ class Findings:
         """Add a refused value as an error."""
         self.error(place, reason.message, reason.remedy)
 
-    def warning(self, place: Place, message: str, remedy: str) -> None:
-        """Add something odd that could be understood."""
+    def warning(self, place: Place, message: str, remedy: str, about: str = '') -> None:
+        """Add something odd that could be understood; ``about`` names an axis that it is about."""
         problem = Problem(place.file, place.line, place.key, message, remedy)
-        self._warnings.setdefault((place, message), problem)
+        _, names = self._warnings.setdefault((place, message), (problem, []))
+        if about and about not in names:
+            names.append(about)
 
     def extend(self, errors: Iterable[Problem] = (), warnings: Iterable[Problem] = ()) -> None:
         """Add what was found in another file."""
@@ -68,7 +71,12 @@ class Findings:
     @property
     def warnings(self) -> tuple[Problem, ...]:
         """What is to be looked at, as it was found; other files' included."""
-        return tuple(self._warnings.values())
+        return tuple(
+            replace(problem, message=f'{", ".join(names)}: {problem.message}')
+            if names
+            else problem
+            for problem, names in self._warnings.values()
+        )
 
     def raise_errors(self) -> None:
         """End with all errors, if there are any.

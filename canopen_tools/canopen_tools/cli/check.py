@@ -108,7 +108,8 @@ def _print_units(units: Sequence[AxisUnits]) -> None:
 
 def _acceleration(axis: AxisUnits) -> str:
     """Return the scale of accelerations, with who says it where bus.yml does not."""
-    by = axis.acceleration_by or 'assumed'
+    assumed = 'default' if axis.rule is UnitRule.UPSTREAM else 'assumed'  # with a warning
+    by = axis.acceleration_by or assumed
     return f'{axis.acceleration:g}' + ('' if by == ACCELERATION_KEY else f' ({by})')
 
 

@@ -187,10 +187,11 @@ def _check_coarse(subject: Subject, units: AxisUnits) -> None:
         if coarse:
             subject.findings.warning(
                 subject.place(key),
-                f'{units.name}: 1.0 is {scale:g} device units of {what}, so one of them is '
+                f'1.0 is {scale:g} device units of {what}, so one of them is '
                 f'{1 / abs(scale):g} user units: {refused}',
                 f'correct {key}: it is device units per user unit (ros2_canopen has 1000), the '
                 'inverse of the one from the device',
+                about=units.name,
             )
 
 
@@ -205,10 +206,11 @@ def _check_velocity_default(subject: Subject, axis: DriveConfig, units: AxisUnit
     in_rpm = math.copysign(SECONDS_PER_MINUTE / REVOLUTION, position)
     subject.findings.warning(
         subject.place(POSITION_KEY),
-        f'{units.name}: positions have a scale, velocities the default {default:g}: a drive that '
+        f'positions have a scale, velocities the default {default:g}: a drive that '
         f'counts increments per second moves at {default / abs(position):.4g} where 1.0 is asked',
         f'write {VELOCITY_KEY}: {position:g} (increments per second: the same as {POSITION_KEY}; '
         f'rpm of the joint: {in_rpm:.7g}, of the motor: times its gear), and its inverse',
+        about=units.name,
     )
 
 
@@ -216,13 +218,15 @@ def _check_acceleration(subject: Subject, units: AxisUnits) -> None:
     """Warn when neither bus.yml nor the EDS gives the unit of accelerations."""
     if units.acceleration_by or units.rule is UnitRule.UPSTREAM:
         return  # the default of ros2_canopen assumes all of them
+    given = is_requested(subject.bus, subject.node, VELOCITY_KEY)
     subject.findings.warning(
-        subject.place(VELOCITY_KEY),
-        f'{units.name}: 1.0 per s2 is assumed to be {units.acceleration:g} device units of '
+        subject.place(VELOCITY_KEY if given else POSITION_KEY),
+        f'1.0 per s2 is assumed to be {units.acceleration:g} device units of '
         'acceleration, velocity units per second: where the drive counts others, its ramps and '
         'stops are longer or shorter than the master believes',
         f'write {ACCELERATION_KEY}: {units.acceleration:g} where the manual says so for 0x6083, '
         'else what it says',
+        about=units.name,
     )
 
 
@@ -237,10 +241,11 @@ def _check_offsets(subject: Subject, axis: DriveConfig, units: AxisUnits) -> Non
         return
     subject.findings.warning(
         subject.place(OFFSET_FROM_KEY if from_dev else OFFSET_TO_KEY),
-        f'{units.name}: {OFFSET_FROM_KEY} {from_dev:g} and {OFFSET_TO_KEY} {to_dev:g} do not '
+        f'{OFFSET_FROM_KEY} {from_dev:g} and {OFFSET_TO_KEY} {to_dev:g} do not '
         f'cancel: a target at the position that is shown moves the axis by {jump:g}',
         f'write {OFFSET_TO_KEY}: {-from_dev * units.increments:.10g} '
         f'(-{OFFSET_FROM_KEY} * {POSITION_KEY})',
+        about=units.name,
     )
 
 
@@ -256,17 +261,19 @@ def _check_against_factors(subject: Subject, units: AxisUnits) -> None:
             return
         subject.findings.warning(
             subject.place(POSITION_KEY),
-            f'{units.name}: without {POSITION_KEY} 1.0 is {units.increments:g} increments, as '
+            f'without {POSITION_KEY} 1.0 is {units.increments:g} increments, as '
             f'with ros2_canopen; by the factor group of the EDS they are {units.radians:.4g} rad',
             f"write {POSITION_KEY} and the other scales, or '{FACTOR_KEY}: true' for radians",
+            about=units.name,
         )
     elif units.rule is UnitRule.BUS_YML and _is_far_off(units):
         subject.findings.warning(
             subject.place(POSITION_KEY),
-            f'{units.name}: 1.0 is {units.increments:g} increments, and by the factor group of '
+            f'1.0 is {units.increments:g} increments, and by the factor group of '
             f'the EDS only {abs(units.radians or 0.0):.4g} rad: one of them is wrong',
             f"try which it is: canopen first-motion, or leave the scales out for '{FACTOR_KEY}: "
             "true' (canopen new: without --turn)",
+            about=units.name,
         )
 
 
