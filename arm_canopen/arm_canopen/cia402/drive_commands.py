@@ -375,8 +375,8 @@ class DriveCommands:
         if not stored:
             return ''
         return (
-            f', not homed: method {stored} is set in the drive (0x6098), but not in bus.yml; home '
-            'it if it shall be'
+            f', not homed: method {stored} is set in the drive (0x6098), but not in bus.yml; call '
+            '~/home if it has to be homed'
         )
 
     def _set(self, command: Callable[[float], Promise[None]], target: float) -> None:
@@ -404,6 +404,8 @@ class DriveCommands:
             raise steps.refused(f'takes no target; {steps.way_to_enable()}')
         if refusal.cause is RefusalCause.MODE_CHANGE and isinstance(drive.control.mode, NoMode):
             return  # which refuses every target itself
+        if refusal.cause is RefusalCause.OFFLINE:
+            raise steps.refused('takes no target')  # whose description says why
         raise steps.refused(f'takes no target: it {refusal}')
 
     def _ending(self) -> DriveError:

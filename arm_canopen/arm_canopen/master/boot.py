@@ -85,6 +85,7 @@ class BootProcess:
         line = bus.place_of(node.name, 'reset_communication').line
         self._written = f' ({bus.file}:{line})' if line else ''
         self._reported = ''
+        self._failure = ''  # of the attempt before, in words
         self._fault: BootFault | None = BootFault.CONFIGURATION
         self._restored = False
 
@@ -95,6 +96,7 @@ class BootProcess:
         ``was_reset`` is not asked before it could have done so, as the question would be lost.
         """
         self._startup.forget(self._node)
+        self._failure = ''
         if was_reset:
             self._enter(BootPhase.WAITING)
             await self._scheduler.timer(BOOT_UP_TIME)
@@ -237,7 +239,7 @@ class BootProcess:
 
     def _go_online(self, text: str, *, taken_over: bool = False) -> None:
         self._node.go_online(self._scheduler.now, taken_over=taken_over)
-        self._reported = ''
+        self._reported = self._failure = ''
         self._enter(BootPhase.OPERATIONAL)
         self._node.report(EventKind.BOOT, Severity.INFO, text)
 
@@ -309,11 +311,13 @@ class BootProcess:
 
     def _enter(self, phase: BootPhase, detail: str = '') -> None:
         self._node.phase = phase
-        self._node.phase_detail = detail
+        self._node.phase_detail = '; '.join(filter(None, (detail, self._failure)))
 
     def _fail(self, reason: str) -> None:
         step, fault = self._node.phase.value, f' ({self._fault})' if self._fault else ''
+        self._failure = ''
         self._enter(BootPhase.FAILED, f'{step}: {reason}{fault}')
+        self._failure = f'the last attempt failed while {step}: {reason}{fault}'
         self._report_once(f'boot failed while {step}: {reason}{fault}')
 
     def _report_once(self, text: str) -> None:
