@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
 ENABLE_TIMEOUT = 60.0
 """Longest time for all drives to boot and to be enabled in [s]."""
+BOOT_TIMEOUT = 30.0
+"""Longest time in [s] in which drives boot before they are enabled all the same."""
+OPERATIONAL = 'START'
+"""The NMT state of a device that has booted, on its topic ``nmt_state``."""
 AGAIN = 1.0
 """Pause after a refusal in [s]: a drive that has not booted yet says so."""
 
@@ -69,6 +73,8 @@ def _enable(
     deadline = time.monotonic() + ENABLE_TIMEOUT
     try:
         client.prepare(itertools.chain(*groups))
+        with contextlib.suppress(CallError):  # their services say why
+            _await_boot(client, groups[0])
         while (refusal := _refusal(client, groups)) and time.monotonic() < deadline:
             client.wait_until(_after(AGAIN), 2 * AGAIN, 'another try')
         if refusal:
@@ -79,6 +85,35 @@ def _enable(
         pass  # the bring-up ends, and says why
     finally:
         client.close()
+
+
+def _await_boot(client: ServiceClient, services: Sequence[str]) -> None:
+    """Wait until the devices of drives are operational, of those that publish ``nmt_state``."""
+    from std_msgs.msg import String
+
+    from node_runner import LATCHED
+
+    node, states = client.node, dict[str, str]()
+
+    def watch(service: str) -> str:
+        topic = f'{service.rpartition("/")[0]}/nmt_state'
+
+        def note(message: String) -> None:
+            states[topic] = message.data
+
+        node.create_subscription(String, topic, note, LATCHED)
+        return topic
+
+    topics = {service: watch(service) for service in services}
+
+    def booted() -> bool:
+        return all(
+            states.get(topic) == OPERATIONAL
+            or (client.is_ready(service) and not node.count_publishers(topic))
+            for service, topic in topics.items()
+        )
+
+    client.wait_until(booted, BOOT_TIMEOUT, 'the boot of the drives')
 
 
 def _refusal(client: ServiceClient, groups: Sequence[list[str]]) -> str:

@@ -27,6 +27,10 @@ class ServiceClient(GraphClient):
         for name in services:
             self._clients[name] = self.node.create_client(Trigger, name)
 
+    def is_ready(self, service: str) -> bool:
+        """Whether a service that was prepared is there."""
+        return bool(self._clients[service].service_is_ready())
+
     def call(self, services: list[str], timeout: float) -> dict[str, str]:
         """Call services side by side.
 

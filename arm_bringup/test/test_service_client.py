@@ -7,15 +7,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 import threading
+import time
 
 from isolation import reserve
 import pytest
 import rclpy
 from rclpy.node import Node
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from arm_bringup.enabling import enabling
 from arm_bringup.service_client import ServiceClient
-from node_runner import spin
+from node_runner import LATCHED, spin
 from process_supervisor import CallError
 
 pytestmark = pytest.mark.scenario
@@ -57,6 +60,24 @@ def drives(monkeypatch: pytest.MonkeyPatch) -> Iterator[Drives]:
         thread.join()
         node.destroy_node()
         rclpy.shutdown()
+
+
+def test_drives_are_enabled_when_they_have_booted(drives: Drives) -> None:
+    """No service is called that would be refused, and said to be, at a healthy start."""
+    states = drives.create_publisher(String, 'arm/nmt_state', LATCHED)
+    states.publish(String(data='PREOP'))
+    for name in ('init', 'mode'):
+        drives.create_service(Trigger, f'arm/{name}', partial(drives._answer, name))
+    said: list[str] = []
+    with enabling(['arm'], 'mode', said.append):
+        time.sleep(3.0)
+        assert drives.calls == []
+        states.publish(String(data='START'))
+        deadline = time.monotonic() + 60.0
+        while not said and time.monotonic() < deadline:
+            time.sleep(0.05)
+    assert said == ['all 1 drives are enabled, in mode']
+    assert drives.calls == ['init', 'mode']
 
 
 def test_each_service_is_called_once(drives: Drives) -> None:
