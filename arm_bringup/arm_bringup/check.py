@@ -26,7 +26,7 @@ from .session import add_robot, locate, robots_epilog
 from .start_positions import given_positions
 
 if TYPE_CHECKING:
-    from arm_canopen.config.model.checks.drive_units import AxisUnits
+    from arm_canopen.config import AxisUnits
 
 EXAMPLE_ACCELERATIONS = (2.0, 0.5)
 """Modest limits to begin with: of an axis that turns in [rad/s2], of a linear one in [m/s2]."""

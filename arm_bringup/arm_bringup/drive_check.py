@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from .findings import Finding, warning
 
 if TYPE_CHECKING:
-    from arm_canopen.config.model.checks.drive_units import AxisUnits
+    from arm_canopen.config import AxisUnits
     from arm_model import JointLimits
 
 LONGER = 5.0  # times the way of a stop within the limits, from which on one surprises

@@ -20,7 +20,7 @@ from .motion import controller_names
 from .robots import Robot, SETTINGS
 
 if TYPE_CHECKING:
-    from arm_canopen.config.model.checks.drive_units import AxisUnits
+    from arm_canopen.config import AxisUnits
     from arm_model import RobotModel
 
 START = 'ready'

@@ -3,8 +3,7 @@
 """CANopen master and CiA 402 drives, for ROS 2 and, as :class:`CanopenMaster`, without it.
 
 The names here are the public API. Those that need ROS, or take long, are loaded when they are
-used. Public besides, for tools and simulated devices: `standard`, `config` and `can`, and
-what `master` names.
+used. Public besides, for tools and simulated devices: `standard`, `config` and `can`.
 """
 
 from __future__ import annotations
@@ -39,6 +38,9 @@ if TYPE_CHECKING:
     from .library.canopen_master import CanopenMaster
     from .library.device import CanopenDevice
     from .master.events import Event, EventKind, Severity
+    from .master.other_master import MasterFrames
+    from .master.scheduler import Promise, Scheduler
+    from .master.sdo_client import SdoClient
     from .nodes.master import run_master, serve_buses
     from .nodes.master_process import MasterProcess
 
@@ -59,15 +61,19 @@ __all__ = [
     'EventKind',
     'LifecycleError',
     'LssError',
+    'MasterFrames',
     'MasterProcess',
     'MotionSource',
     'NodeConfig',
     'ObjectError',
     'OperationMode',
     'OtherMasterError',
+    'Promise',
     'Refusal',
     'RefusalCause',
+    'Scheduler',
     'SdoAbortError',
+    'SdoClient',
     'SdoError',
     'SdoTimeoutError',
     'Setpoint',
@@ -85,7 +91,11 @@ _LATE = {
     'CanopenMaster': '.library.canopen_master',
     'Event': '.master.events',
     'EventKind': '.master.events',
+    'MasterFrames': '.master.other_master',
     'MasterProcess': '.nodes.master_process',
+    'Promise': '.master.scheduler',
+    'Scheduler': '.master.scheduler',
+    'SdoClient': '.master.sdo_client',
     'Severity': '.master.events',
     'run_master': '.nodes.master',
     'serve_buses': '.nodes.master',

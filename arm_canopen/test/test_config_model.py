@@ -29,17 +29,17 @@ import pytest
 from arm_canopen import DriveState
 from arm_canopen.config import (
     BusConfig,
+    DEFAULT_DRIVE,
     Identity,
     load_bus,
     load_eds,
     NodeConfig,
     PdoConfig,
+    Place,
     SdoWrite,
 )
-from arm_canopen.config.findings import Place
 from arm_canopen.config.model.drive import RecoveryPolicy
 from arm_canopen.config.read.document import Item, Scalar, ScalarKind, YamlMap
-from arm_canopen.config.resolve.eds_files import DEFAULT_DRIVE
 from arm_canopen.config.resolve.layout import merge_device
 from arm_canopen.standard import CAN_ID_MASK, DataType
 

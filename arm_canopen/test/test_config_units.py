@@ -27,9 +27,8 @@ from arm_canopen.cia402.modes import Mode
 from arm_canopen.cia402.parameters import DriveParameters
 from arm_canopen.cia402.target_limits import check_target
 from arm_canopen.cia402.units import Units
-from arm_canopen.config import check_file, DriveConfig
+from arm_canopen.config import AxisUnits, check_file, DriveConfig, rate_units, UnitRule
 from arm_canopen.config.model.checks import check_bus
-from arm_canopen.config.model.checks.drive_units import AxisUnits, rate_units, UnitRule
 from arm_canopen.standard import Index
 
 JOINT = 'joint1'

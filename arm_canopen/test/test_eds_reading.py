@@ -15,24 +15,19 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen import CodecError, ConfigError
-from arm_canopen.config import Eds, load_eds
-from arm_canopen.config.read.eds_values import (
-    BYTE_TYPES,
-    bytes_from_text,
-    EdsValue,
-    parse_integer,
-    parse_value,
-    text_from_bytes,
-)
+from arm_canopen.config import bytes_from_text, Eds, load_eds, parse_integer, text_from_bytes
+from arm_canopen.config.read.eds_values import BYTE_TYPES, EdsValue, parse_value
 from arm_canopen.standard import (
     AccessType,
     byte_length,
     DataType,
+    decode,
+    encode,
     integer_range,
     ObjectEntry,
     REAL_FORMATS,
+    Value,
 )
-from arm_canopen.standard.datatypes import decode, encode, Value
 
 
 def read(folder: Path, text: str | bytes) -> Eds:

@@ -17,8 +17,15 @@ from arm_canopen.master.object_access import (
     raw_from_bytes,
     raw_from_number,
 )
-from arm_canopen.standard import byte_length, DataType, integer_range, MappedObject, SIGNED_BITS
-from arm_canopen.standard.datatypes import decode, encode
+from arm_canopen.standard import (
+    byte_length,
+    DataType,
+    decode,
+    encode,
+    integer_range,
+    MappedObject,
+    SIGNED_BITS,
+)
 
 RAW = st.integers(0, 0xFFFF_FFFF)
 SMALL = [t for t in DataType if (byte_length(t) or 9) <= 4]

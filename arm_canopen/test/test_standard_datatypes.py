@@ -14,12 +14,14 @@ from arm_canopen.standard import (
     bit_length,
     byte_length,
     DataType,
+    decode,
+    encode,
     FIXED_BITS,
     integer_range,
     SIGNED_BITS,
     UNSIGNED_BITS,
+    Value,
 )
-from arm_canopen.standard.datatypes import decode, encode, Value
 
 pytestmark = pytest.mark.slow
 

@@ -15,12 +15,12 @@ from arm_canopen.standard import (
     FIXED_BITS,
     integer_range,
     MappedObject,
+    Number,
     PDO_BITS_MAX,
     PdoCodec,
     REAL_FORMATS,
     SIGNED_BITS,
 )
-from arm_canopen.standard.pdo import Number
 
 pytestmark = pytest.mark.slow
 

@@ -10,6 +10,7 @@ import pytest
 
 from arm_canopen import CodecError
 from arm_canopen.standard import (
+    Abort,
     abort_text,
     AbortCode,
     DataType,
@@ -18,11 +19,14 @@ from arm_canopen.standard import (
     DownloadRequest,
     DownloadResponse,
     DownloadSegmentResponse,
+    fitted,
+    Response,
+    Segment,
     UploadRequest,
     UploadResponse,
     UploadSegmentRequest,
 )
-from arm_canopen.standard.sdo import Abort, fitted, Request, Response, Segment
+from arm_canopen.standard.sdo import Request
 
 INDEX = st.integers(0, 0xFFFF)
 SUBINDEX = st.integers(0, 0xFF)

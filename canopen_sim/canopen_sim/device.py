@@ -7,8 +7,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from arm_canopen.can import Frame
-from arm_canopen.config.model.factor_group import FactorGroup
+from arm_canopen.config import FactorGroup
 from arm_canopen.standard import (
+    Abort,
     AXIS_OFFSET,
     CobId,
     drive_axes,
@@ -21,7 +22,6 @@ from arm_canopen.standard import (
     ObjectDictionary,
     UNCONFIGURED,
 )
-from arm_canopen.standard.sdo import Abort
 
 from .deviations import Service
 from .drive.axis import ServoModel

@@ -13,7 +13,7 @@ import struct
 from typing import NamedTuple
 
 from arm_canopen.can import Frame
-from arm_canopen.standard.sdo import Abort
+from arm_canopen.standard import Abort
 
 from .deviations import Effect, FaultInjection, FRAME_BYTES, Service
 from .timed import NEVER

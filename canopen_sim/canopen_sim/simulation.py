@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from arm_canopen import BusConfig, CanopenError, load_bus, open_bus
-from arm_canopen.config.model.checks.drive_units import rate_units, reported_increments
+from arm_canopen.config import rate_units, reported_increments
 
 from .host import DeviceHost
 from .node_id_check import NodeIdCheck

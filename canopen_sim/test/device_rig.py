@@ -12,6 +12,7 @@ from arm_canopen import DriveState
 from arm_canopen.can import Frame
 from arm_canopen.config import load_eds
 from arm_canopen.standard import (
+    Abort,
     decode_response,
     DownloadRequest,
     DownloadResponse,
@@ -21,11 +22,12 @@ from arm_canopen.standard import (
     NmtCommand,
     NmtState,
     ObjectDictionary,
+    Response,
+    Segment,
     UploadRequest,
     UploadResponse,
     UploadSegmentRequest,
 )
-from arm_canopen.standard.sdo import Abort, Response, Segment
 from canopen_sim import Device, Drive, Fault, FaultInjection
 
 EDS = Path(__file__).parents[2] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'

@@ -22,8 +22,14 @@ import pytest
 from arm_canopen import DriveState
 from arm_canopen.can import Frame
 from arm_canopen.config import load_eds
-from arm_canopen.standard import AbortCode, decode_response, NmtCommand, NmtState, UploadRequest
-from arm_canopen.standard.sdo import Abort
+from arm_canopen.standard import (
+    Abort,
+    AbortCode,
+    decode_response,
+    NmtCommand,
+    NmtState,
+    UploadRequest,
+)
 from canopen_sim import Device, DeviceHost, Fault, FaultInjection
 from canopen_sim.deviations import FAULTS, parse_fault
 

@@ -15,13 +15,23 @@ from pathlib import Path
 from typing import TypeAlias
 
 from arm_canopen import ConfigError
-from arm_canopen.config import Eds, load_eds, Problem
-from arm_canopen.config.findings import Findings, Place
-from arm_canopen.config.model.pdo_direction import Direction, RPDO, TPDO
-from arm_canopen.config.read.eds import DUMMY_TYPES, read_eds_text
-from arm_canopen.config.read.eds_ini import IniFile, IniSection, read_ini
-from arm_canopen.config.read.eds_values import parse_integer
-from arm_canopen.config.resolve.pdo_mapping import eds_mapping
+from arm_canopen.config import (
+    Direction,
+    DUMMY_TYPES,
+    Eds,
+    eds_mapping,
+    Findings,
+    IniFile,
+    IniSection,
+    load_eds,
+    parse_integer,
+    Place,
+    Problem,
+    read_eds_text,
+    read_ini,
+    RPDO,
+    TPDO,
+)
 from arm_canopen.standard import (
     AccessType,
     bit_length,

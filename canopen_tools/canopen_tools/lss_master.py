@@ -10,9 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from arm_canopen import LssError
+from arm_canopen import LssError, Scheduler
 from arm_canopen.can import Frame
-from arm_canopen.master import Scheduler
 from arm_canopen.standard import (
     ADDRESS_BITS,
     BIT_RATES,

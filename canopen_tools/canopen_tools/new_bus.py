@@ -13,9 +13,7 @@ from itertools import groupby
 import json
 
 from arm_canopen import OperationMode
-from arm_canopen.config.model.factor_group import FACTOR_OBJECTS
-from arm_canopen.config.model.pdo_direction import Direction, RPDO, TPDO
-from arm_canopen.config.resolve.pdo_mapping import is_fixed, mapping_slots
+from arm_canopen.config import Direction, FACTOR_OBJECTS, is_fixed, mapping_slots, RPDO, TPDO
 from arm_canopen.standard import (
     AXIS_OFFSET,
     bit_length,

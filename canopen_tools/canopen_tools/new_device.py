@@ -9,10 +9,16 @@ from dataclasses import dataclass, field, replace
 import math
 
 from arm_canopen import CanopenError, OperationMode
-from arm_canopen.config import Eds
-from arm_canopen.config.model.checks.drive_units import is_coarse
-from arm_canopen.config.model.factor_group import FACTOR_OBJECTS, FactorGroup, UNSET
-from arm_canopen.config.model.si_unit import NamedUnit, position_unit, RPM
+from arm_canopen.config import (
+    Eds,
+    FACTOR_OBJECTS,
+    FactorGroup,
+    is_coarse,
+    NamedUnit,
+    position_unit,
+    RPM,
+    UNSET,
+)
 from arm_canopen.standard import Index, is_drive
 
 TURN = 2.0 * math.pi

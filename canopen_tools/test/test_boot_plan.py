@@ -10,15 +10,16 @@ from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, sdo_write, with_defaults
 import pytest
 
-from arm_canopen.config import Identity, NodeConfig
-from arm_canopen.config.model.boot_plan import (
+from arm_canopen.config import (
     boot_writes,
     BootWrite,
     consumer_to_read,
     held_after_boot,
     HeldConsumers,
-    WATCH_KEY,
+    Identity,
+    NodeConfig,
 )
+from arm_canopen.config.model.boot_plan import WATCH_KEY
 from arm_canopen.master.configuration import Configurator, PDO_OBJECTS
 from canopen_tools.cli.diff import expected_defaults, expected_objects
 from canopen_tools.dcf.concise import device_writes

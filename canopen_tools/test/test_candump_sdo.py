@@ -14,11 +14,11 @@ from arm_canopen.standard import (
     DownloadRequest,
     DownloadResponse,
     DownloadSegmentResponse,
+    Segment,
     UploadRequest,
     UploadResponse,
     UploadSegmentRequest,
 )
-from arm_canopen.standard.sdo import Segment
 from canopen_tools.monitor import FrameDescriber
 from canopen_tools.monitor.object_names import ObjectNames
 from canopen_tools.monitor.sdo_follower import SdoFollower

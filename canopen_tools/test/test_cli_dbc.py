@@ -23,7 +23,7 @@ FILES = [
 ]
 
 
-def database(file: Path, folder: Path, *options: str) -> cantools.db.Database:
+def database(file: Path, folder: Path, *options: str) -> cantools.database.can.Database:
     """Write the DBC of a bus and load it."""
     out = folder / 'bus.dbc'
     assert main(['dbc', str(file), '--out', str(out), *options]) == 0

@@ -16,8 +16,7 @@ from device_rig import Rig
 import pytest
 from tool_environment import REPOSITORY
 
-from arm_canopen.config import load_eds
-from arm_canopen.config.findings import Findings
+from arm_canopen.config import Findings, load_eds
 from arm_canopen.config.resolve.sdo_list import parameter_writes
 from arm_canopen.standard import is_drive
 from canopen_tools import EdsReport, lint_eds

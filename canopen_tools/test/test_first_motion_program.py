@@ -23,7 +23,7 @@ import pytest
 from tool_environment import ENVIRONMENT, Output, REPOSITORY
 
 from arm_canopen import DriveState, load_bus
-from arm_canopen.config.model.factor_group import FactorGroup
+from arm_canopen.config import FactorGroup
 from canopen_sim import DeviceRunner, Fault, FaultInjection, simulated_devices
 from canopen_tools.cli.main import main
 from canopen_tools.first_motion.checks import AxisFacts

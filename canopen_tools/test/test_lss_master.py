@@ -14,9 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen import LssError
+from arm_canopen import LssError, Promise, Scheduler
 from arm_canopen.can import Frame
-from arm_canopen.master import Promise, Scheduler
 from arm_canopen.standard import (
     BIT_RATES,
     decode_lss,

@@ -20,8 +20,8 @@ import pytest
 from tool_environment import Output
 
 from arm_canopen import CanopenMaster, load_bus, open_bus
-from arm_canopen.config import Identity, load_eds
-from arm_canopen.config.model.si_unit import position_unit, POSITIONS, TIMES, velocity_unit
+from arm_canopen.config import Identity, load_eds, position_unit
+from arm_canopen.config.model.si_unit import POSITIONS, TIMES, velocity_unit
 from canopen_sim import DeviceRunner, Fault, FaultInjection
 from canopen_tools.cli.main import main
 from canopen_tools.eds_match import match_eds, NoMatchError, SeveralMatchError

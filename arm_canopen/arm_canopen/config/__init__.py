@@ -14,6 +14,7 @@ remedy; ``check_file`` reports them, and what works and was probably meant other
 """
 
 from ..exceptions import Problem
+from .findings import Findings, Place
 from .load import check_file, load_bus
 from .model import (
     BusConfig,
@@ -24,19 +25,89 @@ from .model import (
     PdoConfig,
     SdoWrite,
 )
-from .read.eds import Eds, load_eds
+from .model.boot_plan import (
+    boot_writes,
+    BootWrite,
+    consumer_to_read,
+    held_after_boot,
+    HeldConsumers,
+)
+from .model.bus import IDENTITY_OBJECTS, U16_MAX
+from .model.checks.drive_units import (
+    ACCELERATION_KEY,
+    AxisUnits,
+    is_coarse,
+    MOTION_OBJECTS,
+    rate_units,
+    reported_increments,
+    UnitRule,
+)
+from .model.checks.traffic import LoadEstimate, Traffic
+from .model.factor_group import FACTOR_ADDRESSES, FACTOR_OBJECTS, FactorGroup, UNSET
+from .model.pdo_direction import Direction, RPDO, TPDO
+from .model.si_unit import NamedUnit, position_unit, RPM
+from .read.eds import DUMMY_TYPES, Eds, load_eds, read_eds_text
+from .read.eds_ini import IniFile, IniSection, read_ini
+from .read.eds_values import bytes_from_text, parse_integer, text_from_bytes
+from .resolve.eds_files import DEFAULT_DRIVE
+from .resolve.pdo_mapping import eds_mapping, is_fixed, mapping_slots
+from .units import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS
 
 __all__ = [
+    'ACCELERATION_KEY',
+    'DEFAULT_DRIVE',
+    'DUMMY_TYPES',
+    'FACTOR_ADDRESSES',
+    'FACTOR_OBJECTS',
+    'HUNDRED_MICROSECONDS',
+    'IDENTITY_OBJECTS',
+    'KILOBIT',
+    'MICROSECONDS',
+    'MILLISECONDS',
+    'MOTION_OBJECTS',
+    'RPDO',
+    'RPM',
+    'TPDO',
+    'U16_MAX',
+    'UNSET',
+    'AxisUnits',
+    'BootWrite',
     'BusConfig',
+    'Direction',
     'DriveConfig',
     'Eds',
+    'FactorGroup',
+    'Findings',
+    'HeldConsumers',
     'Identity',
+    'IniFile',
+    'IniSection',
+    'LoadEstimate',
     'MasterConfig',
+    'NamedUnit',
     'NodeConfig',
     'PdoConfig',
+    'Place',
     'Problem',
     'SdoWrite',
+    'Traffic',
+    'UnitRule',
+    'boot_writes',
+    'bytes_from_text',
     'check_file',
+    'consumer_to_read',
+    'eds_mapping',
+    'held_after_boot',
+    'is_coarse',
+    'is_fixed',
     'load_bus',
     'load_eds',
+    'mapping_slots',
+    'parse_integer',
+    'position_unit',
+    'rate_units',
+    'read_eds_text',
+    'read_ini',
+    'reported_increments',
+    'text_from_bytes',
 ]

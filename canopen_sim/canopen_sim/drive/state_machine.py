@@ -11,8 +11,7 @@ from typing import NamedTuple, TypeVar
 
 from arm_canopen import DriveState as State
 from arm_canopen import OperationMode
-from arm_canopen.standard import AbortCode
-from arm_canopen.standard.datatypes import Value
+from arm_canopen.standard import AbortCode, Value
 
 from ..deviations import Fault
 from ..objects.object_store import Integer, refusal

@@ -20,14 +20,16 @@ from arm_canopen.standard import (
     COB_ID_EXTENDED,
     COB_ID_INVALID,
     DataType,
+    decode,
+    encode,
     integer_range,
+    Number,
     object_address,
     ObjectDictionary,
     ObjectEntry,
     REAL_FORMATS,
+    Value,
 )
-from arm_canopen.standard.datatypes import decode, encode, Value
-from arm_canopen.standard.pdo import Number
 
 STRING_BYTES_MAX = 65_536  # [byte] longest string or domain that a client may write
 

@@ -10,8 +10,7 @@ import logging
 from pathlib import Path
 
 from arm_canopen import SdoAbortError
-from arm_canopen.standard import AbortCode, Index
-from arm_canopen.standard.datatypes import encode, Value
+from arm_canopen.standard import AbortCode, encode, Index, Value
 
 from .object_store import Integer, ObjectStore, refusal, Variable
 

@@ -8,8 +8,7 @@ from collections import deque
 from collections.abc import Callable
 
 from arm_canopen.can import Frame
-from arm_canopen.standard import AbortCode, CAN_ID_MASK, COB_ID_INVALID, Emergency, Index
-from arm_canopen.standard.datatypes import Value
+from arm_canopen.standard import AbortCode, CAN_ID_MASK, COB_ID_INVALID, Emergency, Index, Value
 
 from ..objects.object_store import check_cob_id, Integer, ObjectStore, refusal
 from ..timed import NEVER

@@ -19,8 +19,8 @@ from arm_canopen.standard import (
     Index,
     NmtState,
     parse_heartbeat,
+    Value,
 )
-from arm_canopen.standard.datatypes import Value
 
 from ..objects.object_store import Integer, ObjectStore, refusal
 from ..timed import NEVER

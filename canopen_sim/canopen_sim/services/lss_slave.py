@@ -24,8 +24,8 @@ from arm_canopen.standard import (
     NODE_ID_MIN,
     STANDARD_TABLE,
     UNCONFIGURED,
+    WHOLE_NUMBER,
 )
-from arm_canopen.standard.lss import WHOLE_NUMBER
 
 from ..objects.object_store import ObjectStore
 from ..objects.parameter_storage import ParameterMemory

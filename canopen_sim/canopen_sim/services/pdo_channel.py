@@ -27,8 +27,8 @@ from arm_canopen.standard import (
     PdoCodec,
     RTR_FORBIDDEN,
     SYNCHRONOUS_MAX,
+    Value,
 )
-from arm_canopen.standard.datatypes import Value
 
 from ..objects.object_store import check_cob_id, ObjectStore, refusal, Scalar, Variable
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import struct
 
-from arm_canopen.standard import AbortCode
-from arm_canopen.standard.sdo import (
+from arm_canopen.standard import (
+    AbortCode,
     ACKNOWLEDGE_UPLOAD,
     block_frames,
     BLOCK_SEGMENTS_MAX,

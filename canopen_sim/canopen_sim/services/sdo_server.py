@@ -16,8 +16,11 @@ import struct
 from arm_canopen import CodecError, SdoAbortError
 from arm_canopen.can import Frame
 from arm_canopen.standard import (
+    Abort,
     AbortCode,
     CAN_ID_MASK,
+    CLIENT_DOWNLOAD,
+    CLIENT_UPLOAD,
     COB_ID_INVALID,
     CobId,
     decode_request,
@@ -26,12 +29,12 @@ from arm_canopen.standard import (
     DownloadSegmentResponse,
     EXPEDITED_MAX,
     Index,
+    Segment,
     SEGMENT_MAX,
     UploadRequest,
     UploadResponse,
     UploadSegmentRequest,
 )
-from arm_canopen.standard.sdo import Abort, CLIENT_DOWNLOAD, CLIENT_UPLOAD, Segment
 
 from ..objects.object_store import check_cob_id, ObjectStore, refusal, STRING_BYTES_MAX
 from ..timed import NEVER

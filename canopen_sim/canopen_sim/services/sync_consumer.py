@@ -7,8 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from arm_canopen.can import Frame
-from arm_canopen.standard import AbortCode, CAN_ID_MASK, CobId, Index, SYNC_PRODUCER
-from arm_canopen.standard.datatypes import Value
+from arm_canopen.standard import AbortCode, CAN_ID_MASK, CobId, Index, SYNC_PRODUCER, Value
 
 from ..objects.object_store import check_can_id, ObjectStore, refusal
 

@@ -17,8 +17,8 @@ from arm_canopen.standard import (
     Index,
     TIME_CONSUMER,
     TIME_PRODUCER,
+    Value,
 )
-from arm_canopen.standard.datatypes import Value
 
 from ..objects.object_store import check_can_id, FRAME_BITS, ObjectStore, refusal
 

@@ -34,9 +34,7 @@ from arm_canopen import (
     Severity,
 )
 from arm_canopen.cia402.position_modes import Move
-from arm_canopen.config import load_bus, load_eds, NodeConfig
-from arm_canopen.config.model.boot_plan import BootWrite
-from arm_canopen.config.resolve.eds_files import DEFAULT_DRIVE
+from arm_canopen.config import BootWrite, DEFAULT_DRIVE, load_bus, load_eds, NodeConfig
 from arm_canopen.master.scheduler import Promise
 from arm_canopen.standard import ObjectDictionary
 from canopen_sim import Fault, FaultInjection

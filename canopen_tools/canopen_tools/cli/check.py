@@ -9,14 +9,15 @@ from collections.abc import Iterable, Sequence
 from itertools import groupby
 from pathlib import Path
 
-from arm_canopen.config import check_file
-from arm_canopen.config.model.checks.drive_units import (
+from arm_canopen.config import (
     ACCELERATION_KEY,
     AxisUnits,
+    check_file,
+    LoadEstimate,
     MOTION_OBJECTS,
+    Traffic,
     UnitRule,
 )
-from arm_canopen.config.model.checks.traffic import LoadEstimate, Traffic
 from arm_canopen.standard import Index
 
 from .arguments import bitrate, SubParsers

@@ -10,15 +10,15 @@ from contextlib import suppress
 
 from arm_canopen import CodecError, SdoAbortError
 from arm_canopen.can import open_bus
-from arm_canopen.config import BusConfig, NodeConfig
-from arm_canopen.config.model.boot_plan import (
+from arm_canopen.config import (
     BootWrite,
+    BusConfig,
     consumer_to_read,
     held_after_boot,
     HeldConsumers,
+    NodeConfig,
 )
-from arm_canopen.standard import abort_text, DataType, Index, ObjectDictionary
-from arm_canopen.standard.datatypes import encode
+from arm_canopen.standard import abort_text, DataType, encode, Index, ObjectDictionary
 
 from ..monitor.object_names import ObjectNames
 from ..monitor.value_text import data_text

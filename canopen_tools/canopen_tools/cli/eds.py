@@ -7,8 +7,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from arm_canopen.config import Eds
-from arm_canopen.config.model.pdo_direction import RPDO, TPDO
+from arm_canopen.config import Eds, RPDO, TPDO
 
 from ..eds_lint import EdsReport, lint_eds
 from .arguments import SubParsers

@@ -12,8 +12,7 @@ import re
 
 from arm_canopen import ConfigError, SdoError
 from arm_canopen.can import open_bus
-from arm_canopen.config import Eds, Identity, load_eds
-from arm_canopen.config.model.factor_group import FACTOR_ADDRESSES
+from arm_canopen.config import Eds, FACTOR_ADDRESSES, Identity, load_eds
 from arm_canopen.standard import Index
 
 from ..eds_match import (

@@ -8,9 +8,8 @@ import argparse
 
 from arm_canopen import CodecError, SdoAbortError
 from arm_canopen.can import open_bus
-from arm_canopen.config.read.eds_values import bytes_from_text, text_from_bytes
-from arm_canopen.standard import DataType, Index, ObjectEntry
-from arm_canopen.standard.sdo import fitted
+from arm_canopen.config import bytes_from_text, text_from_bytes
+from arm_canopen.standard import DataType, fitted, Index, ObjectEntry
 
 from ..monitor.object_names import ObjectNames
 from ..monitor.value_text import data_text

@@ -8,11 +8,9 @@ import argparse
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
-from arm_canopen import SdoError
+from arm_canopen import SdoClient, SdoError
 from arm_canopen.can import Frame, open_bus
-from arm_canopen.config import BusConfig, Identity, load_bus, NodeConfig
-from arm_canopen.config.model.bus import IDENTITY_OBJECTS
-from arm_canopen.master import SdoClient
+from arm_canopen.config import BusConfig, Identity, IDENTITY_OBJECTS, load_bus, NodeConfig
 from arm_canopen.standard import (
     CobId,
     DeviceProfile,

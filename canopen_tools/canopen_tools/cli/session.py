@@ -12,9 +12,9 @@ from collections.abc import Callable, Coroutine
 from time import monotonic
 from typing import Any, TypeVar
 
+from arm_canopen import MasterFrames, Promise, Scheduler, SdoClient
 from arm_canopen.can import Bus, Frame
 from arm_canopen.config import BusConfig
-from arm_canopen.master import MasterFrames, Promise, Scheduler, SdoClient
 from arm_canopen.standard import (
     CobId,
     NmtState,

@@ -9,18 +9,17 @@ from dataclasses import dataclass
 from functools import cache
 
 from arm_canopen import ObjectError
-from arm_canopen.config import BusConfig, load_bus, load_eds, NodeConfig
-from arm_canopen.config.resolve.eds_files import DEFAULT_DRIVE
+from arm_canopen.config import BusConfig, DEFAULT_DRIVE, load_bus, load_eds, NodeConfig
 from arm_canopen.standard import (
     DataType,
     find_object,
     NODE_ID_MAX,
     NODE_ID_MIN,
+    NUMBER,
     ObjectDictionary,
     ObjectEntry,
     slow_timeout,
 )
-from arm_canopen.standard.object_path import NUMBER
 
 from ..monitor.object_names import ObjectNames
 from .arguments import UsageError

@@ -11,11 +11,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 import struct
 
-from arm_canopen.config import BusConfig, NodeConfig, SdoWrite
-from arm_canopen.config.model.boot_plan import boot_writes, BootWrite
-from arm_canopen.config.model.pdo_direction import RPDO, TPDO
-from arm_canopen.standard import COB_ID_INVALID, DataType, Index, ObjectEntry, PDO_COUNT_MAX
-from arm_canopen.standard.datatypes import encode
+from arm_canopen.config import boot_writes, BootWrite, BusConfig, NodeConfig, RPDO, SdoWrite, TPDO
+from arm_canopen.standard import (
+    COB_ID_INVALID,
+    DataType,
+    encode,
+    Index,
+    ObjectEntry,
+    PDO_COUNT_MAX,
+)
 
 COUNT = struct.Struct('<I')
 ENTRY = struct.Struct('<HBI')

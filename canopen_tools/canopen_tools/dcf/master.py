@@ -13,10 +13,20 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from arm_canopen import CodecError
-from arm_canopen.config import BusConfig, MasterConfig, NodeConfig, PdoConfig
-from arm_canopen.config.model.bus import U16_MAX
-from arm_canopen.config.model.pdo_direction import Direction, RPDO, TPDO
-from arm_canopen.config.units import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS
+from arm_canopen.config import (
+    BusConfig,
+    Direction,
+    HUNDRED_MICROSECONDS,
+    KILOBIT,
+    MasterConfig,
+    MICROSECONDS,
+    MILLISECONDS,
+    NodeConfig,
+    PdoConfig,
+    RPDO,
+    TPDO,
+    U16_MAX,
+)
 from arm_canopen.standard import (
     AccessType,
     BIT_RATES_KBIT,

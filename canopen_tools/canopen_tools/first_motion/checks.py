@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 import math
 
 from arm_canopen import CanopenMaster, DriveError, ObjectError, OperationMode, SdoError
-from arm_canopen.config import DriveConfig
-from arm_canopen.config.model.factor_group import FactorGroup
+from arm_canopen.config import DriveConfig, FactorGroup
 from arm_canopen.standard import AXIS_OFFSET, CYCLIC_MODES, Index
 from first_motion import FASTEST, JointKind, too_few_increments
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from arm_canopen import CodecError
 from arm_canopen.standard import (
+    Abort,
     abort_text,
     decode_request,
     decode_response,
@@ -18,11 +19,12 @@ from arm_canopen.standard import (
     DownloadResponse,
     DownloadSegmentResponse,
     FRAME_BYTES,
+    Response,
+    Segment,
     UploadRequest,
     UploadResponse,
     UploadSegmentRequest,
 )
-from arm_canopen.standard.sdo import Abort, Response, Segment
 
 from .object_names import ObjectNames
 from .value_text import data_text

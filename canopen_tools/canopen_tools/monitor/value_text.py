@@ -13,17 +13,18 @@ from arm_canopen.standard import (
     ConsumerHeartbeatTime,
     Controlword,
     DataType,
+    decode,
     drive_state,
     error_code_text,
     error_register_text,
+    fitted,
     Index,
     mapped_place,
     mode_title,
     object_address,
     PDO_COUNT_MAX,
+    Value,
 )
-from arm_canopen.standard.datatypes import decode, Value
-from arm_canopen.standard.sdo import fitted
 
 CONTROLWORD_COMMANDS: tuple[tuple[int, int, str], ...] = (
     (0x80, 0x80, 'Fault reset'),

@@ -6,8 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Container
 
-from arm_canopen.standard import AbortCode
-from arm_canopen.standard.datatypes import Value
+from arm_canopen.standard import AbortCode, Value
 
 from ...deviations import Fault
 from ...objects.object_store import refusal
