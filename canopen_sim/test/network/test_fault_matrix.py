@@ -385,15 +385,23 @@ DEVIATIONS = {
     'no state without a mode': (Deviation.MODE_REQUIRED, Deviation.MODE_ZERO_REFUSED),
     'no mode under halt': (Deviation.MODE_HELD_UNDER_HALT,),
     'EMCYs without end': (Deviation.EMCY_FLOOD,),
+    'bits of an arrival without power': (Deviation.ARRIVED_WHEN_DISABLED,),
+    'other COB-IDs': (
+        FaultInjection(Deviation.OBJECT_KEPT, object=(0x1800, 1), value=0x1F0),
+        FaultInjection(Deviation.OBJECT_KEPT, object=(0x1400, 1), value=0x1F1),
+    ),
 }
 
 
 @pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
 @pytest.mark.parametrize('deviations', DEVIATIONS.values(), ids=DEVIATIONS)
 def test_a_drive_that_deviates_is_used_as_any_other(
-    deviations: tuple[Deviation, ...], mode: OperationMode
+    deviations: tuple[Deviation | FaultInjection, ...], mode: OperationMode
 ) -> None:
-    """It is enabled, moves in each mode, stops, and is switched; what is odd is reported once."""
+    """It is enabled, moves in each mode, stops, is switched, and reports errors in EMCYs.
+
+    What is odd is reported once.
+    """
     arm = Arm(0.3, *deviations)
     arm.move(mode)
     arm.stop(FAULTY, mode)
@@ -409,6 +417,10 @@ def test_a_drive_that_deviates_is_used_as_any_other(
     assert arm.state() is DriveState.OPERATION_ENABLED
     warnings = [event.text for event in arm.net.events if event.severity is Severity.WARNING]
     assert len(warnings) == len(set(warnings))
+    over_current(arm)
+    arm.net.run(SETTLING)
+    history = arm.net.network.nodes[FAULTY].emergencies.history
+    assert 0x2310 in [emcy.code for _, emcy in history]
 
 
 def rates(velocity: float, acceleration: float) -> FaultInjection:
