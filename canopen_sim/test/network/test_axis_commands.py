@@ -242,7 +242,7 @@ def test_init_homes_only_where_bus_yml_configures_it(requested: bool) -> None:
     net.boot()
     answer = net.do(JOINT, 'init')
     assert ('homed by method 37' in answer) is requested
-    assert ('home it if' in answer) is not requested
+    assert ('call ~/home' in answer) is not requested
 
 
 def test_init_homes_by_the_method_of_bus_yml_whatever_was_tried_before() -> None:
