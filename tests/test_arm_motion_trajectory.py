@@ -164,6 +164,7 @@ def _slows_down(arm: MovingArm) -> None:
     assert run.wait()[0] == GoalStatus.STATUS_SUCCEEDED
     times = [f.header.stamp.sec + 1e-9 * f.header.stamp.nanosec for f in run.feedback]
     assert times[-1] - times[0] > 1.5  # of 2 s
+    assert not any('incompatible QoS' in line for line in arm.master.lines)
 
 
 def _scales(

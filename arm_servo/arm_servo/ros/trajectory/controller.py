@@ -14,6 +14,7 @@ from typing import Any
 from control_msgs.msg import JointTrajectoryControllerState, SpeedScalingFactor
 from control_msgs.srv import QueryTrajectoryState
 from rclpy.duration import Duration
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from trajectory_msgs.msg import JointTrajectory
 
@@ -57,8 +58,17 @@ class TrajectoryController:
             JointTrajectoryControllerState, '~/controller_state', 10
         )
         node.create_subscription(JointTrajectory, '~/joint_trajectory', self._take, 10)
-        for qos in (LATCHED, 1):  # who publishes it once from a shell does not latch it
-            node.create_subscription(SpeedScalingFactor, '~/speed_scaling_input', self._scale, qos)
+        # who publishes it once from a shell does not latch it: that no value comes from such a
+        # publisher by the latched subscription is no news, as the other one gets it
+        silent = SubscriptionEventCallbacks(use_default_callbacks=False)
+        for qos in (LATCHED, 1):
+            node.create_subscription(
+                SpeedScalingFactor,
+                '~/speed_scaling_input',
+                self._scale,
+                qos,
+                event_callbacks=silent,
+            )
         node.create_service(QueryTrajectoryState, '~/query_state', self._query)
         TrajectoryPause(node, gateway)
         node.create_timer(1.0 / parameters.state_rate, self._publish_state)
