@@ -580,11 +580,11 @@ def test_messages_that_are_not_installed_here_leave_the_rest(
     """Another computer offers what has them; it is said once, with the package."""
     state = state_message()
     moveit = import_module('moveit_msgs.action')
-    for module in ('msg', 'action', 'srv'):
-        monkeypatch.setitem(sys.modules, f'{package}.{module}', None)
     robot.node.create_publisher(type(state), 'arm_controller/controller_state', 10)
     ActionServer(robot.node, moveit.MoveGroup, 'move_action', lambda _: None)
     ActionServer(robot.node, moveit.ExecuteTrajectory, 'execute_trajectory', lambda _: None)
+    for module in ('msg', 'action', 'srv'):  # after the servers, whose types load them
+        monkeypatch.setitem(sys.modules, f'{package}.{module}', None)
     robot.spin_until(lambda: bool(said), 'a sentence')
     assert said == [f'{what}: {package} is not installed here: run `make build`, or install it']
     robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
