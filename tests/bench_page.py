@@ -22,7 +22,7 @@ from processes import executable, RunningProcess
 from ros_client import RosClient
 from sensor_msgs.msg import JointState
 
-from arm_canopen.master.statistics import WINDOW
+from arm_canopen.master.runner import WINDOW
 
 TIMEOUT = 60.0  # [s]
 MOVING = 0.05  # [rad/s]

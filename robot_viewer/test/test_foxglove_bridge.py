@@ -173,7 +173,7 @@ def test_who_comes_late_gets_what_is_latched(rig: Rig, client: FoxgloveClient) -
 
 
 def test_clients_from_before_the_sdk_are_served(rig: Rig) -> None:
-    """As @foxglove/ws-protocol of npm and older Lichtblick; all are told the distribution."""
+    """As @foxglove/ws-protocol of npm and older Lichtblick; all get the distribution."""
     robot, client = rig.robot, FoxgloveClient(rig.url, protocol=FORMER)
     assert client.info['metadata']['ROS_DISTRO'] == 'jazzy'
     client.subscribe('/robot_description')

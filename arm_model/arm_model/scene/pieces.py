@@ -66,7 +66,7 @@ def cut(corners: Array, triangles: Places) -> Sequence[Array]:
 
 
 def _closed(triangles: Places) -> bool:
-    """Tell whether each edge belongs to two triangles, which pass it in opposite directions."""
+    """Return whether each edge belongs to two triangles, which pass it in opposite directions."""
     edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     ways = {(start, end) for start, end in edges.tolist()}
     return len(ways) == len(edges) and all((end, start) in ways for start, end in ways)

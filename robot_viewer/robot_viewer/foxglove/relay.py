@@ -6,7 +6,7 @@ The server of foxglove-sdk admits every client. So it is bound to a loopback add
 guessed, and stands behind this. It limits the number of messages that wait for a slow client, not
 their bytes: a thousand images are gigabytes. So messages of topics are dropped here while more
 than a number of bytes waits for their client. Clients that know only the former sub-protocol are
-served too, as its messages have the same form; all of them are told the distribution of ROS.
+served too, as its messages have the same form; all of them get the distribution of ROS.
 """
 
 from __future__ import annotations
@@ -120,13 +120,13 @@ class Relay:
             await writer.drain()
             return
         former = SUBPROTOCOL.encode() not in head
-        names = (FORMER.encode(), SUBPROTOCOL.encode())
+        theirs, ours = FORMER.encode(), SUBPROTOCOL.encode()
         inner_reader, inner_writer = await asyncio.open_connection(*self._behind)
         try:
-            inner_writer.write(head.replace(*names) if former else head)
+            inner_writer.write(head.replace(theirs, ours) if former else head)
             there = asyncio.create_task(_pass(reader, inner_writer))
             answer = await inner_reader.readuntil(b'\r\n\r\n')
-            writer.write(answer.replace(*reversed(names)) if former else answer)
+            writer.write(answer.replace(ours, theirs) if former else answer)
             back = asyncio.create_task(
                 _pass_messages(inner_reader, writer, self._limit)
                 if b' 101 ' in answer.partition(b'\r\n')[0]
@@ -152,7 +152,7 @@ async def _pass_messages(
     reader: asyncio.StreamReader, writer: asyncio.StreamWriter, limit: int
 ) -> None:
     """Pass frames of a WebSocket on; leave messages of topics out while too many bytes wait."""
-    told = False
+    informed = False
     while True:
         start = await reader.readexactly(2)
         size = start[1]
@@ -160,8 +160,8 @@ async def _pass_messages(
             length = await reader.readexactly(2 if size == 126 else 8)
             start, size = start + length, int.from_bytes(length, 'big')
         body = await reader.readexactly(size)
-        if not told and start[0] == TEXT:  # the first message is serverInfo
-            told, (start, body) = True, _with_distribution(start, body)
+        if not informed and start[0] == TEXT:  # the first message is serverInfo
+            informed, (start, body) = True, _with_distribution(start, body)
         waiting = writer.transport.get_write_buffer_size()
         of_topic = start[0] == BINARY and body[:1] == bytes([MESSAGE_DATA])
         if of_topic and waiting and waiting + size > limit:
