@@ -44,6 +44,7 @@ def check_robot(robot: Robot) -> list[Finding]:
         tree = read_urdf(urdf)
     except (DescriptionError, urdf_reader.DescriptionError) as problem:
         return [*findings, error(robot.description.name, str(problem), 'correct the description')]
+    findings += _looks(robot, tree)
     if drives:
         findings += _names(robot, drives, tree)
     if robot.lacking:
@@ -64,6 +65,21 @@ def check_robot(robot: Robot) -> list[Finding]:
             moving
         )  # what is wrong with the names of drives is reported already
     return [*findings, *found, *check_motion(robot, urdf, tree, semantic, drives)]
+
+
+def _looks(robot: Robot, tree: KinematicTree) -> Iterable[Finding]:
+    """Find what the page would not show, or show grey; each problem once."""
+    found: dict[str, str] = {}  # link by problem
+    for shape in tree.visuals():
+        if shape.note:
+            found.setdefault(shape.note, shape.link)
+        if shape.shape == 'mesh':
+            try:
+                urdf_reader.find_mesh(shape.attributes.get('filename', ''))
+            except urdf_reader.MeshFileError as problem:
+                found.setdefault(str(problem), shape.link)
+    for what, link in found.items():
+        yield warning(f'{robot.description.name}, link {link}', what, 'it moves all the same')
 
 
 def _remedies(robot: Robot, drives: Collection[str], tree: KinematicTree) -> Iterable[str]:

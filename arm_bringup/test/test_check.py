@@ -26,6 +26,11 @@ pytestmark = pytest.mark.slow
 ROBOTS = Path(__file__).parents[1] / 'robots'
 ERROR, WARNING = Severity.ERROR, Severity.WARNING
 
+CAMERA = """
+<link name="camera"><visual><geometry><mesh filename="file:///lost.stl"/></geometry>
+<material name="red"><color rgba="1 0 0"/></material></visual></link>
+<joint name="camera" type="fixed"><parent link="tool0"/><child link="camera"/></joint>"""
+
 
 @pytest.fixture
 def robot(tmp_path: Path) -> Robot:
@@ -70,6 +75,12 @@ def test_nothing_is_wrong_with_our_robots(name: str, warnings: list[str]) -> Non
             [(WARNING, '0x6084 is 0.02')],
         ),
         ('gp110.urdf.xacro', '</robot>', '', [(ERROR, 'gp110.urdf.xacro')]),
+        (
+            'gp110.urdf.xacro',
+            '</robot>',
+            f'{CAMERA}</robot>',
+            [(WARNING, 'link camera: <color rgba="1 0 0">'), (WARNING, 'no file /lost.stl')],
+        ),
         ('limits.yaml', '  joint_3_u:\n', '  joint_3:\n', [(ERROR, 'joint_3')]),
         ('gp110.srdf', '"tool0"', '"tool9"', [(ERROR, 'tool9')]),
         ('gp110.srdf', 'name="ready"', 'name="home"', [(WARNING, 'no pose')]),
@@ -86,7 +97,12 @@ def test_nothing_is_wrong_with_our_robots(name: str, warnings: list[str]) -> Non
             '',
             [(WARNING, 'link_4_r and link_5_b')],
         ),
-        ('gp110.srdf', 'name="joint_5_b" v', 'name="joint_5" v', [(WARNING, 'has joint_5,')]),
+        (
+            'gp110.srdf',
+            'name="joint_5_b" v',
+            'name="joint_5" v',
+            [(WARNING, 'joint_5 is none of them')],
+        ),
         ('controllers.yaml', 'joint_6_t:', 'joint_6:', [(ERROR, "no joint 'joint_6'")]),
         ('controllers.yaml', 'gp110_arm_controller:\n', 'arm:\n', [(WARNING, 'no parameters')]),
         ('controllers.yaml', 'goal_time: 0', 'goal_tim: 0', [(ERROR, "'constraints.goal_time'")]),
