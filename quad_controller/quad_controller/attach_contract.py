@@ -12,10 +12,12 @@ import sys
 
 from .exceptions import PolicyError, QuadControllerError
 from .policy import onnx_file
+from .policy.check import scale_rows
 from .policy.contract.document import ContractDocument, setting
 from .policy.contract.files import read_contract_file
 from .policy.contract.mjlab import CONTRACT_KEY, read_metadata
 from .policy.contract.model import build_contract
+from .policy.load import find_policy, SHIPPED
 from .policy.network import OnnxNetwork
 from .policy.report import table_text
 
@@ -24,18 +26,23 @@ def run(arguments: Sequence[str]) -> int:
     """Write a contract; return 0 when nothing of it is open."""
     options = _parser().parse_args(arguments)
     try:
-        document = _document(options.model, options.file, options.set)
+        model = find_policy(options.model)
+        document = _document(model, options.file, options.set)
         _print_table(document)
-        build_contract(document)
+        for row in scale_rows(build_contract(document), document):
+            sys.stdout.write(f'{row.verdict.value}: {row.subject} {row.found}\n')
         if options.dry_run:
             return 0
-        target = options.output or options.model
-        _write(options.model, target, document)
-        digest = onnx_file.read_model(target).digest
+        target = options.output or model
+        if target.parent == SHIPPED:
+            raise PolicyError(f'{model.name} is shipped: write another file (--output)')
+        _write(model, target, document)
+        written = onnx_file.read_model(target)
     except (QuadControllerError, OSError) as error:
         sys.stdout.write(f'{error}\n')
         return 1
-    sys.stdout.write(f'{target} has its contract, sha256 {digest}\n')
+    of = f' (with {", ".join(written.sides)})' if written.sides else ''
+    sys.stdout.write(f'{target} has its contract, sha256 {written.digest}{of}\n')
     return 0
 
 
@@ -86,7 +93,7 @@ def _parser() -> argparse.ArgumentParser:
         'order, frames and scales. Later files count before earlier ones, --set before all.',
         allow_abbrev=False,
     )
-    parser.add_argument('model', type=Path, help='ONNX file')
+    parser.add_argument('model', help='ONNX file, or the name of one that is shipped')
     parser.add_argument(
         'file',
         type=Path,

@@ -44,6 +44,7 @@ class FakeNetwork(OnnxNetwork):
         self.outputs: tuple[Port, ...] = (('actions', FLOAT, (1, joints)),)
         self.name, self.digest = 'test', 'abc'
         self.warnings: tuple[str, ...] = ()
+        self.sides: tuple[str, ...] = ()
         self.action: Floats = np.zeros((1, joints), np.float32)
         self.blind = False
         self.asked: list[Floats] = []

@@ -290,7 +290,7 @@ def rl_sar() -> Tool:
 
 
 def playground() -> Tool:
-    """MuJoCo Playground's joystick task, with a recurrent network."""
+    """MuJoCo Playground's Go1 joystick, with a recurrent network."""
 
     def observe(step: Step, last: Floats, _memory: list[Floats]) -> Floats:
         yawed = np.array([-1.0, -1.0, 1.0], np.float32)
@@ -300,7 +300,8 @@ def playground() -> Tool:
         )  # fmt: skip
 
     config = {'ctrl_dt': 0.02, 'sim_dt': 0.004, 'Kp': 10.0, 'Kd': 0.25, 'action_scale': 0.25,
-              'history_len': 1, 'action_repeat': 1}  # fmt: skip
+              'history_len': 1, 'command_config': {}, 'noise_config': {},
+              'pert_config': {}}  # fmt: skip
     return Tool(
         files={'config.json': json.dumps(config)},
         metadata={},

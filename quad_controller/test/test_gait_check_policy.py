@@ -55,7 +55,7 @@ def test_a_policy_that_only_stands_walks_nowhere(
     output = capsys.readouterr().out
     went = output.partition(' went ')[2]
     assert float(went.split()[0]) == pytest.approx(0.0, abs=0.02)
-    assert 'too slow: is it made for other servos' in output
+    assert 'hardly any: look at the command' in output
 
 
 def damped(path: Path) -> Path:

@@ -25,6 +25,7 @@ from quad_controller import (
 from quad_controller.attach_contract import run
 from quad_controller.policy.contract.document import document_of, read_yaml
 from quad_controller.policy.contract.files import read_contract_file
+from quad_controller.policy.contract.mjlab import read_metadata
 from quad_controller.policy.contract.model import build_contract, RecurrentState
 from quad_controller.policy.load import LoadedPolicy
 from quad_controller.policy.network import OnnxNetwork
@@ -129,6 +130,7 @@ def test_a_changed_side_file_changes_the_digest(tmp_path: Path) -> None:
     read = attached(tool, tmp_path)
     assert run(read) == 0
     first = load(path)
+    assert 'sha256 is of both' in str(first)
     side = tmp_path / 'policy.onnx.data'
     before = side.read_bytes()
     data = bytearray(before)
@@ -138,6 +140,9 @@ def test_a_changed_side_file_changes_the_digest(tmp_path: Path) -> None:
         load(path)
     assert run(read) == 0
     assert load(path).digest != first.digest
+    side.unlink()
+    with pytest.raises(PolicyError, match='copy that file along'):
+        load(path)
     path.write_bytes(path.read_bytes().replace(b'policy.onnx.data', b'../icy.onnx.data'))
     with pytest.raises(PolicyError, match='outside of its folder'):
         load(path)
@@ -273,7 +278,9 @@ def test_a_senseless_contract_is_refused(path: str, value: object, words: str) -
 def test_a_contract_of_nothing_asks_for_everything() -> None:
     """At once."""
     with pytest.raises(PolicyError) as refusal:
-        build_contract(document_of({}, 'test'))
+        build_contract(read_metadata({}))
+    assert 'mjlab' not in refusal.value.reason
+    assert 'attach_contract MODEL [FILE ...] --set' in refusal.value.reason
     for key in ('joints', 'default_positions', 'period', 'observation.terms', 'action.scale'):
         assert f'{key}: ' in refusal.value.reason
 
@@ -290,6 +297,19 @@ def test_a_contract_of_nothing_asks_for_everything() -> None:
             'config.yaml',
         ),
         ('config.yaml', 'go2: {observations: 5}', 'config.yaml'),
+        # Playground's Barkour, Go1 handstand, Spot
+        *(
+            (
+                'config.json',
+                f'{{ctrl_dt: 0.02, {more}}}',
+                'than the Go1 joystick',
+            )
+            for more in (
+                'obs_noise: 0.05',
+                'Kp: 35.0, noise_config: {scales: {linvel: 0.1}}',
+                'history_len: 3, noise_config: {}, pert_config: {}, command_config: {}',
+            )
+        ),
         (
             'env.yaml',
             'sim: {}\ndecimation: 4\nobservations: {policy: {a: {func: b:c, history_length: x}}}',
@@ -303,7 +323,7 @@ def test_a_file_of_no_tool_or_form_is_refused(
     """With the file, or what is looked for; no other error leaves."""
     (tmp_path / name).write_text(text)
     with pytest.raises(PolicyError, match=words):
-        read_contract_file(tmp_path / name)
+        build_contract(read_contract_file(tmp_path / name))
 
 
 def test_a_contract_beside_the_policy_counts(tmp_path: Path) -> None:
@@ -424,6 +444,26 @@ def test_a_model_is_written_whole_and_beside_its_weights(
     assert not any(other.parent.iterdir())
     assert run([*arguments, '--output', str(tmp_path / 'new.onnx')]) == 0
     assert load(tmp_path / 'new.onnx').contract.width == tool.width
+
+
+def test_a_shipped_policy_keeps_its_contract(capsys: pytest.CaptureFixture[str]) -> None:
+    """Its name prints the contract; writing one needs another file."""
+    assert run(['trot_ppo', '--dry-run']) == 0
+    assert run(['trot_ppo']) == 1
+    assert 'is shipped' in capsys.readouterr().out
+
+
+def test_a_contract_that_was_written_warns_of_three_decimals(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As often as it is written, until the scale is set."""
+    tool, key = TOOLS['mjlab'](), 'observation_terms_scale'
+    scales = tool.metadata[key].replace('0.050', '0.004')
+    write_network(replace(tool, metadata={**tool.metadata, key: scales}), tmp_path / 'policy.onnx')
+    for last in ([], [], ['--set', 'observation.terms.joint_vel.scale=0.004']):
+        assert run([*attached(tool, tmp_path), *last]) == 0
+        for text in (capsys.readouterr().out, str(load(tmp_path / 'policy.onnx').report)):
+            assert ('0.004, with three decimals' in text) == (not last)
 
 
 def test_clips_of_isaac_lab_are_matched_with_joints(tmp_path: Path) -> None:

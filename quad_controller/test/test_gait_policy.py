@@ -73,7 +73,7 @@ def check(network: FakeNetwork, options: PolicyOptions | None = None) -> LoadedP
           'observation_terms_flatten_history_dim': '1,1,1,1,0.000,1,1'}, 'must be flat'),
         ({'observation_terms_scale': '0.25,1.0'}, 'has 2 entries for 7 terms'),
         ({'observation_terms_scale': 'a,1,1,1,1,1,1'}, 'is not a list'),
-        ({'observation_terms_scale': '1,1,1,1,1,0.000,1'}, 'joint_vel.scale: 0: the policy'),
+        ({'observation_terms_scale': '1,1,1,1,1,0.000,1'}, 'joint_vel.scale: 0: the number'),
         ({'imu_frame': 'sideways'}, 'must be one of base, yawed'),
         ({'phase_period': '-1.0'}, 'phase_period -1.0 must be within 0.1 to 5'),
         ({'phase_period': '0.000001'}, 'phase_period'),
@@ -119,6 +119,7 @@ def test_a_policy_runs_at_the_rate_of_its_training_only(rate: float) -> None:
             {'observation_terms_scale': '1,1,1,1,1,0.005,1'},
             '0.005, with three decimals',
         ),
+        ({'action_scale': '0.004'}, '0.004, with three decimals'),
         ({'decimation': '4', 'latent_dim': '8'}, 'understood: decimation = 4, latent_dim = 8'),
         ({'phase_period': None}, f'0.4, of {VENDOR}'),
     ],
@@ -143,7 +144,7 @@ def test_shapes_and_answers_are_looked_at() -> None:
     blind = FakeNetwork(metadata())
     blind.blind = True  # as weights that training has driven to zero
     for network, reason in (
-        *((wide, 'input'), (two, 'input'), (wild, 'standing'), (bad, 'NaN')),
+        *((wide, 'input'), (two, 'export the actor alone'), (wild, 'standing'), (bad, 'NaN')),
         (blind, 'another observation'),
     ):
         with pytest.raises(PolicyError) as refusal:

@@ -15,7 +15,7 @@ from .contract import mjlab
 from .contract.document import ContractDocument
 from .contract.model import PolicyContract
 from .gains import gain_rows, ServoResponse
-from .network import FLOAT, Floats, observation_ports, OnnxNetwork
+from .network import FLOAT, Floats, observation_ports, OnnxNetwork, Port
 from .observation import observed_places
 from .report import Row, Verdict
 
@@ -29,6 +29,8 @@ MAX_LATENCY_RATIO = 0.25  # of the period
 PROBES, PROBE = 20, 0.1  # changes of an observation, and their deviation
 ROUNDED = 0.01  # a scale below is more than 5 % off where it has three decimals
 STATES = 'several: recurrent states are named as recurrence: {h_in: h_out, c_in: c_out}'
+NOT_ONE = 'several, and none is a recurrent state (no output has its shape): export the actor '
+NOT_ONE += 'alone, with its own observation'
 MIN_NEWEST = 0.1  # share of what the oldest step of a history does that the newest must do
 
 
@@ -59,10 +61,14 @@ def check_contract(
     )
     yield _shape('input', inputs, contract.width, terms)
     if len(inputs) > 1:
-        yield Row('input', 'one', STATES, Verdict.REFUSE)
+        recurs = {_sizes_of(port) for port in inputs} & {_sizes_of(port) for port in outputs}
+        yield Row('input', 'one', STATES if recurs else NOT_ONE, Verdict.REFUSE)
     yield _shape('output', outputs, count, f'{count} joints')
     if len(outputs) > 1:
         yield Row('output', 'one', 'several: name it with action.output', Verdict.REFUSE)
+    if network.sides:
+        found = f'in {", ".join(network.sides)} beside the file; the sha256 is of both'
+        yield Row('weights', 'any', found, Verdict.OK)
     for warning in network.warnings:
         yield Row('weights', 'in the file', warning, Verdict.WARN)
     yield from _recurrent(network, contract)
@@ -73,9 +79,8 @@ def check_contract(
     yield from _joints(contract.joint_names, robot, hold_missing=hold_missing)
     yield from _defaults(contract, robot, stand)
     largest = max((abs(scale) for scale in contract.action.scale), default=0.0)
-    fits = all(0.0 < abs(scale) <= MAX_SCALE for scale in contract.action.scale)
-    yield _row('action.scale', f'up to {MAX_SCALE:g} rad, not 0', f'{largest:g}', fits)
-    yield from _scales(contract, document)
+    yield _row('action.scale', f'up to {MAX_SCALE:g} rad', f'{largest:g}', largest <= MAX_SCALE)
+    yield from scale_rows(contract, document)
     yield from gain_rows(contract.gains, servo, period)
     yield from _commands(contract)
     if strange := mjlab.not_understood(metadata):
@@ -179,6 +184,11 @@ def _shape(
     return _row(what, f'float [1, {expected}] ({meaning})', found, fits)
 
 
+def _sizes_of(port: Port) -> tuple[int | None, ...]:
+    """Return the shape without the names of sizes that are open."""
+    return tuple(size if isinstance(size, int) else None for size in port[2])
+
+
 def _sizes(what: str, sizes: Mapping[str, float], expected: int) -> Iterator[Row]:
     for key, size in sizes.items():
         yield _row(f'{key} ({what})', f'{expected}', f'{size:g}', size == expected)
@@ -218,13 +228,13 @@ def _rates(
         yield _row('loop_rate', f'{expected}, or several times that', found, fits)
 
 
-def _scales(contract: PolicyContract, document: ContractDocument) -> Iterator[Row]:
+def scale_rows(contract: PolicyContract, document: ContractDocument) -> Iterator[Row]:
     """Refuse a scale of 0, and warn of those that three decimals have rounded."""
-    for term in contract.terms:
-        name = f'observation.terms.{term.name}.scale'
-        least = min(map(abs, term.scale), default=1.0)
+    scales = {f'observation.terms.{term.name}.scale': term.scale for term in contract.terms}
+    for name, scale in {**scales, 'action.scale': contract.action.scale}.items():
+        least = min(map(abs, scale), default=1.0)
         if least == 0.0:
-            found = '0: the policy would not observe it; exporters write 0.0004 as 0.000'
+            found = '0: the number would not count; exporters write 0.0004 as 0.000'
             yield Row(name, 'not 0', found, Verdict.REFUSE)
         elif least < ROUNDED and document.origins.get(name) == mjlab.FILE:
             found = f'{least:g}, with three decimals: up to {0.0005 / least:.0%} off'

@@ -26,6 +26,7 @@ class OnnxNetwork:
     Attributes:
         name: Of its file.
         digest: SHA-256 of its file and of those that its weights lie in.
+        sides: Names of the files that its weights lie in.
         metadata: What its file has.
         inputs: Name, type and shape of each input.
         outputs: The same of each output.
@@ -42,7 +43,7 @@ class OnnxNetwork:
             PolicyError: There is no such file, no ONNX Runtime, or it cannot be loaded.
         """
         model = onnx_file.read_model(path)
-        self.name, self.digest = path.name, model.digest
+        self.name, self.digest, self.sides = path.name, model.digest, tuple(model.sides)
         session = _session(path, model)
         self.metadata: Mapping[str, str] = dict(session.get_modelmeta().custom_metadata_map)
         self.warnings = _check_weights(path, model, {} if new_weights else self.metadata)

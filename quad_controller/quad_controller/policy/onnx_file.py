@@ -100,7 +100,9 @@ def read_model(path: Path) -> OnnxModel:
         PolicyError: A file cannot be read, or lies outside of the folder of the first one.
     """
     data = _read(path)
-    return OnnxModel(data, {name: _read(file) for name, file in side_files(path, data).items()})
+    lack = f'; weights of {path.name} lie there: copy that file along'
+    sides = side_files(path, data).items()
+    return OnnxModel(data, {name: _read(file, lack) for name, file in sides})
 
 
 def side_files(path: Path, data: bytes) -> dict[str, Path]:
@@ -215,8 +217,8 @@ def _number(value: int) -> bytes:
     return bytes(encoded)
 
 
-def _read(path: Path) -> bytes:
+def _read(path: Path, remedy: str = '') -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise PolicyError(f'policy {path}: {error.strerror}') from error
+        raise PolicyError(f'policy {path}: {error.strerror}{remedy}') from error

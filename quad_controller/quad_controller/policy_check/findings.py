@@ -41,7 +41,9 @@ def astray(went: Velocity, commanded: Velocity) -> Iterator[str]:
         most = MAX_EXCESS if got * want > want**2 else MAX_LACK
         if abs(got - want) <= max(most * abs(want), drift):
             continue
-        if got * want < 0.0:
+        if abs(got) <= drift:
+            hint = 'hardly any: look at the command, action.scale, and the servos (--servo)'
+        elif got * want < 0.0:
             hint = 'the other way: look at the order of its joints, and at signs (scales below 0)'
         elif abs(got) < abs(want):
             hint = 'too slow: is it made for other servos (--servo), or a smaller scale?'

@@ -16,6 +16,7 @@ would change observations or actions is refused.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 import math
 import re
 from typing import Any
@@ -88,7 +89,11 @@ def read_metadata(values: Mapping[str, str]) -> ContractDocument:
         document.values, document.origins, HINTS, tuple(refusals + _layouts(values))
     )
     if CONTRACT_KEY in values:
-        document = read_yaml(values[CONTRACT_KEY], f'metadata {CONTRACT_KEY}').over(document)
+        attached = read_yaml(values[CONTRACT_KEY], f'metadata {CONTRACT_KEY}')
+        # what came from the exporter still has its three decimals
+        lines = values[CONTRACT_KEY].splitlines()
+        rounded = {path: FILE for path in attached.origins if f'# {path}: {FILE}' in lines}
+        document = replace(attached, origins={**attached.origins, **rounded}).over(document)
     return document
 
 
@@ -97,7 +102,7 @@ HINTS = {
     'default_positions': 'the file has no metadata default_joint_pos',
     'action.scale': 'the file has no metadata action_scale',
     'observation.terms': 'the file has no metadata observation_names',
-    'period': 'no exporter of mjlab writes it',
+    'period': 'the file has no metadata step_dt',
 }
 
 

@@ -207,6 +207,10 @@ class PolicyContract:
 
 T = TypeVar('T')
 E = TypeVar('E', bound=Enum)
+HOW = (
+    'set what is open in a file (check_policy --contract FILE, parameter policy_contract), or in '
+    'the model: attach_contract MODEL [FILE ...] --set KEY=VALUE'
+)
 MAX_HISTORY = 200  # steps; more is a mistake
 MAX_POINTS = 10_000  # of a constant or a scan
 
@@ -322,6 +326,7 @@ def build_contract(document: ContractDocument) -> PolicyContract:
     problems = [*document.refusals, *top.wrong]
     if top.open:
         problems.append(f'open: {"; ".join(top.open)}')
+        problems.append(HOW)
     if problems:
         raise PolicyError(
             'the contract of the policy is not complete:\n'

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Contracts from MuJoCo Playground: ``config.json`` of a training (its joystick tasks).
+"""Contracts from MuJoCo Playground: ``config.json`` of a training (the Go1 joystick).
 
-The order of the observation is that of the joystick tasks' ``state``: it stands in their code, not
+The order of the observation is that of the Go1 joystick's ``state``: it stands in their code, not
 in the file. So do the names of the joints and the default pose (keyframe ``home``), and the frame
 of the IMU's site: those are asked for.
 """
@@ -24,7 +24,9 @@ TERMS: dict[str, Values] = {
     'last_act': {'source': Source.LAST_ACTION.value},
     'command': {'source': Source.COMMAND.value},
 }
-JOYSTICK = 'joystick task of MuJoCo Playground'
+JOYSTICK = 'Go1 joystick of MuJoCo Playground'
+GO1_KEYS = {'command_config', 'history_len', 'noise_config', 'pert_config'}
+"""No other task of Playground 0.2.0 has all of these."""
 HINTS = {
     'joints': 'order of the actuators in the MJCF file of the training',
     'default_positions': 'keyframe "home" of the MJCF file of the training',
@@ -48,9 +50,8 @@ def read_config(values: Mapping[str, Any], origin: str) -> ContractDocument:
     if gains:
         contract['gains'] = gains
     refusals: tuple[str, ...] = ()
-    if values.get('history_len', 1) != 1:
-        length = values['history_len']
-        refusals = (f'{origin}: history_len {length} is of another task; write its contract',)
+    if not values.keys() >= GO1_KEYS or values['history_len'] != 1:
+        refusals = (f'{origin} is of another task than the Go1 joystick; write its contract',)
     terms = document_of(
         {'observation': {'terms': {k: dict(v) for k, v in TERMS.items()}}}, JOYSTICK
     )
