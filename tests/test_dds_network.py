@@ -29,10 +29,11 @@ HALT = '/panda_joint1/halt'
 ROBOT, DESK = '10.77.0.1', '10.77.0.2'
 SERVER_VARIABLE = 'ROS_DISCOVERY_SERVER'
 STOP = """
-import sys, time, urllib.request
+import contextlib, sys, time, urllib.error, urllib.request
 while True:
     request = urllib.request.Request(sys.argv[1] + '/stop', headers={'X-Robot-Stop': '1'})
-    urllib.request.urlopen(request, timeout=10.0).read()
+    with contextlib.suppress(urllib.error.HTTPError):  # what stops is not known yet
+        urllib.request.urlopen(request, timeout=10.0).read()
     time.sleep(0.5)
 """
 LOOK = 3.0  # [s] a host that is open is seen in a tenth of that

@@ -201,7 +201,13 @@ class NodeRig(Rig):
             self.receive('/joint_states', 3)
             return len(self.peer.commands) > before
 
+        def is_quiet() -> bool:  # on a busy machine commands are still on their way
+            sent = len(self.peer.commands)
+            self.receive('/joint_states', 10)
+            return len(self.peer.commands) == sent
+
         self.client.spin_until(is_commanded, TIMEOUT, 'the last command')
+        self.client.spin_until(is_quiet, TIMEOUT, 'the end of commands')
         self.peer.angles.update(dict.fromkeys(self.peer.angles, 0.0))
         self.peer.commands.clear()
         for messages in self.received.values():

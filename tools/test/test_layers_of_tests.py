@@ -7,6 +7,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 from pathlib import Path
+import re
 
 import pytest
 
@@ -34,7 +35,7 @@ def families() -> Iterator[dict[str, int]]:
         yield {
             name.strip(' ()'): layer
             for layer, names in enumerate(contract['layers'])
-            for name in names.split('|')
+            for name in re.split('[|:]', names)
         }
 
 
@@ -60,7 +61,7 @@ def folders(family: dict[str, int]) -> dict[Path, int]:
     found: dict[Path, int] = {}
     for name, layer in family.items():
         (module,) = [
-            *ROOT.glob(f'{name}/{name}/__init__.py'),
+            *ROOT.glob(f'*/{name}/__init__.py'),
             *ROOT.glob(f'libraries/*/{name}/__init__.py'),
         ]
         folder = module.parents[1]
