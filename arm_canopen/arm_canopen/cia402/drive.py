@@ -195,8 +195,8 @@ class Drive:
         if self.view.state in POWERED and not self.view.stands:
             self.stop.begin()
 
-    async def lead_to_rest(self, reason: str, severity: Severity = Severity.ERROR) -> None:
-        """Bring it to rest and take its power away, before its device is configured.
+    async def lead_to_rest(self, reason: str, severity: Severity = Severity.ERROR) -> bool:
+        """Bring it to rest and take its power away; return whether that was seen.
 
         What TPDOs do not show is read by SDO; one that does not answer is left as it is.
         """
@@ -206,8 +206,12 @@ class Drive:
             self._note_interruption()
             self._take_out(Refusal(RefusalCause.OFFLINE, reason), reason, severity)
             await self.stop.ended()
+            seen = self.stop.disabled and self.stop.rests
+        else:
+            seen = state is not DriveState.UNKNOWN
         if not self.node.operational:
             self.view.lose_sight()
+        return seen
 
     def _take_out(self, refusal: Refusal, text: str, severity: Severity = Severity.ERROR) -> None:
         """Stop and disable it; only the first cause is reported until it is enabled again."""

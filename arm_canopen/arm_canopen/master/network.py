@@ -264,23 +264,29 @@ class Network:
             return self.scheduler.spawn(self._all(each))
         return self._nmt.send(command, node_id)
 
-    async def command_nmt(self, command: NmtCommand, node_id: int) -> None:
-        """Send a command of a client, as :meth:`send_nmt`.
+    async def command_nmt(self, command: NmtCommand, node_id: int) -> str:
+        """Send a command of a client, as :meth:`send_nmt`; return what was done, in words.
 
         Axes that it would take from the master while they move are brought to rest before.
 
         Raises:
             BusError: The bus has not taken the command.
         """
+        unseen: list[str] = []
         if command is not NmtCommand.START:
             everyone = node_id in (ALL_NODES, self.config.master.node_id)
-            ends = [
-                node.bring_to_rest(f'NMT {command.name} was commanded', Severity.WARNING)
+            led = {
+                node.name: node.bring_to_rest(
+                    f'NMT {command.name} was commanded', Severity.WARNING
+                )
                 for node in self.nodes.values()
                 if node.operational and (everyone or node.config.node_id == node_id)
-            ]
-            await self.scheduler.gather(ends)
+            }
+            ends = zip(led, await self.scheduler.gather(list(led.values())), strict=True)
+            unseen = [name for name, seen in ends if not all(seen)]
         await self.send_nmt(command, node_id)
+        warning = f'; not seen to stand before: {", ".join(unseen)}' if unseen else ''
+        return f'NMT {command.name} sent to node {node_id}{warning}'
 
     async def _all(self, sent: Sequence[Promise[None]]) -> None:
         await self.scheduler.gather(sent)

@@ -29,7 +29,7 @@ FIRST_PAUSE, LONGEST_PAUSE = 0.5, 30.0  # [s] before a device that drops out is 
 STABLE_TIME = 10.0  # [s] in operation after which a drop is the first one again
 
 
-LeadToRest: TypeAlias = Callable[[str, Severity], Coroutine[Promise[Any], None, None]]
+LeadToRest: TypeAlias = Callable[[str, Severity], Coroutine[Promise[Any], None, bool]]
 
 
 class BootPhase(Enum):
@@ -112,10 +112,10 @@ class RemoteNode:
         # called when it was lost by itself; what an NMT command does to it is no loss
         self.on_gone: Callable[[], None] = lambda: None
         # its drivers, which bring what moves to rest and take its power away, for a reason that
-        # is reported with a severity; each returns when that has ended, well or not
+        # is reported with a severity; each returns whether that was seen
         self.lead_to_rest: list[LeadToRest] = []
         self._missing = ''  # the life sign, in words
-        self._resting: Promise[list[None]] | None = None
+        self._resting: Promise[list[bool]] | None = None
         # its drivers, which stop because a step of the cycle failed for this device; each gets the
         # error, and the RPDO that cannot be sent for it, if it is one
         self.on_failed: list[Callable[[Exception, SentRpdo | None], None]] = []
@@ -256,8 +256,8 @@ class RemoteNode:
 
     def bring_to_rest(
         self, reason: str, severity: Severity = Severity.ERROR
-    ) -> Promise[list[None]]:
-        """Bring all its axes to rest at the same time; done when the last one has ended."""
+    ) -> Promise[list[bool]]:
+        """Bring all its axes to rest at the same time; for each, whether that was seen."""
         ends = [self._scheduler.spawn(lead(reason, severity)) for lead in self.lead_to_rest]
         return self._scheduler.spawn(self._scheduler.gather(ends))
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from concurrent.futures import Future
 from functools import partial
 from typing import Any
@@ -126,9 +126,8 @@ class DeviceNode(Node):
     def _offer_nmt(self, name: str, command: NmtCommand) -> None:
         node_id = self.device.config.node_id
 
-        async def send() -> str:
-            await self._thread.network.command_nmt(command, node_id)
-            return f'NMT {command.name} sent to node {node_id}'
+        def send() -> Coroutine[Promise[Any], None, str]:
+            return self._thread.network.command_nmt(command, node_id)
 
         self.offer_trigger(f'~/{name}', lambda: self._thread.run_coroutine(send))
 

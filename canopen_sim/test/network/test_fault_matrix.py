@@ -769,6 +769,17 @@ def test_an_nmt_command_of_a_client_leaves_when_the_axis_stands(
     arm.net.do(FAULTY, 'enable')
 
 
+def test_an_nmt_command_says_which_axis_was_not_seen_to_stand() -> None:
+    """It leaves all the same: a reset is what helps a drive that takes no other command."""
+    arm = slow_heartbeat(0.1)
+    move_far(arm, OperationMode.PROFILE_VELOCITY)
+    node_id = arm.net.network.nodes[FAULTY].config.node_id
+    arm.net.wire.loses = lambda _, frame: frame.can_id in {0x200 + node_id, 0x600 + node_id}
+    sent = arm.net.network.command_nmt(NmtCommand.RESET_NODE, node_id)
+    said = arm.net.result(arm.net.network.scheduler.spawn(sent), 30.0)
+    assert said == f'NMT RESET_NODE sent to node {node_id}; not seen to stand before: {FAULTY}'
+
+
 def move_far(arm: Arm, mode: OperationMode) -> None:
     """Set both drives in a motion that does not end by itself."""
     arm.move(mode)
