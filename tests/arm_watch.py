@@ -15,9 +15,9 @@ import threading
 import time
 
 from arm_canopen import DriveState
-from arm_canopen.can import Frame
-from arm_canopen.standard import drive_state, rpdo_default, tpdo_default
 from arm_model import JointLimits
+from canopen_core.can import Frame
+from canopen_core.standard import drive_state, rpdo_default, tpdo_default
 
 INCREMENTS = 1000.0
 """Of a radian, as the Panda's bus.yml has it."""

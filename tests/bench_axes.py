@@ -24,7 +24,7 @@ import psutil
 from sensor_msgs.msg import JointState
 from simulated_arm import panda_bus, SimulatedArm
 
-from arm_canopen.standard import ALL_NODES, CobId
+from canopen_core.standard import ALL_NODES, CobId
 
 if TYPE_CHECKING:
     from processes import RunningProcess

@@ -23,12 +23,12 @@ import psutil
 from simulated_arm import SimulatedArm
 
 from arm_canopen import Event
-from arm_canopen.can import open_bus
 from arm_canopen.cia402.drive import Drive
 from arm_canopen.cia402.motion_group import MotionGroup
 from arm_canopen.config import load_bus
 from arm_canopen.master.network import Network
 from arm_canopen.master.runner import NetworkThread
+from canopen_core.can import open_bus
 
 if TYPE_CHECKING:
     from isolation import Isolation

@@ -31,14 +31,14 @@ from std_msgs.msg import Float64MultiArray
 
 from arm_bringup.description import expand_xacro
 from arm_bringup.robots import installed_robots_folder
-from arm_canopen.can import Frame
-from arm_canopen.standard import CobId
 from arm_model import Array, load_limits, RobotModel
 from arm_servo import JogRequest, MotionCore, SetPoint, TwistCommand
 from arm_servo.core.gateway import CommandGateway, start_worker
 from arm_servo.io.following import FollowingLimits, FollowingWatch
 from arm_servo.io.joint_feedback import JointFeedback
 from arm_servo.io.motion_thread import MotionCycle, MotionThread
+from canopen_core.can import Frame
+from canopen_core.standard import CobId
 from realtime_loop import raise_priority
 
 if TYPE_CHECKING:

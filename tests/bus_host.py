@@ -14,8 +14,8 @@ import socket
 import sys
 import time
 
-from arm_canopen.can import Frame, open_bus
-from arm_canopen.can.multicast import encode
+from canopen_core.can import Frame, open_bus
+from canopen_core.can.multicast import encode
 
 PERIOD = 0.05  # [s]
 

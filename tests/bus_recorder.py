@@ -7,8 +7,8 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING
 
-from arm_canopen.can import Frame, open_bus
-from arm_canopen.standard import CobId, drive_state
+from canopen_core.can import Frame, open_bus
+from canopen_core.standard import CobId, drive_state
 
 if TYPE_CHECKING:
     from types import TracebackType

@@ -12,7 +12,7 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
-from arm_canopen.can import Bus, Frame, open_bus
+from canopen_core.can import Bus, Frame, open_bus
 
 if TYPE_CHECKING:
     from types import TracebackType

@@ -20,9 +20,9 @@ from sdo_probe import is_enabled, read_position
 from simulated_arm import JOINTS
 
 from arm_bringup.description import expand_xacro
-from arm_canopen.can import open_bus
 from arm_model import JointLimits, load_limits, RobotModel
 from arm_watch import ArmWatch
+from canopen_core.can import open_bus
 
 if TYPE_CHECKING:
     from types import TracebackType

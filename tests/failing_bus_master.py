@@ -10,10 +10,10 @@ import threading
 from typing import TYPE_CHECKING
 
 from arm_canopen import BusError, run_master
-from arm_canopen.can.socket_bus import SocketBus
+from canopen_core.can.socket_bus import SocketBus
 
 if TYPE_CHECKING:
-    from arm_canopen.can import Frame
+    from canopen_core.can import Frame
 
 DOWN = 'the bus went down'
 

@@ -17,6 +17,7 @@ READMES = (
     'arm_planning',
     'arm_servo',
     'arm_trajectory',
+    'canopen_core',
     'canopen_sim',
     'canopen_tools',
     'quad_controller',

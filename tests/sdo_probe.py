@@ -8,11 +8,11 @@ import time
 from typing import TYPE_CHECKING
 
 from arm_canopen import DriveState
-from arm_canopen.can import Frame
-from arm_canopen.standard import CobId, drive_state
+from canopen_core.can import Frame
+from canopen_core.standard import CobId, drive_state
 
 if TYPE_CHECKING:
-    from arm_canopen.can import Bus
+    from canopen_core.can import Bus
 
 STATUSWORD, POSITION = 0x6041, 0x6064
 TIMEOUT = 2.0

@@ -29,8 +29,8 @@ import psutil
 from simulated_arm import JOINTS
 from simulated_quad import SimulatedQuad
 
-from arm_canopen.can import open_bus
-from arm_canopen.standard import CobId
+from canopen_core.can import open_bus
+from canopen_core.standard import CobId
 from quad_msgs.srv import InjectFault
 
 if TYPE_CHECKING:

@@ -20,15 +20,15 @@ from sdo_probe import is_enabled, read_position
 from std_srvs.srv import SetBool
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from arm_canopen.can import open_bus
 from arm_msgs.srv import InjectFault
+from canopen_core.can import open_bus
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from isolation import Isolation
 
-    from arm_canopen.can import Bus
+    from canopen_core.can import Bus
 
 pytestmark = pytest.mark.scenario
 

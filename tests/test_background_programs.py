@@ -19,7 +19,7 @@ import pytest
 from ros_client import RosClient
 from std_msgs.msg import String
 
-from arm_canopen.can import open_bus
+from canopen_core.can import open_bus
 from canopen_tools.cli.main import INTERRUPTED
 from quad_pty_peer import PtyPeer
 

@@ -16,9 +16,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from simulated_arm import SimulatedArm
 
-from arm_canopen.can import read_log
-from arm_canopen.standard import CobId
 from arm_msgs.srv import InjectFault
+from canopen_core.can import read_log
+from canopen_core.standard import CobId
 
 if TYPE_CHECKING:
     from isolation import Isolation

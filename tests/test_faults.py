@@ -13,7 +13,7 @@ from canopen_interfaces.srv import COTargetDouble
 import pytest
 from simulated_arm import JOINTS, SimulatedArm
 
-from arm_canopen.standard import CobId
+from canopen_core.standard import CobId
 
 if TYPE_CHECKING:
     from isolation import Isolation

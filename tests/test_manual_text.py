@@ -23,6 +23,7 @@ SOURCES = (
     'arm_bringup/arm_bringup',
     'arm_canopen/arm_canopen',
     'arm_servo/arm_servo',
+    'canopen_core/canopen_core',
     'canopen_sim/canopen_sim',
     'canopen_tools/canopen_tools',
     'libraries/ros_runtime/process_supervisor',

@@ -24,8 +24,9 @@ print(*{name.partition('.')[0] for name in sys.modules})
 CORE_LOADED = """
 import importlib, pkgutil, sys
 import arm_canopen
-for part in ('cia402', 'config', 'joints', 'master', 'standard'):
-    package = importlib.import_module(f'arm_canopen.{part}')
+parts = [f'arm_canopen.{part}' for part in ('cia402', 'config', 'joints', 'master')]
+for part in (*parts, 'canopen_core.eds', 'canopen_core.standard'):
+    package = importlib.import_module(part)
     for module in pkgutil.iter_modules(package.__path__, f'{package.__name__}.'):
         importlib.import_module(module.name)
 print(*{name.partition('.')[0] for name in sys.modules})

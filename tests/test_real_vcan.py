@@ -14,7 +14,7 @@ import pytest
 from simulated_arm import panda_bus
 from user_mode_linux import run_in_guest, what_is_missing
 
-from arm_canopen.can import can_interfaces
+from canopen_core.can import can_interfaces
 
 if TYPE_CHECKING:
     from isolation import Isolation

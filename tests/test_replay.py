@@ -18,8 +18,8 @@ from ros_client import RosClient
 from sensor_msgs.msg import JointState
 from simulated_arm import JOINTS, panda_bus, SimulatedArm
 
-from arm_canopen.can import read_log
 from arm_msgs.srv import InjectFault
+from canopen_core.can import read_log
 
 if TYPE_CHECKING:
     from isolation import Isolation

@@ -20,7 +20,7 @@ import pytest
 from readme_folder import READMES, run_examples
 
 from arm_canopen import open_bus
-from arm_canopen.can import Frame
+from canopen_core.can import Frame
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group('without-ros')]
 
@@ -45,6 +45,7 @@ IMPORTED = [
     'arm_planning',
     'arm_servo',
     'arm_trajectory',
+    'canopen_core',
     'canopen_sim',
     'canopen_tools',
     'first_motion',

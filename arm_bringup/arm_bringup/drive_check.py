@@ -20,7 +20,7 @@ def check_drives(
     place: str, drives: Mapping[str, AxisUnits | None], limits: JointLimits
 ) -> Iterable[Finding]:
     """Check speed limit and decelerations of each drive; None where these are unknown."""
-    from arm_canopen.standard import Index
+    from canopen_core.standard import Index
 
     rows = zip(limits.names, limits.velocity, limits.acceleration, strict=True)
     for name, velocity, acceleration in rows:

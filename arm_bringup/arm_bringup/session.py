@@ -161,7 +161,7 @@ def own_bus(wanted: str | None, *, simulate: bool) -> Iterator[str]:
     Raises:
         StartError: Another bring-up is on it.
     """
-    from arm_canopen.can import AUTO, auto_names, resolve_name
+    from canopen_core.can import AUTO, auto_names, resolve_name
 
     wanted = wanted or (SIMULATED_BUS if simulate else REAL_BUS)
     names = auto_names() if simulate and wanted == AUTO else iter([resolve_name(wanted)])

@@ -33,7 +33,7 @@ LINES = {
 def workspace(tmp_path: Path, prefix: Path, isolation: Isolation) -> SmallWorkspace:
     """Install the small programs, in a ROS domain that nobody else is in."""
     libraries = ('libraries/recording', 'libraries/robot_primitives', 'libraries/ros_runtime')
-    sources = ('arm_bringup', 'arm_canopen', 'canopen_sim', *libraries)
+    sources = ('arm_bringup', 'arm_canopen', 'canopen_core', 'canopen_sim', *libraries)
     workspace = SmallWorkspace(tmp_path, 'arm_bringup', LINES, sources, [prefix])
     workspace.environment['ROS_DOMAIN_ID'] = str(isolation.domain_id)
     return workspace

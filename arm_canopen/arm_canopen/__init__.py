@@ -3,7 +3,8 @@
 """CANopen master and CiA 402 drives, for ROS 2 and, as :class:`CanopenMaster`, without it.
 
 The names here are the public API. Those that need ROS, or take long, are loaded when they are
-used. Public besides, for tools and simulated devices: `standard`, `config` and `can`.
+used. Public besides: `config`, which reads bus.yml. Buses, tables and EDS files are those of
+:mod:`canopen_core`.
 """
 
 from __future__ import annotations
@@ -11,12 +12,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any, TYPE_CHECKING
 
-from .can import open_bus
-from .cia402.motion import AxisFeedback, MotionSource, Setpoint
-from .cia402.refusal import Refusal, RefusalCause
-from .config import load_bus
-from .config.model import BusConfig, NodeConfig
-from .exceptions import (
+from canopen_core import (
     BootError,
     BusError,
     CanopenError,
@@ -31,7 +27,13 @@ from .exceptions import (
     SdoError,
     SdoTimeoutError,
 )
-from .standard.drive import DriveState, OperationMode
+from canopen_core.can import open_bus
+from canopen_core.standard import DriveState, OperationMode
+
+from .cia402.motion import AxisFeedback, MotionSource, Setpoint
+from .cia402.refusal import Refusal, RefusalCause
+from .config import load_bus
+from .config.model import BusConfig, NodeConfig
 
 if TYPE_CHECKING:
     from .library.canopen_drive import CanopenDrive

@@ -16,10 +16,10 @@ import time
 from black_box_cost import cycle_beside
 
 from arm_canopen import load_bus
-from arm_canopen.can import Frame
-from arm_canopen.can.frame_ring import RECORD_SIZE
-from arm_canopen.can.load import BusLoad
 from arm_canopen.library.bus_recording import BusRecording
+from canopen_core.can import Frame
+from canopen_core.can.frame_ring import RECORD_SIZE
+from canopen_core.can.load import BusLoad
 
 BUS = Path(__file__).parents[2] / 'arm_bringup' / 'robots' / 'panda' / 'bus.yml'
 WINDOW = 60.0  # [s]

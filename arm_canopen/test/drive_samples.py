@@ -10,8 +10,15 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from arm_canopen.config import BusConfig, load_eds, MasterConfig, NodeConfig, PdoConfig, SdoWrite
-from arm_canopen.standard import MappedObject, ObjectDictionary, rpdo_default, tpdo_default
+from arm_canopen.config import (
+    BusConfig,
+    MasterConfig,
+    NodeConfig,
+    PdoConfig,
+    SdoWrite,
+)
+from canopen_core.eds import load_eds
+from canopen_core.standard import MappedObject, ObjectDictionary, rpdo_default, tpdo_default
 
 DRIVE_EDS = Path(__file__).parents[1] / 'eds' / 'cia402_drive.eds'
 PERIOD = 0.01  # [s]

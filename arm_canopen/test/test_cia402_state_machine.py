@@ -15,7 +15,7 @@ from arm_canopen.cia402.state_machine import (
     next_command,
     TARGETS,
 )
-from arm_canopen.standard import drive_state
+from canopen_core.standard import drive_state
 
 S = DriveState
 

@@ -10,21 +10,14 @@ import re
 import shutil
 from typing import NamedTuple
 
-from config_samples import (
-    added,
-    BUS,
-    DRIVE_ROWS,
-    eds_text,
-    load_text,
-    Row,
-    TWO_AXES_EDS,
-    write_bus,
-)
+from config_samples import added, BUS, load_text, TWO_AXES_EDS, write_bus
+from eds_samples import DRIVE_ROWS, eds_text, Row
 import pytest
 
-from arm_canopen.config import check_file, load_bus, Problem
+from arm_canopen.config import check_file, load_bus
 from arm_canopen.config.model.checks import check_bus, Report
 from arm_canopen.config.model.checks.drives import period_setting
+from canopen_core import Problem
 
 HERE = '# <-'
 """Marks the line that a problem must name, the first one of a piece where there is none."""

@@ -9,7 +9,8 @@ from pathlib import Path
 import re
 from typing import Any, NamedTuple
 
-from config_samples import DRIVE_ROWS, eds_text, load_text, Row
+from config_samples import load_text
+from eds_samples import DRIVE_ROWS, eds_text, Row
 import pytest
 import yaml
 

@@ -10,18 +10,8 @@ from pathlib import Path
 import shutil
 from typing import Any
 
-from config_samples import (
-    added,
-    ARTICLE_BUS,
-    BUS,
-    DRIVE_ROWS,
-    eds_text,
-    errors_of,
-    load_text,
-    Row,
-    TWO_AXES_EDS,
-    write_bus,
-)
+from config_samples import added, ARTICLE_BUS, BUS, errors_of, load_text, TWO_AXES_EDS, write_bus
+from eds_samples import DRIVE_ROWS, eds_text, Row
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -32,16 +22,16 @@ from arm_canopen.config import (
     DEFAULT_DRIVE,
     Identity,
     load_bus,
-    load_eds,
     NodeConfig,
     PdoConfig,
-    Place,
     SdoWrite,
 )
 from arm_canopen.config.model.drive import RecoveryPolicy
 from arm_canopen.config.read.document import Item, Scalar, ScalarKind, YamlMap
 from arm_canopen.config.resolve.layout import merge_device
-from arm_canopen.standard import CAN_ID_MASK, DataType
+from canopen_core import Place
+from canopen_core.eds import load_eds
+from canopen_core.standard import CAN_ID_MASK, DataType
 
 PACKAGE = Path(__file__).parents[1]
 

@@ -7,10 +7,12 @@ from pathlib import Path
 import random
 
 from config_mutations import mutated
-from config_samples import ARTICLE_BUS, BUS, DRIVE_ROWS, eds_text, outcome, write_bus
+from config_samples import ARTICLE_BUS, BUS, outcome, write_bus
+from eds_samples import DRIVE_ROWS, eds_text
 import pytest
 
-from arm_canopen.config import check_file, load_eds
+from arm_canopen.config import check_file
+from canopen_core.eds import load_eds
 
 pytestmark = pytest.mark.slow
 

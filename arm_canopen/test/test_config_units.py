@@ -9,17 +9,9 @@ import re
 from types import SimpleNamespace
 from typing import cast
 
-from config_samples import (
-    added,
-    ARTICLE_BUS,
-    DRIVE_ROWS,
-    eds_text,
-    FACTOR_ROWS,
-    load_text,
-    Row,
-    write_bus,
-)
+from config_samples import added, ARTICLE_BUS, load_text, write_bus
 from drive_samples import SCALE
+from eds_samples import DRIVE_ROWS, eds_text, FACTOR_ROWS, Row
 import pytest
 
 from arm_canopen import DriveError, OperationMode
@@ -29,7 +21,7 @@ from arm_canopen.cia402.target_limits import check_target
 from arm_canopen.cia402.units import Units
 from arm_canopen.config import AxisUnits, check_file, DriveConfig, rate_units, UnitRule
 from arm_canopen.config.model.checks import check_bus
-from arm_canopen.standard import Index
+from canopen_core.standard import Index
 
 JOINT = 'joint1'
 POSITION, VELOCITY, TORQUE = (

@@ -13,10 +13,10 @@ from config_samples import BUS, load_text
 import pytest
 
 from arm_canopen import DriveState, Event, EventKind, Severity
-from arm_canopen.can import Frame
 from arm_canopen.library.bus_replay import BusReplay, unknown_scales
-from arm_canopen.standard import NmtState
 from black_box import LogPlayer
+from canopen_core.can import Frame
+from canopen_core.standard import NmtState
 
 PERIOD = 0.01  # [s] of SYNC
 ENABLED, FAULT = 0x1237, 0x1218  # statuswords

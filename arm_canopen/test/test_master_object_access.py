@@ -17,7 +17,7 @@ from arm_canopen.master.object_access import (
     raw_from_bytes,
     raw_from_number,
 )
-from arm_canopen.standard import (
+from canopen_core.standard import (
     byte_length,
     DataType,
     decode,

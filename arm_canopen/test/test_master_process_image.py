@@ -13,11 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.can import Frame
 from arm_canopen.config import PdoConfig
 from arm_canopen.master.process_image import ProcessImage, ReceivedTpdo, SyncRound
 from arm_canopen.master.remote_objects import start_value
-from arm_canopen.standard import DataType, is_controlword, MappedObject
+from canopen_core.can import Frame
+from canopen_core.standard import DataType, is_controlword, MappedObject
 
 CONTROLWORD, MODE, TARGET, VELOCITY = 0x6040, 0x6060, 0x607A, 0x60FF
 TPDOS = (

@@ -13,12 +13,12 @@ import time
 import pytest
 
 from arm_canopen import BusError
-from arm_canopen.can import Frame, VirtualBus, VirtualWire
 from arm_canopen.config import BusConfig, MasterConfig
 from arm_canopen.master.network import Network
 from arm_canopen.master.runner import Clock, NetworkThread
 from arm_canopen.master.scheduler import Promise
-from arm_canopen.standard import CobId
+from canopen_core.can import Frame, VirtualBus, VirtualWire
+from canopen_core.standard import CobId
 
 TIMEOUT = 10.0  # [s] deadline for what takes milliseconds
 

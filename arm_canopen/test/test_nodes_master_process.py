@@ -24,10 +24,10 @@ from arm_canopen import (
     MasterProcess,
     Severity,
 )
-from arm_canopen.can import VirtualBus, VirtualWire
 from arm_canopen.config import BusConfig, MasterConfig
 from arm_canopen.master.runner import NetworkThread
 from arm_canopen.nodes import master
+from canopen_core.can import VirtualBus, VirtualWire
 
 DEADLINE = 10.0  # [s] for what takes milliseconds
 CONFIG = BusConfig(Path('bus.yml'), MasterConfig(1, cycle_period=0.005), ())

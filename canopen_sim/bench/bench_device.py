@@ -13,9 +13,9 @@ import math
 from pathlib import Path
 from time import process_time
 
-from arm_canopen.can import Frame
-from arm_canopen.config import load_eds
-from arm_canopen.standard import DownloadRequest
+from canopen_core.can import Frame
+from canopen_core.eds import load_eds
+from canopen_core.standard import DownloadRequest
 from canopen_sim import DeviceHost
 
 EDS = Path(__file__).parents[2] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'

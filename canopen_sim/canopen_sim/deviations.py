@@ -16,7 +16,7 @@ from functools import partial
 import re
 from typing import NamedTuple
 
-from arm_canopen.standard import AbortCode, object_address
+from canopen_core.standard import AbortCode, object_address
 
 DELAY = 0.5  # [s] default: longer than the SDO time-out of most masters
 FRAME_BYTES = 8  # [byte] of an SDO

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from arm_canopen.can import Frame
 from arm_canopen.config import FactorGroup
-from arm_canopen.standard import (
+from canopen_core.can import Frame
+from canopen_core.standard import (
     Abort,
     AXIS_OFFSET,
     CobId,

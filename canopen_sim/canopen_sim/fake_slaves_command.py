@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import signal
 import sys
 
-from arm_canopen import CanopenError
+from canopen_core import CanopenError
 
 from .simulation import simulated_devices
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-from arm_canopen.can import Frame
-from arm_canopen.standard import ObjectDictionary, UNCONFIGURED
+from canopen_core.can import Frame
+from canopen_core.standard import ObjectDictionary, UNCONFIGURED
 
 from .device import Device, RateUnits
 from .drive.axis import ServoModel

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Protocol
 
-from arm_canopen.standard import Index, object_address
+from canopen_core.standard import Index, object_address
 
 from .deviations import Fault, FaultInjection
 from .drive.drive import Drive

@@ -12,8 +12,8 @@ import random
 import struct
 from typing import NamedTuple
 
-from arm_canopen.can import Frame
-from arm_canopen.standard import Abort
+from canopen_core.can import Frame
+from canopen_core.standard import Abort
 
 from .deviations import Effect, FaultInjection, FRAME_BYTES, Service
 from .timed import NEVER

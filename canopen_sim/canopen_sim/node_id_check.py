@@ -13,9 +13,9 @@ from collections.abc import Callable, Iterable
 import contextlib
 import time
 
-from arm_canopen import BusError, CanopenError
-from arm_canopen.can import Bus, Frame
-from arm_canopen.standard import CobId, Index, UNCONFIGURED, UploadRequest
+from canopen_core import BusError, CanopenError
+from canopen_core.can import Bus, Frame
+from canopen_core.standard import CobId, Index, UNCONFIGURED, UploadRequest
 
 ANSWER_TIME = 0.15  # [s] a device answers an SDO within some milliseconds, unless it is too busy
 EVIDENCE = {CobId.SDO_RESPONSE: 'SDO response', CobId.HEARTBEAT: 'heartbeat or boot-up'}

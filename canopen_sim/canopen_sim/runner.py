@@ -10,9 +10,9 @@ import logging
 import time
 from typing import TypeVar
 
-from arm_canopen import BusError
-from arm_canopen.can import Bus, BusThread, Frame
-from arm_canopen.standard import CobId, NODE_ID_MAX
+from canopen_core import BusError
+from canopen_core.can import Bus, BusThread, Frame
+from canopen_core.standard import CobId, NODE_ID_MAX
 
 from .device import Device
 from .host import DeviceHost

@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from arm_canopen import BusConfig, CanopenError, load_bus, open_bus
-from arm_canopen.config import rate_units, reported_increments
+from arm_canopen.config import BusConfig, load_bus, rate_units, reported_increments
+from canopen_core import CanopenError
+from canopen_core.can import open_bus
 
 from .host import DeviceHost
 from .node_id_check import NodeIdCheck
@@ -69,7 +70,7 @@ def simulated_devices(
 
     Args:
         bus_config: The bus.yml.
-        bus: Name of the bus, as for :func:`arm_canopen.open_bus`.
+        bus: Name of the bus, as for :func:`canopen_core.can.open_bus`.
         positions: Where drives stand at the start, by name, in the units of bus.yml [rad or m].
 
     Yields:

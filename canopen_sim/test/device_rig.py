@@ -9,9 +9,9 @@ from functools import cache
 from pathlib import Path
 
 from arm_canopen import DriveState
-from arm_canopen.can import Frame
-from arm_canopen.config import load_eds
-from arm_canopen.standard import (
+from canopen_core.can import Frame
+from canopen_core.eds import load_eds
+from canopen_core.standard import (
     Abort,
     decode_response,
     DownloadRequest,

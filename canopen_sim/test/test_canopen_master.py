@@ -41,9 +41,9 @@ from arm_canopen import (
     SdoAbortError,
     Severity,
 )
-from arm_canopen.can import Frame
-from arm_canopen.can.plugin import ArmCanopenBus
-from arm_canopen.standard import ObjectDictionary
+from canopen_core.can import Frame
+from canopen_core.can.plugin import ArmCanopenBus
+from canopen_core.standard import ObjectDictionary
 from canopen_sim import DeviceRunner
 
 pytestmark = pytest.mark.slow

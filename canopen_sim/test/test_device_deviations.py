@@ -20,9 +20,9 @@ from device_rig import (
 import pytest
 
 from arm_canopen import DriveState
-from arm_canopen.can import Frame
-from arm_canopen.config import load_eds
-from arm_canopen.standard import (
+from canopen_core.can import Frame
+from canopen_core.eds import load_eds
+from canopen_core.standard import (
     Abort,
     AbortCode,
     decode_response,

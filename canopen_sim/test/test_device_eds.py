@@ -12,8 +12,8 @@ import canopen
 from device_rig import EDS, NODE_ID, Rig
 import pytest
 
-from arm_canopen.config import load_eds
-from arm_canopen.standard import NmtCommand
+from canopen_core.eds import load_eds
+from canopen_core.standard import NmtCommand
 from canopen_sim.drive.objects import DriveObjects
 from canopen_sim.objects.object_store import Integer, ObjectStore
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from device_rig import NODE_ID, RefusedError, Rig
 import pytest
 
-from arm_canopen.standard import Emergency, NmtCommand
+from canopen_core.standard import Emergency, NmtCommand
 
 EMCY = 0x080 + NODE_ID
 

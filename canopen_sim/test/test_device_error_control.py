@@ -10,8 +10,8 @@ from device_rig import drive_dictionary, NODE_ID, Rig
 import pytest
 
 from arm_canopen import DriveState
-from arm_canopen.can import Frame
-from arm_canopen.standard import (
+from canopen_core.can import Frame
+from canopen_core.standard import (
     AbortCode,
     DataType,
     NmtCommand,

@@ -13,8 +13,8 @@ from device_rig import drive_dictionary
 from isolation import Isolation
 import pytest
 
-from arm_canopen.can import Bus, open_bus
-from arm_canopen.standard import Statusword
+from canopen_core.can import Bus, open_bus
+from canopen_core.standard import Statusword
 from canopen_sim import DeviceRunner, Fault
 
 rclpy = pytest.importorskip('rclpy')

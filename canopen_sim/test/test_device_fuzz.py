@@ -9,8 +9,8 @@ import random
 from device_rig import NODE_ID, Rig
 import pytest
 
-from arm_canopen.can import Frame
-from arm_canopen.standard import NmtState
+from canopen_core.can import Frame
+from canopen_core.standard import NmtState
 
 pytestmark = pytest.mark.slow
 

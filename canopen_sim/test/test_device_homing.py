@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.standard import NmtCommand
+from canopen_core.standard import NmtCommand
 from canopen_sim.drive.switches import Switches
 
 pytestmark = pytest.mark.slow

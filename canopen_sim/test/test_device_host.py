@@ -14,8 +14,14 @@ from device_rig import drive_dictionary
 import pytest
 
 from arm_canopen import BusError
-from arm_canopen.can import Bus, Frame, open_bus, VirtualBus, VirtualWire
-from arm_canopen.standard import DownloadRequest, NmtState
+from canopen_core.can import (
+    Bus,
+    Frame,
+    open_bus,
+    VirtualBus,
+    VirtualWire,
+)
+from canopen_core.standard import DownloadRequest, NmtState
 from canopen_sim import DeviceHost, DeviceRunner
 
 ARRIVAL = 10.0  # [s] a deadline, no measure

@@ -12,8 +12,8 @@ import canopen
 from device_rig import drive_dictionary, NODE_ID, Rig, with_defaults
 import pytest
 
-from arm_canopen.can import Frame
-from arm_canopen.standard import NmtCommand, NmtState
+from canopen_core.can import Frame
+from canopen_core.standard import NmtCommand, NmtState
 from canopen_sim import DeviceHost, Fault
 
 REQUEST, RESPONSE = 0x7E5, 0x7E4

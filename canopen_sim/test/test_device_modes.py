@@ -17,7 +17,7 @@ from device_rig import (
 import pytest
 
 from arm_canopen import OperationMode
-from arm_canopen.standard import AbortCode, NmtCommand
+from canopen_core.standard import AbortCode, NmtCommand
 
 pytestmark = pytest.mark.slow
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 from device_rig import NODE_ID, Rig
 import pytest
 
-from arm_canopen.can import Frame
-from arm_canopen.standard import NmtCommand, NmtState, ObjectDictionary
+from canopen_core.can import Frame
+from canopen_core.standard import NmtCommand, NmtState, ObjectDictionary
 
 PRE, OP, STOP = NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL, NmtState.STOPPED
 START = NmtCommand.START

@@ -11,8 +11,8 @@ from device_rig import drive_dictionary, NODE_ID
 import pytest
 
 from arm_canopen import CanopenError
-from arm_canopen.can import Frame, open_bus
-from arm_canopen.standard import UNCONFIGURED
+from canopen_core.can import Frame, open_bus
+from canopen_core.standard import UNCONFIGURED
 from canopen_sim import DeviceRunner, simulated_devices
 from canopen_sim.node_id_check import NodeIdCheck
 

@@ -21,7 +21,7 @@ from device_rig import EDS
 from isolation import Isolation
 import pytest
 
-from arm_canopen.can import open_bus
+from canopen_core.can import open_bus
 
 pytestmark = pytest.mark.slow
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 from device_rig import drive_dictionary, NODE_ID, Rig, with_defaults
 import pytest
 
-from arm_canopen.can import Frame
-from arm_canopen.standard import AbortCode, NmtCommand
+from canopen_core.can import Frame
+from canopen_core.standard import AbortCode, NmtCommand
 
 DISABLED = 0x8000_0000
 NO_RTR = 0x4000_0000

@@ -22,8 +22,8 @@ from canopen.profiles.p402 import BaseNode402, OperationMode
 from device_rig import drive_dictionary, EDS, NODE_ID, Rig
 import pytest
 
-from arm_canopen.can import Frame, open_bus
-from arm_canopen.can.plugin import ArmCanopenBus
+from canopen_core.can import Frame, open_bus
+from canopen_core.can.plugin import ArmCanopenBus
 from canopen_sim import DeviceRunner
 
 pytestmark = pytest.mark.slow

@@ -13,8 +13,8 @@ from can_addresses import free_virtual
 from device_rig import drive_dictionary, NODE_ID, with_defaults
 import pytest
 
-from arm_canopen.can import Frame, open_bus
-from arm_canopen.standard import CobId, nmt_frame, NmtCommand, tpdo_default
+from canopen_core.can import Frame, open_bus
+from canopen_core.standard import CobId, nmt_frame, NmtCommand, tpdo_default
 from canopen_sim import DeviceRunner, runner
 from canopen_sim.runner import newest_process_data
 

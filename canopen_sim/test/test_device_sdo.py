@@ -11,7 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.standard import AbortCode, AccessType, DataType, ObjectDictionary, ObjectEntry
+from canopen_core.standard import (
+    AbortCode,
+    AccessType,
+    DataType,
+    ObjectDictionary,
+    ObjectEntry,
+)
 
 STRING = 0x2000
 BIG = 0x2001

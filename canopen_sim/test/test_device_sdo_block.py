@@ -11,8 +11,8 @@ from device_rig import drive_dictionary, NODE_ID, Rig
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from arm_canopen.can import Frame
-from arm_canopen.standard import (
+from canopen_core.can import Frame
+from canopen_core.standard import (
     AbortCode,
     COB_ID_INVALID,
     DataType,

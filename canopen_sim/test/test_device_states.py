@@ -18,7 +18,7 @@ from device_rig import (
 import pytest
 
 from arm_canopen import DriveState as State
-from arm_canopen.standard import drive_state, ObjectDictionary
+from canopen_core.standard import drive_state, ObjectDictionary
 
 pytestmark = pytest.mark.slow
 

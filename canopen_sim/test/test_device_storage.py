@@ -10,7 +10,7 @@ from pathlib import Path
 from device_rig import drive_dictionary, NODE_ID, Rig
 import pytest
 
-from arm_canopen.standard import (
+from canopen_core.standard import (
     AbortCode,
     COB_ID_INVALID,
     DataType,

@@ -12,7 +12,7 @@ from device_rig import ENABLE, Rig
 import pytest
 
 from arm_canopen import DriveState
-from arm_canopen.standard import NmtCommand
+from canopen_core.standard import NmtCommand
 
 REACHED, LIMIT, BIT12, HALT = 0x400, 0x800, 0x1000, 0x100
 PERIOD = 0.01  # [s]

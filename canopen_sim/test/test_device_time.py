@@ -10,7 +10,13 @@ import struct
 from device_rig import drive_dictionary, NODE_ID, Rig
 import pytest
 
-from arm_canopen.standard import AbortCode, DataType, NmtCommand, ObjectDictionary, ObjectEntry
+from canopen_core.standard import (
+    AbortCode,
+    DataType,
+    NmtCommand,
+    ObjectDictionary,
+    ObjectEntry,
+)
 
 NOON = datetime(2026, 11, 21, 12, 0, 0, 500_000, tzinfo=timezone.utc)
 

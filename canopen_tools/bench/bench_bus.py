@@ -25,10 +25,10 @@ import warnings
 
 import can
 
-from arm_canopen import BusError
-from arm_canopen.can import can_interfaces, Frame, LogWriter, open_bus
-from arm_canopen.can.load import BusLoad
-from arm_canopen.can.multicast import decode, encode
+from canopen_core import BusError
+from canopen_core.can import can_interfaces, Frame, LogWriter, open_bus
+from canopen_core.can.load import BusLoad
+from canopen_core.can.multicast import decode, encode
 from canopen_tools.monitor import FrameDescriber
 
 FRAMES = 20_000

@@ -5,7 +5,7 @@
 The names here are the public API.
 """
 
-from arm_canopen.can import read_log
+from canopen_core.can import read_log
 
 from .eds_lint import EdsReport, lint_eds
 from .monitor.describe import FrameDescriber

@@ -22,9 +22,16 @@ import sys
 from time import monotonic
 from types import FrameType
 
-from arm_canopen import CanopenError, CodecError
-from arm_canopen.can import Bus, Frame, LogWriter, open_bus, read_buses, wall_clock_offset
 from arm_canopen.config import BusConfig, load_bus
+from canopen_core import CanopenError, CodecError
+from canopen_core.can import (
+    Bus,
+    Frame,
+    LogWriter,
+    open_bus,
+    read_buses,
+    wall_clock_offset,
+)
 
 from .monitor import FrameDescriber, FrameFilter
 from .monitor.line_format import LineFormat, TimeStyle

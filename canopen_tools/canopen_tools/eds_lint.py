@@ -14,25 +14,19 @@ import os
 from pathlib import Path
 from typing import TypeAlias
 
-from arm_canopen import ConfigError
-from arm_canopen.config import (
-    Direction,
+from arm_canopen.config import Direction, eds_mapping, RPDO, TPDO
+from canopen_core import ConfigError, Findings, Place, Problem
+from canopen_core.eds import (
     DUMMY_TYPES,
     Eds,
-    eds_mapping,
-    Findings,
     IniFile,
     IniSection,
     load_eds,
     parse_integer,
-    Place,
-    Problem,
     read_eds_text,
     read_ini,
-    RPDO,
-    TPDO,
 )
-from arm_canopen.standard import (
+from canopen_core.standard import (
     AccessType,
     bit_length,
     BIT_RATES_KBIT,

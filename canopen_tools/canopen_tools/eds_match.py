@@ -7,9 +7,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from arm_canopen import CanopenError
-from arm_canopen.config import Eds, Identity
-from arm_canopen.standard import Index, PROFILE_MASK, profile_number
+from arm_canopen.config import Identity
+from canopen_core import CanopenError
+from canopen_core.eds import Eds
+from canopen_core.standard import Index, PROFILE_MASK, profile_number
 
 MAJOR_SHIFT = 16  # of 0x1018:03: above it is the revision of the behaviour (CiA 301, 7.5.2.19)
 

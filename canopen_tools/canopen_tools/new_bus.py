@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from itertools import groupby
 import json
 
-from arm_canopen import OperationMode
 from arm_canopen.config import Direction, FACTOR_OBJECTS, is_fixed, mapping_slots, RPDO, TPDO
-from arm_canopen.standard import (
+from canopen_core.standard import (
     AXIS_OFFSET,
     bit_length,
     CYCLIC_MODES,
@@ -24,6 +23,7 @@ from arm_canopen.standard import (
     NODE_ID_MIN,
     object_address,
     ObjectEntry,
+    OperationMode,
     PDO_BITS_MAX,
     profile_number,
     TARGET_OBJECTS,

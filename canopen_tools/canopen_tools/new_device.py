@@ -8,9 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 import math
 
-from arm_canopen import CanopenError, OperationMode
 from arm_canopen.config import (
-    Eds,
     FACTOR_OBJECTS,
     FactorGroup,
     is_coarse,
@@ -19,7 +17,9 @@ from arm_canopen.config import (
     RPM,
     UNSET,
 )
-from arm_canopen.standard import Index, is_drive
+from canopen_core import CanopenError
+from canopen_core.eds import Eds
+from canopen_core.standard import Index, is_drive, OperationMode
 
 TURN = 2.0 * math.pi
 """A turn in [rad]."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from arm_canopen.config import BusConfig, MasterConfig, NodeConfig, PdoConfig
-from arm_canopen.standard import DataType, MappedObject, ObjectDictionary, ObjectEntry
+from canopen_core.standard import DataType, MappedObject, ObjectDictionary, ObjectEntry
 
 DRIVE_OBJECTS = ObjectDictionary(
     [

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.can import Frame
-from arm_canopen.standard import ConsumerHeartbeatTime
+from canopen_core.can import Frame
+from canopen_core.standard import ConsumerHeartbeatTime
 from canopen_tools.monitor import Description, FrameDescriber, FrameFilter, FrameKind
 from canopen_tools.monitor.line_format import LineFormat, TimeStyle
 from canopen_tools.monitor.value_text import value_text

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.can import Frame
-from arm_canopen.standard import (
+from canopen_core.can import Frame
+from canopen_core.standard import (
     DownloadRequest,
     DownloadResponse,
     DownloadSegmentResponse,

@@ -16,10 +16,10 @@ from device_rig import EDS
 import pytest
 
 from arm_canopen import Event, EventKind, SdoError, Severity
-from arm_canopen.can import open_bus
 from arm_canopen.config import load_bus
 from arm_canopen.master.network import Network
 from arm_canopen.master.runner import NetworkThread
+from canopen_core.can import open_bus
 from canopen_sim import DeviceRunner
 from canopen_tools.cli.main import main
 

@@ -15,8 +15,8 @@ from device_rig import EDS
 import pytest
 from tool_environment import Output
 
-from arm_canopen.can import Bus, Frame, open_bus
-from arm_canopen.config import load_eds
+from canopen_core.can import Bus, Frame, open_bus
+from canopen_core.eds import load_eds
 from canopen_sim import DeviceRunner, Fault, FaultInjection
 from canopen_tools.cli.main import main
 

@@ -13,7 +13,8 @@ import subprocess
 import sys
 
 from can_addresses import free_multicast
-from config_samples import BUS, DRIVE_ROWS, eds_text, FACTOR_ROWS, Row, write_bus
+from config_samples import BUS, write_bus
+from eds_samples import DRIVE_ROWS, eds_text, FACTOR_ROWS, Row
 import pytest
 from tool_environment import ENVIRONMENT, Output, REPOSITORY
 

@@ -14,7 +14,7 @@ import pytest
 
 from arm_canopen.cia402.units import Units
 from arm_canopen.config import load_bus, NodeConfig
-from arm_canopen.standard import Index, PdoCodec
+from canopen_core.standard import Index, PdoCodec
 from canopen_tools.cli.main import main
 
 ROBOTS = Path(__file__).parents[2] / 'arm_bringup' / 'robots'

@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import canopen
-from config_samples import eds_text, load_text, write_bus
+from config_samples import load_text, write_bus
+from eds_samples import eds_text
 import pytest
 from tool_environment import REPOSITORY
 
-from arm_canopen.config import BusConfig, load_bus, load_eds, SdoWrite
+from arm_canopen.config import BusConfig, load_bus, SdoWrite
+from canopen_core.eds import load_eds
 from canopen_tools import lint_eds
 from canopen_tools.cli.diff import expected_objects
 from canopen_tools.cli.main import main

@@ -13,7 +13,7 @@ import tempfile
 import time
 
 from can_addresses import free_virtual
-from config_samples import DRIVE_ROWS, eds_text, FACTOR_ROWS, Row
+from eds_samples import DRIVE_ROWS, eds_text, FACTOR_ROWS, Row
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest

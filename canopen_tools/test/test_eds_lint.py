@@ -11,14 +11,16 @@ import re
 from typing import NamedTuple
 
 from config_mutations import mutated
-from config_samples import DRIVE_ROWS, eds_text, Row, write_bus
+from config_samples import write_bus
 from device_rig import Rig
+from eds_samples import DRIVE_ROWS, eds_text, Row
 import pytest
 from tool_environment import REPOSITORY
 
-from arm_canopen.config import Findings, load_eds
 from arm_canopen.config.resolve.sdo_list import parameter_writes
-from arm_canopen.standard import is_drive
+from canopen_core import Findings
+from canopen_core.eds import load_eds
+from canopen_core.standard import is_drive
 from canopen_tools import EdsReport, lint_eds
 from canopen_tools.cli.main import main
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from config_samples import DRIVE_ROWS, eds_text
+from eds_samples import DRIVE_ROWS, eds_text
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest

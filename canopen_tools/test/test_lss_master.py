@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen import LssError, Promise, Scheduler
-from arm_canopen.can import Frame
-from arm_canopen.standard import (
+from canopen_core.can import Frame
+from canopen_core.standard import (
     BIT_RATES,
     decode_lss,
     fast_scan,

@@ -14,9 +14,9 @@ from isolation import Isolation
 import pytest
 from tool_environment import Output
 
-from arm_canopen.can import Bus, Frame, open_bus
-from arm_canopen.config import load_eds
-from arm_canopen.standard import LssState
+from canopen_core.can import Bus, Frame, open_bus
+from canopen_core.eds import load_eds
+from canopen_core.standard import LssState
 from canopen_sim import DeviceRunner
 from canopen_tools.cli.main import main
 

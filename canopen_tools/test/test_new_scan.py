@@ -13,15 +13,16 @@ from pathlib import Path
 import time
 
 from can_addresses import free_virtual
-from config_samples import DRIVE_ROWS, eds_text, FACTOR_ROWS, Row
+from eds_samples import DRIVE_ROWS, eds_text, FACTOR_ROWS, Row
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 from tool_environment import Output
 
 from arm_canopen import CanopenMaster, load_bus, open_bus
-from arm_canopen.config import Identity, load_eds, position_unit
+from arm_canopen.config import Identity, position_unit
 from arm_canopen.config.model.si_unit import POSITIONS, TIMES, velocity_unit
+from canopen_core.eds import load_eds
 from canopen_sim import DeviceRunner, Fault, FaultInjection
 from canopen_tools.cli.main import main
 from canopen_tools.eds_match import match_eds, NoMatchError, SeveralMatchError

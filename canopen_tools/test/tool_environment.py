@@ -16,6 +16,7 @@ ENVIRONMENT = os.environ | {
         str(REPOSITORY / package)
         for package in (
             'arm_canopen',
+            'canopen_core',
             'canopen_tools',
             'libraries/recording',
             'libraries/robot_primitives',

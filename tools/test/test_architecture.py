@@ -84,7 +84,7 @@ def test_the_picture_shows_every_package() -> None:
     assert named - own - {'robot_state_publisher'} == set()
 
 
-OF_CHECKLIST = ('arm_canopen', 'canopen_sim', 'canopen_tools', 'tests')
+OF_CHECKLIST = ('arm_canopen', 'canopen_core', 'canopen_sim', 'canopen_tools', 'tests')
 REFERENCE = re.compile(r'`(?:tests/)?(?P<file>test_\w+\.py)::(?P<test>\w+)`')
 
 

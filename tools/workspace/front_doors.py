@@ -17,8 +17,9 @@ import subprocess
 import sys
 
 SUB_PACKAGES = {
-    'arm_canopen': ('can', 'config', 'standard'),
+    'arm_canopen': ('config',),
     'arm_model': ('ros',),
+    'canopen_core': ('can', 'eds', 'standard'),
     'canopen_tools': ('monitor',),
     'node_runner': ('action_goals',),
     'operator_input': ('devices', 'gamepad', 'terminal'),

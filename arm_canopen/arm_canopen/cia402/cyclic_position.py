@@ -6,9 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from canopen_core.standard import Controlword, OperationMode
+
 from ..master.process_image import IN_THE_IMAGE, Writer
 from ..master.scheduler import Promise
-from ..standard.drive import Controlword, OperationMode
 from .modes import Actual, fitting, Mode, NO_BITS
 from .setpoint_profile import ProfileLimits, SetpointProfile
 from .units import Units

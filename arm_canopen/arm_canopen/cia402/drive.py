@@ -7,13 +7,14 @@ from __future__ import annotations
 from collections.abc import Callable
 import math
 
+from canopen_core import CanopenError, SdoError
+from canopen_core.standard import DriveState, mode_title, OperationMode, Statusword
+
 from ..config.model.drive import DriveConfig
-from ..exceptions import CanopenError, SdoError
 from ..master.events import EventKind, Severity
 from ..master.process_image import SentRpdo
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler, Task
-from ..standard.drive import DriveState, mode_title, OperationMode, Statusword
 from .cyclic_position import CyclicPosition, InterpolatedPosition
 from .drive_control import DriveControl
 from .drive_view import DriveView, FAULTY, LOOK_PERIOD, POWERED

@@ -8,12 +8,12 @@ from collections.abc import Callable, Coroutine
 from dataclasses import replace
 from typing import Any, TypeAlias, TypeVar
 
+from canopen_core import DriveError, SdoTimeoutError
+from canopen_core.standard import DriveState, object_address, OperationMode, TARGET_OBJECTS
+
 from ..config.model.drive import RecoveryPolicy
-from ..exceptions import DriveError, SdoTimeoutError
 from ..master.events import Severity
 from ..master.scheduler import completed, Promise, Scheduler, Task
-from ..standard.dictionary import object_address
-from ..standard.drive import DriveState, OperationMode, TARGET_OBJECTS
 from .drive import Drive
 from .drive_control import NOT_TAKEN
 from .drive_view import FAULTY

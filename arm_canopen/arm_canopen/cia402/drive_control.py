@@ -6,8 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from canopen_core.standard import DriveState, mode_title, OperationMode
+
 from ..master.scheduler import Promise
-from ..standard.drive import DriveState, mode_title, OperationMode
 from .cyclic_position import CyclicPosition
 from .drive_view import DriveView, FAULTY
 from .halt import Halt

@@ -7,10 +7,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 import math
 
+from canopen_core.standard import (
+    AXIS_OFFSET,
+    drive_state,
+    DriveState,
+    Index,
+    OperationMode,
+    TARGET_OBJECTS,
+)
+
 from ..master.process_image import ReceivedTpdo, SentRpdo, Writer
 from ..master.remote_node import RemoteNode
-from ..standard.drive import drive_state, DriveState, OperationMode, TARGET_OBJECTS
-from ..standard.objects import AXIS_OFFSET, Index
 
 
 class DriveObjects:

@@ -9,13 +9,19 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import math
 
+from canopen_core import CodecError, DriveError, SdoError
+from canopen_core.standard import (
+    drive_state,
+    DriveState,
+    error_code_text,
+    Index,
+    mode_title,
+    statusword_text,
+)
+
 from ..config.model.drive import DriveConfig
-from ..exceptions import CodecError, DriveError, SdoError
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler
-from ..standard.drive import drive_state, DriveState, mode_title, statusword_text
-from ..standard.emcy import error_code_text
-from ..standard.objects import Index
 from .drive_objects import DriveObjects
 from .modes import Actual
 from .parameters import DriveParameters, ParameterCache

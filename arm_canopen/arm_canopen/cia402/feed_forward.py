@@ -8,7 +8,8 @@ it adds them to the target, so none may be left over from a stream.
 
 from __future__ import annotations
 
-from ..standard.objects import Index
+from canopen_core.standard import Index
+
 from .drive_objects import DriveObjects
 from .modes import fitting
 from .motion import Setpoint

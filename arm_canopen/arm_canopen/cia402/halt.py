@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
+from canopen_core.standard import Controlword, OperationMode
+
 from ..master.scheduler import completed, Promise
-from ..standard.drive import Controlword, OperationMode
 from .modes import Mode, NO_BITS
 
 HALT_BIT = int(Controlword.HALT)

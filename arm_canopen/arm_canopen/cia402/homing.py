@@ -7,11 +7,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import Enum
 
-from ..exceptions import CodecError, DriveError, SdoError
+from canopen_core import CodecError, DriveError, SdoError
+from canopen_core.standard import DriveState, Index, OperationMode, Statusword
+
 from ..master.events import EventKind, Severity
 from ..master.scheduler import Promise
-from ..standard.drive import DriveState, OperationMode, Statusword
-from ..standard.objects import Index
 from .drive import Drive
 from .modes import Homing
 from .sequences import DriveSequences

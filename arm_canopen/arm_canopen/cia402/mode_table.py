@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import partial
 
-from ..standard.drive import OperationMode, TARGET_OBJECTS
-from ..standard.objects import Index
+from canopen_core.standard import Index, OperationMode, TARGET_OBJECTS
+
 from .cyclic_position import CyclicPosition, InterpolatedPosition
 from .drive_objects import DriveObjects
 from .modes import Homing, Mode, NoMode

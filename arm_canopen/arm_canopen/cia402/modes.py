@@ -13,10 +13,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import NamedTuple
 
-from ..exceptions import DriveError
+from canopen_core import DriveError
+from canopen_core.standard import Controlword, OperationMode, Statusword
+
 from ..master.process_image import Writer
 from ..master.scheduler import completed, Promise
-from ..standard.drive import Controlword, OperationMode, Statusword
 
 TARGET_REACHED = int(Statusword.TARGET_REACHED)
 NO_BITS = 0  # bits are plain numbers in the cycle, where operators of IntFlag cost too much

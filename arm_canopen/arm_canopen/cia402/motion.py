@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import math
 from typing import Protocol
 
-from ..standard.drive import DriveState
+from canopen_core.standard import DriveState
+
 from .refusal import Refusal
 
 

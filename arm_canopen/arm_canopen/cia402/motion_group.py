@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 from functools import partial
 import math
 
-from ..exceptions import CanopenError, DriveError
+from canopen_core import CanopenError, DriveError
+from canopen_core.standard import DriveState
+
 from ..master.events import Event, EventKind, Report, Severity
-from ..standard.drive import DriveState
 from .drive import Drive
 from .motion import AxisFeedback, MotionSource, Setpoint
 from .refusal import Refusal, RefusalCause

@@ -7,14 +7,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from canopen_core import CodecError, SdoAbortError, SdoError
+from canopen_core.standard import AXIS_OFFSET, Index, OperationMode
+
 from ..config.model.checks.drive_units import is_coarse
 from ..config.model.drive import DriveConfig
 from ..config.model.factor_group import ACCELERATION_ADDRESSES, FACTOR_ADDRESSES, FactorGroup
-from ..exceptions import CodecError, SdoAbortError, SdoError
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Promise, Scheduler, Task
-from ..standard.drive import OperationMode
-from ..standard.objects import AXIS_OFFSET, Index
 from .setpoint_profile import ProfileLimits
 from .target_offset import OFFSET_OBJECTS
 from .units import Units

@@ -10,10 +10,11 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 import math
 
-from ..exceptions import DriveError
+from canopen_core import DriveError
+from canopen_core.standard import Controlword, OperationMode, Statusword
+
 from ..master.process_image import Writer
 from ..master.scheduler import completed, Promise
-from ..standard.drive import Controlword, OperationMode, Statusword
 from .modes import Actual, fitting, Mode, TARGET_REACHED
 from .units import Units
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..exceptions import DriveError
+from canopen_core import DriveError
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from canopen_core.standard import OperationMode
+
 from ..master.process_image import IN_THE_IMAGE, Writer
 from ..master.scheduler import completed, Promise
-from ..standard.drive import OperationMode
 from .modes import Actual, fitting, Mode, NO_BITS
 
 VL_RAMP = 0x70

@@ -7,11 +7,11 @@ from __future__ import annotations
 from collections.abc import Callable
 import contextlib
 
-from ..exceptions import CodecError, DriveError, SdoError, SdoTimeoutError
+from canopen_core import CodecError, DriveError, SdoError, SdoTimeoutError
+from canopen_core.standard import DriveState, Index, OperationMode, Statusword
+
 from ..master.events import Severity
 from ..master.scheduler import Scheduler
-from ..standard.drive import DriveState, OperationMode, Statusword
-from ..standard.objects import Index
 from .drive import Drive
 from .drive_control import NOT_TAKEN
 from .drive_view import FAULTY

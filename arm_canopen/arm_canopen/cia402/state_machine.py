@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from ..standard.drive import Controlword, DriveState
+from canopen_core.standard import Controlword, DriveState
 
 _S = DriveState
 RESET_PULSE = 0.05  # [s] for which bit 7 of a fault reset is set, and then cleared

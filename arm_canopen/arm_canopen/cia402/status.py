@@ -6,8 +6,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from canopen_core.standard import DriveState, mode_title, Statusword, statusword_text
+
 from ..master.status import node_status, NodeStatus
-from ..standard.drive import DriveState, mode_title, Statusword, statusword_text
 from .drive import Drive
 from .drive_view import DriveView, FAULTY
 

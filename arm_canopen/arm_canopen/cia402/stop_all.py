@@ -8,9 +8,10 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields
 
-from ..exceptions import CanopenError, DriveError
+from canopen_core import CanopenError, DriveError
+from canopen_core.standard import DriveState
+
 from ..master.scheduler import Promise, Scheduler
-from ..standard.drive import DriveState
 from .drive_commands import DriveCommands
 from .drive_view import FAULTY, POWERED
 from .stop_commands import BRAKED_TIMEOUT

@@ -8,9 +8,10 @@ from collections.abc import Coroutine
 from contextlib import suppress
 from typing import Any
 
-from ..exceptions import DriveError
+from canopen_core import DriveError
+from canopen_core.standard import DriveState
+
 from ..master.scheduler import Promise, Scheduler
-from ..standard.drive import DriveState
 from .drive import Drive
 from .refusal import Refusal, RefusalCause
 from .sequences import DriveSequences

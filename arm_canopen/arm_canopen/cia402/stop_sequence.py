@@ -7,12 +7,11 @@ from __future__ import annotations
 from collections.abc import Callable
 import math
 
-from ..exceptions import CodecError, SdoError
+from canopen_core import CodecError, SdoError
+from canopen_core.standard import DriveState, Index, NmtCommand, NmtState, statusword_text
+
 from ..master.events import Severity
 from ..master.scheduler import Scheduler, Task
-from ..standard.drive import DriveState, statusword_text
-from ..standard.nmt import NmtCommand, NmtState
-from ..standard.objects import Index
 from .drive_view import DriveView
 from .state_machine import Command
 

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import math
 
-from ..exceptions import DriveError
+from canopen_core import DriveError
+
 from ..master.events import Severity
 from ..master.scheduler import Promise, Scheduler, Task
 from .drive import Drive

@@ -6,9 +6,10 @@ from __future__ import annotations
 
 import math
 
+from canopen_core import DriveError
+from canopen_core.standard import OperationMode
+
 from ..config.model.checks.drive_units import POSITION_TOLERANCE
-from ..exceptions import DriveError
-from ..standard.drive import OperationMode
 from .modes import Mode
 from .motion import Setpoint
 from .parameters import DriveParameters

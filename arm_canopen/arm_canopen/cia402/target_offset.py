@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from canopen_core.standard import Index, OperationMode
+
 from ..master.process_image import Writer
 from ..master.scheduler import Promise
-from ..standard.drive import OperationMode
-from ..standard.objects import Index
 
 OFFSET_OBJECTS: dict[OperationMode, Index] = {
     OperationMode.CYCLIC_POSITION: Index.POSITION_OFFSET,

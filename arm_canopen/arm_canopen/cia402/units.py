@@ -6,8 +6,9 @@ from __future__ import annotations
 
 import math
 
+from canopen_core import DriveError
+
 from ..config.model.drive import DriveConfig
-from ..exceptions import DriveError
 
 INT16_MAX = 2**15 - 1
 INT32_MAX = 2**31 - 1

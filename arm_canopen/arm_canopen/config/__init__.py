@@ -13,8 +13,8 @@ everything that is wrong and raise one ``ConfigError`` whose problems name file,
 remedy; ``check_file`` reports them, and what works and was probably meant otherwise.
 """
 
-from ..exceptions import Problem
-from .findings import Findings, Place
+from canopen_core.eds import load_eds
+
 from .load import check_file, load_bus
 from .model import (
     BusConfig,
@@ -46,9 +46,6 @@ from .model.checks.traffic import LoadEstimate, Traffic
 from .model.factor_group import FACTOR_ADDRESSES, FACTOR_OBJECTS, FactorGroup, UNSET
 from .model.pdo_direction import Direction, RPDO, TPDO
 from .model.si_unit import NamedUnit, position_unit, RPM
-from .read.eds import DUMMY_TYPES, Eds, load_eds, read_eds_text
-from .read.eds_ini import IniFile, IniSection, read_ini
-from .read.eds_values import bytes_from_text, parse_integer, text_from_bytes
 from .resolve.eds_files import DEFAULT_DRIVE
 from .resolve.pdo_mapping import eds_mapping, is_fixed, mapping_slots
 from .units import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS
@@ -56,7 +53,6 @@ from .units import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS
 __all__ = [
     'ACCELERATION_KEY',
     'DEFAULT_DRIVE',
-    'DUMMY_TYPES',
     'FACTOR_ADDRESSES',
     'FACTOR_OBJECTS',
     'HUNDRED_MICROSECONDS',
@@ -75,25 +71,18 @@ __all__ = [
     'BusConfig',
     'Direction',
     'DriveConfig',
-    'Eds',
     'FactorGroup',
-    'Findings',
     'HeldConsumers',
     'Identity',
-    'IniFile',
-    'IniSection',
     'LoadEstimate',
     'MasterConfig',
     'NamedUnit',
     'NodeConfig',
     'PdoConfig',
-    'Place',
-    'Problem',
     'SdoWrite',
     'Traffic',
     'UnitRule',
     'boot_writes',
-    'bytes_from_text',
     'check_file',
     'consumer_to_read',
     'eds_mapping',
@@ -103,11 +92,7 @@ __all__ = [
     'load_bus',
     'load_eds',
     'mapping_slots',
-    'parse_integer',
     'position_unit',
     'rate_units',
-    'read_eds_text',
-    'read_ini',
     'reported_increments',
-    'text_from_bytes',
 ]

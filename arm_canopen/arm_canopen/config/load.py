@@ -7,8 +7,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ..exceptions import ConfigError
-from .findings import Findings
+from canopen_core import ConfigError, Findings
+
 from .model import BusConfig
 from .model.checks import check_bus, Report
 from .read.document import read_document

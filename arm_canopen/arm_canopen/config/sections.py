@@ -20,7 +20,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ..standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
+from canopen_core.standard import NODE_ID_MAX, NODE_ID_MIN
+
 from .keys import Key, key, keys_of, Kind, Use
 from .model.bus import MasterConfig, NodeConfig, RETRY_FACTOR, U16_MAX, U32_MAX
 from .model.drive import DriveConfig

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from urdf_reader import DescriptionError, Mimic, read_urdf
 
-from ..exceptions import CanopenError
+from canopen_core import CanopenError
 
 
 @dataclass(frozen=True, slots=True)

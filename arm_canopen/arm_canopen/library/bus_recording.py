@@ -10,12 +10,17 @@ from pathlib import Path
 import time
 
 from black_box import Pause
+from canopen_core.can import (
+    format_line,
+    Frame,
+    frame_bits,
+    FrameRing,
+    log_channel,
+    PAYLOAD_MAX,
+    RecordedFrame,
+    wall_clock_offset,
+)
 
-from ..can.bus import wall_clock_offset
-from ..can.candump_format import format_line, log_channel
-from ..can.frame import Frame, PAYLOAD_MAX
-from ..can.frame_ring import FrameRing, RecordedFrame
-from ..can.load import frame_bits
 from ..config.model import BusConfig
 
 LOG = 'can.log'

@@ -8,24 +8,28 @@ from collections.abc import Callable
 from functools import partial
 import math
 
-from ..can.bus import BusCounters
-from ..can.frame import Frame
-from ..can.load import BusLoad
+from canopen_core import CodecError
+from canopen_core.can import BusCounters, BusLoad, Frame
+from canopen_core.standard import (
+    CAN_ID_MASK,
+    CobId,
+    decode_response,
+    DriveState,
+    error_code_text,
+    Index,
+    NmtState,
+    OperationMode,
+    UploadResponse,
+)
+
 from ..cia402.drive_view import DriveView, FAULTY
 from ..cia402.status import axis_status, DriveStatus
 from ..config.model import BusConfig
-from ..exceptions import CodecError
 from ..master.events import EventKind, Report, Severity
 from ..master.network import Network
 from ..master.process_image import SentRpdo
 from ..master.remote_node import BootPhase, RemoteNode
 from ..master.runner import CycleFigures, CycleStatistics
-from ..standard.cob_id import CAN_ID_MASK, CobId
-from ..standard.drive import DriveState, OperationMode
-from ..standard.emcy import error_code_text
-from ..standard.nmt import NmtState
-from ..standard.objects import Index
-from ..standard.sdo import decode_response, UploadResponse
 
 STEP = 0.02  # [s] in which time passes at most without a look for what is missing
 

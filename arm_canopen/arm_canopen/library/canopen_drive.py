@@ -7,12 +7,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
+from canopen_core import DriveError
+from canopen_core.standard import DriveState, OperationMode
+
 from ..cia402.drive_commands import DriveCommands, Sequence
 from ..cia402.position_modes import Move
 from ..cia402.status import drive_status, DriveStatus
-from ..exceptions import DriveError
 from ..master.runner import NetworkThread
-from ..standard.drive import DriveState, OperationMode
 from .device import DeviceSdo
 
 MOVE_TIMEOUT = 60.0  # [s]

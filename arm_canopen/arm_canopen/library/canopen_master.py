@@ -18,12 +18,11 @@ from types import MappingProxyType, TracebackType
 from typing import TYPE_CHECKING
 
 from black_box import BlackBox, BlackBoxSettings
+from canopen_core import BootError, BusError, CanopenError, DriveError
+from canopen_core.can import Bus, BusLoad, Frame, open_bus
+from canopen_core.standard import CobId, DownloadRequest, Index
 from realtime_loop import raise_priority
 
-from ..can import open_bus
-from ..can.bus import Bus
-from ..can.frame import Frame
-from ..can.load import BusLoad
 from ..cia402.drive import Drive
 from ..cia402.drive_commands import DriveCommands
 from ..cia402.motion import MotionSource
@@ -33,16 +32,12 @@ from ..cia402.stop_sequence import SHUTDOWN_MAX
 from ..config import load_bus
 from ..config.model import BusConfig
 from ..config.model.checks import check_bus
-from ..exceptions import BootError, BusError, CanopenError, DriveError
 from ..master.events import Event, EventKind, Report, Severity
 from ..master.network import Network
 from ..master.other_master import describe, listen, refuse_other_master
 from ..master.remote_node import RemoteNode
 from ..master.runner import Clock, NetworkThread, OWNER
 from ..master.scheduler import Scheduler
-from ..standard.cob_id import CobId
-from ..standard.objects import Index
-from ..standard.sdo import DownloadRequest
 from .bus_recording import BusRecording
 from .canopen_drive import CanopenDrive
 from .device import CanopenDevice, DeviceSdo

@@ -6,13 +6,12 @@ from __future__ import annotations
 
 from functools import partial
 
+from canopen_core.standard import decode, encode, NmtCommand, object_address, ObjectEntry, Value
+
 from ..config.model import NodeConfig
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
 from ..master.status import node_status, NodeStatus
-from ..standard.datatypes import decode, encode, Value
-from ..standard.dictionary import object_address, ObjectEntry
-from ..standard.nmt import NmtCommand
 
 
 class DeviceSdo:

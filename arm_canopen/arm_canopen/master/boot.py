@@ -9,11 +9,17 @@ from contextlib import suppress
 from enum import Enum
 from functools import partial
 
+from canopen_core import (
+    BootError,
+    BusError,
+    SdoAbortError,
+    SdoError,
+    SdoTimeoutError,
+)
+from canopen_core.standard import Index, NmtCommand, NmtState
+
 from ..config.model import BusConfig, SdoWrite
 from ..config.model.bus import Identity
-from ..exceptions import BootError, BusError, SdoAbortError, SdoError, SdoTimeoutError
-from ..standard.nmt import NmtCommand, NmtState
-from ..standard.objects import Index
 from .bus_sender import Send
 from .configuration import Configurator
 from .events import EventKind, Severity

@@ -7,8 +7,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeAlias
 
-from ..can.frame import Frame
-from ..exceptions import BusError
+from canopen_core import BusError
+from canopen_core.can import Frame
+
 from .events import Event, EventKind, Report, Severity
 
 Send: TypeAlias = Callable[[Frame], BusError | None]

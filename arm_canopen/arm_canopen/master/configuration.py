@@ -7,6 +7,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 
+from canopen_core import SdoAbortError, SdoError, SdoTimeoutError
+from canopen_core.standard import Index, is_setting, object_address, PDO_COUNT_MAX
+
 from ..config.model import BusConfig, SdoWrite
 from ..config.model.boot_plan import (
     assumed_cob_ids,
@@ -18,9 +21,6 @@ from ..config.model.boot_plan import (
     WATCH_KEY,
     watch_word,
 )
-from ..exceptions import SdoAbortError, SdoError, SdoTimeoutError
-from ..standard.dictionary import object_address
-from ..standard.objects import Index, is_setting, PDO_COUNT_MAX
 from .events import EventKind, Severity
 from .remote_node import RemoteNode
 

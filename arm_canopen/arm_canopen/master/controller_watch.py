@@ -4,14 +4,15 @@
 
 from __future__ import annotations
 
-from ..can.error_frames import (
+from canopen_core.can import (
     controller_state,
     ControllerState,
     error_counters,
     error_text,
+    Frame,
     is_unacknowledged,
 )
-from ..can.frame import Frame
+
 from .events import Event, EventKind, Report, Severity
 
 _RESTART = (

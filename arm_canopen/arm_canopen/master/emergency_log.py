@@ -8,9 +8,10 @@ from collections import Counter, deque
 from collections.abc import Callable
 import math
 
-from ..can.frame import Frame
-from ..exceptions import CodecError
-from ..standard.emcy import Emergency, error_code_text
+from canopen_core import CodecError
+from canopen_core.can import Frame
+from canopen_core.standard import Emergency, error_code_text
+
 from .events import EventKind, Severity
 
 HISTORY = 16  # EMCYs that are remembered

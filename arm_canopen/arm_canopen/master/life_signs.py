@@ -6,10 +6,10 @@ from __future__ import annotations
 
 import math
 
-from ..can.frame import Frame
+from canopen_core.can import Frame
+from canopen_core.standard import CobId, NmtState
+
 from ..config.model import NodeConfig
-from ..standard.cob_id import CobId
-from ..standard.nmt import NmtState
 from .bus_sender import Send
 
 TOGGLE = 0x80  # bit of an answer that changes with each

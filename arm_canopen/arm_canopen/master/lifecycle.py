@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, TypeAlias
 
-from ..exceptions import CanopenError, LifecycleError
+from canopen_core import CanopenError, LifecycleError
+
 from .scheduler import Promise, Scheduler
 
 

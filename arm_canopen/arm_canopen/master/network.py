@@ -14,14 +14,22 @@ from functools import partial
 from traceback import walk_tb
 from typing import TypeAlias
 
-from ..can.frame import Frame
+from canopen_core import CanopenError
+from canopen_core.can import Frame
+from canopen_core.standard import (
+    ALL_NODES,
+    CAN_ID_MASK,
+    CobId,
+    COMMANDED_STATES,
+    encode_time_of_day,
+    NmtCommand,
+    NmtState,
+    Number,
+    object_address,
+    parse_nmt,
+)
+
 from ..config.model import BusConfig
-from ..exceptions import CanopenError
-from ..standard.cob_id import CAN_ID_MASK, CobId
-from ..standard.dictionary import object_address
-from ..standard.nmt import ALL_NODES, COMMANDED_STATES, NmtCommand, NmtState, parse_nmt
-from ..standard.pdo import Number
-from ..standard.time_of_day import encode_time_of_day
 from .boot import BootManager
 from .bus_sender import BusSender
 from .controller_watch import ControllerWatch

@@ -8,10 +8,10 @@ from collections import deque
 from collections.abc import Callable
 from typing import TypeAlias
 
-from ..can.frame import Frame
-from ..exceptions import BusError
-from ..standard.cob_id import CobId
-from ..standard.nmt import ALL_NODES, nmt_frame, NmtCommand
+from canopen_core import BusError
+from canopen_core.can import Frame
+from canopen_core.standard import ALL_NODES, CobId, nmt_frame, NmtCommand
+
 from .bus_sender import Send
 from .scheduler import Promise, Scheduler
 

@@ -6,9 +6,15 @@ from __future__ import annotations
 
 import struct
 
-from ..exceptions import CodecError
-from ..standard.datatypes import byte_length, DataType, SIGNED_BITS
-from ..standard.pdo import MappedObject, Number, PdoCodec
+from canopen_core import CodecError
+from canopen_core.standard import (
+    byte_length,
+    DataType,
+    MappedObject,
+    Number,
+    PdoCodec,
+    SIGNED_BITS,
+)
 
 RAW_BYTES = 4  # [byte] in COData, CORead and COWrite
 

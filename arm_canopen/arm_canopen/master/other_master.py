@@ -13,12 +13,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 
-from ..can.bus import Bus
-from ..can.frame import Frame
+from canopen_core import BusError, OtherMasterError
+from canopen_core.can import Bus, Frame
+from canopen_core.standard import ALL_NODES, CobId, parse_nmt
+
 from ..config.model import BusConfig
-from ..exceptions import BusError, OtherMasterError
-from ..standard.cob_id import CobId
-from ..standard.nmt import ALL_NODES, parse_nmt
 from .events import Event, EventKind, Report, Severity
 
 LISTENING_TIME = 0.2  # [s] a start takes longer by it; a master that runs may be held up as long

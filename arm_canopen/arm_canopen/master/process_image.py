@@ -12,13 +12,20 @@ from collections.abc import Callable, Sequence
 import math
 from typing import Protocol, TypeAlias
 
-from ..can.frame import Frame
+from canopen_core import CodecError
+from canopen_core.can import Frame
+from canopen_core.standard import (
+    DataType,
+    integer_range,
+    MappedObject,
+    Number,
+    object_address,
+    PdoCodec,
+    SYNCHRONOUS_MAX,
+)
+
 from ..config.model import PdoConfig
 from ..config.model.tpdo_freshness import longest_silence, loss_unnoticed
-from ..exceptions import CodecError
-from ..standard.datatypes import DataType, integer_range
-from ..standard.dictionary import object_address
-from ..standard.pdo import MappedObject, Number, PdoCodec, SYNCHRONOUS_MAX
 from .scheduler import completed, Promise
 
 REPEAT_SHARE = 0.5  # of the deadline of an RPDO, after which it is repeated

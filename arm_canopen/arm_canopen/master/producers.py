@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..can.frame import Frame
+from canopen_core.can import Frame
+
 from .bus_sender import Send
 
 

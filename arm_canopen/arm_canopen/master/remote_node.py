@@ -8,11 +8,18 @@ from collections.abc import Callable, Coroutine
 from enum import Enum
 from typing import Any, TypeAlias
 
-from ..can.frame import Frame
+from canopen_core import CodecError, SdoError
+from canopen_core.can import Frame
+from canopen_core.standard import (
+    COMMANDED_STATES,
+    Index,
+    NmtCommand,
+    NmtState,
+    parse_heartbeat,
+    RESETS,
+)
+
 from ..config.model import NodeConfig
-from ..exceptions import CodecError, SdoError
-from ..standard.nmt import COMMANDED_STATES, NmtCommand, NmtState, parse_heartbeat, RESETS
-from ..standard.objects import Index
 from .bus_sender import Send
 from .emergency_log import EmergencyLog
 from .events import Event, EventKind, Report, Severity

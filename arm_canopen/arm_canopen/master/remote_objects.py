@@ -10,14 +10,23 @@ from functools import partial
 import math
 from typing import NamedTuple, TypeAlias
 
+from canopen_core import CodecError, DriveError, SdoError, SdoTimeoutError
+from canopen_core.standard import (
+    DataType,
+    decode,
+    encode,
+    find_object,
+    is_controlword,
+    MappedObject,
+    Number,
+    object_address,
+    ObjectEntry,
+    PdoCodec,
+    Value,
+)
+
 from ..config.model import NodeConfig
 from ..config.model.tpdo_freshness import PERIODS_MISSED, STALE_AFTER
-from ..exceptions import CodecError, DriveError, SdoError, SdoTimeoutError
-from ..standard.datatypes import DataType, decode, encode, Value
-from ..standard.dictionary import object_address, ObjectEntry
-from ..standard.object_path import find_object
-from ..standard.objects import is_controlword
-from ..standard.pdo import MappedObject, Number, PdoCodec
 from .bus_sender import Send
 from .events import EventKind, Severity
 from .process_image import InputReader, Limits, limits_of, ProcessImage, SyncRound, Writer

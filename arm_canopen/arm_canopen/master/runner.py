@@ -14,12 +14,10 @@ import math
 import time
 from typing import Any, TypeVar
 
+from canopen_core import BusError
+from canopen_core.can import Bus, BusThread, Frame
 from realtime_loop import Cycle, CycleTimer
 
-from ..can.bus import Bus
-from ..can.bus_thread import BusThread
-from ..can.frame import Frame
-from ..exceptions import BusError
 from .network import Network
 from .scheduler import Promise
 

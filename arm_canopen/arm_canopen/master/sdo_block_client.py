@@ -6,8 +6,9 @@ from __future__ import annotations
 
 import struct
 
-from ..exceptions import SdoError, SdoTimeoutError
-from ..standard.sdo import (
+from canopen_core import SdoError, SdoTimeoutError
+from canopen_core.standard import (
+    AbortCode,
     ACKNOWLEDGE_UPLOAD,
     block_frames,
     BLOCK_SEGMENTS_MAX,
@@ -28,7 +29,7 @@ from ..standard.sdo import (
     UPLOAD_INITIATE,
     UPLOAD_INITIATED,
 )
-from ..standard.sdo_abort import AbortCode
+
 from .scheduler import Scheduler
 from .sdo_channel import Match, SdoChannel
 

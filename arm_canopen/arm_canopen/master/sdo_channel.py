@@ -9,21 +9,23 @@ from dataclasses import dataclass
 import math
 from typing import Any, TypeAlias, TypeVar
 
-from ..can.frame import Frame
-from ..exceptions import BusError, CodecError, SdoAbortError, SdoTimeoutError
-from ..standard.cob_id import CobId
-from ..standard.dictionary import object_address
-from ..standard.sdo import (
+from canopen_core import BusError, CodecError, SdoAbortError, SdoTimeoutError
+from canopen_core.can import Frame
+from canopen_core.standard import (
     Abort,
+    abort_text,
+    AbortCode,
+    CobId,
     decode_response,
     DownloadResponse,
     DownloadSegmentResponse,
     FRAME_BYTES,
+    object_address,
     Segment,
     UploadRequest,
     UploadResponse,
 )
-from ..standard.sdo_abort import abort_text, AbortCode
+
 from .bus_sender import Send
 from .scheduler import Promise, Scheduler
 

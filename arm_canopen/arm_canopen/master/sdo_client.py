@@ -9,22 +9,24 @@ from collections.abc import Callable, Coroutine
 from functools import partial
 from typing import Any, NamedTuple, TypeAlias, TypeVar
 
-from ..can.frame import Frame
-from ..exceptions import SdoAbortError, SdoError, SdoTimeoutError
-from ..standard.dictionary import object_address, ObjectDictionary
-from ..standard.sdo import (
+from canopen_core import SdoAbortError, SdoError, SdoTimeoutError
+from canopen_core.can import Frame
+from canopen_core.standard import (
+    AbortCode,
     DownloadRequest,
     DownloadResponse,
     DownloadSegmentResponse,
     EXPEDITED_MAX,
     fitted,
+    object_address,
+    ObjectDictionary,
     Segment,
     SEGMENT_MAX,
     UploadRequest,
     UploadResponse,
     UploadSegmentRequest,
 )
-from ..standard.sdo_abort import AbortCode
+
 from .bus_sender import Send
 from .scheduler import Promise, Scheduler, Task
 from .sdo_block_client import read_blocks, write_blocks

@@ -7,8 +7,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
+from canopen_core.standard import ALL_NODES, NmtCommand
+
 from ..config.model.bus import MasterConfig
-from ..standard.nmt import ALL_NODES, NmtCommand
 from .events import Event, EventKind, Report, Severity
 from .nmt_sender import SendNmt
 from .remote_node import RemoteNode

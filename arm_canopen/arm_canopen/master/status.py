@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ..standard.emcy import Emergency
-from ..standard.nmt import NmtState
+from canopen_core.standard import Emergency, NmtState
+
 from .remote_node import BootPhase, RemoteNode
 from .sdo_channel import SdoCounters
 

@@ -7,12 +7,19 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import replace
 
-from ..exceptions import BootError, CodecError, SdoAbortError, SdoError
-from ..standard.datatypes import decode
-from ..standard.dictionary import object_address
-from ..standard.drive import OperationMode, TARGET_OBJECTS
-from ..standard.objects import AXIS_OFFSET, Index, OFFSETS
-from ..standard.pdo import MappedObject, Number
+from canopen_core import BootError, CodecError, SdoAbortError, SdoError
+from canopen_core.standard import (
+    AXIS_OFFSET,
+    decode,
+    Index,
+    MappedObject,
+    Number,
+    object_address,
+    OFFSETS,
+    OperationMode,
+    TARGET_OBJECTS,
+)
+
 from .process_image import SentRpdo
 from .remote_node import RemoteNode
 from .remote_objects import start_value

@@ -13,12 +13,12 @@ from canopen_interfaces.srv import COTargetDouble
 from std_msgs.msg import Float64
 
 from arm_msgs.srv import Move as MoveService
+from canopen_core.standard import OperationMode
 
 from ..cia402.drive_commands import DriveCommands
 from ..cia402.position_modes import Move
 from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
-from ..standard.drive import OperationMode
 from .device_node import DeviceNode
 from .home_action import HomeAction
 from .joint_states import DriveJointStates

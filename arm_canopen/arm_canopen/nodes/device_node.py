@@ -15,15 +15,14 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
+from canopen_core import CanopenError, SdoError
+from canopen_core.standard import NmtCommand, object_address
 from node_runner import create_deferred_service, destroyed_when_refused
 
-from ..exceptions import CanopenError, SdoError
 from ..master.object_access import bytes_from_raw, number_from_raw, raw_from_bytes
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
-from ..standard.dictionary import object_address
-from ..standard.nmt import NmtCommand
 from .device_topics import DeviceTopics, node_options
 from .output_thread import OutputThread
 

@@ -11,6 +11,7 @@ from canopen_interfaces.msg import COData
 from rclpy.node import Node
 from std_msgs.msg import String
 
+from canopen_core.standard import NmtState
 from node_runner import LATCHED
 
 from ..config.model import NodeConfig
@@ -18,7 +19,6 @@ from ..master.events import Event, EventKind, Severity
 from ..master.object_access import raw_from_number
 from ..master.process_image import ReceivedTpdo
 from ..master.remote_node import RemoteNode
-from ..standard.nmt import NmtState
 from .output_thread import OutputThread
 
 NMT_STATE_WORDS: dict[NmtState, str] = {

@@ -10,15 +10,14 @@ from functools import partial
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
-from ..can.bus import BusCounters
-from ..can.error_frames import ControllerState
-from ..can.load import LoadFigures
+from canopen_core.can import BusCounters, ControllerState, LoadFigures
+from canopen_core.standard import DriveState
+
 from ..cia402.status import DriveStatus
 from ..master.controller_watch import ControllerWatch
 from ..master.network import Network
 from ..master.runner import CycleFigures
 from ..master.status import node_status, NodeStatus
-from ..standard.drive import DriveState
 from .output_thread import OutputThread
 
 HIGH_LOAD = 0.7  # share of the bus time above which low-priority frames begin to wait long

@@ -12,6 +12,7 @@ from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
+from canopen_core import CanopenError
 from node_runner import (
     destroyed_when_refused,
     notify_ready,
@@ -20,7 +21,6 @@ from node_runner import (
     run_node,
 )
 
-from ..exceptions import CanopenError
 from ..joints.aggregator import JointSample
 from ..joints.robot_joints import RobotJoint
 from ..joints.silence_watch import SilenceWatch

@@ -14,10 +14,10 @@ from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from canopen_core import CanopenError
 from node_runner import LATCHED
 
 from ..cia402.drive_view import DriveView
-from ..exceptions import CanopenError
 from ..joints.aggregator import JointAggregator, JointSample, JointSet
 from ..joints.robot_joints import movable_joints, RobotJoint
 from .output_thread import OutputThread

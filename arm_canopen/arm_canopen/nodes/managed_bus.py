@@ -9,8 +9,9 @@ from collections.abc import Callable, Mapping, Sequence
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 
+from canopen_core import BootError
+
 from ..cia402.drive_commands import DriveCommands
-from ..exceptions import BootError
 from ..master.lifecycle import Managed, MANAGER, Supervisor, Verb, Work
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread

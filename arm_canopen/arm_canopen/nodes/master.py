@@ -14,6 +14,8 @@ import threading
 from rclpy.node import Node
 
 from black_box import BlackBoxSettings
+from canopen_core import CanopenError
+from canopen_core.can import Bus, open_bus
 from node_runner import (
     declare_black_box,
     declare_thread_priority,
@@ -26,12 +28,9 @@ from node_runner import (
     spin,
 )
 
-from ..can import open_bus
-from ..can.bus import Bus
 from ..config import load_bus
 from ..config.model import BusConfig
 from ..config.model.checks import check_bus
-from ..exceptions import CanopenError
 from ..library.canopen_master import THREAD_PRIORITY
 from ..master.lifecycle import MANAGER
 from .master_process import MasterProcess

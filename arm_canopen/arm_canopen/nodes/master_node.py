@@ -11,16 +11,21 @@ from functools import partial
 from canopen_interfaces.srv import CONmtID, COReadID, COWriteID
 from rclpy.node import Node
 
+from canopen_core import CanopenError
+from canopen_core.standard import (
+    ALL_NODES,
+    byte_length,
+    DataType,
+    NmtCommand,
+    NODE_ID_MAX,
+    NODE_ID_MIN,
+    object_address,
+)
 from node_runner import create_deferred_service
 
-from ..exceptions import CanopenError
 from ..master.object_access import bytes_from_raw, raw_from_bytes
 from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
-from ..standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
-from ..standard.datatypes import byte_length, DataType
-from ..standard.dictionary import object_address
-from ..standard.nmt import ALL_NODES, NmtCommand
 from .device_node import answer_read, answer_write
 from .output_thread import OutputThread
 

@@ -13,13 +13,13 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 
 from black_box import BlackBoxSettings
+from canopen_core import CanopenError
+from canopen_core.can import Bus
 from node_runner import notify_ready, raise_thread_priority
 
-from ..can.bus import Bus
 from ..cia402.motion import MotionSource
 from ..cia402.status import drive_status
 from ..config.model import BusConfig
-from ..exceptions import CanopenError
 from ..library.canopen_master import CanopenMaster
 from ..master.events import Event
 from .axis_services import DriveServices

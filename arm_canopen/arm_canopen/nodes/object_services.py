@@ -8,12 +8,11 @@ from concurrent.futures import Future
 from functools import partial
 
 from arm_msgs.srv import ReadObject, WriteObject
+from canopen_core import CanopenError, ObjectError
+from canopen_core.eds import bytes_from_text, text_from_bytes
+from canopen_core.standard import object_address, object_path, ObjectEntry
 
-from ..config.read.eds_values import bytes_from_text, text_from_bytes
-from ..exceptions import CanopenError, ObjectError
 from ..master.runner import NetworkThread
-from ..standard.dictionary import object_address, ObjectEntry
-from ..standard.object_path import object_path
 from .device_node import DeviceNode
 
 Transfer = tuple[ObjectEntry, bytes]

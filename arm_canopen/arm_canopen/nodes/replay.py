@@ -17,6 +17,8 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 
 from black_box import LogPlayer, PlaybackError
+from canopen_core import CanopenError
+from canopen_core.can import Frame, read_log
 from node_runner import (
     discover_other_nodes,
     log_as,
@@ -28,11 +30,8 @@ from node_runner import (
     spin_beside,
 )
 
-from ..can.frame import Frame
-from ..can.frame_log import read_log
 from ..config import load_bus
 from ..config.model import BusConfig
-from ..exceptions import CanopenError
 from ..library.bus_replay import BusReplay, unknown_scales
 from ..master.events import Event
 from .device_topics import DeviceTopics, log_bus_event, node_options

@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 import math
 
-from arm_canopen import DriveState as State
-from arm_canopen.standard import Controlword, STATE_WORDS, Statusword
+from canopen_core.standard import Controlword, STATE_WORDS, Statusword
+from canopen_core.standard import DriveState as State
 
 from ..deviations import Fault, FaultInjection
 from ..objects.object_store import ObjectStore

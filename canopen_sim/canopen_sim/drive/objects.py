@@ -7,8 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeAlias
 
-from arm_canopen import OperationMode
-from arm_canopen.standard import AXIS_OFFSET, Index, TARGET_OBJECTS
+from canopen_core.standard import AXIS_OFFSET, Index, OperationMode, TARGET_OBJECTS
 
 from ..objects.object_store import Integer, ObjectStore
 from .axis import Limits

@@ -9,9 +9,8 @@ from enum import auto, Enum
 from functools import partial
 from typing import NamedTuple, TypeVar
 
-from arm_canopen import DriveState as State
-from arm_canopen import OperationMode
-from arm_canopen.standard import AbortCode, Value
+from canopen_core.standard import AbortCode, OperationMode, Value
+from canopen_core.standard import DriveState as State
 
 from ..deviations import Fault
 from ..objects.object_store import Integer, refusal

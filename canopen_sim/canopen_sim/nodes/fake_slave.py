@@ -11,9 +11,9 @@ import sys
 from ament_index_python.packages import get_package_share_directory
 from rclpy.node import Node
 
-from arm_canopen import CanopenError
-from arm_canopen.config import load_eds
-from arm_canopen.standard import NODE_ID_MAX, NODE_ID_MIN, UNCONFIGURED
+from canopen_core import CanopenError
+from canopen_core.eds import load_eds
+from canopen_core.standard import NODE_ID_MAX, NODE_ID_MIN, UNCONFIGURED
 from node_runner import ParameterReader
 
 from ..host import DeviceHost

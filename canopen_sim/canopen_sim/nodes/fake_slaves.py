@@ -11,9 +11,9 @@ import threading
 
 from rclpy.node import Node
 
-from arm_canopen import CanopenError
-from arm_canopen.can import open_bus
 from arm_canopen.config import BusConfig, load_bus
+from canopen_core import CanopenError
+from canopen_core.can import open_bus
 from node_runner import (
     declare_thread_priority,
     log_as,

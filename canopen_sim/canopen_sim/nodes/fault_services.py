@@ -14,8 +14,8 @@ from typing import Any
 from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
-from arm_canopen import BusError
 from arm_msgs.srv import InjectFault
+from canopen_core import BusError
 
 from ..deviations import Fault, FaultInjection, parse_fault, unknown
 from ..device import Device

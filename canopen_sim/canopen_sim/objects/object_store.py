@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from arm_canopen import CodecError, SdoAbortError
-from arm_canopen.standard import (
+from canopen_core import CodecError, SdoAbortError
+from canopen_core.standard import (
     abort_text,
     AbortCode,
     byte_length,

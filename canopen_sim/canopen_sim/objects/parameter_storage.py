@@ -9,8 +9,8 @@ import json
 import logging
 from pathlib import Path
 
-from arm_canopen import SdoAbortError
-from arm_canopen.standard import AbortCode, encode, Index, Value
+from canopen_core import SdoAbortError
+from canopen_core.standard import AbortCode, encode, Index, Value
 
 from .object_store import Integer, ObjectStore, refusal, Variable
 

@@ -7,8 +7,15 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-from arm_canopen.can import Frame
-from arm_canopen.standard import AbortCode, CAN_ID_MASK, COB_ID_INVALID, Emergency, Index, Value
+from canopen_core.can import Frame
+from canopen_core.standard import (
+    AbortCode,
+    CAN_ID_MASK,
+    COB_ID_INVALID,
+    Emergency,
+    Index,
+    Value,
+)
 
 from ..objects.object_store import check_cob_id, Integer, ObjectStore, refusal
 from ..timed import NEVER

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from arm_canopen.can import Frame
-from arm_canopen.standard import (
+from canopen_core.can import Frame
+from canopen_core.standard import (
     ALL_NODES,
     COMMANDED_STATES,
     NmtCommand,

@@ -13,8 +13,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Generic, TypeVar
 
-from arm_canopen import CodecError, SdoAbortError
-from arm_canopen.standard import (
+from canopen_core import CodecError, SdoAbortError
+from canopen_core.standard import (
     AbortCode,
     bit_length,
     CAN_ID_MASK,

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import struct
 
-from arm_canopen.standard import (
+from canopen_core.standard import (
     AbortCode,
     ACKNOWLEDGE_UPLOAD,
     block_frames,

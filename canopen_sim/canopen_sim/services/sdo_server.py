@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from functools import partial
 import struct
 
-from arm_canopen import CodecError, SdoAbortError
-from arm_canopen.can import Frame
-from arm_canopen.standard import (
+from canopen_core import CodecError, SdoAbortError
+from canopen_core.can import Frame
+from canopen_core.standard import (
     Abort,
     AbortCode,
     CAN_ID_MASK,

@@ -6,8 +6,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from arm_canopen.can import Frame
-from arm_canopen.standard import AbortCode, CAN_ID_MASK, CobId, Index, SYNC_PRODUCER, Value
+from canopen_core.can import Frame
+from canopen_core.standard import (
+    AbortCode,
+    CAN_ID_MASK,
+    CobId,
+    Index,
+    SYNC_PRODUCER,
+    Value,
+)
 
 from ..objects.object_store import check_can_id, ObjectStore, refusal
 

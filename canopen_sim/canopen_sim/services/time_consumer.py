@@ -8,9 +8,9 @@ from collections.abc import Callable
 import contextlib
 from datetime import datetime, timedelta
 
-from arm_canopen import CodecError
-from arm_canopen.can import Frame
-from arm_canopen.standard import (
+from canopen_core import CodecError
+from canopen_core.can import Frame
+from canopen_core.standard import (
     AbortCode,
     CAN_ID_MASK,
     decode_time_of_day,

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from arm_canopen.can import Frame
-from arm_canopen.standard import Index, ObjectEntry, SYNCHRONOUS_MAX
+from canopen_core.can import Frame
+from canopen_core.standard import Index, ObjectEntry, SYNCHRONOUS_MAX
 
 from ..objects.object_store import ObjectStore
 from ..timed import NEVER

@@ -31,12 +31,12 @@ from arm_canopen import (
     Setpoint,
     Severity,
 )
-from arm_canopen.can import Bus, Frame
-from arm_canopen.can.frame import checked
 from arm_canopen.config import BusConfig, NodeConfig
 from arm_canopen.master.runner import Clock
 from arm_canopen.master.scheduler import Promise
-from arm_canopen.standard import ObjectDictionary
+from canopen_core.can import Bus, Frame
+from canopen_core.can.frame import checked
+from canopen_core.standard import ObjectDictionary
 from canopen_sim import Device, ServoModel
 from canopen_sim import Drive as SimulatedDrive
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from drive_samples import drive_dictionary
 from sdo_byte_server import SdoByteServer
 
-from arm_canopen.can import Frame
-from arm_canopen.standard import byte_length, NmtState
+from canopen_core.can import Frame
+from canopen_core.standard import byte_length, NmtState
 
 START, STOP, PRE_OPERATIONAL, RESET_NODE, RESET_COMMUNICATION = 0x01, 0x02, 0x80, 0x81, 0x82
 STATES = {

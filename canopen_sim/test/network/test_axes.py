@@ -13,7 +13,7 @@ import pytest
 
 from arm_canopen import DriveError, DriveState, OperationMode
 from arm_canopen.config import load_bus
-from arm_canopen.standard import AXIS_OFFSET, Index
+from canopen_core.standard import AXIS_OFFSET, Index
 
 EDS = DRIVE_EDS.with_name('cia402_two_axes.eds')
 BUS = f"""

@@ -38,13 +38,13 @@ from arm_canopen import (
     OperationMode,
     Severity,
 )
-from arm_canopen.can import Frame
 from arm_canopen.cia402.homing import HomingProgress
 from arm_canopen.cia402.position_modes import Move, QUEUE_MAX
 from arm_canopen.config import DriveConfig, NodeConfig
 from arm_canopen.config.model.drive import RecoveryPolicy
 from arm_canopen.master.scheduler import Promise
-from arm_canopen.standard import NmtCommand
+from canopen_core.can import Frame
+from canopen_core.standard import NmtCommand
 from canopen_sim import Fault, FaultInjection, ServoModel
 
 pytestmark = pytest.mark.slow

@@ -28,11 +28,11 @@ from scripted_device import (
 )
 
 from arm_canopen import CanopenError, EventKind, Severity
-from arm_canopen.can import Frame
 from arm_canopen.config import Identity, NodeConfig
 from arm_canopen.config.model import Place
 from arm_canopen.master.remote_node import BootPhase, LONGEST_PAUSE, RemoteNode, STABLE_TIME
-from arm_canopen.standard import AccessType, NmtCommand, NmtState, ObjectDictionary
+from canopen_core.can import Frame
+from canopen_core.standard import AccessType, NmtCommand, NmtState, ObjectDictionary
 
 NODE = 'io'
 NODE_ID = 9

@@ -25,11 +25,11 @@ from arm_canopen import (
     RefusalCause,
     Severity,
 )
-from arm_canopen.can import Frame
 from arm_canopen.cia402.position_modes import Move
 from arm_canopen.cia402.units import Units
 from arm_canopen.config import DriveConfig, NodeConfig
-from arm_canopen.standard import DataType
+from canopen_core.can import Frame
+from canopen_core.standard import DataType
 
 pytestmark = pytest.mark.slow
 

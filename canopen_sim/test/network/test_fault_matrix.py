@@ -41,12 +41,12 @@ from arm_canopen import (
     Setpoint,
     Severity,
 )
-from arm_canopen.can import Frame
 from arm_canopen.cia402.status import drive_status, DriveStatus
 from arm_canopen.config import Identity, SdoWrite
 from arm_canopen.nodes.diagnostics import drive_diagnostic
-from arm_canopen.standard import DataType, NmtCommand, ObjectDictionary, ObjectEntry
-from arm_canopen.standard.nmt import COMMANDED_STATES
+from canopen_core.can import Frame
+from canopen_core.standard import DataType, NmtCommand, ObjectDictionary, ObjectEntry
+from canopen_core.standard.nmt import COMMANDED_STATES
 from canopen_sim import Device, FaultInjection
 from canopen_sim import Drive as SimulatedDrive
 from canopen_sim import Fault as Deviation

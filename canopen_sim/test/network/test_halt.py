@@ -27,13 +27,13 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen import DriveError, DriveState, OperationMode, Severity
-from arm_canopen.can import Frame
 from arm_canopen.cia402.drive_view import VelocityEstimate, WINDOW
 from arm_canopen.cia402.halt import UNDER_HALT_TIME
 from arm_canopen.cia402.position_modes import Move
 from arm_canopen.config import NodeConfig
 from arm_canopen.config.model.drive import RecoveryPolicy
-from arm_canopen.standard import Controlword, ObjectDictionary, Statusword
+from canopen_core.can import Frame
+from canopen_core.standard import Controlword, ObjectDictionary, Statusword
 
 pytestmark = pytest.mark.slow
 

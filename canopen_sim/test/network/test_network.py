@@ -25,7 +25,6 @@ from arm_canopen import (
     SdoTimeoutError,
     Severity,
 )
-from arm_canopen.can import Frame, VirtualBus, VirtualWire
 from arm_canopen.config import NodeConfig
 from arm_canopen.master.emergency_log import EmergencyLog
 from arm_canopen.master.life_signs import Guarding
@@ -39,7 +38,8 @@ from arm_canopen.master.other_master import (
 )
 from arm_canopen.master.remote_node import RESET_TIME
 from arm_canopen.master.status import node_status
-from arm_canopen.standard import (
+from canopen_core.can import Frame, VirtualBus, VirtualWire
+from canopen_core.standard import (
     CobId,
     DataType,
     decode_time_of_day,

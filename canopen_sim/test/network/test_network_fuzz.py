@@ -11,8 +11,8 @@ from drive_samples import bus_config, drive_config, PERIOD, SCALE
 import pytest
 
 from arm_canopen import DriveState, OperationMode
-from arm_canopen.can import Frame
-from arm_canopen.standard import ALL_NODES, NmtCommand, NmtState
+from canopen_core.can import Frame
+from canopen_core.standard import ALL_NODES, NmtCommand, NmtState
 
 pytestmark = pytest.mark.slow
 

@@ -37,7 +37,13 @@ import pytest
 
 from arm_canopen import BusConfig, CanopenError, DriveError, DriveState, OperationMode, Severity
 from arm_canopen.config import load_bus, PdoConfig
-from arm_canopen.standard import CobId, NmtCommand, PdoCodec, rpdo_default, SYNCHRONOUS_MAX
+from canopen_core.standard import (
+    CobId,
+    NmtCommand,
+    PdoCodec,
+    rpdo_default,
+    SYNCHRONOUS_MAX,
+)
 from canopen_sim import DeviceHost
 from canopen_sim.simulation import add_devices
 

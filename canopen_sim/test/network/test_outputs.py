@@ -24,7 +24,7 @@ import pytest
 from arm_canopen import BusError, CanopenError, CodecError, OperationMode
 from arm_canopen.config import NodeConfig
 from arm_canopen.config.model.checks import check_bus
-from arm_canopen.standard import NmtCommand
+from canopen_core.standard import NmtCommand
 from canopen_sim import Fault, FaultInjection
 
 MODULE = 'module'

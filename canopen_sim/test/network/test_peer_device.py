@@ -16,8 +16,8 @@ import can
 import canopen
 from drive_samples import bus_config, drive_config, DRIVE_EDS
 
-from arm_canopen.can import Frame
 from arm_canopen.config import NodeConfig
+from canopen_core.can import Frame
 
 NODE_ID = 2
 NAME = 'stranger'

@@ -34,9 +34,10 @@ from arm_canopen import (
     Severity,
 )
 from arm_canopen.cia402.position_modes import Move
-from arm_canopen.config import BootWrite, DEFAULT_DRIVE, load_bus, load_eds, NodeConfig
+from arm_canopen.config import BootWrite, DEFAULT_DRIVE, load_bus, NodeConfig
 from arm_canopen.master.scheduler import Promise
-from arm_canopen.standard import ObjectDictionary
+from canopen_core.eds import load_eds
+from canopen_core.standard import ObjectDictionary
 from canopen_sim import Fault, FaultInjection
 
 pytestmark = pytest.mark.slow

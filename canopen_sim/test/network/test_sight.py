@@ -29,14 +29,14 @@ from arm_canopen import (
     RefusalCause,
     Severity,
 )
-from arm_canopen.can import Frame
 from arm_canopen.cia402.following_watch import Following, FollowingWatch
 from arm_canopen.config import boot_writes, BusConfig, load_bus, NodeConfig
 from arm_canopen.config.model import Place
 from arm_canopen.config.model.checks import check_bus
 from arm_canopen.config.model.tpdo_freshness import with_event_timer
 from arm_canopen.master.process_image import ReceivedTpdo, SyncRound
-from arm_canopen.standard import ObjectDictionary, Statusword
+from canopen_core.can import Frame
+from canopen_core.standard import ObjectDictionary, Statusword
 from canopen_sim import Fault, FaultInjection
 
 pytestmark = pytest.mark.slow

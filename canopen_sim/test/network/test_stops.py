@@ -20,7 +20,6 @@ from moving_drive import MovingDrive, NODE_ID, RAMP, STANDING
 import pytest
 
 from arm_canopen import DriveError, DriveState, EventKind, OperationMode, Severity
-from arm_canopen.can import Frame
 from arm_canopen.cia402.drive_objects import DriveObjects
 from arm_canopen.cia402.status import drive_status
 from arm_canopen.cia402.stop_all import stop_all, StopReport
@@ -29,7 +28,8 @@ from arm_canopen.config.model.drive import RecoveryPolicy
 from arm_canopen.library.canopen_master import leave_device
 from arm_canopen.master.remote_node import BootPhase
 from arm_canopen.nodes.diagnostics import drive_diagnostic
-from arm_canopen.standard import NmtCommand
+from canopen_core.can import Frame
+from canopen_core.standard import NmtCommand
 
 pytestmark = pytest.mark.slow
 

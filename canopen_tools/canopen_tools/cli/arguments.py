@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 import difflib
 from typing import Any, TYPE_CHECKING, TypeAlias
 
-from arm_canopen import CanopenError
-from arm_canopen.standard import NODE_ID_MAX, NODE_ID_MIN
+from canopen_core import CanopenError
+from canopen_core.standard import NODE_ID_MAX, NODE_ID_MIN
 
 if TYPE_CHECKING:
     SubParsers: TypeAlias = argparse._SubParsersAction[argparse.ArgumentParser]  # noqa: SLF001

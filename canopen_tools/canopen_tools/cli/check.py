@@ -18,7 +18,7 @@ from arm_canopen.config import (
     Traffic,
     UnitRule,
 )
-from arm_canopen.standard import Index
+from canopen_core.standard import Index
 
 from .arguments import bitrate, SubParsers
 from .output import counted, print_line, print_problem, print_table, RED, YELLOW

@@ -13,7 +13,14 @@ from pathlib import Path
 import re
 
 from arm_canopen.config import BusConfig, DriveConfig, load_bus, NodeConfig, PdoConfig
-from arm_canopen.standard import AXIS_OFFSET, CobId, DataType, Index, MappedObject, NmtState
+from canopen_core.standard import (
+    AXIS_OFFSET,
+    CobId,
+    DataType,
+    Index,
+    MappedObject,
+    NmtState,
+)
 
 from ..monitor.object_names import ObjectNames
 from .arguments import SubParsers, UsageError

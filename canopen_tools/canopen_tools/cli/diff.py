@@ -8,8 +8,6 @@ import argparse
 from collections.abc import Iterator
 from contextlib import suppress
 
-from arm_canopen import CodecError, SdoAbortError
-from arm_canopen.can import open_bus
 from arm_canopen.config import (
     BootWrite,
     BusConfig,
@@ -18,7 +16,15 @@ from arm_canopen.config import (
     HeldConsumers,
     NodeConfig,
 )
-from arm_canopen.standard import abort_text, DataType, encode, Index, ObjectDictionary
+from canopen_core import CodecError, SdoAbortError
+from canopen_core.can import open_bus
+from canopen_core.standard import (
+    abort_text,
+    DataType,
+    encode,
+    Index,
+    ObjectDictionary,
+)
 
 from ..monitor.object_names import ObjectNames
 from ..monitor.value_text import data_text

@@ -7,7 +7,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from arm_canopen.config import Eds, RPDO, TPDO
+from arm_canopen.config import RPDO, TPDO
+from canopen_core.eds import Eds
 
 from ..eds_lint import EdsReport, lint_eds
 from .arguments import SubParsers

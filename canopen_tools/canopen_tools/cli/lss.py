@@ -8,9 +8,9 @@ import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from arm_canopen import LssError, SdoAbortError, SdoTimeoutError
-from arm_canopen.can import Frame, open_bus
-from arm_canopen.standard import (
+from canopen_core import LssError, SdoAbortError, SdoTimeoutError
+from canopen_core.can import Frame, open_bus
+from canopen_core.standard import (
     BIT_RATES,
     CobId,
     Index,

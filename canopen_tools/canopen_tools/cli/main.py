@@ -15,7 +15,7 @@ import os
 import signal
 import sys
 
-from arm_canopen import CanopenError
+from canopen_core import CanopenError
 
 from ..ros_arguments import split_ros_arguments
 from . import check, dbc, dcf, diff, eds, first_motion, lss, new, objects, scan

@@ -14,7 +14,7 @@ import sys
 import tempfile
 from typing import TypeVar
 
-from arm_canopen import OperationMode
+from canopen_core.standard import OperationMode
 
 from ..new_bus import bus_text, POSITION_MODES
 from ..new_device import contradiction, NewDevice, said_units, TURN, Units

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 import re
 
-from arm_canopen import ConfigError, SdoError
-from arm_canopen.can import open_bus
-from arm_canopen.config import Eds, FACTOR_ADDRESSES, Identity, load_eds
-from arm_canopen.standard import Index
+from arm_canopen.config import FACTOR_ADDRESSES, Identity
+from canopen_core import ConfigError, SdoError
+from canopen_core.can import open_bus
+from canopen_core.eds import Eds, load_eds
+from canopen_core.standard import Index
 
 from ..eds_match import (
     eds_identity,

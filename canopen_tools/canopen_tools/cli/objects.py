@@ -6,10 +6,10 @@ from __future__ import annotations
 
 import argparse
 
-from arm_canopen import CodecError, SdoAbortError
-from arm_canopen.can import open_bus
-from arm_canopen.config import bytes_from_text, text_from_bytes
-from arm_canopen.standard import DataType, fitted, Index, ObjectEntry
+from canopen_core import CodecError, SdoAbortError
+from canopen_core.can import open_bus
+from canopen_core.eds import bytes_from_text, text_from_bytes
+from canopen_core.standard import DataType, fitted, Index, ObjectEntry
 
 from ..monitor.object_names import ObjectNames
 from ..monitor.value_text import data_text

@@ -9,7 +9,7 @@ from contextlib import suppress
 import os
 import sys
 
-from arm_canopen.config import Problem
+from canopen_core import Problem
 
 RED, YELLOW, RESET = '\x1b[1;31m', '\x1b[33m', '\x1b[0m'
 

@@ -8,10 +8,11 @@ import argparse
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
-from arm_canopen import SdoClient, SdoError
-from arm_canopen.can import Frame, open_bus
+from arm_canopen import SdoClient
 from arm_canopen.config import BusConfig, Identity, IDENTITY_OBJECTS, load_bus, NodeConfig
-from arm_canopen.standard import (
+from canopen_core import SdoError
+from canopen_core.can import Frame, open_bus
+from canopen_core.standard import (
     CobId,
     DeviceProfile,
     Index,

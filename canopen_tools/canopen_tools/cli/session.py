@@ -13,9 +13,9 @@ from time import monotonic
 from typing import Any, TypeVar
 
 from arm_canopen import MasterFrames, Promise, Scheduler, SdoClient
-from arm_canopen.can import Bus, Frame
 from arm_canopen.config import BusConfig
-from arm_canopen.standard import (
+from canopen_core.can import Bus, Frame
+from canopen_core.standard import (
     CobId,
     NmtState,
     NODE_ID_MAX,

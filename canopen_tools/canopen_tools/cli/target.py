@@ -8,9 +8,10 @@ import argparse
 from dataclasses import dataclass
 from functools import cache
 
-from arm_canopen import ObjectError
-from arm_canopen.config import BusConfig, DEFAULT_DRIVE, load_bus, load_eds, NodeConfig
-from arm_canopen.standard import (
+from arm_canopen.config import BusConfig, DEFAULT_DRIVE, load_bus, NodeConfig
+from canopen_core import ObjectError
+from canopen_core.eds import load_eds
+from canopen_core.standard import (
     DataType,
     find_object,
     NODE_ID_MAX,
@@ -52,7 +53,7 @@ class Target:
         return slow_timeout(entry.index, self.timeout)
 
     def entry(self, path: str, data_type: DataType | None = None) -> ObjectEntry:
-        """Find an object by a path of ``standard/object_path.py``; with a type it needs no file.
+        """Find an object by a path of ``standard/object_paths.py``; with a type it needs no file.
 
         Raises:
             UsageError: There is none; the message names similar ones.

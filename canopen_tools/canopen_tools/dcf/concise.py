@@ -12,7 +12,7 @@ from collections.abc import Iterable
 import struct
 
 from arm_canopen.config import boot_writes, BootWrite, BusConfig, NodeConfig, RPDO, SdoWrite, TPDO
-from arm_canopen.standard import (
+from canopen_core.standard import (
     COB_ID_INVALID,
     DataType,
     encode,

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from arm_canopen import CodecError
 from arm_canopen.config import (
     BusConfig,
     Direction,
@@ -27,7 +26,8 @@ from arm_canopen.config import (
     TPDO,
     U16_MAX,
 )
-from arm_canopen.standard import (
+from canopen_core import CodecError
+from canopen_core.standard import (
     AccessType,
     BIT_RATES_KBIT,
     COB_ID_INVALID,

@@ -8,9 +8,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 import math
 
-from arm_canopen import CanopenMaster, DriveError, ObjectError, OperationMode, SdoError
+from arm_canopen import CanopenMaster
 from arm_canopen.config import DriveConfig, FactorGroup
-from arm_canopen.standard import AXIS_OFFSET, CYCLIC_MODES, Index
+from canopen_core import DriveError, ObjectError, SdoError
+from canopen_core.standard import AXIS_OFFSET, CYCLIC_MODES, Index, OperationMode
 from first_motion import FASTEST, JointKind, too_few_increments
 
 TURNS_MAX = 20.0  # turns from 0 beyond which a position is hardly one of an arm

@@ -9,7 +9,7 @@ import shutil
 import sys
 import textwrap
 
-from arm_canopen import CanopenError
+from canopen_core import CanopenError
 from first_motion import Cause, JointKind, read_quantity, Seen
 
 WIDTH_MIN = 40  # [characters]

@@ -12,17 +12,10 @@ import os
 from pathlib import Path
 import time
 
-from arm_canopen import (
-    BootError,
-    CanopenDrive,
-    CanopenError,
-    CanopenMaster,
-    DriveState,
-    Event,
-    Severity,
-)
+from arm_canopen import CanopenDrive, CanopenMaster, Event, Severity
 from arm_canopen.config import DriveConfig
-from arm_canopen.standard import CYCLIC_MODES
+from canopen_core import BootError, CanopenError
+from canopen_core.standard import CYCLIC_MODES, DriveState
 from first_motion import (
     FOLLOWING,
     JointKind,

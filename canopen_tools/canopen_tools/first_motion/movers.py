@@ -11,17 +11,10 @@ import threading
 import time
 from typing import TypeAlias
 
-from arm_canopen import (
-    AxisFeedback,
-    CanopenError,
-    CanopenMaster,
-    DriveError,
-    ObjectError,
-    Refusal,
-    SdoError,
-)
+from arm_canopen import AxisFeedback, CanopenMaster, Refusal
 from arm_canopen.config import DriveConfig
-from arm_canopen.standard import AXIS_OFFSET, Index
+from canopen_core import CanopenError, DriveError, ObjectError, SdoError
+from canopen_core.standard import AXIS_OFFSET, Index
 from first_motion import MotionPlan
 
 PERMIT = 0.25  # [s] for which one permission holds

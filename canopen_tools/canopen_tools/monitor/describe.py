@@ -7,10 +7,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeAlias
 
-from arm_canopen import CodecError
-from arm_canopen.can import error_text, Frame
 from arm_canopen.config import BusConfig, NodeConfig, PdoConfig
-from arm_canopen.standard import (
+from canopen_core import CodecError
+from canopen_core.can import error_text, Frame
+from canopen_core.standard import (
     ALL_NODES,
     CAN_ID_MASK,
     COB_ID_INVALID,

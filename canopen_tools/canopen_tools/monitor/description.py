@@ -10,7 +10,7 @@ from enum import Enum
 import re
 from typing import TypeAlias
 
-from arm_canopen.can import EXTENDED_ID_MAX, Frame
+from canopen_core.can import EXTENDED_ID_MAX, Frame
 
 
 class FrameKind(Enum):

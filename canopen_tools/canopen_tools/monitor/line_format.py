@@ -7,7 +7,7 @@ from __future__ import annotations
 from datetime import datetime
 from enum import Enum
 
-from arm_canopen.can import Frame
+from canopen_core.can import Frame
 
 from .description import Description, FrameKind
 

@@ -4,7 +4,13 @@
 
 from __future__ import annotations
 
-from arm_canopen.standard import DataType, Index, object_address, ObjectDictionary, PDO_COUNT_MAX
+from canopen_core.standard import (
+    DataType,
+    Index,
+    object_address,
+    ObjectDictionary,
+    PDO_COUNT_MAX,
+)
 
 _PDO_RECORDS: tuple[tuple[Index, str], ...] = (
     (Index.RPDO_COMMUNICATION, 'RPDO{} communication'),

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from arm_canopen import CodecError
-from arm_canopen.standard import (
+from canopen_core import CodecError
+from canopen_core.standard import (
     Abort,
     abort_text,
     decode_request,

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from arm_canopen import CodecError
-from arm_canopen.standard import (
+from canopen_core import CodecError
+from canopen_core.standard import (
     CAN_ID_MASK,
     COB_ID_INVALID,
     ConsumerHeartbeatTime,

@@ -153,7 +153,7 @@ def signal_handlers() -> Iterator[None]:
 
 @pytest.mark.usefixtures('signal_handlers')
 @pytest.mark.parametrize(
-    'source', ['arm_canopen.master.runner', 'arm_canopen.can.socket_bus', 'quad_hardware.link']
+    'source', ['arm_canopen.master.runner', 'canopen_core.can.socket_bus', 'quad_hardware.link']
 )
 def test_what_the_layers_below_log_reaches_rosout(isolation: Isolation, source: str) -> None:
     """A record of any package's logger, in any thread, is a message of the node on /rosout."""

@@ -5,7 +5,8 @@
 It is made of plain values, and imports nothing that reads files.
 """
 
-from ..findings import Place
+from canopen_core import Place
+
 from .bus import BusConfig, Identity, MasterConfig, NodeConfig, PdoConfig, SdoWrite
 from .drive import DriveConfig, RecoveryPolicy
 

@@ -11,20 +11,23 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from ...standard.cob_id import (
+from canopen_core import Place
+from canopen_core.standard import (
     CAN_ID_MASK,
     COB_ID_EXTENDED,
     COB_ID_INVALID,
+    ConsumerHeartbeatTime,
+    DataType,
+    encode,
+    Index,
+    MAPPED_LENGTH_MASK,
+    object_address,
+    PDO_COUNT_MAX,
     SYNC_PRODUCER,
     TIME_CONSUMER,
     TIME_PRODUCER,
 )
-from ...standard.datatypes import DataType, encode
-from ...standard.dictionary import object_address
-from ...standard.nmt import ConsumerHeartbeatTime
-from ...standard.objects import Index, PDO_COUNT_MAX
-from ...standard.pdo import MAPPED_LENGTH_MASK
-from ..findings import Place
+
 from ..units import HUNDRED_MICROSECONDS, MILLISECONDS
 from .bus import BusConfig, NodeConfig, PdoConfig, SdoWrite
 from .pdo_direction import Direction, RPDO, TPDO

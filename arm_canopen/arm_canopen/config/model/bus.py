@@ -8,14 +8,24 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ...exceptions import CodecError, Problem
-from ...standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, CobId
-from ...standard.datatypes import DataType, decode, Value
-from ...standard.dictionary import object_address, ObjectDictionary
-from ...standard.lss import BIT_RATES_KBIT
-from ...standard.objects import AXIS_OFFSET, COMMANDS, Index, slow_timeout
-from ...standard.pdo import MappedObject
-from ..findings import Place
+from canopen_core import CodecError, Place, Problem
+from canopen_core.standard import (
+    AXIS_OFFSET,
+    BIT_RATES_KBIT,
+    CAN_ID_MASK,
+    COB_ID_INVALID,
+    CobId,
+    COMMANDS,
+    DataType,
+    decode,
+    Index,
+    MappedObject,
+    object_address,
+    ObjectDictionary,
+    slow_timeout,
+    Value,
+)
+
 from ..keys import key, Kind, Use
 from ..units import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS
 from .drive import DriveConfig

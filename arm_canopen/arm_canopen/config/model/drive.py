@@ -7,7 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from ...standard.drive import DriveState, OperationMode
+from canopen_core.standard import DriveState, OperationMode
+
 from ..keys import key, Kind
 from ..units import MILLISECONDS
 

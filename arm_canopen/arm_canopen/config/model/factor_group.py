@@ -8,7 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
-from ...standard.objects import Index
+from canopen_core.standard import Index
+
 from .si_unit import acceleration_unit, NamedUnit, position_unit, velocity_unit
 
 REVOLUTION = 2.0 * math.pi  # [rad]

@@ -7,9 +7,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ...standard.cob_id import rpdo_default, tpdo_default
-from ...standard.dictionary import ObjectDictionary, ObjectEntry
-from ...standard.objects import Index, PDO_COUNT_MAX
+from canopen_core.standard import (
+    Index,
+    ObjectDictionary,
+    ObjectEntry,
+    PDO_COUNT_MAX,
+    rpdo_default,
+    tpdo_default,
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,9 +11,8 @@ from __future__ import annotations
 from dataclasses import replace
 import math
 
-from ...standard.dictionary import ObjectDictionary
-from ...standard.objects import Index, is_state
-from ...standard.pdo import EVENT_DRIVEN, SYNCHRONOUS_MAX
+from canopen_core.standard import EVENT_DRIVEN, Index, is_state, ObjectDictionary, SYNCHRONOUS_MAX
+
 from ..units import HUNDRED_MICROSECONDS, MILLISECONDS
 from .bus import PdoConfig
 

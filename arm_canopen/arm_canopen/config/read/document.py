@@ -18,7 +18,7 @@ from typing import TypeAlias
 
 import yaml
 
-from ..findings import Findings, Place
+from canopen_core import Findings, Place
 
 TAG_PREFIX = 'tag:yaml.org,2002:'
 MERGE_TAG = TAG_PREFIX + 'merge'

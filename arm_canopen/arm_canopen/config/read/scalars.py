@@ -11,7 +11,8 @@ from __future__ import annotations
 import math
 import re
 
-from ..findings import RefusedError
+from canopen_core import RefusedError
+
 from .document import Item, Scalar, ScalarKind, YamlList
 
 TRUE_WORDS = frozenset({'true', 'yes', 'on', 'y', '1'})

@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterable, Sequence
 import difflib
 from typing import Any
 
-from ..findings import Findings, RefusedError
+from canopen_core import Findings, RefusedError
+
 from ..keys import Key, Kind, Use
 from ..sections import SECTIONS, TOP_LEVEL
 from . import scalars

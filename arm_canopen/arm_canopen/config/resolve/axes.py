@@ -8,8 +8,9 @@ from dataclasses import replace
 import re
 from typing import Any
 
-from ...standard.drive import DriveState
-from ..findings import Findings, Place, RefusedError
+from canopen_core import Findings, Place, RefusedError
+from canopen_core.standard import DriveState
+
 from ..model.drive import DriveConfig, RecoveryPolicy
 from ..read import scalars
 from ..read.document import Item, YamlMap

@@ -7,7 +7,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from ..findings import Findings, Place
+from canopen_core import Findings, Place
+
 from ..model import BusConfig, MasterConfig, NodeConfig
 from ..model.pdo_direction import RPDO, TPDO
 from ..read.document import Item, YamlMap

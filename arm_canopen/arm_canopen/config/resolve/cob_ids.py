@@ -7,8 +7,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from ...standard.cob_id import CAN_ID_MASK
-from ..findings import Findings
+from canopen_core import Findings
+from canopen_core.standard import CAN_ID_MASK
+
 from ..model.bus import NodeConfig, PdoConfig
 from ..model.pdo_direction import Direction, RPDO, TPDO
 from .pdos import AUTO_ID

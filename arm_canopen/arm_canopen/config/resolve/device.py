@@ -8,24 +8,28 @@ from collections.abc import Iterable
 from dataclasses import replace
 from itertools import product
 
-from ...standard.datatypes import DataType, UNSIGNED_BITS
-from ...standard.dictionary import (
+from canopen_core import Findings, Place
+from canopen_core.eds import Eds
+from canopen_core.standard import (
+    AXIS_OFFSET,
+    DataType,
     drive_axes,
+    Index,
     is_drive,
+    is_signed,
     object_address,
     ObjectDictionary,
     profile_number,
+    SYNCHRONOUS_MAX,
+    UNSIGNED_BITS,
 )
-from ...standard.objects import AXIS_OFFSET, Index, is_signed
-from ...standard.pdo import SYNCHRONOUS_MAX
-from ..findings import Findings, Place
+
 from ..keys import keys_of
 from ..model.bus import Identity, MasterConfig, NodeConfig, POLL_PERIOD
 from ..model.drive import DriveConfig
 from ..model.pdo_direction import RPDO, TPDO
 from ..model.tpdo_freshness import with_event_timer
 from ..read.document import YamlMap
-from ..read.eds import Eds
 from ..read.section import read_section, texts
 from ..sections import DEVICE_KEYS, DeviceSettings, DRIVE_KEYS, MasterSettings, Options
 from ..units import MILLISECONDS

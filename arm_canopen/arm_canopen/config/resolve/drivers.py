@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import difflib
 
-from ..findings import Findings
+from canopen_core import Findings
+
 from ..read.document import YamlMap
 
 MASTER_PACKAGE = 'canopen_master_driver'

@@ -7,10 +7,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ...exceptions import ConfigError
-from ..findings import Findings
+from canopen_core import ConfigError, Findings
+from canopen_core.eds import Eds, load_eds
+
 from ..read.document import Item
-from ..read.eds import Eds, load_eds
 
 DEFAULT_DRIVE = Path(__file__).with_name('default_drive.eds')
 PATH_VARIABLE = '@BUS_CONFIG_PATH@'

@@ -20,7 +20,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 import difflib
 
-from ..findings import Findings, RefusedError
+from canopen_core import Findings, RefusedError
+
 from ..read.document import Item, YamlList, YamlMap
 from ..read.scalars import describe, integer
 from ..read.section import block

@@ -7,8 +7,9 @@ from __future__ import annotations
 from dataclasses import replace
 import re
 
-from ...standard.cob_id import TIME_PRODUCER
-from ..findings import Findings, RefusedError
+from canopen_core import Findings, RefusedError
+from canopen_core.standard import TIME_PRODUCER
+
 from ..keys import keys_of
 from ..model.bus import CYCLE_PERIOD, Identity, MasterConfig, U16_MAX
 from ..read.document import YamlMap

@@ -4,14 +4,26 @@
 
 from __future__ import annotations
 
-from ...standard.datatypes import bit_length, DataType, SIGNED_BITS, UNSIGNED_BITS
-from ...standard.dictionary import is_drive, object_address, ObjectDictionary, ObjectEntry
-from ...standard.objects import is_signed, PDO_BITS_MAX
-from ...standard.pdo import MAPPED_LENGTH_MASK, mapped_place, MappedObject
-from ..findings import Findings, Place, RefusedError
+from canopen_core import Findings, Place, RefusedError
+from canopen_core.eds import DUMMY_TYPES, Eds
+from canopen_core.standard import (
+    bit_length,
+    DataType,
+    is_drive,
+    is_signed,
+    MAPPED_LENGTH_MASK,
+    mapped_place,
+    MappedObject,
+    object_address,
+    ObjectDictionary,
+    ObjectEntry,
+    PDO_BITS_MAX,
+    SIGNED_BITS,
+    UNSIGNED_BITS,
+)
+
 from ..model.pdo_direction import Direction, RPDO
 from ..read.document import Item, YamlList
-from ..read.eds import DUMMY_TYPES, Eds
 from ..sections import MAPPING_KEYS
 from .sdo_list import find_entry, read_object
 

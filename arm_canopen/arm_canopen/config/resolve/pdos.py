@@ -8,15 +8,21 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
-from ...standard.cob_id import CAN_ID_MASK, COB_ID_EXTENDED, COB_ID_INVALID, PREDEFINED_MAX
-from ...standard.dictionary import object_address
-from ...standard.objects import PDO_COUNT_MAX
-from ...standard.pdo import SYNCHRONOUS_MAX
-from ..findings import Findings, Place, RefusedError
+from canopen_core import Findings, Place, RefusedError
+from canopen_core.eds import Eds
+from canopen_core.standard import (
+    CAN_ID_MASK,
+    COB_ID_EXTENDED,
+    COB_ID_INVALID,
+    object_address,
+    PDO_COUNT_MAX,
+    PREDEFINED_MAX,
+    SYNCHRONOUS_MAX,
+)
+
 from ..model.bus import PdoConfig
 from ..model.pdo_direction import Direction, RPDO, TPDO
 from ..read.document import Item, Scalar, YamlList, YamlMap
-from ..read.eds import Eds
 from ..read.scalars import describe, integer, key_number
 from ..read.section import block, listing, read_section
 from ..sections import RPDO_KEYS, TPDO_KEYS

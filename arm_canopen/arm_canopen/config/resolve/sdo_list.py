@@ -12,26 +12,34 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from ...exceptions import CodecError
-from ...standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, CobId
-from ...standard.datatypes import (
+from canopen_core import CodecError, Findings, Place, RefusedError
+from canopen_core.eds import Eds
+from canopen_core.standard import (
+    axis_of,
+    CAN_ID_MASK,
+    COB_ID_INVALID,
+    CobId,
+    COMMANDS,
     DataType,
     encode,
     FIXED_BITS,
+    Index,
     integer_range,
+    is_drive,
+    object_address,
+    ObjectDictionary,
+    ObjectEntry,
+    PDO_COUNT_MAX,
     REAL_FORMATS,
     SIGNED_BITS,
     Value,
 )
-from ...standard.dictionary import is_drive, object_address, ObjectDictionary, ObjectEntry
-from ...standard.objects import axis_of, COMMANDS, Index, PDO_COUNT_MAX
-from ..findings import Findings, Place, RefusedError
+
 from ..keys import Key
 from ..model.boot_plan import ERROR_CONTROL
 from ..model.bus import SdoWrite
 from ..read import scalars
 from ..read.document import Item, Scalar, ScalarKind, YamlMap
-from ..read.eds import Eds
 from ..read.section import block, listing, read_section
 from ..sections import SDO_KEYS, U8_MAX
 

@@ -8,8 +8,7 @@ from collections.abc import Generator
 import math
 from typing import NamedTuple
 
-from arm_canopen import OperationMode
-from arm_canopen.standard import Controlword, Statusword
+from canopen_core.standard import Controlword, OperationMode, Statusword
 
 from ...services.sync_consumer import SyncConsumer
 from ...timed import NEVER

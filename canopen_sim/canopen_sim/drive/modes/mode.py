@@ -6,8 +6,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from arm_canopen import OperationMode
-from arm_canopen.standard import Statusword
+from canopen_core.standard import OperationMode, Statusword
 
 from ...services.sync_consumer import SyncConsumer
 from ...timed import NEVER

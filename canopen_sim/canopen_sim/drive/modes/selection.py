@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Container
 
-from arm_canopen.standard import AbortCode, Value
+from canopen_core.standard import AbortCode, Value
 
 from ...deviations import Fault
 from ...objects.object_store import refusal

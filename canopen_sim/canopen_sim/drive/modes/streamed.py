@@ -12,8 +12,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections import deque
 
-from arm_canopen import OperationMode
-from arm_canopen.standard import Controlword, Statusword
+from canopen_core.standard import Controlword, OperationMode, Statusword
 
 from ...services.sync_consumer import SyncConsumer
 from ..axis import Axis, Limits

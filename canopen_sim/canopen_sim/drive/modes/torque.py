@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from arm_canopen import OperationMode
+from canopen_core.standard import OperationMode
 
 from ...services.sync_consumer import SyncConsumer
 from ...timed import NEVER

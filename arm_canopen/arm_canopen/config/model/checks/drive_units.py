@@ -9,10 +9,9 @@ from dataclasses import dataclass, field
 from enum import Enum
 import math
 
-from ....standard.dictionary import object_address
-from ....standard.drive import OperationMode
-from ....standard.objects import AXIS_OFFSET, Index
-from ...findings import Findings
+from canopen_core import Findings
+from canopen_core.standard import AXIS_OFFSET, Index, object_address, OperationMode
+
 from ..boot_plan import is_requested
 from ..bus import BusConfig, NodeConfig
 from ..drive import DriveConfig

@@ -4,10 +4,16 @@
 
 from __future__ import annotations
 
-from ....standard.dictionary import object_address
-from ....standard.drive import CYCLIC_MODES, mode_title, TARGET_OBJECTS
-from ....standard.objects import AXIS_OFFSET, Index
-from ....standard.pdo import SYNCHRONOUS_MAX
+from canopen_core.standard import (
+    AXIS_OFFSET,
+    CYCLIC_MODES,
+    Index,
+    mode_title,
+    object_address,
+    SYNCHRONOUS_MAX,
+    TARGET_OBJECTS,
+)
+
 from ..pdo_direction import RPDO, TPDO
 from .subject import object_name, Subject, UsedMode
 

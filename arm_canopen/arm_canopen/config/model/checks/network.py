@@ -7,10 +7,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 import math
 
-from ....standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, CobId, SYNC_PRODUCER
-from ....standard.dictionary import object_address
-from ....standard.objects import Index
-from ...findings import Findings, Place
+from canopen_core import Findings, Place
+from canopen_core.standard import (
+    CAN_ID_MASK,
+    COB_ID_INVALID,
+    CobId,
+    Index,
+    object_address,
+    SYNC_PRODUCER,
+)
+
 from ...units import MICROSECONDS
 from ..boot_plan import boot_writes, WATCH_KEY
 from ..bus import BusConfig

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from ....standard.objects import axis_of, Index
-from ....standard.pdo import SYNCHRONOUS_MAX
+from canopen_core.standard import axis_of, Index, SYNCHRONOUS_MAX
+
 from ..bus import PdoConfig
 from ..pdo_direction import Direction, TPDO
 from ..tpdo_freshness import longest_silence, loss_unnoticed

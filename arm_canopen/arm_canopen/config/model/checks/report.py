@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ....exceptions import Problem
-from ...findings import Findings
+from canopen_core import Findings, Problem
+
 from ..bus import BusConfig
 from .drive_units import axis_units, AxisUnits, check_units
 from .drives import check_drive

@@ -7,10 +7,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from ....standard.dictionary import object_address
-from ....standard.drive import OperationMode
-from ....standard.objects import axis_of, AXIS_OFFSET, Index
-from ...findings import Findings, Place
+from canopen_core import Findings, Place
+from canopen_core.standard import axis_of, AXIS_OFFSET, Index, object_address, OperationMode
+
 from ...units import HUNDRED_MICROSECONDS, MILLISECONDS
 from ..bus import BusConfig, NodeConfig, PdoConfig
 from ..drive import DriveConfig

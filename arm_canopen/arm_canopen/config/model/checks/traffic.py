@@ -7,13 +7,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from ....can.frame import PAYLOAD_MAX
-from ....can.load import frame_bits, stuff_bits_mean, stuff_bits_worst
-from ....standard.cob_id import CAN_ID_MASK, CobId
-from ....standard.dictionary import object_address
-from ....standard.objects import AXIS_OFFSET, Index
-from ....standard.pdo import SYNCHRONOUS_MAX
-from ...findings import Findings
+from canopen_core import Findings
+from canopen_core.can import frame_bits, PAYLOAD_MAX, stuff_bits_mean, stuff_bits_worst
+from canopen_core.standard import (
+    AXIS_OFFSET,
+    CAN_ID_MASK,
+    CobId,
+    Index,
+    object_address,
+    SYNCHRONOUS_MAX,
+)
+
 from ..bus import BusConfig, NodeConfig, PdoConfig
 from ..pdo_direction import Direction, TPDO
 from .subject import Subject

@@ -1,0 +1,45 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a CANopen master, simulated devices and tools share: errors and findings.
+
+Public besides: `can` (buses by name), `standard` (tables and codecs of CiA 301 and 402) and `eds`
+(EDS and DCF files).
+"""
+
+from .exceptions import (
+    BootError,
+    BusError,
+    CanopenError,
+    CodecError,
+    ConfigError,
+    DriveError,
+    LifecycleError,
+    LssError,
+    ObjectError,
+    OtherMasterError,
+    Problem,
+    SdoAbortError,
+    SdoError,
+    SdoTimeoutError,
+)
+from .findings import Findings, Place, RefusedError
+
+__all__ = [
+    'BootError',
+    'BusError',
+    'CanopenError',
+    'CodecError',
+    'ConfigError',
+    'DriveError',
+    'Findings',
+    'LifecycleError',
+    'LssError',
+    'ObjectError',
+    'OtherMasterError',
+    'Place',
+    'Problem',
+    'RefusedError',
+    'SdoAbortError',
+    'SdoError',
+    'SdoTimeoutError',
+]

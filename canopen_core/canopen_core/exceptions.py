@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Everything that the CANopen packages raise.
+
+::
+
+    CanopenError
+    ├── ConfigError (ValueError)     a bus.yml or EDS is wrong; lists every problem
+    ├── BusError (OSError)           a CAN interface cannot be opened, or refuses a frame
+    ├── OtherMasterError             another master leads this bus already
+    ├── CodecError (ValueError)      a value does not fit its type, or bytes are no message
+    ├── ObjectError (LookupError)    a device has no object of that name or number
+    ├── SdoError                     a device did not do what an SDO requested
+    │   ├── SdoAbortError            the device (or we) aborted the transfer with a code
+    │   └── SdoTimeoutError (TimeoutError)   the device did not answer
+    ├── LssError                     a device did not do what LSS requested
+    ├── BootError                    a device did not come up; names the phase
+    ├── DriveError                   a drive refused a command or did not reach a state in time
+    └── LifecycleError               a managed node cannot make this transition now
+
+Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+
+class CanopenError(Exception):
+    """Root of all errors of the CANopen packages."""
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """Something wrong with a configuration file."""
+
+    file: Path
+    line: int  # line, from 1; 0 when the whole file is meant
+    key: str  # path of the key, such as ``nodes.joint1.tpdo.1.mapping``; empty when none applies
+    message: str  # what is wrong, and with which value
+    remedy: str  # what to do about it
+
+    def __str__(self) -> str:
+        """Write it as compilers do: file, line, key, message, remedy."""
+        place = f'{self.file}:{self.line}' if self.line else str(self.file)
+        key = f'{self.key}: ' if self.key else ''
+        remedy = f' ({self.remedy})' if self.remedy else ''
+        return f'{place}: {key}{self.message}{remedy}'
+
+
+class ConfigError(CanopenError, ValueError):
+    """A bus.yml or EDS is wrong. The message lists every problem that was found, one per line.
+
+    Scenarios: a file is missing, a key is unknown, a value does not fit, two devices share an id.
+    """
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        self.problems = tuple(problems)  # each with file, line, key, message and remedy
+        super().__init__('\n'.join(str(problem) for problem in self.problems))
+
+
+class BusError(CanopenError, OSError):
+    """A CAN interface cannot be opened or refuses a frame.
+
+    Scenarios: unknown interface name, interface down, transmit queue full.
+    """
+
+
+class OtherMasterError(CanopenError):
+    """Another master leads this bus already; the message names its frames."""
+
+
+class CodecError(CanopenError, ValueError):
+    """A value does not fit its data type, or received bytes are no valid message."""
+
+
+class ObjectError(CanopenError, LookupError):
+    """A device has no object of that name or number; the message names similar ones."""
+
+
+class SdoError(CanopenError):
+    """A device did not do what an SDO requested."""
+
+
+class SdoTimeoutError(SdoError, TimeoutError):
+    """A device did not answer an SDO request in time."""
+
+
+class SdoAbortError(SdoError):
+    """An SDO transfer was aborted."""
+
+    def __init__(self, message: str, code: int) -> None:
+        super().__init__(message)
+        self.code = code  # abort code as transmitted (CiA 301, table 22)
+
+
+class LssError(CanopenError):
+    """A device did not do what layer setting services requested.
+
+    Scenarios: no device answers, several do, a node id or bit rate is refused.
+    """
+
+
+class BootError(CanopenError):
+    """A device did not come up.
+
+    Scenarios: no answer, another identity than expected, configuration refused.
+    """
+
+
+class DriveError(CanopenError):
+    """A drive refused a command or did not reach the wanted state in time."""
+
+
+class LifecycleError(CanopenError):
+    """A managed node cannot make this transition now; the message names others."""

@@ -1,0 +1,292 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The bus over python-can: names, echoes, odd messages and failing drivers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+import errno
+import os
+from pathlib import Path
+from time import monotonic, time
+import tty
+
+import can
+from can_addresses import free_virtual
+import pytest
+
+from canopen_core import BusError
+from canopen_core.can import Bus, Frame, open_bus
+from canopen_core.can.adapter import AdapterBus
+
+SLCAN_OPENING = 2.0  # [s] for which the driver of slcan sleeps
+
+
+class ScriptedDriver(can.BusABC):
+    """A driver that delivers prepared messages, and refuses to send."""
+
+    def __init__(self, messages: list[can.Message]) -> None:
+        super().__init__('scripted')
+        self.messages = messages
+        self.cause: OSError | None = None
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        return (self.messages.pop(0) if self.messages else None), True
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        """Refuse."""
+        raise can.CanOperationError('bus off') from self.cause
+
+
+@pytest.fixture
+def messages() -> list[can.Message]:
+    """Give what the scripted driver delivers."""
+    return []
+
+
+@pytest.fixture
+def opened_with(monkeypatch: pytest.MonkeyPatch, messages: list[can.Message]) -> dict[str, object]:
+    """Put a scripted driver in place of all drivers, and note what it was opened with."""
+    options: dict[str, object] = {}
+
+    def open_driver(**given: object) -> can.BusABC:
+        options.update(given)
+        return ScriptedDriver(messages)
+
+    monkeypatch.setattr(can, 'Bus', open_driver)
+    return options
+
+
+@pytest.mark.parametrize(
+    ('name', 'interface', 'channel', 'bitrate'),
+    [
+        ('pcan:PCAN_USBBUS1@500000', 'pcan', 'PCAN_USBBUS1', 500_000),
+        ('slcan:/dev/ttyUSB0@1000000', 'slcan', '/dev/ttyUSB0', 1_000_000),
+        ('kvaser:0', 'kvaser', '0', None),
+        ('socketcand:can0:localhost:29536', 'socketcand', 'can0:localhost:29536', None),
+        ('slcan:user@host@125000', 'slcan', 'user@host', 125_000),
+    ],
+)
+def test_a_name_is_interface_channel_and_bit_rate(
+    opened_with: dict[str, object], name: str, interface: str, channel: str, bitrate: int | None
+) -> None:
+    """The parts of the name reach the driver, own messages are not requested."""
+    with open_bus(name) as bus:
+        assert bus.name == name
+    assert opened_with['interface'] == interface
+    assert opened_with['channel'] == channel
+    assert opened_with.get('bitrate') == bitrate
+    assert opened_with['receive_own_messages'] is False
+
+
+@pytest.mark.parametrize(
+    ('name', 'reason'),
+    [
+        *((f'pcan:X@{rate}', 'no bit rate') for rate in ('', 'fast', '0', '-1')),
+        ('paecan:PCAN_USBBUS1', r'no interface paecan; it has .*pcan'),
+        ('slcan:/nowhere/tty@500000', 'cannot open slcan:/nowhere/tty'),
+    ],
+)
+def test_what_cannot_be_opened_says_why(name: str, reason: str) -> None:
+    """A wrong bit rate, an unknown interface, or the driver's own reason."""
+    with pytest.raises(BusError, match=reason):
+        open_bus(name)
+
+
+def _message(**fields: object) -> can.Message:
+    return can.Message(arbitration_id=0x181, is_extended_id=False, **fields)  # type: ignore[arg-type]
+
+
+@pytest.mark.usefixtures('opened_with')
+def test_echoes_and_fd_messages_are_not_delivered(messages: list[can.Message]) -> None:
+    """Drivers that echo mark it; CAN FD messages are counted and dropped."""
+    messages += [_message(is_rx=False), _message(is_fd=True, data=bytes(64)), _message(data=b'1')]
+    with open_bus('pcan:X') as bus:
+        frames = bus.receive(0.0)
+        assert [frame[:2] for frame in frames] == [(0x181, b'1')]
+        assert bus.counters.malformed == 1
+
+
+@pytest.mark.usefixtures('opened_with')
+@pytest.mark.parametrize('age', [0.0, 0.5, -5.0, 4e8], ids=['now', 'recent', 'future', 'uptime'])
+def test_stamps_of_drivers_become_steady_time(messages: list[can.Message], age: float) -> None:
+    """Wall clock stamps are moved over; those that count from something else become now."""
+    before, expected = monotonic(), age if age == 0.5 else 0.0
+    messages.append(_message(timestamp=time() - age))
+    with open_bus('pcan:X') as bus:
+        (frame,) = bus.receive(0.0)
+    # a busy machine may pause between two looks at the clocks
+    assert before - 0.2 <= frame.timestamp + expected <= monotonic() + 0.2
+
+
+@pytest.mark.usefixtures('opened_with')
+def test_a_refused_frame_is_counted_and_reported() -> None:
+    """The driver's error becomes ours, with its reason."""
+    with open_bus('pcan:X') as bus:
+        with pytest.raises(BusError, match='bus off'):
+            bus.send(Frame(1))
+        assert (bus.counters.sent, bus.counters.send_errors) == (0, 1)
+
+
+class SerialAdapter:
+    """The far end of the serial line of an slcan adapter."""
+
+    def __init__(self) -> None:
+        """Open the line."""
+        self._ours, theirs = os.openpty()
+        tty.setraw(theirs)
+        self.tty = os.ttyname(theirs)
+        self.name = f'slcan:{self.tty}'
+        self._theirs = theirs
+
+    def write(self, *lines: bytes) -> None:
+        """Send lines to the computer."""
+        os.write(self._ours, b''.join(line + b'\r' for line in lines))
+
+    def read(self, text: bytes) -> None:
+        """Read until a text from the computer comes."""
+        received = b''
+        while text not in received:
+            received += os.read(self._ours, 1000)
+
+    def close(self) -> None:
+        """Close both ends."""
+        os.close(self._ours)
+        os.close(self._theirs)
+
+
+@pytest.fixture
+def serial_adapter() -> Iterator[SerialAdapter]:
+    """Open a serial line."""
+    adapter = SerialAdapter()
+    yield adapter
+    adapter.close()
+
+
+DAMAGED = [b't18', b't1x11AA', b't1811ZZ', b't\xff811AA', b'T0000', b't1814AABB']
+LINES = 20 * DAMAGED  # more than may be damaged in a row
+
+
+def receive(bus: Bus, count: int, deadline: float) -> list[tuple[int, bytes]]:
+    """Return identifiers and data of as many frames."""
+    frames: list[Frame] = []
+    while len(frames) < count and monotonic() < deadline:
+        frames += bus.receive(0.1)
+    return [(frame.can_id, frame.data) for frame in frames]
+
+
+def test_a_damaged_line_costs_no_other_frame(serial_adapter: SerialAdapter) -> None:
+    """Truncated, or with bytes that are no digits: each is counted, and the bus stays open."""
+    with open_bus(serial_adapter.name) as bus:
+        for damaged in LINES:
+            serial_adapter.write(b't1811AA', damaged, b't1821BB')
+        frames = receive(bus, 2 * len(LINES), monotonic() + 10.0)
+        assert frames == [(0x181, b'\xaa'), (0x182, b'\xbb')] * len(LINES)
+        assert bus.counters.malformed == len(LINES)
+
+
+def test_an_adapter_that_delivers_nothing_but_damage_is_reported(
+    serial_adapter: SerialAdapter,
+) -> None:
+    """A wrong rate of the line is no silent bus; the first good frame ends it."""
+    with open_bus(serial_adapter.name) as bus:
+        serial_adapter.write(*[b't18'] * 150)
+        deadline = monotonic() + 10.0
+        with pytest.raises(BusError, match=r'damaged messages only, 100 in a row \(IndexError'):
+            receive(bus, 1, deadline)
+        serial_adapter.write(b't1811AA')
+        frames: list[tuple[int, bytes]] = []
+        while not frames and monotonic() < deadline:
+            with suppress(BusError):
+                frames = receive(bus, 1, deadline)
+        assert frames == [(0x181, b'\xaa')]
+
+
+def failure(bus: Bus) -> str:
+    """Receive once; return why that failed, or nothing."""
+    try:
+        bus.receive(0.02)
+    except BusError as error:
+        return str(error)
+    return ''
+
+
+def fails(bus: Bus, text: str, deadline: float) -> bool:
+    """Receive until that fails with a text."""
+    while monotonic() < deadline:
+        if text in failure(bus):
+            return True
+    return False
+
+
+def test_an_adapter_that_is_plugged_in_again_is_used_again(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Meanwhile no call waits for its driver, which takes 2 s to open it; then both ways work."""
+    plug = tmp_path / 'ttyACM0'
+    first, second = SerialAdapter(), SerialAdapter()
+    plug.symlink_to(first.tty)
+    deadline = monotonic() + 20.0
+    with open_bus(f'slcan:{plug}@500000') as bus:
+        first.close()
+        plug.unlink()
+        assert fails(bus, 'it is opened again when it is back', deadline)
+        with pytest.raises(BusError, match='went away'):
+            bus.send(Frame(1))
+        assert fails(bus, 'is it plugged in', deadline)
+        plug.symlink_to(second.tty)
+        longest, gone = 0.0, True
+        while gone and monotonic() < deadline:
+            began = monotonic()
+            gone = bool(failure(bus))
+            longest = max(longest, monotonic() - began)
+        second.write(b't1811AA')
+        assert receive(bus, 1, deadline) == [(0x181, b'\xaa')]
+        assert longest < SLCAN_OPENING
+        bus.send(Frame(0x201, b'\xbb'))
+        second.read(b't2011BB\r')
+    assert [record.message for record in caplog.records] == [f'{bus.name} is back']
+    second.close()
+
+
+@pytest.mark.parametrize('gone', [errno.ENODEV, errno.EIO])
+def test_an_adapter_whose_loss_only_sending_shows_is_opened_again(
+    gone: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Drivers as that of gs_usb receive nothing from a device that is gone, and raise nothing."""
+    opened: list[ScriptedDriver] = []
+
+    def open_driver(**given: object) -> can.BusABC:
+        opened.append(ScriptedDriver([_message(data=b'1')]))
+        opened[-1].cause = OSError(gone, os.strerror(gone)) if len(opened) == 1 else None
+        return opened[-1]
+
+    monkeypatch.setattr(can, 'Bus', open_driver)
+    with open_bus('gs_usb:0@1000000') as bus:
+        assert len(bus.receive(0.0)) == 1
+        with pytest.raises(BusError, match='bus off'):
+            bus.send(Frame(1))
+        frames: list[Frame] = []
+        deadline = monotonic() + 10.0
+        while not frames and monotonic() < deadline:
+            with suppress(BusError):
+                frames = bus.receive(0.02)
+        assert len(frames) == 1
+        with pytest.raises(BusError, match='bus off'):  # an error of the bus, not of the device
+            bus.send(Frame(1))
+        assert bus.receive(0.0) == []
+    assert len(opened) == 2
+
+
+def test_an_adapter_may_be_closed_while_it_is_gone() -> None:
+    """Its loss is reported; whatever its opening comes to is released, too."""
+    bus = AdapterBus('test', 'virtual', free_virtual(), None)
+    bus._bus.shutdown()
+    with pytest.raises(BusError, match='went away'):
+        bus.receive(0.1)
+    with suppress(BusError):
+        bus.receive(0.0)
+    bus.close()
+    with pytest.raises(BusError, match='closed'):
+        bus.receive(0.0)

@@ -1,0 +1,306 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The multicast bus: python-can as its peer, losses, foreign frames, loopback interface."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import os
+import re
+import socket
+from threading import current_thread, Thread
+from time import monotonic, time_ns
+
+import can
+from can.interfaces.udp_multicast.utils import pack_message
+from can_addresses import free_multicast
+from can_receiving import DEADLINE, receive_count, unstamped
+from can_strategies import frames
+from hypothesis import example, given
+from hypothesis import strategies as st
+import msgpack
+import pytest
+
+from canopen_core import BusError, CodecError
+from canopen_core.can import Bus, Frame, open_bus, STANDARD_ID_MAX
+from canopen_core.can.adapter import from_message, to_message
+from canopen_core.can.multicast import _is_local, decode, encode, MulticastBus
+
+FRAMES = [
+    Frame(0x000, b'\x01\x05'),
+    Frame(0x080),
+    Frame(0x181, bytes(range(8))),
+    Frame(0x1FFF_FFFF, b'x', is_extended=True),
+    Frame(0x705, is_remote=True),
+]
+
+
+@pytest.fixture
+def name() -> str:
+    """Name a group of one's own."""
+    return free_multicast()
+
+
+@pytest.fixture
+def bus(name: str) -> Iterator[Bus]:
+    """Open our bus."""
+    with open_bus(name) as opened:
+        yield opened
+
+
+@pytest.fixture
+def peer(name: str) -> Iterator[can.BusABC]:
+    """Open python-can's own udp_multicast on the same group."""
+    _, group, port = name.split(':')
+    try:
+        opened = can.Bus(interface='udp_multicast', channel=group, port=int(port))
+    except can.CanInitializationError as error:
+        pytest.skip(f'python-can finds no multicast route here: {error}')
+    with opened:
+        yield opened
+
+
+def send_raw(name: str, datagram: bytes) -> None:
+    """Send bytes to the group from this host, as any program could."""
+    _, group, port = name.split(':')
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton('127.0.0.1'))
+        sender.sendto(datagram, (group, int(port)))
+
+
+def test_python_can_receives_ours(bus: Bus, peer: can.BusABC) -> None:
+    """python-can's bus reads what ours sends, in order."""
+    for frame in FRAMES:
+        bus.send(frame)
+    messages = [peer.recv(DEADLINE) for _ in FRAMES]
+    assert [from_message(message, 0.0) for message in messages if message] == FRAMES
+
+
+def test_we_receive_python_can(bus: Bus, peer: can.BusABC) -> None:
+    """Our bus reads what python-can's sends, in order and once."""
+    for frame in FRAMES:
+        peer.send(to_message(frame))
+    assert unstamped(receive_count(bus, len(FRAMES))) == FRAMES
+    assert bus.receive(0.0) == []
+
+
+def test_fd_frames_and_garbage_are_counted_and_dropped(bus: Bus, name: str) -> None:
+    """What is no classic CAN frame costs a count, and what follows still arrives."""
+    for datagram in (b'', b'garbage', bytes(5000), b'\x80'):
+        send_raw(name, datagram)
+    with open_bus(name) as other:
+        other.send(Frame(5))
+    frames = receive_count(bus, 2)  # an empty map is a frame for python-can: all defaults
+    assert unstamped(frames) == [Frame(0, is_extended=True), Frame(5)]
+    assert bus.counters.malformed == 3
+
+
+def test_other_groups_on_the_same_port_are_not_received(bus: Bus, name: str) -> None:
+    """Two robots may share a port as long as their groups differ."""
+    kind, group, port = name.split(':')
+    head, _, last = group.rpartition('.')
+    neighbour = f'{kind}:{head}.{int(last) % 250 + 3}:{port}'
+    with open_bus(neighbour) as other, open_bus(name) as same:
+        other.send(Frame(1))
+        same.send(Frame(2))
+    assert unstamped(receive_count(bus, 1)) == [Frame(2)]
+    assert bus.receive(0.0) == []
+
+
+def test_losses_are_counted_and_reported_once(name: str, caplog: pytest.LogCaptureFixture) -> None:
+    """When the receive buffer is full the kernel drops, and the bus knows how many."""
+    sent = 3000
+    with open_bus(name) as sender, open_bus(name) as late:
+        assert isinstance(late, MulticastBus)
+        late._receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 65536)
+        for _ in range(sent):
+            sender.send(Frame(1))
+        got = len(late.receive(0.0))
+        assert 0 < got < sent
+        sender.send(Frame(2))  # the kernel reports the count with the next frame
+        assert unstamped(receive_count(late, 1)) == [Frame(2)]
+        assert late.counters.lost == sent - got
+        for _ in range(sent):
+            sender.send(Frame(1))
+        receive_count(late, got)
+        sender.send(Frame(2))
+        receive_count(late, 1)
+        assert late.counters.lost > sent - got
+    (warning,) = [record.message for record in caplog.records if 'lost' in record.message]
+    assert 'sysctl -w net.core.rmem_max' in warning
+
+
+def test_frames_stay_on_the_loopback_interface(bus: Bus) -> None:
+    """The sending socket names the loopback interface and gives no hop."""
+    assert isinstance(bus, MulticastBus)
+    options = bus._sender
+    interface = options.getsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, 4)
+    assert socket.inet_ntoa(interface) == '127.0.0.1'
+    assert options.getsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL) == 0
+    assert bus._own_address[0].startswith('127.')
+
+
+def test_frames_of_other_hosts_are_not_taken() -> None:
+    """python-can opens the group on the network, so a sender's address is looked at."""
+    assert _is_local('127.3.2.1')
+    assert not _is_local('192.0.2.77')  # TEST-NET-1, nobody's
+
+
+def test_buses_send_from_addresses_of_their_own(name: str) -> None:
+    """No two buses share the address that a receiver blocks as its own."""
+    with open_bus(name) as first, open_bus(name) as second:
+        assert isinstance(first, MulticastBus)
+        assert isinstance(second, MulticastBus)
+        assert first._own_address[0] != second._own_address[0]
+
+
+def test_stamps_do_not_go_back_when_the_wall_clock_is_set(
+    bus: Bus, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The kernel stamps with the wall clock; setting it neither ages nor rejuvenates a frame."""
+    stamps = []
+    with open_bus(name) as sender:
+        for shift in (0, 3600, -7200):  # [s]
+            monkeypatch.setattr(
+                'canopen_core.can.socket_bus.time_ns', lambda s=shift: time_ns() + s * 10**9
+            )
+            sender.send(Frame(1))
+            stamps += [frame.timestamp for frame in receive_count(bus, 1)]
+    assert len(stamps) == 3
+    assert stamps == sorted(stamps)
+    assert stamps[-1] <= monotonic()
+
+
+@pytest.mark.parametrize(
+    ('wrong', 'reason'),
+    [
+        ('udp_multicast:ff15::1', 'IPv6'),
+        ('udp_multicast:[ff15::1]', 'no IP address'),
+        ('udp_multicast:ff15:7079:7468:6f6e:6465:6d6f:6d63:6173', 'IPv6'),
+        ('udp_multicast:10.0.0.1', 'no multicast address'),
+        ('udp_multicast:localhost', 'no IP address'),
+        ('udp_multicast:239.1.2.3:', 'no UDP port'),
+        ('udp_multicast:239.1.2.3:0', 'no UDP port'),
+        ('udp_multicast:239.1.2.3:65536', 'no UDP port'),
+        ('udp_multicast:239.1.2.3:x', 'no UDP port'),
+    ],
+)
+def test_wrong_groups_and_ports_are_refused_with_the_reason(wrong: str, reason: str) -> None:
+    """Each mistake in the name is reported, with what would be right."""
+    with pytest.raises(BusError, match=f'^{re.escape(wrong)}: .*{reason}'):
+        open_bus(wrong)
+
+
+def test_a_wake_writes_to_no_descriptor_that_was_closed(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It may be a file of somebody else by then: a thread hands work over while the bus ends."""
+    opened, write, states = open_bus(name), os.eventfd_write, []
+    closing = Thread(target=opened.close)
+
+    def write_late(descriptor: int, value: int) -> None:
+        if current_thread() is not closing:
+            closing.start()
+            closing.join(0.2)  # it must not get further while this thread has the descriptor
+            states.append(os.fstat(descriptor))
+        write(descriptor, value)
+
+    monkeypatch.setattr(os, 'eventfd_write', write_late)
+    opened.wake()
+    monkeypatch.undo()
+    closing.join(10.0)
+    assert not closing.is_alive()
+    assert len(states) == 1
+
+
+def packed(**changes: object) -> bytes:
+    """Return the map of a small frame with some keys changed."""
+    message = {'arbitration_id': 0x181, 'is_extended_id': False, 'data': b'\x27\x06'}
+    return bytes(msgpack.packb(message | changes))
+
+
+@given(frames())
+def test_bytes_equal_those_of_python_can(frame: Frame) -> None:
+    """The hand-joined pieces are exactly what python-can writes for the same message."""
+    assert encode(frame) == pack_message(to_message(frame))
+
+
+def test_every_standard_identifier_and_length_equals_python_can() -> None:
+    """The ready-made pieces are right for all identifiers; the lengths for one of them."""
+    for can_id in range(STANDARD_ID_MAX + 1):
+        assert encode(Frame(can_id, b'\x05')) == pack_message(to_message(Frame(can_id, b'\x05')))
+    for size in range(9):
+        frame = Frame(0x181, bytes(size))
+        assert encode(frame) == pack_message(to_message(frame))
+
+
+@given(frames(), st.floats(0.0, 1e9))
+def test_decode_inverts_encode(frame: Frame, stamp: float) -> None:
+    """What was encoded comes back, with the receiver's stamp."""
+    assert decode(encode(frame), stamp) == frame._replace(timestamp=stamp)
+
+
+@given(frames(), st.floats(0.0, 2e9), st.one_of(st.none(), st.text(), st.integers(0, 9)))
+def test_messages_with_a_time_and_a_channel_are_read(
+    frame: Frame, stamp: float, channel: str | int | None
+) -> None:
+    """Replayed python-can messages carry more than ours and mean the same."""
+    message = to_message(frame, stamp)
+    message.channel = channel
+    assert decode(pack_message(message), 0.0) == frame
+
+
+@given(frames(), st.randoms())
+def test_the_order_of_the_keys_means_nothing(frame: Frame, shuffler: st.DataObject) -> None:
+    """Another implementation may write the map in another order, or leave defaults out."""
+    fields = list(msgpack.unpackb(encode(frame)).items())
+    shuffler.shuffle(fields)  # type: ignore[attr-defined]  # a random.Random
+    assert decode(msgpack.packb(dict(fields)), 0.0) == frame
+    needed = {'arbitration_id', 'is_extended_id', 'is_remote_frame', 'dlc', 'data'}
+    assert decode(msgpack.packb({k: v for k, v in fields if k in needed}), 0.0) == frame
+
+
+@st.composite
+def damaged(draw: st.DrawFn) -> bytes:
+    """Return a datagram with another byte in one place."""
+    datagram = bytearray(encode(draw(frames())))
+    datagram[draw(st.integers(0, len(datagram) - 1))] = draw(st.integers(0, 255))
+    return bytes(datagram)
+
+
+@given(st.one_of(st.binary(max_size=200), damaged()))
+@example(b'')
+@example(b'\x8b')
+@example(encode(Frame(0x181, bytes(8)))[:-1])
+@example(encode(Frame(0x181, bytes(8))) + b'\0')
+@example(b'\x93' * 200)
+def test_any_bytes_are_a_possible_frame_or_refused(datagram: bytes) -> None:
+    """Garbage and damage raise the one error that the bus counts."""
+    try:
+        frame = decode(datagram, 0.0)
+    except CodecError:
+        return
+    encode(frame)
+
+
+@pytest.mark.parametrize(
+    ('datagram', 'reason'),
+    [
+        (packed(is_fd=True), 'CAN FD'),
+        (pack_message(can.Message(is_fd=True, data=bytes(64), is_extended_id=False)), 'CAN FD'),
+        (packed(arbitration_id=0x800), 'out of range'),
+        (packed(arbitration_id=-1), 'out of range'),
+        (packed(arbitration_id='x'), "identifier 'x'"),
+        (packed(arbitration_id=True), 'identifier True'),
+        (packed(data=bytes(9)), 'at most 8'),
+        (packed(data='text'), "payload 'text'"),
+        (packed(is_extended_id=1), 'is_extended_id'),
+        (packed(is_remote_frame='no'), 'is_remote_frame'),
+        (bytes(msgpack.packb([1, 2])), 'a list'),
+        (b'\xc1', 'no msgpack'),
+    ],
+)
+def test_what_is_no_classic_frame_is_named(datagram: bytes, reason: str) -> None:
+    """Each way to be wrong has its own message."""
+    with pytest.raises(CodecError, match=reason):
+        decode(datagram, 0.0)

@@ -1,0 +1,561 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""EDS and DCF files: careful and sloppy ones, their values as text, and another reader."""
+
+import math
+from pathlib import Path
+import re
+import struct
+import textwrap
+
+import canopen
+from eds_samples import DRIVE_ROWS, eds_text
+from hypothesis import example, given
+from hypothesis import strategies as st
+import pytest
+
+from canopen_core import CodecError, ConfigError
+from canopen_core.eds import (
+    bytes_from_text,
+    Eds,
+    load_eds,
+    parse_integer,
+    text_from_bytes,
+)
+from canopen_core.eds.values import BYTE_TYPES, EdsValue, parse_value
+from canopen_core.standard import (
+    AccessType,
+    byte_length,
+    DataType,
+    decode,
+    encode,
+    integer_range,
+    ObjectEntry,
+    REAL_FORMATS,
+    Value,
+)
+
+
+def read(folder: Path, text: str | bytes) -> Eds:
+    """Write and read a file; indentation common to all lines does not count."""
+    path = folder / 'x.eds'
+    data = textwrap.dedent(text).encode() if isinstance(text, str) else text
+    path.write_bytes(data)
+    return load_eds(path)
+
+
+def test_a_careful_file_is_read_without_warnings(tmp_path: Path) -> None:
+    """Every object is there with type, access, default, limits and mapping; nothing is odd."""
+    text = eds_text()
+    eds = read(tmp_path, text)
+    assert not eds.warnings
+    assert len(eds.dictionary) == len(DRIVE_ROWS)
+    statusword = eds.dictionary.get(0x6041)
+    assert statusword is not None
+    assert text.splitlines()[statusword.line - 1] == '[6041]'
+    for row in DRIVE_ROWS:
+        entry = eds.dictionary.get(row.index, row.subindex)
+        assert entry is not None
+        assert entry.name == row.name
+        assert entry.data_type == row.data_type
+        assert entry.access.value == row.access
+        assert entry.pdo_mappable == row.mappable
+        assert entry.low_limit == (float(row.low) if row.low else None)
+        assert entry.high_limit == (float(row.high) if row.high else None)
+
+
+def test_defaults_with_the_node_id(tmp_path: Path) -> None:
+    """``$NODEID`` sums stay open until the node id is known."""
+    eds = read(tmp_path, eds_text())
+    entry, resolved = eds.dictionary.get(0x1800, 1), eds.dictionary.for_node(5).get(0x1800, 1)
+    assert entry is not None
+    assert resolved is not None
+    assert entry.node_relative
+    assert resolved.default == 0x185
+
+
+SLOPPY = """\
+    garbage before the first section
+
+    ; a comment
+    # another one
+    [ deviceinfo ]
+    vendorname = Werkstätten
+    [1000]
+    PARAMETERNAME=Device type
+    datatype = 0x7
+    AccessType=RO
+    DefaultValue=0x192
+    PdoMapping=
+    [6040]
+    ParameterName=Controlword
+    ObjectType=
+    DataType=006
+    AccessType=RWW
+    PDOMapping=0x1
+    LowLimit=
+    HighLimit=0xFFFF
+    [60fe Sub0]
+    ParameterName=Number of entries
+    DataType=5
+    AccessType=const
+    DefaultValue=2
+    [60FE]
+    ParameterName=Digital outputs
+    ObjectType=8
+    SubNumber=2
+    [60FESUB1]
+    ParameterName=Outputs
+    DataType=7
+    AccessType=rw
+"""
+
+
+@pytest.mark.parametrize('line_end', ['\n', '\r\n', '\r'], ids=['LF', 'CRLF', 'CR'])
+@pytest.mark.parametrize('encoding', ['utf-8', 'utf-8-sig', 'latin-1'])
+def test_sloppy_files_are_read(tmp_path: Path, line_end: str, encoding: str) -> None:
+    """Case, blanks, padding, empty keys, line ends and encodings do not matter."""
+    text = textwrap.dedent(SLOPPY).replace('\n', line_end)
+    eds = read(tmp_path, text.encode(encoding))
+    dictionary = eds.dictionary
+    device_type, controlword = dictionary.get(0x1000), dictionary.get(0x6040)
+    assert device_type is not None
+    assert controlword is not None
+    assert device_type.default == 0x192
+    assert device_type.access is AccessType.READ_ONLY
+    assert controlword.data_type is DataType.UNSIGNED16
+    assert controlword.access is AccessType.READ_WRITE_RPDO
+    assert controlword.pdo_mappable
+    assert (controlword.low_limit, controlword.high_limit) == (None, 0xFFFF)
+    assert [entry.subindex for entry in dictionary.subindices(0x60FE)] == [0, 1]
+
+
+NUMBER = 'DataType=5|AccessType=rw'
+
+ODDITIES: list[tuple[str, int, str]] = [
+    ('[2000]|DataType 5|AccessType=rw', 2, 'neither a section nor a value'),
+    (f'[2000|{NUMBER}', 1, 'no closing bracket'),
+    (f'[2000]|{NUMBER}|[2000]', 4, 'already opened in line 1'),
+    (f'[2000]|{NUMBER}|DataType=6', 4, 'already given in line 2'),
+    ('[2000]|DataType=0x99|AccessType=rw', 2, 'unknown DataType 0x0099'),
+    ('[2000]|AccessType=rw', 1, 'no DataType, taken as DOMAIN'),
+    ('[2000]|DataType=5|AccessType=maybe', 3, "unknown AccessType 'maybe'"),
+    ('[2000]|DataType=5', 1, 'no AccessType, taken as rw'),
+    (f'[2000]|ObjectType=0x42|{NUMBER}', 2, 'unknown ObjectType 66'),
+    (f'[2000]|{NUMBER}|DefaultValue=abc', 4, "'abc' is not a whole number"),
+    (f'[2000]|{NUMBER}|DefaultValue=1Fh', 4, "'1Fh' is not a whole number: write 0x1F"),
+    (f'[2000]|{NUMBER}|DefaultValue=300', 4, '300 does not fit UNSIGNED8'),
+    (f'[2000]|{NUMBER}|LowLimit=9|HighLimit=1', 4, 'LowLimit 9 is above HighLimit 1'),
+    ('[2000]|ObjectType=9', 1, 'RECORD without sub-indices'),
+    (f'[2000sub1]|{NUMBER}', 1, r'without the section \[2000\]'),
+    ('[2000]|ObjectType=9|CompactSubObj=255', 3, 'not 1 to 254'),
+    (f'[2000]|ObjectType=9|SubNumber=3|[2000sub0]|{NUMBER}', 3, 'SubNumber is 3, but 1'),
+    (f'[OptionalObjects]|SupportedObjects=2|1=0x2000|[2000]|{NUMBER}', 2, 'is 2, but 1'),
+    ('[OptionalObjects]|1=0x2000', 0, 'listed, but without a section: 0x2000'),
+    (f'[OptionalObjects]|1=0x1000|[2000]|{NUMBER}', 0, 'in no list of objects: 0x2000'),
+]
+
+
+@pytest.mark.parametrize(('text', 'line', 'message'), ODDITIES)
+def test_oddities_are_warnings_with_their_line(
+    tmp_path: Path, text: str, line: int, message: str
+) -> None:
+    """What is wrong is reported with its line, and the rest of the file is read."""
+    lines = [*text.split('|'), '[1000]', 'DataType=7', 'AccessType=ro']
+    eds = read(tmp_path, '\n'.join(lines))
+    assert (0x1000, 0) in eds.dictionary
+    found = [problem for problem in eds.warnings if problem.line == line]
+    assert any(re.search(message, problem.message) for problem in found), eds.warnings
+
+
+ARRAY = f'[2000]|ObjectType=8|{NUMBER}|DefaultValue=7|CompactSubObj=3'
+VALUES: list[tuple[str, str, int, Value | None]] = [
+    ('compact default', ARRAY, 3, 7),
+    ('compact count', ARRAY, 0, 3),
+    ('compact value', f'{ARRAY}|[2000Value]|NrOfEntries=1|2=9', 2, 9),
+    ('DCF value', f'[2000]|{NUMBER}|DefaultValue=7|ParameterValue=8', 0, 8),
+    ('empty DCF value', f'[2000]|{NUMBER}|DefaultValue=7|ParameterValue=', 0, 7),
+    ('bad DCF value', f'[2000]|{NUMBER}|DefaultValue=7|ParameterValue=bad', 0, 7),
+    ('domain', '[2000]|ObjectType=2|AccessType=rw|DefaultValue=0x1234', 0, None),
+    ("two's complement", '[2000]|DataType=2|AccessType=rw|DefaultValue=0xFF', 0, -1),
+    (
+        'derived type',
+        f'[A0sub1]|{NUMBER}|DefaultValue=6|[2000]|DataType=0xA0|AccessType=rw|DefaultValue=300',
+        0,
+        300,
+    ),
+]
+
+
+@pytest.mark.parametrize(
+    ('text', 'subindex', 'value'),
+    [case[1:] for case in VALUES],
+    ids=[case[0] for case in VALUES],
+)
+def test_values_after_a_reset(
+    tmp_path: Path, text: str, subindex: int, value: Value | None
+) -> None:
+    """Compact arrays, DCF values and special types give the value that the device starts with."""
+    entry = read(tmp_path, text.replace('|', '\n')).dictionary.get(0x2000, subindex)
+    assert entry is not None
+    assert entry.default == value
+
+
+COMPACT_PDOS = """
+[DeviceInfo]
+CompactPDO=0x13
+NrOfRXPDO=1
+NrOfTXPDO=5
+[OptionalObjects]
+SupportedObjects=3
+1=0x1400
+2=0x1600
+3=0x1804
+[1800]
+ObjectType=9
+SubNumber=2
+[1800sub0]
+DataType=5
+AccessType=const
+DefaultValue=1
+[1800sub1]
+DataType=7
+AccessType=rw
+DefaultValue=0x80000000
+"""
+
+
+def test_compact_pdos_are_written_out(tmp_path: Path) -> None:
+    """By their number and the mask of sub-indices; what has a section keeps it."""
+    eds = read(tmp_path, COMPACT_PDOS)
+    dictionary = eds.dictionary.for_node(3)
+    assert not [problem for problem in eds.warnings if 'without a section' in problem.message]
+    for index in (0x1400, 0x1801, 0x1804):
+        assert [entry.subindex for entry in dictionary.subindices(index)] == [0, 1, 2, 5]
+    defaults = {(0x1400, 0): 5, (0x1400, 1): 0x203, (0x1801, 1): 0x283}
+    defaults |= {(0x1804, 1): 0x8000_0000, (0x1800, 1): 0x8000_0000, (0x1A04, 0): 0}
+    for address, default in defaults.items():
+        entry = dictionary.get(*address)
+        assert entry is not None
+        assert entry.default == default
+    assert len(dictionary.subindices(0x1600)) == len(dictionary.subindices(0x1A00)) == 65
+    assert not dictionary.has_index(0x1401)
+    assert not dictionary.has_index(0x1805)
+
+
+def test_compact_arrays_are_named(tmp_path: Path) -> None:
+    """[2000Name] names single elements, the others are numbered."""
+    text = (
+        '[2000]\nParameterName=Field\nObjectType=8\nDataType=5\nAccessType=rw\nCompactSubObj=2\n'
+        '[2000Name]\nNrOfEntries=1\n2=Second'
+    )
+    names = [entry.name for entry in read(tmp_path, text).dictionary.subindices(0x2000)]
+    assert names == ['NrOfObjects', 'Field1', 'Second']
+
+
+@pytest.mark.parametrize(
+    ('section', 'node_id'),
+    [
+        ('[DeviceComissioning]\nNodeID=0x05', 5),
+        ('[DeviceCommissioning]\nNodeID=7', 7),
+        ('[DeviceComissioning]\nNodeID=', None),
+        ('[DeviceComissioning]\nNodeID=200', None),
+        ('', None),
+    ],
+)
+def test_the_node_id_of_a_dcf(tmp_path: Path, section: str, node_id: int | None) -> None:
+    """A DCF gives the node id, under either spelling; an invalid one does not count."""
+    eds = read(tmp_path, f'{section}\n[1000]\nDataType=7\nAccessType=ro')
+    assert eds.node_id == node_id
+
+
+def test_dummy_usage(tmp_path: Path) -> None:
+    """Only the gaps that the device takes are allowed; a file without the section allows all."""
+    objects = '\n[1000]\nDataType=7\nAccessType=ro'
+    assert read(tmp_path, objects).dummy_types == set(range(2, 8))
+    text = '[DummyUsage]\nDummy0001=1\nDummy0002=0\nDummy0005=1\nDummy0006=\nDummy0007=0x1'
+    assert read(tmp_path, text + objects).dummy_types == {5, 7}
+
+
+@pytest.mark.parametrize(
+    ('content', 'message'),
+    [(None, 'no such file'), (b'', 'no object'), (b'\x7fELF\0\0\xff\xfe', 'no object')],
+    ids=['missing', 'empty', 'binary'],
+)
+def test_files_that_are_no_eds_are_refused(
+    tmp_path: Path, content: bytes | None, message: str
+) -> None:
+    """A missing, empty or binary file or a folder is one error with the path and a remedy."""
+    path = tmp_path / 'x.eds'
+    if content is not None:
+        path.write_bytes(content)
+    for each in (path, tmp_path) if content is None else (path,):
+        with pytest.raises(ConfigError, match=message) as caught:
+            load_eds(each)
+        (problem,) = caught.value.problems
+        assert problem.file == each
+        assert problem.remedy
+
+
+@pytest.mark.parametrize(
+    ('text', 'value'),
+    [
+        ('0', 0),
+        ('001', 1),
+        ('010', 10),  # decimal: vendors pad, nobody means octal
+        ('42', 42),
+        ('-3', -3),
+        ('+7', 7),
+        ('0x1A', 26),
+        ('0X1a', 26),
+        ('-0x10', -16),
+        ('0x6040 ; controlword', 0x6040),
+    ],
+)
+def test_whole_numbers(text: str, value: int) -> None:
+    """Decimal with or without padding, hexadecimal in any case, with a comment behind."""
+    assert parse_integer(text) == value
+
+
+@pytest.mark.parametrize('text', ['', 'abc', '0x', '1.5', '1_000', '1 2', '--1', '9' * 50, '٣'])
+def test_what_is_no_number_is_refused(text: str) -> None:
+    """Nothing is guessed; the message shows the text."""
+    with pytest.raises(ValueError, match='not a whole number'):
+        parse_integer(text)
+
+
+@pytest.mark.parametrize(
+    ('text', 'expected'),
+    [
+        ('$NODEID+0x180', EdsValue(0x180, node_relative=True)),
+        ('$nodeid + 0x180', EdsValue(0x180, node_relative=True)),
+        ('0x200+$NODEID', EdsValue(0x200, node_relative=True)),
+        ('$NODEID', EdsValue(0, node_relative=True)),
+        ('$NODEID+0x80000000+0x280', EdsValue(0x8000_0280, node_relative=True)),
+        ('$NODEID+384 ; TPDO 1', EdsValue(384, node_relative=True)),
+    ],
+)
+def test_sums_with_the_node_id(text: str, expected: EdsValue) -> None:
+    """The node id stands on either side, in any case, with any blanks."""
+    assert parse_value(DataType.UNSIGNED32, text) == expected
+
+
+@pytest.mark.parametrize(
+    ('data_type', 'text', 'message'),
+    [
+        (DataType.UNSIGNED8, '256', 'does not fit UNSIGNED8'),
+        (DataType.UNSIGNED8, '-1', 'does not fit UNSIGNED8'),
+        (DataType.INTEGER8, '256', 'does not fit INTEGER8'),
+        (DataType.INTEGER8, '-129', 'does not fit INTEGER8'),
+        (DataType.UNSIGNED32, '$NODEID+$NODEID', 'more than once'),
+        (DataType.UNSIGNED32, '$NODEID-1', 'not a whole number'),
+        (DataType.UNSIGNED32, '1+2', 'not a whole number'),
+        (DataType.REAL32, 'much', 'could not convert'),
+        (DataType.REAL32, '0x1FFFFFFFF', 'does not fit REAL32'),
+        (DataType.OCTET_STRING, 'zz', 'non-hexadecimal'),
+        (DataType.TIME_OF_DAY, '-1', 'does not fit TIME_OF_DAY'),
+    ],
+)
+def test_values_that_do_not_fit_are_refused(data_type: DataType, text: str, message: str) -> None:
+    """The reason names the text or the type."""
+    with pytest.raises(ValueError, match=message):
+        parse_value(data_type, text)
+
+
+@pytest.mark.parametrize(
+    ('data_type', 'text', 'value'),
+    [
+        (DataType.BOOLEAN, '1', 1),
+        (DataType.BOOLEAN, 'TRUE', True),
+        (DataType.BOOLEAN, 'false', False),
+        (DataType.VISIBLE_STRING, 'Drive; rev. 2', 'Drive; rev. 2'),
+        (DataType.OCTET_STRING, '0A 1B2c', b'\x0a\x1b\x2c'),
+        (DataType.UNICODE_STRING, '00410042', 'AB'),
+        (DataType.UNICODE_STRING, 'plain', 'plain'),
+        (DataType.TIME_DIFFERENCE, '1', b'\x01\0\0\0\0\0'),
+        (DataType.REAL32, '1.5 ; gain', 1.5),
+        (DataType.REAL64, '-2e-3', -0.002),
+    ],
+)
+def test_other_types(data_type: DataType, text: str, value: Value) -> None:
+    """Booleans, strings, octets, times and reals, as files write them."""
+    assert parse_value(data_type, text) == EdsValue(value)
+
+
+@given(value=st.floats(width=32))
+def test_hexadecimal_reals_are_bits(value: float) -> None:
+    """A real in hexadecimal gives the bits of the number (CiA 306-1)."""
+    (bits,) = struct.unpack('<I', struct.pack('<f', value))
+    parsed = parse_value(DataType.REAL32, f'0x{bits:08X}')
+    assert parsed is not None
+    assert parsed.value == value or (math.isnan(value) and math.isnan(float(parsed.value)))
+
+
+@given(data_type=st.sampled_from(DataType))
+def test_an_empty_text_is_no_value(data_type: DataType) -> None:
+    """Empty keys are common and mean nothing."""
+    assert parse_value(data_type, '') is None
+
+
+TEXTS = st.one_of(
+    st.text(max_size=20),
+    st.text(alphabet='0123456789abcdefx$NODEIDnodeid+-.; ', max_size=20),
+    st.integers(-(2**70), 2**70).map(str),
+    st.floats().map(str),
+)
+
+
+@given(data_type=st.sampled_from(DataType), text=TEXTS)
+@example(data_type=DataType.REAL32, text='3.5e38')
+def test_any_text_is_a_value_of_the_type_or_refused(data_type: DataType, text: str) -> None:
+    """What is read can be written to the device and read back; a refusal has a reason."""
+    try:
+        parsed = parse_value(data_type, text)
+    except ValueError as error:
+        limits = integer_range(data_type) or (0, -1)
+        is_value = bool(re.fullmatch('[0-9]{1,30}', text)) and int(text) <= limits[1]
+        assert (bool(str(error)), is_value) == (True, False)  # noqa: PT017  # half of the law
+        return
+    if parsed is None:
+        assert data_type is DataType.DOMAIN or not text.partition(';')[0].strip()
+        return
+    if data_type is DataType.VISIBLE_STRING:
+        assert parsed.value == text
+        return
+    decoded = decode(data_type, encode(data_type, parsed.value))
+    if isinstance(decoded, float) and isinstance(parsed.value, float):
+        assert decoded == pytest.approx(parsed.value, rel=1e-6, nan_ok=True)
+    else:
+        assert decoded == parsed.value
+
+
+NODE_ID = 5
+SHIPPED = sorted((Path(__file__).parents[2] / 'arm_canopen' / 'eds').glob('*.eds'))
+
+
+@pytest.fixture(params=['sample', *(path.name for path in SHIPPED)])
+def eds_path(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    """Give the sample, then every EDS that the package ships."""
+    name = str(request.param)
+    if name != 'sample':
+        return SHIPPED[0].parent / name
+    path = tmp_path / 'sample.eds'
+    path.write_text(eds_text(), encoding='utf-8')
+    return path
+
+
+def peer_entries(path: Path) -> dict[tuple[int, int], object]:
+    """Read a file with the canopen package."""
+    peer = canopen.objectdictionary.import_od(str(path), NODE_ID)
+    entries: dict[tuple[int, int], object] = {}
+    for index, item in peer.items():
+        if isinstance(item, canopen.objectdictionary.ODVariable):
+            entries[index, 0] = item
+        else:
+            entries.update({(index, subindex): part for subindex, part in item.subindices.items()})
+    return entries
+
+
+def test_both_readers_agree(eds_path: Path) -> None:
+    """Both find the same objects with the same types, access, defaults and limits."""
+    eds = load_eds(eds_path)
+    assert not eds.warnings
+    ours = {entry.address: entry for entry in eds.dictionary.for_node(NODE_ID)}
+    theirs = {
+        address: entry
+        for address, entry in peer_entries(eds_path).items()
+        if address[0] >= 0x1000  # [DummyUsage] becomes objects there
+    }
+    assert ours.keys() == theirs.keys()
+    for address, entry in ours.items():
+        assert describe(entry) == describe_peer(theirs[address]), entry
+
+
+def describe(entry: ObjectEntry) -> tuple[object, ...]:
+    """List what is compared."""
+    is_real = entry.data_type in REAL_FORMATS  # whose limits the peer reads as integers only
+    return (
+        entry.name,
+        entry.data_type.value,
+        entry.access.value,
+        entry.pdo_mappable,
+        entry.default,
+        None if is_real else entry.low_limit,
+        None if is_real else entry.high_limit,
+    )
+
+
+def describe_peer(entry: object) -> tuple[object, ...]:
+    """List the same of the peer's entry."""
+    is_real = getattr(entry, 'data_type', 0) in [kind.value for kind in REAL_FORMATS]
+    default = getattr(entry, 'default', None)
+    return (
+        getattr(entry, 'name', None),
+        getattr(entry, 'data_type', None),
+        getattr(entry, 'access_type', None),
+        getattr(entry, 'pdo_mappable', None),
+        None if default in ('', b'') else default,
+        None if is_real else getattr(entry, 'min', None),
+        None if is_real else getattr(entry, 'max', None),
+    )
+
+
+NUMBERS = [data_type for data_type in DataType if integer_range(data_type) is not None]
+
+
+@given(st.sampled_from(NUMBERS), st.data())
+def test_numbers_come_back(data_type: DataType, data: st.DataObject) -> None:
+    """Every value of BOOLEAN and the integers: decimal, and two's complement in hexadecimal."""
+    low, high = integer_range(data_type) or (0, 0)
+    value = data.draw(st.integers(low, high))
+    raw = value.to_bytes(byte_length(data_type) or 0, 'little', signed=low < 0)
+    shown = text_from_bytes(data_type, raw)
+    assert shown == (str(value == 1).lower() if data_type is DataType.BOOLEAN else str(value))
+    for text in (shown, str(value), f'0x{value % (high - low + 1):X}'):
+        assert bytes_from_text(data_type, text) == raw
+
+
+@given(st.sampled_from(list(REAL_FORMATS)), st.floats(width=32, allow_nan=False))
+def test_reals_come_back(data_type: DataType, value: float) -> None:
+    """Infinities and denormals too."""
+    raw = struct.pack(REAL_FORMATS[data_type], value)
+    assert bytes_from_text(data_type, text_from_bytes(data_type, raw)) == raw
+
+
+def test_nan_is_no_secret() -> None:
+    """It is shown as what it is."""
+    assert text_from_bytes(DataType.REAL32, struct.pack('<f', math.nan)) == 'nan'
+
+
+@given(st.sampled_from(sorted(BYTE_TYPES)), st.binary(min_size=6, max_size=6))
+def test_bytes_come_back(data_type: DataType, raw: bytes) -> None:
+    """As hexadecimal digits, with or without spaces."""
+    text = text_from_bytes(data_type, raw)
+    assert bytes_from_text(data_type, text) == raw
+    assert bytes_from_text(data_type, text.replace(' ', '')) == raw
+
+
+@given(st.text(st.characters(max_codepoint=255), min_size=1))
+def test_strings_come_back(text: str) -> None:
+    """Every character that a VISIBLE_STRING of a real device may have."""
+    raw = bytes_from_text(DataType.VISIBLE_STRING, text)
+    assert text_from_bytes(DataType.VISIBLE_STRING, raw) == text
+
+
+@pytest.mark.parametrize(
+    ('data_type', 'text'),
+    [
+        (DataType.UNSIGNED8, '256'),
+        (DataType.INTEGER16, ''),
+        (DataType.INTEGER16, '1.5'),
+        (DataType.UNSIGNED32, '$NODEID+1'),
+        (DataType.DOMAIN, 'xyz'),
+        (DataType.TIME_OF_DAY, '00 01'),
+        (DataType.VISIBLE_STRING, '\u20ac'),
+    ],
+    ids=str,
+)
+def test_what_is_no_value_is_refused(data_type: DataType, text: str) -> None:
+    """The message has the text or the type."""
+    with pytest.raises(CodecError):
+        bytes_from_text(data_type, text)
