@@ -19,7 +19,7 @@ from .environment import (
     restrict_dds,
     selected_reach,
 )
-from .reach import Interface, NetworkChoiceError, Reach
+from .reach import Interface, NetworkChoiceError, participants_on_this_host, Reach
 
 __all__ = [
     'NETWORK_VARIABLE',
@@ -29,6 +29,7 @@ __all__ = [
     'Reach',
     'is_this_host',
     'open_dds',
+    'participants_on_this_host',
     'restrict_dds',
     'selected_reach',
 ]

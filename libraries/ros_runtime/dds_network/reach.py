@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 import errno
 import fcntl
+from pathlib import Path
 import re
 import socket
 import struct
@@ -17,6 +18,9 @@ _SIOCGIFADDR = 0x8915  # linux/sockios.h: the first IPv4 address of an interface
 _IFREQ_SIZE = 40  # [byte] struct ifreq
 _NAME_SIZE = 16  # [byte] IFNAMSIZ
 _RUNNING = 0x40  # linux/if.h: IFF_RUNNING, what Fast DDS asks for
+_DOMAIN_PORT = 7400  # DDSI-RTPS 9.6.2.3: PB, DG and, in pairs of ports, d1
+_PORTS = 250
+_FIRST_PARTICIPANT = 5
 _ANY_PORT = 7400  # connecting a UDP socket sends nothing; the port does not matter
 _LOOPBACK = '127.'
 
@@ -40,6 +44,17 @@ def read_interfaces() -> dict[str, str]:
             # struct sockaddr_in behind the name: family, port, address
             found[name] = socket.inet_ntoa(struct.unpack_from('4s', answer, _NAME_SIZE + 4)[0])
     return found
+
+
+def participants_on_this_host(domain: int) -> int:
+    """Return how many participants of a domain have a socket on this host, ROS or not.
+
+    Each has a port for discovery by unicast (DDSI-RTPS 9.6.2.3), unless its user gave it another.
+    """
+    ports = range(_DOMAIN_PORT + domain * _PORTS, _DOMAIN_PORT + (domain + 1) * _PORTS, 2)
+    lines = Path('/proc/net/udp').read_text().splitlines()[1:]
+    bound = {int(line.split()[1].partition(':')[2], 16) for line in lines}
+    return len(bound.intersection(ports[_FIRST_PARTICIPANT:]))
 
 
 def has_link(name: str) -> bool:

@@ -15,6 +15,7 @@ from dds_network import (
     NETWORK_VARIABLE,
     NetworkChoiceError,
     open_dds,
+    participants_on_this_host,
     PROFILE_VARIABLE,
     Reach,
     restrict_dds,
@@ -226,3 +227,15 @@ def test_the_loopback_interface_has_a_link() -> None:
     assert read_interfaces()['lo'] == '127.0.0.1'
     assert has_link('lo')
     assert not has_link('no.such.device')
+
+
+def test_a_participant_is_counted_by_its_port_for_discovery() -> None:
+    """In its own domain, once, of any vendor."""
+    domain = 230  # ports above those that the kernel hands out
+    before = participants_on_this_host(domain)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as there:
+        port = 7410 + 250 * domain + 2 * 60
+        there.bind(('127.0.0.1', port))
+        assert participants_on_this_host(domain) == before + 1
+        assert participants_on_this_host(domain + 1) == 0
+    assert participants_on_this_host(domain) == before

@@ -34,9 +34,12 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     return clock
 
 
-def view(nodes: int, spin_time: float | None = None) -> Graph:
-    """Return a graph with nodes, one of which is our own."""
-    node = SimpleNamespace(get_node_names=lambda: ['a'] * nodes)
+def view(known: int, spin_time: float | None = None) -> Graph:
+    """Return a graph in which some participants are known as those of ROS."""
+    node = SimpleNamespace(
+        context=SimpleNamespace(get_domain_id=lambda: 7),
+        get_publishers_info_by_topic=lambda topic, no_mangle: [topic] * known,
+    )
     return Graph(SimpleNamespace(node=node), spin_time)  # type: ignore[arg-type]
 
 
@@ -44,7 +47,7 @@ def view(nodes: int, spin_time: float | None = None) -> Graph:
     ('seen', 'here', 'waits'),
     [
         ((2, None), True, (0.5, 1.5)),
-        ((1, None), True, (1.5, 1.5)),  # an empty list is looked at twice
+        ((1, None), True, (1.0, 1.5)),  # a node is late, or the other participant is not of ROS
         ((2, None), False, (3.2, 3.2)),
         ((2, 2.0), True, (2.0, 2.0)),
         ((1, 0.2), False, (0.2, 0.2)),
@@ -59,6 +62,7 @@ def test_a_command_waits_as_its_user_and_the_reach_of_dds_want(
 ) -> None:
     """Lists as ros2cli on this host; a name that is missing a little longer."""
     monkeypatch.setattr(graph, 'is_this_host', lambda environ: here)
+    monkeypatch.setattr(graph, 'participants_on_this_host', lambda domain: 2)
     found = view(*seen)
     found.settle()
     assert clock.now - 100.0 == pytest.approx(waits[0])

@@ -4,8 +4,10 @@
 
 There is no daemon: each command joins the graph anew, and waits as long as ros2cli without its
 daemon does. Then all nodes of this host are known, because their profile (`dds_network`) makes
-them announce themselves often. A command that wants a name goes on as soon as the name is there,
-and waits a little longer for one that is not.
+them announce themselves often. A list waits longer while a participant of this host is not known
+as one of ROS: on a busy machine a node is late, and DDS of another vendor answers in up to 0.8 s.
+A command that wants a name goes on as soon as the name is there, and waits a little longer for
+one that is not.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ import os
 import time
 from typing import TypeVar
 
-from dds_network import is_this_host
+from dds_network import is_this_host, participants_on_this_host
 
 from ..cli.errors import FrontendError, NoAnswerError
 from ..cli.verb import Argument, GRAPH_ARGUMENTS, Verb
@@ -29,6 +31,7 @@ from .session import open_session, Session
 T = TypeVar('T')
 
 _SPIN_TIME = 0.5  # [s] as ros2cli
+_LATE_TIME = 1.0  # [s] while a participant of this host is not known
 _NAME_TIME = 1.5  # [s] until a name is missing: on a machine that is too busy, discovery is late
 _OPEN_SPIN_TIME = (
     3.2  # [s]; with Fast DDS's own profile, participants announce themselves every 3 s
@@ -55,6 +58,7 @@ class Graph:
         longest = _OPEN_SPIN_TIME if spin_time is None else spin_time
         begin = time.monotonic()
         self._complete = begin + (_SPIN_TIME if fast else longest)
+        self._late = begin + (_LATE_TIME if fast else longest)
         self._missing = begin + (_NAME_TIME if fast else longest)
 
     def nodes(self, hidden: bool = False) -> list[NodeName]:
@@ -90,9 +94,14 @@ class Graph:
         return list(self._node.get_subscriptions_info_by_topic(topic))
 
     def settle(self, meanwhile: Callable[[], None] = lambda: None) -> None:
-        """Wait until the time for discovery has passed; a little longer where no other node is."""
+        """Wait until the time for discovery has passed; longer for a participant not yet known."""
         _wait(meanwhile, self._complete)
-        self.wait_for(lambda: len(self._node.get_node_names()) > 1 or None)
+        _wait(lambda: self._knows_this_host() or None, self._late)
+
+    def _knows_this_host(self) -> bool:
+        # each participant of ROS publishes this topic, whichever vendor's DDS it uses
+        known = self._node.get_publishers_info_by_topic('ros_discovery_info', no_mangle=True)
+        return len(known) >= participants_on_this_host(self._node.context.get_domain_id())
 
     def wait_for(self, look: Callable[[], T | None], timeout: float = math.inf) -> T | None:
         """Return what `look` finds; None when it is missing for sure, or after `timeout` [s]."""
