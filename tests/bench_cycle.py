@@ -86,7 +86,7 @@ def run_alone(path: str, interface: str) -> dict[str, float]:
     config = load_bus(path)
 
     def ignore(event: Event) -> None:
-        """Report to nobody."""
+        """Discard the report."""
 
     with open_bus(interface) as can:
         network = Network(config, can.send, ignore)

@@ -140,7 +140,7 @@ def open_page(browser: Browser, url: str, **options: object) -> Page:
 
 
 def texts() -> Iterator[str]:
-    """Yield what the pages say that are open, for whoever looks for the cause of a failure."""
+    """Yield the console output of open pages, which shows the cause of a failure."""
     for started in _started:
         from playwright.sync_api import Error
 

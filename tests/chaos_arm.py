@@ -164,7 +164,7 @@ class ArmVictim:
             self._tap.quality = PERFECT
 
     def _end_of(self, run: GoalRun, event: Event) -> str:
-        """Return how a goal ended; where it was not reached, somebody says why."""
+        """Return how a goal ended; where it was not reached, the cause is in a log or answer."""
         if event.kind is Disturbance.KILL and event.process == 'master':
             self._stops_without_master()
             return 'stopped by the drives'

@@ -133,7 +133,7 @@ class QuadVictim:
                 process.signal(signal.SIGCONT)
 
     def _end(self) -> str:
-        """Let nobody command it any more; where it has stopped by itself, it says why."""
+        """End all commands; where it has stopped by itself, it says why."""
         self._quad.spin(SETTLING)
         self._quad.tap.forget()
         state = self._quad.state
@@ -156,7 +156,7 @@ class QuadVictim:
         )
 
     def _stays(self) -> None:
-        """Nothing goes anywhere while nobody asks for it."""
+        """Nothing moves without a command."""
         before = self._place()
         self._quad.spin(1.0)
         after = self._place()

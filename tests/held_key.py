@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A terminal with a program in it, and a key that somebody holds."""
+"""A terminal with a program in it, and a key that is held."""
 
 from __future__ import annotations
 

@@ -186,6 +186,6 @@ def _receive(end: int) -> bytes:
 
 
 def _send(end: int, data: bytes) -> None:
-    """Write to a line; nobody keeps what nobody reads."""
+    """Write to a line; what is not read is dropped."""
     with suppress(BlockingIOError):
         os.write(end, data)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Two arms and a gripper of one description, brought up from files that nobody edited."""
+"""Two arms and a gripper of one description, brought up from unedited files."""
 
 from __future__ import annotations
 

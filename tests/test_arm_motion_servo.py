@@ -125,7 +125,7 @@ def _jogs(jogger: Jogger) -> None:
     jogger.until(
         twist('panda_link0', z=-0.5), lambda: abs(jogger.at[3] - begin[3]) > 0.02, 'motion'
     )
-    jogger.at_rest()  # by the time-out, nobody said stop
+    jogger.at_rest()  # by the time-out, without a stop
     first = jogger.at[0]
     jog = JointJog(joint_names=['panda_joint1'], velocities=[0.5])
     jogger.until(jog, lambda: jogger.at[0] > first + 0.05, 'joint motion')

@@ -86,7 +86,7 @@ def test_nobody_comes_in_uninvited(isolation: Isolation) -> None:
 
 
 def test_an_arm_whose_cable_is_not_plugged_in_works_on_its_host(isolation: Isolation) -> None:
-    """It says why nobody will come in, also when the cable comes."""
+    """It says why no client can connect, also once the cable is plugged in."""
     with two_hosts() as (robot, desk):
         desk.set_link('down')
         robot.wait_for_link('DOWN')

@@ -129,7 +129,7 @@ def prepare(page: Page, distance: str) -> None:
 
 
 def hold_beyond_the_end(page: Page, other: Page, joint: Joint) -> None:
-    """What is pressed for a motion moves nothing in the next one, whoever prepares that."""
+    """A press for one motion moves nothing in the next one."""
     prepare(page, '-2')
     joint.move(page)
     page.get_by_text('What did the real joint do?').wait_for()

@@ -48,7 +48,7 @@ def test_every_hash_equals_the_public_one() -> None:
 
 
 def test_definitions_that_were_compared_by_eye_do_not_change() -> None:
-    """Nothing else proves them; whoever changes one compares it again."""
+    """Nothing else proves them; a change has to be compared again."""
     assert changed(UNPROVEN) == []
 
 

@@ -62,7 +62,7 @@ def test_a_program_prints_the_text(text: str) -> None:
 
 
 def test_texts_are_found_by_their_order() -> None:
-    """Somebody who has the text finds its row."""
+    """A reader who has the text finds its row."""
     for table in tables():
         assert table == sorted(table, key=str.casefold)
 

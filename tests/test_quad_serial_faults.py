@@ -109,7 +109,7 @@ def test_a_broken_line_is_reported_and_survived(
     inject(quad, fault, *settings)
     for count, (speaker, reason) in zip(counts, reasons, strict=True):
         quad.processes[speaker].wait_for(reason, count=count + 1)
-    if fault != 'brown_out':  # servos without torque hold nobody up
+    if fault != 'brown_out':  # servos without torque do not hold the body
         assert tilt(quad) < math.radians(15.0)
     walk_again(quad)
     assert largest_step(diagnostics) < LARGEST_STEP

@@ -122,7 +122,7 @@ def test_a_recorded_fault_is_seen_as_when_it_happened(
 
 
 def test_a_replay_ends_when_the_master_comes(isolation: Isolation, tmp_path: Path) -> None:
-    """Nobody receives both; a damaged log is an error with its place."""
+    """No subscriber receives both; a damaged log is an error with its place."""
     log = tmp_path / 'bus.log'
     log.write_text('(1.000000) can0 080#\n(2.000000) can0 080#\n(3.0) can0 nonsense\n')
     with RunningProcess(replay(log, '-p', 'rate:=100.0'), isolation.env) as damaged:

@@ -33,13 +33,13 @@ def start(
 
 
 def is_open(url: str) -> bool:
-    """Whether somebody listens there."""
+    """Whether a server listens there."""
     with closing(socket.socket()) as client:
         return client.connect_ex(('127.0.0.1', int(url.rpartition(':')[2]))) == 0
 
 
 def memory_of_dds(robot: RunningProcess) -> list[str]:
-    """Return what its processes share: whoever hangs or dies there lets the others wait."""
+    """Return what its processes share: one that hangs or dies makes the others wait."""
     processes = psutil.Process(robot.pid).children(recursive=True)
     maps = []
     for process in processes:

@@ -104,7 +104,7 @@ FOR_ROS = [
     'twist_mux',
     'urdf',
 ]
-"""Executables of `ros2 run`, which would die on rclpy or have somebody else's name."""
+"""Executables of `ros2 run`, which would die on rclpy or have the name of another program."""
 TIMEOUT = 120.0  # [s] for a program on a busy machine
 NO_NETWORK = ('dns error', 'Failed to fetch', 'connect error', 'client error')
 NOT_SOURCE = shutil.ignore_patterns('__pycache__', '*.egg-info', 'build', 'test', 'bench')

@@ -31,7 +31,7 @@ LINES = {
 
 @pytest.fixture
 def workspace(tmp_path: Path, prefix: Path, isolation: Isolation) -> SmallWorkspace:
-    """Install the small programs, in a ROS domain that nobody else is in."""
+    """Install the small programs, in a ROS domain of their own."""
     libraries = ('libraries/recording', 'libraries/robot_primitives', 'libraries/ros_runtime')
     sources = ('arm_bringup', 'arm_canopen', 'canopen_core', 'canopen_sim', *libraries)
     workspace = SmallWorkspace(tmp_path, 'arm_bringup', LINES, sources, [prefix])

@@ -317,7 +317,7 @@ def test_a_start_at_the_end_of_a_range_is_reported(robot: Robot) -> None:
 def test_a_namespace_of_bus_yml_holds_for_all(
     robot: Robot, old: str, new: str, namespace: str
 ) -> None:
-    """Whoever has it: bring-up, demos and their clients look nowhere else."""
+    """Bring-up, demos and their clients use the same file."""
     replace(robot.bus_config, old, new)
     assert in_namespace_of_bus(RosOptions(), read_bus(robot)).namespace == namespace
     assert check_robot(robot) == []

@@ -48,7 +48,7 @@ def test_a_frame_is_found_up_and_down_the_tree(
 
 
 def test_what_is_old_or_not_connected_is_not_found() -> None:
-    """A transform that nobody renews, another tree and a loop lead nowhere."""
+    """A transform that is not renewed, another tree and a loop lead nowhere."""
     tree = FrameTree()
     still = pose([0.0] * 6)
     tree.learn('cup', 'base', still, 5.0)

@@ -82,7 +82,7 @@ def test_a_joint_of_several_directions_is_refused_in_a_group_only(kind: str) -> 
 
 
 def test_the_only_group_that_is_no_tool_is_the_arm() -> None:
-    """Where there is no choice, nobody has to choose."""
+    """A single candidate is taken without being named."""
     model = gripper('arm')
     assert model.joints == ('j1',)
     assert [each.name for each in model.end_effectors] == ['tool']
@@ -142,7 +142,7 @@ def test_a_pose_to_start_from_is_found(name: str) -> None:
 
 
 def test_a_good_pose_of_the_srdf_is_taken_before_any_that_is_found() -> None:
-    """It was chosen by somebody; a singular one is not taken."""
+    """A state that was chosen is taken; a singular one is not."""
     urdf, srdf = texts('panda')
     renamed = RobotModel(urdf, srdf.replace('"ready"', '"home"'), table('panda'))
     assert start_pose(renamed) is renamed.poses['home']

@@ -77,7 +77,7 @@ def dae(meter: str = '1') -> str:
 
 @pytest.fixture(autouse=True)
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Give each test an empty cache of its own, and the packages of nobody else."""
+    """Give each test an empty cache and packages of its own."""
     monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path / 'cache'))
     monkeypatch.setenv('AMENT_PREFIX_PATH', str(tmp_path / 'prefix'))
     monkeypatch.setenv('ROS_PACKAGE_PATH', '')
@@ -306,7 +306,7 @@ def test_a_damaged_mesh_is_one_note(content: str, tmp_path: Path) -> None:
 
 
 def test_an_arm_without_any_shape_says_so() -> None:
-    """Nobody should believe that it is checked."""
+    """The note says that it is not checked."""
     urdf, srdf, limits = chain_texts('zyy')
     bare = re.sub('<collision>.*?</collision>', '', urdf)
     model = RobotModel(bare, srdf, limits)

@@ -34,7 +34,7 @@ sys.modules['quad_bringup.mode_client'] = SimpleNamespace(ModeClient=lambda *_: 
 
 @pytest.fixture
 def workspace(tmp_path: Path, isolation: Isolation) -> SmallWorkspace:
-    """Install the small programs, in a ROS domain that nobody else is in."""
+    """Install the small programs, in a ROS domain of their own."""
     libraries = tuple(
         f'libraries/{name}' for name in ('recording', 'robot_primitives', 'ros_runtime')
     )

@@ -69,7 +69,7 @@ class GamepadTeleop(DeadmanMapping):
         return None if velocity == ZERO and self._deadman.enable is None else velocity
 
     def feed(self, state: GamepadState) -> list[Mode | BodyPose | RobotRequest]:
-        """Take a state of the gamepad; return what the person requests besides a velocity.
+        """Apply a state of the gamepad; return what the person requests besides a velocity.
 
         Whatever makes the robot move needs the deadman, as walking does; lying down and clearing a
         fault, which moves nothing, need none.

@@ -97,7 +97,7 @@ Request = Mode | BodyPose | RobotRequest | ProgramRequest | str
 REQUESTS: dict[str, Request] = {
     HELP_KEY: HELP,
     'backspace': RobotRequest.CLEAR_FAULT,
-    'space': RobotRequest.STOP,  # ends the gait, too, whoever walks it
+    'space': RobotRequest.STOP,  # ends the gait, too, of any client
     'ctrl+z': ProgramRequest.SUSPEND,
     **dict.fromkeys(('ctrl+c', 'ctrl+d', 'ctrl+\\'), ProgramRequest.QUIT),
 }

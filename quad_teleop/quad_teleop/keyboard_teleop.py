@@ -80,7 +80,7 @@ class KeyboardTeleop(KeyMapping):
         return None if key is None else MOVES[key].at(self.speeds)
 
     def feed(self, event: KeyEvent) -> list[Request]:
-        """Take an event; return what the person requests besides a velocity."""
+        """Apply an event; return what the person requests besides a velocity."""
         key = event.key
         if key in MOVES or not event.is_stroke:
             self._held.feed(event)

@@ -102,7 +102,7 @@ class Multiplexer:
         return max(active, key=lambda each: each.priority, default=None)
 
     def velocity(self, name: str, parts: tuple[float, ...], now: float) -> bool:
-        """Take a velocity of a source, linear and angular; return whether to forward it.
+        """Store a velocity of a source, linear and angular; return whether to forward it.
 
         Raises:
             CommandError: One of its numbers is none; the message does not count as received.
@@ -117,7 +117,7 @@ class Multiplexer:
         return True
 
     def lock(self, name: str, locked: bool, now: float) -> None:
-        """Take a message of a lock."""
+        """Store the state of a lock."""
         self._locks[name] = now, locked
 
     def zero_due(self, now: float) -> bool:

@@ -77,14 +77,14 @@ def patch_cmake_files(prefix: Path, include: str, numpy_include: str) -> int:
 
 
 def patch_bootstrapper(site_packages: Path) -> None:
-    """Let an interpreter that has the library path start once."""
+    """Patch ROS's module so that an interpreter with the library path starts only once."""
     path = site_packages / BOOTSTRAP_FILE
     if path.is_file() and path.read_text(encoding='utf-8') != BOOTSTRAP_LINE:
         write_atomically(path, BOOTSTRAP_LINE)
 
 
 def patch_dds(libraries: Path) -> int:
-    """Let a process leave the graph while it discovers another one.
+    """Patch DDS so that a process can leave the graph while it discovers another one.
 
     Args:
         libraries: The folder of the libraries.

@@ -464,7 +464,7 @@ def run(
         find_robot: Finds the robot that is asked for.
         files: Makes the parameter files of motion nodes; None for a demo of drives.
         plan: With move_group.
-        endless: Whoever saw its table until Ctrl-C needs no summary.
+        endless: The table runs until Ctrl-C, without a summary.
         errors: What is raised besides, where a robot does not suit the demo.
 
     Returns:

@@ -153,7 +153,7 @@ class Axis:
                 self._wanted = False
 
     def leave(self, reason: str) -> None:
-        """Leave the wave."""
+        """Stop the wave."""
         self.active, self._wanted, self.left = False, False, reason
 
     @property

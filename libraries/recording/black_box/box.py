@@ -152,7 +152,7 @@ class BlackBox:
         self._notes.append(_Note(time.monotonic(), subject, text))
 
     def fault(self, subject: str, text: str) -> None:
-        """Have a recording written for a fault; returns at once."""
+        """Request that a recording is written for a fault; does not wait for it."""
         note = _Note(time.monotonic(), subject, text)
         self._notes.append(note)
         self._faults.put(note)

@@ -25,10 +25,10 @@ class Replay(Protocol[Entry_contra]):
     """What a log is played to. Times are those of the log in [s], and never go back."""
 
     def take(self, entry: Entry_contra, now: float) -> None:
-        """Take the next entry, which happened now."""
+        """Handle the next entry, which happened now."""
 
     def advance(self, now: float) -> None:
-        """Let time pass in which nothing happened."""
+        """Advance the time; nothing happened meanwhile."""
 
     def restart(self) -> None:
         """Forget what was, as the log begins again."""

@@ -172,7 +172,7 @@ def test_a_full_disk_is_reported_and_leaves_nothing_behind(
 def test_a_folder_that_cannot_be_made_is_reported(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """Nothing is raised to whoever reports the fault or ends the program."""
+    """Nothing is raised to the caller that reports the fault or ends the program."""
     occupied = tmp_path / 'a_file'
     occupied.touch()
     box = BlackBox('bus', Memory(), settings(occupied / 'black_box'))

@@ -32,13 +32,13 @@ class Recorded:
         self.on_entry: Callable[[int], None] = lambda entry: None
 
     def take(self, entry: int, now: float) -> None:
-        """Take an entry; time never goes back."""
+        """Record an entry; time never goes back."""
         self.advance(now)
         self.entries.append((entry, now))
         self.on_entry(entry)
 
     def advance(self, now: float) -> None:
-        """Let time pass."""
+        """Advance the time."""
         assert now >= self.now
         self.now = now
 

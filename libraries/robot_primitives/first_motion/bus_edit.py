@@ -163,7 +163,7 @@ def _replacements(section: yaml.MappingNode, values: Mapping[str, float | bool])
 def _dated_comments(
     text: str, section: yaml.MappingNode, values: Mapping[str, float | bool]
 ) -> list[_Splice]:
-    """Have comments behind values that are changed say that they are of the old value."""
+    """Return the edits that mark comments behind changed values as those of the old value."""
     splices = []
     for key, value in section.value:
         end = value.end_mark.index

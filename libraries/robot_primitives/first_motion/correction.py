@@ -28,7 +28,7 @@ class AxisScales:
 
     @classmethod
     def of(cls, source: object) -> AxisScales:
-        """Take them from what has attributes of these names."""
+        """Copy them from an object with attributes of these names."""
         return cls(**{each.name: getattr(source, each.name) for each in fields(cls)})
 
 

@@ -135,7 +135,7 @@ class MotionGuard:
         return self._end(Outcome.FINISHED if self._has_begun else Outcome.IDLE)
 
     def step(self, now: float, sample: Sample, *, held: bool, busy: bool) -> Order:
-        """Take a sample of the drives; return what is to be done.
+        """Judge a sample of the drives; return what is to be done.
 
         Held: the person holds the key. Busy: the drive still carries out what was ordered last, so
         it is not ordered to go.

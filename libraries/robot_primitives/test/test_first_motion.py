@@ -94,7 +94,7 @@ def test_the_joint_moves_only_while_the_key_is_held(
 
 
 def test_a_held_up_loop_is_a_release() -> None:
-    """The key has to be pressed anew: nobody was asked meanwhile."""
+    """The key has to be pressed anew: no question was put meanwhile."""
     joint = Joint(PLAN)
     assert joint.step(held=False) is Order.NONE
     assert joint.step(held=True) is Order.GO
@@ -191,7 +191,7 @@ def test_a_motion_that_cannot_be_guarded_is_refused(name: str) -> None:
 
 
 def test_a_first_motion_is_short_and_slow() -> None:
-    """Whoever asks for it; what is no number is neither."""
+    """Both are refused; what is no number is neither."""
     kind = JointKind.TURNS
     assert not too_far(kind, -math.radians(20))
     assert not too_fast(kind, math.radians(5))

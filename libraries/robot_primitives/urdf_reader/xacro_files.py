@@ -73,7 +73,7 @@ def _missing(path: Path, words: str) -> XacroError | None:
 
 @contextlib.contextmanager
 def _package_overlay(packages: Mapping[str, Path]) -> Iterator[None]:
-    """Let ``$(find ...)`` find folders as if they were installed, as long as the block runs."""
+    """Make ``$(find ...)`` find folders as if they were installed, while the block runs."""
     with contextlib.ExitStack() as stack:
         if packages:
             prefix = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix='packages-')))
@@ -90,7 +90,7 @@ def _package_overlay(packages: Mapping[str, Path]) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _without_other_hardware(xacro: Any) -> Iterator[None]:  # noqa: ANN401  # it has no types
-    """Leave out includes for other drivers that are not installed, and calls of their macros."""
+    """Drop includes for other drivers that are not installed, and calls of their macros."""
     include, call = xacro.process_include, xacro.handle_macro_call
 
     def process_include(element: Any, *rest: Any) -> None:  # noqa: ANN401

@@ -140,7 +140,7 @@ class Reach:
         names = ', '.join(f'{each.name} ({each.address})' for each in self.interfaces)
         peers = f', announced to {", ".join(self.peers)}' if self.peers else ''
         return (
-            f'DDS is open on {names}{peers}; it has no authentication: whoever reaches this '
+            f'DDS is open on {names}{peers}; it has no authentication: any client on this '
             f'network can command the robot{left_out}'
         )
 

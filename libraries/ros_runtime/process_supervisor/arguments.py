@@ -53,7 +53,7 @@ def add_network(parser: argparse.ArgumentParser) -> None:
         '--network',
         metavar='NAMES',
         help='open DDS to other machines: network interfaces, or addresses of peers, separated by '
-        'commas; there is no authentication, whoever reaches them can command the robot (default: '
+        'commas; without authentication: any client there can command the robot (default: '
         f'the variable {NETWORK_VARIABLE}, else this host only)',
     )
 

@@ -82,7 +82,7 @@ PROGRAMS = {
             while True: signal.pause()
         print('child', child, flush=True)
     """,
-    # leaves a child behind in a session of its own, which writes for as long as somebody reads
+    # leaves a child behind in a session of its own, which writes for as long as its output is read
     'daemon': """
         os.write(1, b'first words\\n')
         if os.fork() == 0:

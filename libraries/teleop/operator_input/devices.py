@@ -129,7 +129,7 @@ class InputDevice:
             raise self._gone(error) from None
 
     def close(self) -> None:
-        """Let the kernel have it back; one that was unplugged is no error."""
+        """Close the device; one that was unplugged is no error."""
         with contextlib.suppress(OSError):
             self._device.close()
 
@@ -178,7 +178,7 @@ class DeviceSearch:
         period: float,
         others_period: float,
     ) -> None:
-        """Look once a period; what does not fit is left alone for longer: opening wakes it."""
+        """Scan once a period; one that does not fit is opened less often, as opening wakes it."""
         self._devices = devices
         self._fits = fits
         self._period = period

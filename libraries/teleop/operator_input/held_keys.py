@@ -61,7 +61,7 @@ class AutoRepeat:
         return self._delay is not None and self.repeat < gap < self._delay / MARGIN
 
     def learn(self, gap: float | None) -> None:
-        """Take the time since the same character; None where the one before was another."""
+        """Learn from the time since the same character; None where the one before was another."""
         if gap is None:
             self._gaps.clear()
             return
@@ -87,7 +87,7 @@ class HeldKeys:
         self._typed: tuple[str, float, float] | None = None  # key, its first and last time
 
     def feed(self, event: KeyEvent) -> None:
-        """Take an event, in the order of their times."""
+        """Process an event; events come in the order of their times."""
         for key in [key for key, until in self._until.items() if until <= event.time]:
             del self._until[key]
         match event.action:
@@ -123,7 +123,7 @@ class HeldKeys:
         return min((until for until in self._until.values() if now < until), default=math.inf)
 
     def clear(self) -> None:
-        """Let go of all keys; one that is down must be pressed again to count."""
+        """Release all keys; one that is down must be pressed again to count."""
         self._until.clear()
         self._typed = None
 

@@ -196,7 +196,7 @@ class _Key:
 
 
 def _key(parameters: str, final: str) -> _Key | None:
-    """Take a CSI sequence apart; None if it is no key."""
+    """Decode a CSI sequence; return None if it is no key."""
     fields = [[_number(part) for part in field.split(':')] for field in parameters.split(';')]
     codes, text = fields[0], _field(fields, 2, 0)
     modifiers = max((_field(fields, 1, 0) or 1) - 1, 0)

@@ -67,7 +67,7 @@ class TeleopMapping(ABC):
 
     @abstractmethod
     def feed(self, event: Any) -> Sequence[object]:  # noqa: ANN401  # of its source
-        """Take an event of the source; return the person's requests."""
+        """Map an event of the source to the person's requests."""
 
     @abstractmethod
     def wanted(self, now: float) -> object | None:
@@ -86,7 +86,7 @@ class TeleopMapping(ABC):
         return self._stream.due()
 
     def end(self) -> None:
-        """Let go of everything at the end of the program."""
+        """Release everything at the end of the program."""
         self._stream.end()
 
 
@@ -102,7 +102,7 @@ class KeyMapping(TeleopMapping):
         return min(self._held.deadline(now), super().due(now))
 
     def end(self) -> None:
-        """Let go of everything at the end of the program."""
+        """Release everything at the end of the program."""
         self._held.clear()
         super().end()
 
@@ -140,7 +140,7 @@ class DeadmanMapping(TeleopMapping):
         return Grip.RELEASED if self.expired else self._deadman.grip(self.state)
 
     def take(self, state: GamepadState) -> GamepadState:
-        """Take a state of the gamepad, at rest when there is none; return the one before."""
+        """Store a state of the gamepad, at rest when there is none; return the previous one."""
         before, self.state = self.state, state
         changed = state != before or state.changes != before.changes
         self._is_alive |= changed
@@ -168,7 +168,7 @@ class DeadmanMapping(TeleopMapping):
         return min(super().due(now), expires)
 
     def end(self) -> None:
-        """Let go of everything at the end of the program."""
+        """Release everything at the end of the program."""
         self.state = AT_REST
         super().end()
 

@@ -47,7 +47,7 @@ class ReleaseMatcher:
         self._last_typed: KeyEvent | None = None  # not matched yet
 
     def key_down(self, code: int, now: float) -> list[KeyEvent]:
-        """Take a key of a keyboard that went down.
+        """Record a key of a keyboard that went down.
 
         Returns:
             A press, if its character has come already; its release, if it was down.
@@ -63,7 +63,7 @@ class ReleaseMatcher:
         return events + self._match(code, typed.key, now)
 
     def key_up(self, code: int, now: float) -> list[KeyEvent]:
-        """Take a key of a keyboard that went up; return the release of its character, if known."""
+        """Record a key of a keyboard that went up; return the release of its character if known."""
         went_down = self._down.pop(code, None)
         name = self._matched.pop(code, None)
         if name is not None:
@@ -73,7 +73,7 @@ class ReleaseMatcher:
         return []
 
     def terminal(self, event: KeyEvent) -> list[KeyEvent]:
-        """Take an event of the terminal; one that is TYPED may become PRESSED or REPEATED."""
+        """Process an event of the terminal; one that is TYPED may become PRESSED or REPEATED."""
         if event.action is KeyAction.ALL_RELEASED:
             self._matched.clear()
         if event.action is not KeyAction.TYPED:
@@ -130,7 +130,7 @@ class Keyboards:
         return [device.fileno() for device in self._open.values()]
 
     def scan(self, now: float) -> None:
-        """Look for new keyboards, if it is time to."""
+        """Search for new keyboards if a scan is due."""
         for device in self._search.found(now, self._open.__contains__):
             self._open[device.info.path] = device
 
@@ -147,7 +147,7 @@ class Keyboards:
         return events
 
     def close(self) -> None:
-        """Let go of every keyboard that is open."""
+        """Close every keyboard."""
         for device in self._open.values():
             device.close()
         self._open.clear()

@@ -67,7 +67,7 @@ class StatusLine:
         self._output.write(f'{CLEAR_LINE}{text}\n{self._shown}')
 
     def end(self) -> None:
-        """Leave the line as it is, and go below it."""
+        """Move below the line, which stays as it is."""
         if self._shown:
             self._output.write('\n')
         self._shown = ''

@@ -89,7 +89,7 @@ class TerminalDialogue:
         return POP if was in {Stage.PUSHED, Stage.ACTIVE} else ''
 
     def take(self, report: Report) -> str:
-        """Take a report of the terminal; return what to write."""
+        """Process a report of the terminal; return what to write."""
         if report.kind is ReportKind.DEVICE_ATTRIBUTES:
             return self._take_attributes()
         if report.kind is not ReportKind.KITTY_FLAGS:

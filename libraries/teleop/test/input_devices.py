@@ -63,7 +63,7 @@ class InjectedDevice(InputDevice):
         self.report(InputEvent(EV_KEY, code, 1))
 
     def release(self, code: int) -> None:
-        """Let go of a key or button."""
+        """Release a key or button."""
         self.keys.discard(code)
         self.report(InputEvent(EV_KEY, code, 0))
 

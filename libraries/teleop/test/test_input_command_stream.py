@@ -76,7 +76,7 @@ def test_idle_source_is_silent() -> None:
 
 
 def test_stop_speaks_even_when_idle() -> None:
-    """Somebody else may be driving: a person's stop is published."""
+    """Another program may be driving: a person's stop is published."""
     stream = CommandStream(PERIOD, lambda _: 0.0)
     stream.stop()
     assert silence(stream, 0.0) == [0.0] * RESTS

@@ -98,7 +98,7 @@ class Keys(KeyMapping):
     introduction = 'press i'
 
     def feed(self, event: KeyEvent) -> list[object]:
-        """Take a key."""
+        """Record a key."""
         self._held.feed(event)
         return [REQUESTS[event.key]] if event.is_stroke and event.key in REQUESTS else []
 
@@ -200,7 +200,7 @@ class Sticks(DeadmanMapping):
         return None if self.grip is Grip.RELEASED else self.state.axis(Axis.LEFT_Y)
 
     def feed(self, state: GamepadState) -> list[Button]:
-        """Take a state."""
+        """Record a state."""
         return list(state.pressed_since(self.take(state)))
 
 

@@ -18,7 +18,7 @@ def typed(key: str, time: float) -> KeyEvent:
 
 
 def actions(events: list[KeyEvent]) -> list[tuple[str, KeyAction]]:
-    """Leave the times out."""
+    """Return the actions without their times."""
     return [(event.key, event.action) for event in events]
 
 
@@ -72,7 +72,7 @@ def test_character_without_a_key_stays_typed() -> None:
 
 
 def test_focus_lost_forgets_the_match() -> None:
-    """After the focus is lost, the key's release is nobody's, and its character is new."""
+    """After the focus is lost, the key's release belongs to no key, and its character is new."""
     matcher = ReleaseMatcher()
     matcher.key_down(KEY_I, 1.0)
     matcher.terminal(typed('i', 1.0))

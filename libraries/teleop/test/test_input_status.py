@@ -13,7 +13,7 @@ class Paper:
     """Remembers what was written."""
 
     def __init__(self, columns: int) -> None:
-        """Have a width."""
+        """Set the width."""
         self.text = ''
         self.columns = columns
 

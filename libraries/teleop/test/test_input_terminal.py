@@ -48,7 +48,7 @@ def negotiate(keyboard: TerminalKeyboard) -> Stage:
 
 
 def actions(events: list[KeyEvent]) -> list[tuple[str, KeyAction]]:
-    """Leave the times out."""
+    """Return the actions without their times."""
     return [(event.key, event.action) for event in events]
 
 

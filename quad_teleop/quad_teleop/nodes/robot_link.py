@@ -104,7 +104,7 @@ class CommandClient:
         """Make the client.
 
         Args:
-            node: The node; somebody has to spin it for answers to arrive.
+            node: The node; answers arrive while it is spun.
             service_type: Type of the service.
             service: Its name.
             show: Receives the answers, and why there is none.
@@ -121,7 +121,7 @@ class CommandClient:
         self._is_waiting = False  # for the service to be found
 
     def request(self, what: str, request: Any, now: float) -> None:  # noqa: ANN401
-        """Ask for something, named by a word; a question that is still open is dropped."""
+        """Send a request, named by a word; one that is still open is dropped."""
         last = self._question
         if (
             self._drops_repeats

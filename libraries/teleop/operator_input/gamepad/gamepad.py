@@ -95,7 +95,7 @@ class Gamepad(contextlib.AbstractContextManager['Gamepad']):
         return self._reading.state() if self._reading is not None else AT_REST
 
     def scan(self, now: float) -> None:
-        """Look for a gamepad if there is none and it is time to."""
+        """Search for a gamepad if there is none and a scan is due."""
         if self._device is None:
             for device in self._search.found(now, self._is_other_path):
                 if self._use(device):
@@ -106,7 +106,7 @@ class Gamepad(contextlib.AbstractContextManager['Gamepad']):
         self._is_first_scan = False
 
     def wait(self, timeout: float) -> list[GamepadState]:
-        """Look for a gamepad, wait for a change of its state, and read."""
+        """Search for a gamepad, wait for a change of its state, and read it."""
         self.scan(time.monotonic())
         waiting = [self._device] if self._device is not None else []
         select.select(waiting, [], [], timeout)
@@ -186,7 +186,7 @@ class GamepadReading:
         return GamepadState(dict(self._axes), frozenset(self._buttons), self._changes)
 
     def feed(self, event: InputEvent) -> None:
-        """Take an event of the kernel; what the preset does not know is passed over."""
+        """Apply an event of the kernel; events that the preset does not know are ignored."""
         source = event.type, event.code
         self._changes += self._raw.get(source) != event.value
         self._raw[source] = event.value
@@ -203,7 +203,7 @@ class GamepadReading:
                 self._buttons.discard(button)
 
     def reset(self, state: DeviceState) -> None:
-        """Take the whole state, as at the start and after events were lost."""
+        """Replace the whole state, as at the start and after events were lost."""
         self._buttons = {
             self._preset.buttons[code] for code in state.keys if code in self._preset.buttons
         }
