@@ -47,7 +47,7 @@ class ReleaseMatcher:
         self._last_typed: KeyEvent | None = None  # not matched yet
 
     def key_down(self, code: int, now: float) -> list[KeyEvent]:
-        """Record a key of a keyboard that went down.
+        """Record a key that went down.
 
         Returns:
             A press, if its character has come already; its release, if it was down.
@@ -63,7 +63,7 @@ class ReleaseMatcher:
         return events + self._match(code, typed.key, now)
 
     def key_up(self, code: int, now: float) -> list[KeyEvent]:
-        """Record a key of a keyboard that went up; return the release of its character if known."""
+        """Record a key that went up; return the release of its character, if known."""
         went_down = self._down.pop(code, None)
         name = self._matched.pop(code, None)
         if name is not None:
