@@ -80,43 +80,38 @@ RANDOM = ('probability', 'count', 'seed')
 
 @dataclass(frozen=True, slots=True)
 class FaultKind:
-    """A row of the table.
+    """A row of the table."""
 
-    Attributes:
-        text: What the device does, in words.
-        settings: Which fields of :class:`FaultInjection` it uses, beside its duration.
-        services: Whose frames it hits.
-        directions: Those that the device sends, or receives.
-        effect: What becomes of such a frame.
-        of_blocks: It hits SDO block transfers only.
-        of_drive: It belongs to an axis of a drive.
-        code: Error code for 0x603F and EMCY (CiA 402-2); 0 for none.
-        at_once: The torque is gone at once, whatever fault reaction 0x605E selects.
-        lasting: Without a duration it goes on until it is ended; otherwise it is a moment, and a
-            fault reset ends it.
-    """
-
-    text: str
+    text: str  # what the device does, in words
+    # which fields of :class:`FaultInjection` it uses, beside its duration
     settings: tuple[str, ...] = ()
-    services: tuple[Service, ...] = ()
-    directions: tuple[bool, ...] = (SENT, RECEIVED)
-    effect: Effect | Rewrite = Effect.LOSE
-    of_blocks: bool = False
-    of_drive: bool = False
-    code: int = 0
-    at_once: bool = False
+    services: tuple[Service, ...] = ()  # whose frames it hits
+    directions: tuple[bool, ...] = (SENT, RECEIVED)  # those that the device sends, or receives
+    effect: Effect | Rewrite = Effect.LOSE  # what becomes of such a frame
+    of_blocks: bool = False  # it hits SDO block transfers only
+    of_drive: bool = False  # it belongs to an axis of a drive
+    code: int = 0  # error code for 0x603F and EMCY (CiA 402-2); 0 for none
+    at_once: bool = False  # the torque is gone at once, whatever fault reaction 0x605E selects
+    # without a duration it goes on until it is ended; otherwise it is a moment, and a fault reset
+    # ends it
     lasting: bool = True
 
 
-def _on_frames(
-    text: str,
+def _frames(
     service: Service,
     sent: bool,
+    text: str,
     *settings: str,
     effect: Effect | Rewrite = Effect.LOSE,
     of_blocks: bool = False,
 ) -> FaultKind:
     return FaultKind(text, settings, (service,), (sent,), effect, of_blocks)
+
+
+_sdo_answers = partial(_frames, Service.SDO, SENT)
+_sdo_requests = partial(_frames, Service.SDO, RECEIVED)
+_sent_pdos = partial(_frames, Service.PDO, SENT)
+_received_pdos = partial(_frames, Service.PDO, RECEIVED)
 
 
 def _of_drive(text: str, code: int, *, at_once: bool = False, lasting: bool = False) -> FaultKind:
@@ -130,39 +125,20 @@ def _odd_drive(text: str, *settings: str) -> FaultKind:
 class Fault(Enum):
     """Every fault; :attr:`label` is its name in services."""
 
-    SDO_DELAY = _on_frames(
-        'answers SDOs late', Service.SDO, SENT, 'object', 'delay', effect=Effect.DELAY
+    SDO_DELAY = _sdo_answers('answers SDOs late', 'object', 'delay', effect=Effect.DELAY)
+    SDO_SILENCE = _sdo_requests('does not answer SDOs', 'object', *RANDOM)
+    SDO_ABORT = _sdo_requests('aborts SDOs', 'object', 'abort', *RANDOM, effect=Effect.ABORT)
+    SDO_FOUR_BYTES = _sdo_answers(
+        'answers SDO reads of shorter objects with four bytes', effect=partial(_with_command, 0x43)
     )
-    SDO_SILENCE = _on_frames('does not answer SDOs', Service.SDO, RECEIVED, 'object', *RANDOM)
-    SDO_ABORT = _on_frames(
-        'aborts SDOs', Service.SDO, RECEIVED, 'object', 'abort', *RANDOM, effect=Effect.ABORT
+    SDO_NO_SIZE = _sdo_answers(
+        'leaves the size out of its SDO answers', effect=partial(_with_command, 0x42)
     )
-    SDO_FOUR_BYTES = _on_frames(
-        'answers SDO reads of shorter objects with four bytes',
-        Service.SDO,
-        SENT,
-        effect=partial(_with_command, 0x43),
+    SDO_SHORT = _sdo_answers('leaves out the unused bytes of its SDO answers', effect=_shortened)
+    BLOCK_ABORT = _sdo_requests(
+        'aborts SDO block transfers', 'abort', effect=Effect.ABORT, of_blocks=True
     )
-    SDO_NO_SIZE = _on_frames(
-        'leaves the size out of its SDO answers',
-        Service.SDO,
-        SENT,
-        effect=partial(_with_command, 0x42),
-    )
-    SDO_SHORT = _on_frames(
-        'leaves out the unused bytes of its SDO answers', Service.SDO, SENT, effect=_shortened
-    )
-    BLOCK_ABORT = _on_frames(
-        'aborts SDO block transfers',
-        Service.SDO,
-        RECEIVED,
-        'abort',
-        effect=Effect.ABORT,
-        of_blocks=True,
-    )
-    BLOCK_SILENCE = _on_frames(
-        'does not answer SDO block transfers', Service.SDO, RECEIVED, of_blocks=True
-    )
+    BLOCK_SILENCE = _sdo_requests('does not answer SDO block transfers', of_blocks=True)
     BLOCK_CRC = FaultKind(
         'computes another CRC in SDO block transfers',
         services=(Service.SDO,),
@@ -174,17 +150,13 @@ class Fault(Enum):
         directions=(SENT,),
         effect=Effect.REPEAT,
     )
-    TPDO_LOSS = _on_frames('loses PDOs that it sends', Service.PDO, SENT, 'pdo', *RANDOM)
-    TPDO_DELAY = _on_frames(
-        'sends PDOs late', Service.PDO, SENT, 'pdo', 'delay', *RANDOM, effect=Effect.DELAY
-    )
-    RPDO_LOSS = _on_frames('misses PDOs', Service.PDO, RECEIVED, 'pdo', *RANDOM)
-    RPDO_DELAY = _on_frames(
-        'receives PDOs late', Service.PDO, RECEIVED, 'pdo', 'delay', *RANDOM, effect=Effect.DELAY
-    )
+    TPDO_LOSS = _sent_pdos('loses PDOs that it sends', 'pdo', *RANDOM)
+    TPDO_DELAY = _sent_pdos('sends PDOs late', 'pdo', 'delay', *RANDOM, effect=Effect.DELAY)
+    RPDO_LOSS = _received_pdos('misses PDOs', 'pdo', *RANDOM)
+    RPDO_DELAY = _received_pdos('receives PDOs late', 'pdo', 'delay', *RANDOM, effect=Effect.DELAY)
     FRAME_LOSS = FaultKind('loses frames of both directions', RANDOM, ALL_SERVICES)
-    HEARTBEAT_STOP = _on_frames(
-        'sends no heartbeat and answers no node guarding', Service.HEARTBEAT, SENT
+    HEARTBEAT_STOP = _frames(
+        Service.HEARTBEAT, SENT, 'sends no heartbeat and answers no node guarding'
     )
     DISCONNECT = FaultKind('is cut off from the bus and goes on by itself', (), ALL_SERVICES)
 
@@ -239,53 +211,34 @@ FAULTS: dict[str, Fault] = {fault.label: fault for fault in Fault}
 
 @dataclass(frozen=True, slots=True)
 class FaultInjection:
-    """One fault with its settings.
+    """One fault with its settings."""
 
-    Attributes:
-        fault: What goes wrong.
-        duration: How long in [s]; 0 until it is ended. Of a reboot: how long the power is off.
-            Of most faults of a drive 0 is a moment, so that a fault reset ends them.
-        delay: How late frames are in [s].
-        probability: Part of the frames in question that are hit, 0 to 1.
-        count: How many frames are hit, then the fault is over; 0 for no such limit.
-        seed: Beginning of the random numbers; the same seed hits the same frames.
-        pdo: Number of the PDO, from 1; 0 for all.
-        axis: Number of the drive's axis, from 1; 0 for all.
-        object: Index and sub-index; None for all.
-        abort: SDO abort code.
-        position_kept: The encoder knows its position after power-on (absolute), or counts from
-            0 (incremental).
-        device_type: What 0x1000 shows; None for the true value, as in those that follow.
-        vendor: What 0x1018:01 shows.
-        product: What 0x1018:02 shows.
-        revision: What 0x1018:03 shows.
-        serial: What 0x1018:04 shows.
-        velocity: What 1 of the velocities of the drive is in [inc/s]; None for its own unit.
-        acceleration: What 1 of its accelerations is in [inc/s^2]; None for its own unit.
-        position: What the encoder reads in [inc].
-        value: What the object holds.
-    """
-
-    fault: Fault
+    fault: Fault  # what goes wrong
+    # how long in [s]; 0 until it is ended. Of a reboot: how long the power is off. Of most faults
+    # of a drive 0 is a moment, so that a fault reset ends them.
     duration: float = 0.0
-    delay: float = DELAY
-    probability: float = 1.0
-    count: int = 0
-    seed: int = 0
-    pdo: int = 0
-    axis: int = 0
-    object: tuple[int, int] | None = None
-    abort: int = AbortCode.GENERAL
+    delay: float = DELAY  # how late frames are in [s]
+    probability: float = 1.0  # part of the frames in question that are hit, 0 to 1
+    count: int = 0  # how many frames are hit, then the fault is over; 0 for no such limit
+    seed: int = 0  # beginning of the random numbers; the same seed hits the same frames
+    pdo: int = 0  # number of the PDO, from 1; 0 for all
+    axis: int = 0  # number of the drive's axis, from 1; 0 for all
+    object: tuple[int, int] | None = None  # index and sub-index; None for all
+    abort: int = AbortCode.GENERAL  # SDO abort code
+    # the encoder knows its position after power-on (absolute), or counts from 0 (incremental)
     position_kept: bool = True
+    # what 0x1000 shows; None for the true value, as in those that follow
     device_type: int | None = None
-    vendor: int | None = None
-    product: int | None = None
-    revision: int | None = None
-    serial: int | None = None
+    vendor: int | None = None  # what 0x1018:01 shows
+    product: int | None = None  # what 0x1018:02 shows
+    revision: int | None = None  # what 0x1018:03 shows
+    serial: int | None = None  # what 0x1018:04 shows
+    # what 1 of the velocities of the drive is in [inc/s]; None for its own unit
     velocity: float | None = None
+    # what 1 of its accelerations is in [inc/s^2]; None for its own unit
     acceleration: float | None = None
-    position: int = 0
-    value: int = 0
+    position: int = 0  # what the encoder reads in [inc]
+    value: int = 0  # what the object holds
 
     def __post_init__(self) -> None:
         """Refuse what has no meaning.
@@ -345,12 +298,7 @@ def fault_list() -> str:
 
 
 def parse_fault(name: str, lines: Iterable[str], duration: float) -> FaultInjection:
-    """Read a fault as people write it.
-
-    Args:
-        name: Its name.
-        lines: A text ``name=value`` for each of its settings.
-        duration: How long in [s].
+    """Read a fault as people write it; each line is ``name=value`` of one of its settings.
 
     Raises:
         ValueError: A name is unknown, or a value has no meaning; an unknown fault is answered

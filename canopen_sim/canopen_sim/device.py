@@ -53,16 +53,6 @@ class Device:
 
     Call :meth:`advance` once to switch it on, then whenever :attr:`deadline` is due, and
     :meth:`receive` for each frame. All times are on the steady clock in [s].
-
-    Attributes:
-        node_id: CANopen node id; 255 while it has none.
-        first_id: The one that it was made with; LSS may have changed it.
-        store: Present values of all objects.
-        drives: Its axes; none when the device is not a drive.
-        clock: What it knows of the network's time.
-        faults: Its deviations, which :class:`FaultInjector` begins and ends.
-        handlers: The handler of each identifier in the present NMT state; another mapping
-            replaces it when that changes.
     """
 
     def __init__(
@@ -98,15 +88,19 @@ class Device:
         self._memory = memory or ParameterMemory()
         self._dictionary = dictionary
         self._handlers_changed = handlers_changed
-        self.first_id = node_id
-        self.node_id = self._memory.node_id or node_id
+        self.first_id = node_id  # the one that it was made with; LSS may have changed it
+        self.node_id = self._memory.node_id or node_id  # CANopen node id; 255 while it has none
+        # the handler of each identifier in the present NMT state; another mapping replaces it when
+        # that changes
         self.handlers: Mapping[int, Handler] = {}
+        # present values of all objects
         self.store = ObjectStore(dictionary.for_node(self.node_id))
         self._line = FaultLine(send, self._send_abort, self._identify)
         self._send = self._line.send
         self._nmt = NmtSlave(self.node_id, self._reset, self._nmt_changed, boot_time)
         self._errors = EmcyProducer(self.store, self._send)
         self._sync = SyncConsumer(self.store, self._on_sync, self._on_sync_length, self._subscribe)
+        # its axes; none when the device is not a drive
         self.drives = tuple(
             Drive(
                 self.store,
@@ -119,6 +113,7 @@ class Device:
             for axis in (drive_axes(dictionary) if is_drive(dictionary) else ())
         )
         self._build_services()
+        # its deviations, which :class:`FaultInjector` begins and ends
         self.faults = FaultInjector(self, self._line)
         self._powered_parts: list[Timed] = [
             self.faults,
@@ -155,7 +150,7 @@ class Device:
         self._storage = ParameterStorage(store, self._memory)
         self._storage.load()
         self._lss = LssSlave(node_id, store, self._memory, send, nmt.initialise)
-        self.clock = TimeConsumer(store, self._subscribe)
+        self.clock = TimeConsumer(store, self._subscribe)  # what it knows of the network's time
         self._rpdos = RpdoEngine(
             store, self._subscribe, self._errors.set_error, self._sync.window_closed
         )
@@ -234,9 +229,7 @@ class Device:
     def switch_on(self, now: float, *, position_kept: bool = True) -> None:
         """Restore the power: the device starts, its objects with their defaults.
 
-        Args:
-            now: Steady time in [s].
-            position_kept: The encoder knows where the motor is; otherwise it counts from 0.
+        Without ``position_kept`` the encoder does not know where the motor is, and counts from 0.
         """
         if self.powered:
             return

@@ -24,9 +24,6 @@ class DeviceHost:
 
     A bus object never receives what it sent itself, so the frames of one device are handed to
     the others here. Each frame goes straight to those who want its identifier.
-
-    Attributes:
-        devices: In the order in which they were added.
     """
 
     def __init__(
@@ -36,12 +33,10 @@ class DeviceHost:
     ) -> None:
         """Begin without devices.
 
-        Args:
-            send: Takes the frames for the bus.
-            on_defect: Called with an exception in a device, while the others go on; without it
-                the exception leaves the host.
+        ``on_defect`` gets an exception in a device, while the others go on; without it the
+        exception leaves the host.
         """
-        self.devices: list[Device] = []
+        self.devices: list[Device] = []  # in the order in which they were added
         self._send = send
         self._on_defect = on_defect
         self._resting: dict[Device, float] = {}  # until when, after a defect

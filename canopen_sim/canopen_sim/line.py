@@ -27,33 +27,21 @@ OTHER_DEVICE_DELAY = 0.0005  # [s] by which another device of the same node id a
 
 
 class Traffic(NamedTuple):
-    """What a frame is to its device.
+    """What a frame is to its device."""
 
-    Attributes:
-        service: Its kind.
-        outgoing: The device sends it.
-        number: Number of the PDO, from 1.
-    """
-
-    service: Service
-    outgoing: bool
-    number: int = 0
+    service: Service  # its kind
+    outgoing: bool  # the device sends it
+    number: int = 0  # number of the PDO, from 1
 
 
 class ActiveFault:
-    """A fault that goes on.
-
-    Attributes:
-        injection: Its description.
-        end: Steady time in [s] at which it ends.
-        exhausted: It hit as many frames as it was to hit.
-    """
+    """A fault that goes on."""
 
     def __init__(self, injection: FaultInjection, node_id: int, end: float) -> None:
         """Begin; each device and fault has random numbers of its own."""
-        self.injection = injection
-        self.end = end
-        self.exhausted = False
+        self.injection = injection  # its description
+        self.end = end  # steady time in [s] at which it ends
+        self.exhausted = False  # it hit as many frames as it was to hit
         self._left = injection.count
         seed = f'{injection.seed}/{node_id}/{injection.fault.label}/{injection.pdo}'
         self._random = random.Random(seed)  # noqa: S311  # repeatable noise, no secret
@@ -84,9 +72,7 @@ class ActiveFault:
 def sdo_object(data: bytes, specifiers: tuple[int, ...]) -> tuple[int, int] | None:
     """Return the object that an SDO names, None when it continues a transfer.
 
-    Args:
-        data: Its bytes.
-        specifiers: Command specifiers that name one, in its direction.
+    The command specifiers are those that name one, in its direction.
     """
     if len(data) < FRAME_BYTES or data[0] >> 5 not in specifiers:
         return None
@@ -95,12 +81,7 @@ def sdo_object(data: bytes, specifiers: tuple[int, ...]) -> tuple[int, int] | No
 
 
 class FaultLine:
-    """Passes frames on, unless a fault prevents it.
-
-    Attributes:
-        faults: The faults of the line that go on.
-        now: Steady time in [s] of what the device does at the moment; its owner keeps it.
-    """
+    """Passes frames on, unless a fault prevents it."""
 
     def __init__(
         self,
@@ -108,14 +89,9 @@ class FaultLine:
         abort: Callable[[Abort], None],
         identify: Callable[[Frame, bool], Traffic],
     ) -> None:
-        """Begin as a good line.
-
-        Args:
-            send: Takes the frames that reach the bus.
-            abort: Sends an SDO abort, on the line.
-            identify: Returns what a frame is, given whether it is outgoing.
-        """
-        self.faults: list[ActiveFault] = []
+        """Begin as a good line; ``identify`` gets whether a frame is outgoing."""
+        self.faults: list[ActiveFault] = []  # the faults of the line that go on
+        # steady time in [s] of what the device does at the moment; its owner keeps it
         self.now = 0.0
         self._send = send
         self._abort = abort

@@ -23,23 +23,16 @@ EVIDENCE = {CobId.SDO_RESPONSE: 'SDO response', CobId.HEARTBEAT: 'heartbeat or b
 
 
 class NodeIdCheck:
-    """Listens for devices with given node ids, beside other work of a start.
-
-    Attributes:
-        found: What was received from them, in words, by identifier.
-    """
+    """Listens for devices with given node ids, beside other work of a start."""
 
     def __init__(
         self, bus: Bus, node_ids: Iterable[int], clock: Callable[[], float] = time.monotonic
     ) -> None:
         """Request an answer of each; what was received before counts, too.
 
-        Args:
-            bus: An open bus without another reader.
-            node_ids: Node ids of the devices; one without a node id cannot be there twice.
-            clock: The steady clock in [s].
+        The bus has no other reader; a device without a node id cannot be there twice.
         """
-        self.found: dict[int, str] = {}
+        self.found: dict[int, str] = {}  # what was received from them, in words, by identifier
         self._bus = bus
         self._clock = clock
         ids = [node_id for node_id in node_ids if node_id != UNCONFIGURED]

@@ -30,18 +30,12 @@ class DeviceRunner:
 
     A bus that goes away (interface down) is waited for; the devices go on meanwhile, as real
     ones do. A defect in one device is logged, and the others go on.
-
-    Attributes:
-        host: The devices; add them before :meth:`start`, and leave them to the thread then:
-            :meth:`call` gets at them.
     """
 
     def __init__(self, bus: Bus) -> None:
-        """Prepare; the thread starts with :meth:`start`.
-
-        Args:
-            bus: An open bus; it stays the caller's to close.
-        """
+        """Prepare; :meth:`start` starts the thread, and the caller closes the bus."""
+        # the devices; add them before :meth:`start`, and leave them to the thread then:
+        # :meth:`call` gets at them
         self.host = DeviceHost(self._send, _log_defect)
         self._bus = bus
         self._thread = BusThread(bus, 'devices', self._serve, 'the simulation')
@@ -52,11 +46,7 @@ class DeviceRunner:
         return self._bus.name
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:
-        """Switch the devices on, in a thread of their own.
-
-        Args:
-            begin: Called first in the thread, which may want a priority.
-        """
+        """Switch the devices on, in a thread of their own that calls ``begin`` first."""
         self._thread.start(begin)
 
     def stop(self) -> None:
@@ -66,11 +56,8 @@ class DeviceRunner:
     def call(self, function: Callable[[], Result]) -> Future[Result]:
         """Run a function in the thread of the devices, between two of their steps.
 
-        Args:
-            function: May use :attr:`host` and its devices; it must not wait for anything.
-
-        Returns:
-            Its result or its exception; a BusError when the thread has ended or ends before.
+        It may use :attr:`host` and its devices, and must not wait for anything. Its result is a
+        BusError when the thread has ended or ends before.
         """
         return self._thread.call(function)
 

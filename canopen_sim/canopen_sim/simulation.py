@@ -28,12 +28,9 @@ def add_devices(
 ) -> None:
     """Add the devices of a bus to a host, switched off.
 
-    Args:
-        host: Gets them.
-        bus: The bus.
-        positions: Where axes stand at the start, by name, in the units of bus.yml [rad or m], as
-            their absolute encoders report it; the others report 0 increments.
-        memory: Makes what a device keeps without power, by node id.
+    Positions are where axes stand at the start, by name, in the units of bus.yml [rad or m], as
+    their absolute encoders report it; the others report 0 increments. ``memory`` makes what a
+    device keeps without power, by node id.
 
     Raises:
         CanopenError: The bus has no such axis, or it cannot report such a position.

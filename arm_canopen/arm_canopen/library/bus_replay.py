@@ -35,17 +35,13 @@ STEP = 0.02  # [s] in which time passes at most without a look for what is missi
 
 
 class ReplayedAxis:
-    """An axis of a drive: its view, and what the recorded master commands to it.
-
-    Attributes:
-        view: Its state.
-        setpoint: Position last commanded in user units, NaN while no RPDO has carried one.
-        following_error: Set-point that was sent before the position was measured, minus that.
-    """
+    """An axis of a drive: its view, and what the recorded master commands to it."""
 
     def __init__(self, view: DriveView) -> None:
         """Bind to the view."""
-        self.view = view
+        self.view = view  # its state
+        # position last commanded in user units, NaN while no RPDO has carried one;
+        # following_error: set-point that was sent before the position was measured, minus that
         self.setpoint = self.following_error = math.nan
         self._commanded = False
 
@@ -97,18 +93,13 @@ class BusReplay:
 
     Frames are decoded and devices watched by the network of the master. Where the master boots a
     device, here its frames say that it is in operation. Times are those of the log, in [s].
-
-    Attributes:
-        network: The network; nothing that it sends goes anywhere.
-        axes: Axes of the drives, by the name of their device.
-        load: How busy the bus was.
-        counters: Frames so far.
     """
 
     def __init__(self, config: BusConfig, report: Report) -> None:
+        # the network; nothing that it sends goes anywhere
         self.network = network = Network(config, _send_nothing, report, beside_master=True)
-        self.load = BusLoad(config.master.bitrate, 0.0)
-        self.counters = BusCounters()
+        self.load = BusLoad(config.master.bitrate, 0.0)  # how busy the bus was
+        self.counters = BusCounters()  # frames so far
         self._report = report
         self._period = config.master.cycle_period
         self._has_sync = config.master.sync_period > 0
@@ -120,6 +111,7 @@ class BusReplay:
         self._of_master |= {CobId.SDO_REQUEST + node.node_id for node in config.nodes}
         network.on_cycle = self._observe
         network.on_node_lost = _await_again
+        # axes of the drives, by the name of their device
         self.axes: dict[str, list[ReplayedAxis]] = {}
         self._rpdos: dict[int, tuple[RemoteNode, SentRpdo]] = {}
         self._tpdos: dict[int, RemoteNode] = {}

@@ -244,18 +244,15 @@ class OutputWriter:
 
     A value that cannot be packed is refused here, where its writer is known: in the RPDO it would
     keep everything else that it carries from being sent, the controlword too.
-
-    Attributes:
-        limits: Smallest and largest value that the object holds.
-        by_sdo: It does not go by SDO.
     """
 
-    by_sdo = False
+    by_sdo = False  # it does not go by SDO
 
     def __init__(self, places: Sequence[tuple[SentRpdo, int]]) -> None:
         self._places = [(output.values, position) for output, position in places]
         output, position = places[0]
         self._mapped = output.config.mapping[position]
+        # smallest and largest value that the object holds
         self.limits = limits_of(self._mapped.data_type)
         self._low, self._high = self.limits
 

@@ -88,13 +88,9 @@ class QueuedWrite(NamedTuple):
 
 
 class SdoWriter:
-    """An object that no RPDO carries: its values go by SDO, one at a time and in their order.
+    """An object that no RPDO carries: its values go by SDO, one at a time and in their order."""
 
-    Attributes:
-        by_sdo: It goes by SDO.
-    """
-
-    by_sdo = True
+    by_sdo = True  # it goes by SDO
 
     def __init__(
         self, objects: RemoteObjects, scheduler: Scheduler, index: int, subindex: int

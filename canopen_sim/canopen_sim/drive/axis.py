@@ -47,63 +47,39 @@ VISCOUS_FRICTION = 0.01  # [0.1 % of the rated torque per inc/s]
 
 @dataclass(frozen=True, slots=True)
 class ServoModel:
-    """Time constants of a motor.
+    """Time constants of a motor."""
 
-    Attributes:
-        lag: Of the position loop in [s]; the following error is velocity times lag.
-        coasting: Of the velocity in [s] when the power stage is off.
-    """
-
-    lag: float = 0.002
-    coasting: float = 0.03
+    lag: float = 0.002  # of the position loop in [s]; the following error is velocity times lag
+    coasting: float = 0.03  # of the velocity in [s] when the power stage is off
 
 
 class Limits(NamedTuple):
-    """Bounds of a motion; all are positive.
+    """Bounds of a motion; all are positive."""
 
-    Attributes:
-        velocity: Highest speed.
-        acceleration: While the speed grows.
-        deceleration: While it shrinks.
-    """
-
-    velocity: float
-    acceleration: float
-    deceleration: float
+    velocity: float  # highest speed
+    acceleration: float  # while the speed grows
+    deceleration: float  # while it shrinks
 
 
 NO_BOUNDS = (-math.inf, math.inf)
 
 
 class Axis:
-    """Demand and motor of a drive, at one point in time.
-
-    Attributes:
-        time: Steady time of the state.
-        demand: Position demanded now.
-        demand_velocity: Velocity demanded now.
-        phase_end: When the demand changes its acceleration; NEVER at the end of a motion.
-        position: Where the motor is.
-        powered: The motor has torque: the position loop is closed.
-        speed_limited: The motor is behind a demand that was faster than it can turn.
-        speed: Highest speed of the motor.
-        load: Torque that it takes to hold the axis.
-        switches: Where its switches are.
-        origin: Where the mechanical zero is; homing moves it.
-    """
+    """Demand and motor of a drive, at one point in time."""
 
     def __init__(self, model: ServoModel) -> None:
-        self.time = 0.0
-        self.demand = 0.0
-        self.demand_velocity = 0.0
+        self.time = 0.0  # steady time of the state
+        self.demand = 0.0  # position demanded now
+        self.demand_velocity = 0.0  # velocity demanded now
+        # when the demand changes its acceleration; NEVER at the end of a motion
         self.phase_end = NEVER
-        self.position = 0.0
-        self.powered = False
-        self.speed_limited = False
-        self.speed = math.inf
-        self.load = 0.0
-        self.origin = 0.0
-        self.switches = Switches()
+        self.position = 0.0  # where the motor is
+        self.powered = False  # the motor has torque: the position loop is closed
+        self.speed_limited = False  # the motor is behind a demand that was faster than it can turn
+        self.speed = math.inf  # highest speed of the motor
+        self.load = 0.0  # torque that it takes to hold the axis
+        self.origin = 0.0  # where the mechanical zero is; homing moves it
+        self.switches = Switches()  # where its switches are
         self._model = model
         self._stops = NO_BOUNDS
         self._setpoint = 0.0  # output of the rate limiter

@@ -59,12 +59,6 @@ class Drive:
 
     Times ``now`` are on the steady clock in [s], by default when the drive last looked at its
     axis.
-
-    Attributes:
-        deadline: Steady time in [s] at which it wants to look at its axis.
-        number: Of the axis in its device, from 0.
-        faults: Codes of the faults since the last fault reset.
-        causes: Faults whose cause is still there; no fault reset helps against them.
     """
 
     def __init__(
@@ -78,10 +72,11 @@ class Drive:
         rate_units: tuple[float, float] = (1.0, 1.0),
     ) -> None:
         """Work on the objects of a device; ``rate_units`` are those of :class:`DriveObjects`."""
-        self.deadline = NEVER
-        self.faults: set[int] = set()
+        self.deadline = NEVER  # steady time in [s] at which it wants to look at its axis
+        self.faults: set[int] = set()  # codes of the faults since the last fault reset
+        # faults whose cause is still there; no fault reset helps against them
         self.causes: set[Fault] = set()
-        self.number = number
+        self.number = number  # of the axis in its device, from 0
         self._rate_units = rate_units
         self._objects = objects = DriveObjects(store, number, rate_units)
         self._errors = errors

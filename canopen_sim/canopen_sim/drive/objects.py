@@ -32,16 +32,12 @@ PERIOD_MIN = 0.001  # [s] shortest interpolation period that is believed
 
 
 class Rate:
-    """An object in a unit of its drive, seen in increments per second (or second squared).
-
-    Attributes:
-        variable: The object.
-    """
+    """An object in a unit of its drive, seen in increments per second (or second squared)."""
 
     __slots__ = ('_kind', '_units', 'variable')
 
     def __init__(self, variable: Integer, units: list[float], kind: int) -> None:
-        self.variable = variable
+        self.variable = variable  # the object
         self._units = units
         self._kind = kind
 
@@ -63,21 +59,12 @@ class DriveObjects:
     """All objects of a drive, bound once; units are increments, and [inc/s] of velocities.
 
     Those that a dictionary lacks get a harmless value and stay invisible.
-
-    Attributes:
-        rate_units: What 1 of its velocities is in [inc/s], of its accelerations in [inc/s^2].
     """
 
     def __init__(
         self, store: ObjectStore, axis: int = 0, rate_units: tuple[float, float] = (1.0, 1.0)
     ) -> None:
-        """Bind them.
-
-        Args:
-            store: Objects of the device.
-            axis: Number of the axis from 0; those of axis n stand 0x800 n further on.
-            rate_units: What 1 of its velocities is in [inc/s], of its accelerations in [inc/s^2].
-        """
+        """Bind those of an axis, numbered from 0; those of axis n stand 0x800 n further on."""
 
         def bind(index: int, subindex: int = 0, *, default: int = 0) -> Integer:
             return store.integer(index + axis * AXIS_OFFSET, subindex, default=default)
@@ -86,6 +73,7 @@ class DriveObjects:
             variable = bind(index, subindex, default=default)
             return Rate(variable, self.rate_units, index in ACCELERATIONS)
 
+        # what 1 of its velocities is in [inc/s], of its accelerations in [inc/s^2]
         self.rate_units = list(rate_units)
         self._bind_states(bind)
         self._bind_actual_values(bind, rate)

@@ -52,15 +52,10 @@ def decode_command(controlword: int) -> DriveCommand:
 
 
 class Transition(NamedTuple):
-    """An edge of the state machine.
+    """An edge of the state machine."""
 
-    Attributes:
-        number: Its number in CiA 402-2, figure 4.
-        target: Where it leads.
-    """
-
-    number: int
-    target: State
+    number: int  # its number in CiA 402-2, figure 4
+    target: State  # where it leads
 
 
 COMMANDED_TRANSITIONS: dict[tuple[State, DriveCommand], Transition] = {
@@ -141,10 +136,6 @@ class StateMachine:
 
     While a ramp leads out of Operation enabled (option codes 0x605B and 0x605C), the drive stays
     in that state, and changes when the motor stands.
-
-    Attributes:
-        state: Present state.
-        voltage: The power stage is supplied.
     """
 
     def __init__(
@@ -156,14 +147,11 @@ class StateMachine:
     ) -> None:
         """Begin in Not ready to switch on.
 
-        Args:
-            objects: Objects of the drive.
-            axis: What it moves.
-            enabled: Called with the time when operation is enabled, also again.
-            causes: What the drive does wrong, at any time.
+        ``enabled`` is called with the time when operation is enabled, also again; ``causes`` are
+        what the drive does wrong, at any time.
         """
-        self.state = State.NOT_READY_TO_SWITCH_ON
-        self.voltage = True
+        self.state = State.NOT_READY_TO_SWITCH_ON  # present state
+        self.voltage = True  # the power stage is supplied
         self._objects = objects
         self._axis = axis
         self._enabled = enabled
@@ -229,8 +217,7 @@ class StateMachine:
     def fault(self, *, at_once: bool = False) -> None:
         """Pass transition 13, and 14 when there is nothing to be stopped.
 
-        Args:
-            at_once: The fault leaves no torque to brake with, whatever 0x605E selects.
+        A fault ``at_once`` leaves no torque to brake with, whatever 0x605E selects.
         """
         if self.state is State.FAULT_REACTION_ACTIVE and at_once:
             self._power_off(State.FAULT)

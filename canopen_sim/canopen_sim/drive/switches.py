@@ -34,20 +34,16 @@ class Switches:
 
     The mechanical zero is where the motor stood when it was first switched on; homing does not
     move it. The drive shows limit switches in 0x60FD, and stops at them only during homing.
-
-    Attributes:
-        negative_limit: At and below it the negative limit switch is active; -inf for none.
-        positive_limit: At and above it the positive limit switch is active; inf for none.
-        home: The home switch is active from the first to the second; NaN for none.
-        index: Where one of the index pulses of the encoder is.
-        index_period: Between two of them; 0 for none.
     """
 
+    # at and below it the negative limit switch is active; -inf for none
     negative_limit: float = -4000.0
+    # at and above it the positive limit switch is active; inf for none
     positive_limit: float = 4000.0
+    # the home switch is active from the first to the second; NaN for none
     home: tuple[float, float] = (500.0, 700.0)
-    index: float = 100.0
-    index_period: float = 1000.0
+    index: float = 100.0  # where one of the index pulses of the encoder is
+    index_period: float = 1000.0  # between two of them; 0 for none
 
     def active(self, switch: Switch, position: float) -> bool:
         """Return whether a switch is active at a mechanical position."""
@@ -84,21 +80,13 @@ class Switches:
 
 
 class Reference(NamedTuple):
-    """How a homing method finds home.
+    """How a homing method finds home."""
 
-    Attributes:
-        switch: What it looks for.
-        side: The edge of the active range that counts: -1 the lower, 1 the upper.
-        final: Direction in which it passes that edge, and goes on to the index pulse.
-        first: Direction in which it begins to look; at a limit switch it turns back.
-        to_index: Home is the index pulse behind the edge, otherwise the edge.
-    """
-
-    switch: Switch
-    side: int
-    final: int
-    first: int
-    to_index: bool = True
+    switch: Switch  # what it looks for
+    side: int  # the edge of the active range that counts: -1 the lower, 1 the upper
+    final: int  # direction in which it passes that edge, and goes on to the index pulse
+    first: int  # direction in which it begins to look; at a limit switch it turns back
+    to_index: bool = True  # home is the index pulse behind the edge, otherwise the edge
 
 
 _NEGATIVE, _POSITIVE, _HOME = Switch.NEGATIVE_LIMIT, Switch.POSITIVE_LIMIT, Switch.HOME

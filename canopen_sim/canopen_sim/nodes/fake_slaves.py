@@ -75,16 +75,10 @@ def main() -> None:
 def run_slaves(
     name: str, populate: Populate, *, help_text: str, args: Sequence[str] | None = None
 ) -> int:
-    """Run the simulated devices of a node until Ctrl-C or SIGTERM.
+    """Run the simulated devices of a node until Ctrl-C or SIGTERM; return the exit code.
 
-    Args:
-        name: Name of the node.
-        populate: Reads the node's parameters and adds the devices.
-        help_text: What ``--help`` prints, before the parameters that all of them have.
-        args: Command line; None for the process's own.
-
-    Returns:
-        Exit code: 0, or 1 when the devices could not be described or the bus not be opened.
+    ``populate`` reads the parameters of the node and adds the devices. It is 1 when they could
+    not be described or the bus not be opened.
     """
 
     def body(stop: threading.Event) -> None:

@@ -33,13 +33,7 @@ class FaultServices:
     """The services ``~/fault``, ``~/power_cycle`` and ``~/sto``, of all devices and of each."""
 
     def __init__(self, node: Node, runner: DeviceRunner, names: Mapping[str, int]) -> None:
-        """Offer them.
-
-        Args:
-            node: The node that offers them.
-            runner: Runs the devices.
-            names: Node ids of the devices by name.
-        """
+        """Offer them; names are node ids by name."""
         self._node = node
         self._runner = runner
         self._names = dict(names)

@@ -35,33 +35,23 @@ STRING_BYTES_MAX = 65_536  # [byte] longest string or domain that a client may w
 
 
 def refusal(code: AbortCode, place: object) -> SdoAbortError:
-    """Return the exception that ends an SDO transfer with an abort code.
-
-    Args:
-        code: Why it ends.
-        place: The object, for the message.
-    """
+    """Return the exception that ends an SDO transfer; the message names the place."""
     return SdoAbortError(f'{place}: {abort_text(code)}', code)
 
 
 class Variable:
-    """The present value of one sub-index.
-
-    Attributes:
-        entry: Its entry in the dictionary.
-        value: What it holds.
-        check: Called with a value that an SDO wants to write; raises SdoAbortError to refuse.
-        before_read: Called before an SDO reads it; raises SdoAbortError to refuse.
-        listener: Called with the steady time in [s] after an SDO or an RPDO wrote it.
-    """
+    """The present value of one sub-index."""
 
     __slots__ = ('before_read', 'check', 'entry', 'listener', 'value')
 
     def __init__(self, entry: ObjectEntry) -> None:
-        self.entry = entry
-        self.value: Value = default_value(entry)
+        self.entry = entry  # its entry in the dictionary
+        self.value: Value = default_value(entry)  # what it holds
+        # called with a value that an SDO wants to write; raises SdoAbortError to refuse
         self.check: Callable[[Value], None] | None = None
+        # called before an SDO reads it; raises SdoAbortError to refuse
         self.before_read: Callable[[], None] | None = None
+        # called with the steady time in [s] after an SDO or an RPDO wrote it
         self.listener: Callable[[float], None] | None = None
 
     @property
@@ -170,17 +160,13 @@ def make_variable(entry: ObjectEntry) -> Variable:
 
 
 class ObjectStore:
-    """All variables of a device.
-
-    Attributes:
-        dictionary: What it was made from.
-        overlay: What clients read of some objects instead of their values.
-        saved: What some objects hold after a reset instead of their defaults.
-    """
+    """All variables of a device."""
 
     def __init__(self, dictionary: ObjectDictionary) -> None:
-        self.dictionary = dictionary
+        self.dictionary = dictionary  # what it was made from
+        # what clients read of some objects instead of their values
         self.overlay: dict[tuple[int, int], bytes] = {}
+        # what some objects hold after a reset instead of their defaults
         self.saved: dict[tuple[int, int], Value] = {}
         self._variables = {entry.address: make_variable(entry) for entry in dictionary}
 
@@ -208,12 +194,7 @@ class ObjectStore:
     def integer(self, index: int, subindex: int = 0, *, default: int = 0) -> Integer:
         """Bind an integer object, for the device's own use.
 
-        A device whose dictionary lacks it gets one that is invisible outside.
-
-        Args:
-            index: Object index.
-            subindex: Sub-index.
-            default: Its value when the dictionary lacks it.
+        A device whose dictionary lacks it gets one with the default that is invisible outside.
         """
         variable = self._variables.get((index, subindex))
         if isinstance(variable, Integer):
@@ -264,12 +245,6 @@ class ObjectStore:
     def write(self, index: int, subindex: int, data: bytes, now: float) -> None:
         """Execute an SDO download.
 
-        Args:
-            index: Object index.
-            subindex: Sub-index.
-            data: The bytes of the value.
-            now: Steady time in [s].
-
         Raises:
             SdoAbortError: The object, its length, range or own rules refuse it.
         """
@@ -293,11 +268,7 @@ FRAME_BITS = COB_ID_EXTENDED | 0x1FFF_FFFF  # bits 0 to 29: the identifier and i
 
 
 def check_can_id(entry: ObjectEntry, value: Value) -> None:
-    """Refuse an identifier that is extended or set aside for other services.
-
-    Args:
-        entry: The object that shall hold the COB-ID.
-        value: What a client wants to write.
+    """Refuse an identifier for an object that is extended or set aside for other services.
 
     Raises:
         SdoAbortError: It is.
@@ -311,10 +282,6 @@ def check_cob_id(variable: Integer, value: Value) -> None:
     """Refuse a COB-ID that the service behind an object cannot take.
 
     An identifier may only be changed while the service does not exist (bit 31 is set).
-
-    Args:
-        variable: The object that holds the COB-ID.
-        value: What a client wants to write.
 
     Raises:
         SdoAbortError: The identifier is restricted, extended, or in use.

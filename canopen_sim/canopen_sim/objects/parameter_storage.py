@@ -46,17 +46,14 @@ Address = tuple[int, int]
 
 
 class ParameterMemory:
-    """Non-volatile memory that lasts as long as the process.
-
-    Attributes:
-        values: Saved objects as an SDO would transmit them, by index and sub-index.
-        node_id: Node id that was stored by LSS, None for the configured one.
-        bit_timing: Bit rate that was stored by LSS, as index of CiA 305's table.
-    """
+    """Non-volatile memory that lasts as long as the process."""
 
     def __init__(self) -> None:
+        # saved objects as an SDO would transmit them, by index and sub-index
         self.values: dict[Address, bytes] = {}
+        # node id that was stored by LSS, None for the configured one
         self.node_id: int | None = None
+        # bit rate that was stored by LSS, as index of CiA 305's table
         self.bit_timing: int | None = None
 
     def commit(self) -> None:
@@ -128,12 +125,7 @@ class ParameterStorage:
     """Saves the writable objects of a device, and loads them when it starts."""
 
     def __init__(self, store: ObjectStore, memory: ParameterMemory) -> None:
-        """Bind 0x1010 and 0x1011, and load what was saved.
-
-        Args:
-            store: Objects of the device.
-            memory: What lasts without power.
-        """
+        """Bind 0x1010 and 0x1011, and load what was saved."""
         self._store = store
         self._memory = memory
         for index, signature, act in (

@@ -94,11 +94,7 @@ class EmcyProducer:
     ) -> None:
         """Report that an error occurred; one that is active already is not repeated.
 
-        Args:
-            code: Error code of CiA 301 or CiA 402.
-            now: Steady time in [s].
-            source: The part that has it, such as an axis; it is gone when all have lost it.
-            vendor: Five manufacturer-specific bytes.
+        The source has it, such as an axis; it is gone when all have lost it.
         """
         sources = self._active.setdefault(code, set())
         known = bool(sources)

@@ -45,9 +45,6 @@ class ErrorControl:
     It watches the devices that 0x1016 names, each from its first heartbeat on. And it answers
     the remote frames of a master that guards it; life guarding begins with the first request. A
     device that sends heartbeats is not guarded, and one without 0x100C cannot be.
-
-    Attributes:
-        node_id: Id of the device.
     """
 
     def __init__(
@@ -62,15 +59,10 @@ class ErrorControl:
     ) -> None:
         """Bind 0x100C, 0x100D, 0x1016, 0x1017 and 0x1029.
 
-        Args:
-            store: Objects of the device.
-            nmt: Its NMT state.
-            errors: Takes its errors.
-            lost: Called with the time of a loss; its axes stop as 0x6007 selects.
-            send: Takes the frames.
-            subscribe: Called when other identifiers are listened to.
+        ``lost`` is called with the time of a loss, on which the axes stop as 0x6007 selects, and
+        ``subscribe`` when other identifiers are listened to.
         """
-        self.node_id = nmt.node_id
+        self.node_id = nmt.node_id  # id of the device
         self._nmt = nmt
         self._errors = errors
         self._lost = lost

@@ -32,12 +32,7 @@ from ..objects.parameter_storage import ParameterMemory
 
 
 class LssSlave:
-    """The LSS of one device.
-
-    Attributes:
-        state: Whether it takes configuration commands.
-        pending_id: Node id that takes effect with the next initialisation.
-    """
+    """The LSS of one device."""
 
     def __init__(
         self,
@@ -49,16 +44,11 @@ class LssSlave:
     ) -> None:
         """Begin in the waiting state.
 
-        Args:
-            node_id: Present node id, 255 for none.
-            store: Objects of the device, for its identity.
-            memory: What lasts without power.
-            send: Takes the frames.
-            apply: Called with the time when a device without node id has got one.
+        ``apply`` is called with the time when a device without node id has got one.
         """
-        self.state = LssState.WAITING
+        self.state = LssState.WAITING  # whether it takes configuration commands
         self.node_id = node_id
-        self.pending_id = node_id
+        self.pending_id = node_id  # node id that takes effect with the next initialisation
         self._store = store
         self._memory = memory
         self._send = send

@@ -21,13 +21,7 @@ from ..timed import NEVER
 
 
 class NmtSlave:
-    """NMT state of one device; it executes commands for its id and for all.
-
-    Attributes:
-        node_id: Id of the device, 255 while it has none and stays in Initialisation.
-        state: BOOT_UP stands for Initialisation.
-        deadline: When Initialisation ends, as steady time in [s].
-    """
+    """NMT state of one device; it executes commands for its id and for all."""
 
     def __init__(
         self,
@@ -36,16 +30,14 @@ class NmtSlave:
         changed: Callable[[NmtState, float], None],
         boot_time: float,
     ) -> None:
-        """Begin switched off; the first :meth:`advance` starts Initialisation.
+        """Begin switched off; the first :meth:`advance` starts Initialisation, of a time in [s].
 
-        Args:
-            node_id: Id of the device.
-            reset: Returns to the defaults of the whole device or of its communication.
-            changed: Called with the previous state when another was entered, also after boot-up.
-            boot_time: How long Initialisation takes in [s].
+        ``reset`` returns to the defaults of the whole device or of its communication; ``changed``
+        is called with the previous state when another was entered, also after boot-up.
         """
-        self.state = NmtState.BOOT_UP
-        self.deadline = 0.0
+        self.state = NmtState.BOOT_UP  # BOOT_UP stands for Initialisation
+        self.deadline = 0.0  # when Initialisation ends, as steady time in [s]
+        # id of the device, 255 while it has none and stays in Initialisation
         self.node_id = node_id
         self._reset = reset
         self._changed = changed

@@ -38,17 +38,7 @@ MILLISECOND = 0.001  # [s]
 
 
 class PdoChannel(ABC):
-    """One PDO: its communication record and its mapping.
-
-    Attributes:
-        number: From 1.
-        enabled: It exists (bit 31 of the COB-ID is clear) and its mapping can be used.
-        can_id: Its identifier.
-        transmission: Transmission type (CiA 301, tables 69 and 71).
-        event_time: Event timer of a TPDO, deadline of an RPDO in [s]; 0 for none.
-        codec: Packs and unpacks its payload.
-        variables: The mapped objects.
-    """
+    """One PDO: its communication record and its mapping."""
 
     transmission_types: frozenset[int]
 
@@ -59,15 +49,12 @@ class PdoChannel(ABC):
         records: tuple[int, int],
         changed: Callable[[PdoChannel, float], None],
     ) -> None:
-        """Bind the parameter objects of one PDO.
+        """Bind the parameter objects of one PDO; ``number`` is their offset from the first ones.
 
-        Args:
-            store: Objects of the device.
-            number: Offset of its records from the first ones.
-            records: Index of the first communication record, and of the first mapping record.
-            changed: Called with the PDO and the time when a client changed it.
+        The records are those of communication and mapping. ``changed`` is called with the PDO and
+        the time when a client changed it.
         """
-        self.number = number + 1
+        self.number = number + 1  # from 1
         communication, mapping = (index + number for index in records)
         self._store = store
         self._cob_id = store.integer(communication, 1, default=COB_ID_INVALID)
@@ -115,13 +102,15 @@ class PdoChannel(ABC):
 
     def configure(self) -> None:
         """Read the parameter objects; a PDO whose mapping cannot be used does not exist."""
-        self.can_id = self._cob_id.value & CAN_ID_MASK
-        self.transmission = self._type.value
+        self.can_id = self._cob_id.value & CAN_ID_MASK  # its identifier
+        self.transmission = self._type.value  # transmission type (CiA 301, tables 69 and 71)
         self.inhibit_time = self._inhibit.value * INHIBIT_UNIT
+        # event timer of a TPDO, deadline of an RPDO in [s]; 0 for none
         self.event_time = self._event.value * MILLISECOND
         self.sync_start = self._sync_start.value
-        self.variables: tuple[Scalar, ...] = ()
-        self.codec = PdoCodec(())
+        self.variables: tuple[Scalar, ...] = ()  # the mapped objects
+        self.codec = PdoCodec(())  # packs and unpacks its payload
+        # it exists (bit 31 of the COB-ID is clear) and its mapping can be used
         self.enabled = not self._cob_id.value & COB_ID_INVALID
         if self.enabled:
             try:
@@ -198,17 +187,12 @@ Channel = TypeVar('Channel', bound=PdoChannel)
 
 
 class PdoEngine(Generic[Channel]):
-    """All PDOs of a device in one direction.
-
-    Attributes:
-        channels: Those of the dictionary.
-        active: Those that exist, while the device is Operational.
-    """
+    """All PDOs of a device in one direction."""
 
     def __init__(self, changed: Callable[[], None]) -> None:
         """Begin stopped; ``changed`` is called when a client changed a PDO."""
-        self.channels: list[Channel] = []
-        self.active: list[Channel] = []
+        self.channels: list[Channel] = []  # those of the dictionary
+        self.active: list[Channel] = []  # those that exist, while the device is Operational
         self._running = False
         self._changed = changed
 

@@ -26,11 +26,7 @@ ErrorReport = Callable[[int, bool, float, object], None]
 
 
 class Rpdo(PdoChannel):
-    """One receive PDO: writes what it carries into the object dictionary.
-
-    Attributes:
-        deadline: Steady time in [s] at which the next one is overdue.
-    """
+    """One receive PDO: writes what it carries into the object dictionary."""
 
     transmission_types = frozenset((*range(SYNCHRONOUS_MAX + 1), *TRANSMISSION_EVENT))
 
@@ -43,7 +39,7 @@ class Rpdo(PdoChannel):
         too_late: Callable[[float], bool],
     ) -> None:
         """Bind the records of an RPDO; see :class:`RpdoEngine`."""
-        self.deadline = NEVER
+        self.deadline = NEVER  # steady time in [s] at which the next one is overdue
         self._short = self._late = False
         self._report = report
         self._too_late = too_late
@@ -162,11 +158,9 @@ class RpdoEngine(PdoEngine[Rpdo]):
     ) -> None:
         """Bind every RPDO of a dictionary.
 
-        Args:
-            store: Objects of the device.
-            changed: Called when a client changed one of them.
-            report: Called with a code, whether that error is there, the time, and a PDO.
-            too_late: Returns whether the synchronous window is over at a time.
+        ``changed`` is called when a client changed one of them, ``report`` with a code, whether
+        that error is there, the time, and a PDO. ``too_late`` returns whether the synchronous
+        window is over at a time.
         """
         super().__init__(changed)
         self._report = report
@@ -217,8 +211,7 @@ class RpdoEngine(PdoEngine[Rpdo]):
     def handlers(self, finished: Callable[[float], None]) -> dict[int, Handler]:
         """Return what takes the frames of each identifier; several PDOs may share one.
 
-        Args:
-            finished: Called with the time when the objects have their new values.
+        ``finished`` is called with the time when the objects have their new values.
         """
         receivers: dict[int, list[Handler]] = {}
         for rpdo in self.active:

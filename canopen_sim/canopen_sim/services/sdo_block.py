@@ -35,15 +35,13 @@ class BlockDownload:
     Attributes:
         index: Object index.
         subindex: Sub-index.
-        streaming: The client sends segments, which have no command byte.
-        data: What has come, after :meth:`end` without padding.
     """
 
     def __init__(self, request: bytes) -> None:
         command, self.index, self.subindex, size = struct.unpack('<BHBI', request)
         self.size: int | None = size if command & SIZE_BIT else None
-        self.streaming = True
-        self.data = bytearray()
+        self.streaming = True  # the client sends segments, which have no command byte
+        self.data = bytearray()  # what has come, after :meth:`end` without padding
         self._with_crc = bool(command & CRC_BIT)
         self._sequence = 0
         self._finished = False
@@ -106,21 +104,16 @@ class BlockUpload:
     Attributes:
         index: Object index.
         subindex: Sub-index.
-        finished: The client has confirmed the end.
     """
 
     def __init__(self, request: bytes, data: bytes) -> None:
-        """Begin with the client's initiation.
-
-        Args:
-            request: Its frame.
-            data: The object's value.
+        """Begin with the client's initiation, for the data of the object.
 
         Raises:
             SdoAbortError: The client requests blocks of no length.
         """
         command, self.index, self.subindex, segments = struct.unpack_from('<BHBB', request)
-        self.finished = False
+        self.finished = False  # the client has confirmed the end
         self._data = data
         self._with_crc = bool(command & CRC_BIT)
         self._position = 0  # [byte] up to which the client has everything

@@ -50,42 +50,27 @@ Answer = Abort | DownloadResponse | DownloadSegmentResponse | Segment | UploadRe
 
 @dataclass(slots=True)
 class Transfer:
-    """A segmented transfer under way.
+    """A segmented transfer under way."""
 
-    Attributes:
-        index: Object index.
-        subindex: Sub-index.
-        is_download: The client writes.
-        data: What is sent, or was received so far.
-        size: Announced length of a download in [byte], None when it was not announced.
-        position: Number of bytes of an upload that were sent.
-        toggle: Toggle bit of the next segment.
-    """
-
-    index: int
-    subindex: int
-    is_download: bool
-    data: bytearray = field(default_factory=bytearray)
+    index: int  # object index
+    subindex: int  # sub-index
+    is_download: bool  # the client writes
+    data: bytearray = field(default_factory=bytearray)  # what is sent, or was received so far
+    # announced length of a download in [byte], None when it was not announced
     size: int | None = None
-    position: int = 0
-    toggle: bool = False
+    position: int = 0  # number of bytes of an upload that were sent
+    toggle: bool = False  # toggle bit of the next segment
 
 
 class SdoServer:
-    """Serves one SDO channel of a device.
-
-    Attributes:
-        can_id: Identifier of the requests.
-        response_id: Identifier of the answers.
-        deadline: Steady time in [s] at which a silent client's transfer is aborted.
-    """
+    """Serves one SDO channel of a device."""
 
     def __init__(
         self, can_id: int, response_id: int, store: ObjectStore, send: Callable[[Frame], None]
     ) -> None:
-        self.can_id = can_id
-        self.response_id = response_id
-        self.deadline = NEVER
+        self.can_id = can_id  # identifier of the requests
+        self.response_id = response_id  # identifier of the answers
+        self.deadline = NEVER  # steady time in [s] at which a silent client's transfer is aborted
         self._store = store
         self._send = send
         self._transfer: Transfer | BlockDownload | BlockUpload | None = None
@@ -253,11 +238,7 @@ class SdoServer:
 
 
 class SdoServers:
-    """The SDO servers of a device, each with a transfer of its own.
-
-    Attributes:
-        default: The server of the pre-defined connection set.
-    """
+    """The SDO servers of a device, each with a transfer of its own."""
 
     def __init__(
         self,
@@ -273,6 +254,7 @@ class SdoServers:
         self._store = store
         self._send = send
         self._changed = changed
+        # the server of the pre-defined connection set
         self.default = SdoServer(
             CobId.SDO_REQUEST + node_id, CobId.SDO_RESPONSE + node_id, store, send
         )

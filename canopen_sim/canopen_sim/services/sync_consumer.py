@@ -25,12 +25,7 @@ LOST_PERIODS = 3.0  # SYNC is gone after so many periods without one
 
 
 class SyncConsumer:
-    """Counts SYNC messages and measures their period.
-
-    Attributes:
-        period: Time between two SYNCs in [s], from 0x1006 or else measured; 0 when unknown.
-        last_time: Steady time of the last SYNC in [s].
-    """
+    """Counts SYNC messages and measures their period."""
 
     def __init__(
         self,
@@ -41,14 +36,13 @@ class SyncConsumer:
     ) -> None:
         """Bind 0x1005, 0x1006, 0x1007 and 0x1019.
 
-        Args:
-            store: Objects of the device.
-            handle: Called with the counter (0 without one) and the time of each SYNC.
-            length_error: Called with whether the length of a SYNC was wrong, and the time.
-            changed: Called when SYNC has another identifier from now on.
+        ``handle`` is called with the counter (0 without one) and the time of each SYNC,
+        ``length_error`` with whether its length was wrong, and ``changed`` when SYNC has another
+        identifier from now on.
         """
+        # time between two SYNCs in [s], from 0x1006 or else measured; 0 when unknown
         self.period = 0.0
-        self.last_time = float('-inf')
+        self.last_time = float('-inf')  # steady time of the last SYNC in [s]
         self._paused = False
         self._handle = handle
         self._length_error = length_error

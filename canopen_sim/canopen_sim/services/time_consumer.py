@@ -27,12 +27,7 @@ class TimeConsumer:
     """Keeps the network's time of the last TIME message."""
 
     def __init__(self, store: ObjectStore, changed: Callable[[], None]) -> None:
-        """Bind 0x1012.
-
-        Args:
-            store: Objects of the device.
-            changed: Called when TIME is wanted from now on, or under another identifier.
-        """
+        """Bind 0x1012; ``changed`` is called when TIME is wanted, or under another identifier."""
         self._cob_id = store.integer(Index.TIME_COB_ID)
         self._cob_id.check = self._check
         self._cob_id.listener = lambda _now: changed()

@@ -19,11 +19,7 @@ RTR_EVENT = 253  # sampled and sent on a remote frame
 
 
 class Tpdo(PdoChannel):
-    """One transmit PDO.
-
-    Attributes:
-        deadline: Steady time in [s] at which it is to be sent.
-    """
+    """One transmit PDO."""
 
     transmission_types = frozenset(
         (
@@ -42,7 +38,7 @@ class Tpdo(PdoChannel):
         send: Callable[[Frame], None],
     ) -> None:
         """Bind the records of a TPDO; see :class:`TpdoEngine`."""
-        self.deadline = NEVER
+        self.deadline = NEVER  # steady time in [s] at which it is to be sent
         self._send = send
         self._sent: bytes | None = None
         self._sampled: bytes | None = None
@@ -62,12 +58,7 @@ class Tpdo(PdoChannel):
         return self.codec.pack([variable.value for variable in self.variables])
 
     def sync(self, counter: int, now: float) -> None:
-        """Send if this SYNC is its turn.
-
-        Args:
-            counter: Counter value of the SYNC, 0 without one.
-            now: Steady time in [s].
-        """
+        """Send if this SYNC is its turn; the counter is 0 without one."""
         if self.transmission == ACYCLIC:
             payload = self.pack()
             if payload != self._sent:
@@ -123,11 +114,7 @@ class Tpdo(PdoChannel):
 
 
 class TpdoEngine(PdoEngine[Tpdo]):
-    """All transmit PDOs of a device.
-
-    Attributes:
-        deadline: Steady time in [s] at which one of them is to be sent.
-    """
+    """All transmit PDOs of a device."""
 
     def __init__(
         self,
@@ -135,15 +122,9 @@ class TpdoEngine(PdoEngine[Tpdo]):
         changed: Callable[[], None],
         send: Callable[[Frame], None],
     ) -> None:
-        """Bind every TPDO of a dictionary.
-
-        Args:
-            store: Objects of the device.
-            changed: Called when a client changed one of them.
-            send: Takes the frames.
-        """
+        """Bind every TPDO of a dictionary; ``changed`` is called when a client changed one."""
         super().__init__(changed)
-        self.deadline = NEVER
+        self.deadline = NEVER  # steady time in [s] at which one of them is to be sent
         self._synchronous: list[Tpdo] = []
         self._event_driven: list[Tpdo] = []
         self.channels = [

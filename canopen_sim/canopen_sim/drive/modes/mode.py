@@ -21,23 +21,17 @@ class Mode:
 
     The drive calls it only while operation is enabled, with the axis at the time ``now`` unless
     a method documents otherwise.
-
-    Attributes:
-        number: Its value of 0x6060.
-        halted: Bit 8 of the controlword is set; the axis ramps down or stands.
-        limited: A software position limit holds the demand back.
-        due: Steady time in [s] at which a step of the axis has to end.
     """
 
-    number: ClassVar[OperationMode]
+    number: ClassVar[OperationMode]  # its value of 0x6060
 
     def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncConsumer) -> None:
         self.objects = objects
         self.axis = axis
         self.clock = clock
-        self.halted = False
-        self.limited = False
-        self.due = NEVER
+        self.halted = False  # bit 8 of the controlword is set; the axis ramps down or stands
+        self.limited = False  # a software position limit holds the demand back
+        self.due = NEVER  # steady time in [s] at which a step of the axis has to end
 
     @property
     def waiting(self) -> bool:
@@ -93,16 +87,11 @@ class NoMode(Mode):
 
 
 class Dwell:
-    """Detects when a condition has held for a time.
-
-    Attributes:
-        reached: It has.
-        pending: It holds, but not for long enough.
-    """
+    """Detects when a condition has held for a time."""
 
     def __init__(self) -> None:
-        self.reached = False
-        self.pending = False
+        self.reached = False  # it has
+        self.pending = False  # it holds, but not for long enough
         self._since = 0.0
 
     def clear(self) -> None:

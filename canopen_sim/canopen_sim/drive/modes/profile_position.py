@@ -23,19 +23,12 @@ ACKNOWLEDGE = int(Statusword.SET_POINT_ACKNOWLEDGE)
 
 
 class SetPoint(NamedTuple):
-    """A target, and the profile parameters as they were when it was handed over.
+    """A target, and the profile parameters as they were when it was handed over."""
 
-    Attributes:
-        target: Where to go in [inc], within the software limits.
-        limits: Velocity, acceleration and deceleration.
-        clipped: The software limits changed the target.
-        blended: The move before passes its own target without a stop (bit 9).
-    """
-
-    target: float
-    limits: Limits
-    clipped: bool
-    blended: bool
+    target: float  # where to go in [inc], within the software limits
+    limits: Limits  # velocity, acceleration and deceleration
+    clipped: bool  # the software limits changed the target
+    blended: bool  # the move before passes its own target without a stop (bit 9)
 
 
 class ProfilePosition(Mode):

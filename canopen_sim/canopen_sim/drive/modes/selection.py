@@ -41,9 +41,6 @@ class ModeSelection:
     A mode is there when it is simulated and 0x6502 of the dictionary names it; where the
     dictionary does not list it, when it has the objects of the mode. Another one is refused to an
     SDO; from an RPDO it is ignored, and 0x6061 goes on showing the present mode.
-
-    Attributes:
-        current: The selected mode.
     """
 
     def __init__(
@@ -52,7 +49,7 @@ class ModeSelection:
         self._objects = objects
         self._causes = causes
         self._modes: dict[int, Mode] = {m.number: m(objects, axis, clock) for m in MODES}
-        self.current = self._modes[NoMode.number]
+        self.current = self._modes[NoMode.number]  # the selected mode
         objects.mode.check = self._check
 
     def reset(self) -> None:

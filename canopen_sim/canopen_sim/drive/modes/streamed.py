@@ -72,9 +72,7 @@ class Streamed(Mode):
     def take(self, period: float, now: float) -> bool:
         """Apply the set-point, the axis at an earlier time; return whether it moves.
 
-        Args:
-            period: When the next one is due in [s].
-            now: Steady time in [s].
+        The next one is due after the ``period`` in [s].
         """
 
     def go(self, wanted: int, period: float, now: float) -> bool:
