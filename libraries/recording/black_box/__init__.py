@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What happened before a fault: kept in memory, written into a folder when it comes."""
+"""Keeps the latest data in memory and writes it to a folder when a fault occurs."""
 
 from .box import BlackBox, BlackBoxSettings, Contents, default_folder, Pause, WINDOW, WINDOW_MAX
 from .player import LogPlayer, PlaybackError, Replay

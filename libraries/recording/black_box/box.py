@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Writes what was kept in memory into a folder, some seconds after a fault, in its own thread."""
+"""Writes the data in memory to a folder, some seconds after a fault, in a thread of its own."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ PAUSE_SHARE = 0.75  # of the window
 
 @dataclass(frozen=True, slots=True)
 class BlackBoxSettings:
-    """How a black box behaves; times in [s].
+    """Settings of a black box; times in [s].
 
     Attributes:
-        folder: Where its recordings go; it is made when it is needed.
+        folder: Folder of its recordings, made with the first one.
         window: How far back a recording reaches.
-        after: How long after a fault it is written, so that what follows is in it.
-        kept: How many recordings stay in the folder; the oldest are removed.
+        after: Delay from the fault to the writing, so that the recording covers what follows.
+        kept: Number of recordings in the folder; older ones are removed.
     """
 
     folder: Path
@@ -43,7 +43,7 @@ class BlackBoxSettings:
 
     @property
     def pause(self) -> float:
-        """Least time between two recordings, so that a fault that repeats does not fill the disk.
+        """Shortest time between two recordings, so that a repeated fault does not fill the disk.
 
         Less than the window: a fault in the pause is in the next recording, with what came before.
         """
@@ -74,29 +74,29 @@ Pause: TypeAlias = Callable[[], None]
 
 
 class Contents(Protocol):
-    """What a black box holds, besides what was reported."""
+    """The data that a black box holds, besides the reports."""
 
     @property
     def about(self) -> str:
-        """What it is of, in a line or some."""
+        """What was recorded, in one or more lines."""
 
     def save(self, folder: Path, pause: Pause) -> Path:
-        """Write it; called in the thread of the black box.
+        """Write the recording; called in the thread of the black box.
 
         Returns:
-            The file that people want to open first.
+            The main file of the recording.
 
         Raises:
-            OSError: It cannot be written.
+            OSError: The recording cannot be written.
         """
 
     def usage(self, path: Path) -> str:
-        """Return the command, or commands in lines, that show that file."""
+        """Return the commands, one a line, that show that file."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Note:
-    """Something that was reported; the time is steady, in [s]."""
+    """A report, with its steady time in [s]."""
 
     time: float
     subject: str
@@ -108,22 +108,22 @@ class _Note:
 
 
 class BlackBox:
-    """Waits for faults, and writes a folder for each, or for several that come together.
+    """Writes one folder for each fault, or for several faults that come together.
 
-    What reports a fault never waits: not for the disk, and not for a lock. A disk that is full or
+    Reporting a fault waits neither for the disk nor for a lock. A disk that is full or
     a folder that cannot be made is a warning, and harms nothing else.
 
     Attributes:
-        last: File of the last recording that people want to open first; None before one.
+        last: Main file of the last recording; None before the first one.
     """
 
     def __init__(self, name: str, contents: Contents, settings: BlackBoxSettings) -> None:
-        """Prepare; nothing is written before :meth:`start`.
+        """Create a black box; it writes nothing before :meth:`start`.
 
         Args:
-            name: What it is of, for the names of its folders.
-            contents: What it holds.
-            settings: How it behaves.
+            name: Name of what is recorded, used in the names of the folders.
+            contents: The data to keep.
+            settings: Its settings.
         """
         self.last: Path | None = None
         self._name = re.sub(r'[^A-Za-z0-9.-]+', '_', name).strip('_.') or 'fault'
@@ -141,14 +141,14 @@ class BlackBox:
         self._thread.start()
 
     def close(self) -> None:
-        """Write what is still to be written, at once, and end; never raises."""
+        """Write pending recordings at once, and end the thread; never raises."""
         self._closing = True
         self._faults.put(None)
         if self._thread.is_alive():
             self._thread.join(CLOSE_TIMEOUT)
 
     def note(self, subject: str, text: str) -> None:
-        """Keep what was reported, for the report of a fault that comes later."""
+        """Keep a report for the recording of a later fault."""
         self._notes.append(_Note(time.monotonic(), subject, text))
 
     def fault(self, subject: str, text: str) -> None:
@@ -158,7 +158,7 @@ class BlackBox:
         self._faults.put(note)
 
     def recording_of(self, subject: str) -> Path | None:
-        """Return the file of the last recording with a fault of a device; None before one."""
+        """Return the main file of the last recording of a device's fault; None before one."""
         return self._by_subject.get(subject)
 
     def _run(self) -> None:
@@ -183,7 +183,7 @@ class BlackBox:
                 return
 
     def _collect(self, faults: list[_Note], due: float) -> bool:
-        """Wait until a recording is due, for other faults too; return whether it is the last."""
+        """Wait until a recording is due, and collect faults; return whether it is the last."""
         while (left := due - time.monotonic()) > 0.0:
             try:
                 fault = self._faults.get(timeout=left)
@@ -233,7 +233,7 @@ class BlackBox:
         return '\n'.join(lines)
 
     def _remove_old(self, newest: Path) -> None:
-        """Remove recordings beyond those that are kept, and what a killed program has left."""
+        """Remove the oldest recordings, and unfinished ones of a killed program."""
         own = re.compile(rf'{re.escape(self._name)}_\d{{4}}-\d\d-\d\dT[0-9-]{{8}}\.\d{{3}}(-\d+)?')
         found = [
             path
@@ -252,7 +252,7 @@ def _age(path: Path) -> float:
 
 
 def _unused(path: Path) -> Path:
-    """Return the path, or one with a number behind where there is something already."""
+    """Return the path, with a number appended if it exists."""
     candidate, number = path, 1
     while candidate.exists():
         number += 1

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Plays what a log has to a replay of it, at the times at which it happened."""
+"""Plays the entries of a log to a replay at their original times."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ Entry_contra = TypeVar('Entry_contra', contravariant=True)
 
 
 class PlaybackError(ValueError):
-    """A log has nothing to play: it is empty, or ends before the place where it is to begin."""
+    """A log has nothing to play: it is empty, or ends before the requested start."""
 
 
 class Replay(Protocol[Entry_contra]):
-    """What a log is played to. Times are those of the log in [s], and never go back."""
+    """The receiver of a log's entries. Times are those of the log in [s] and never go back."""
 
     def take(self, entry: Entry_contra, now: float) -> None:
         """Handle the next entry, which happened now."""
@@ -31,14 +31,14 @@ class Replay(Protocol[Entry_contra]):
         """Advance the time; nothing happened meanwhile."""
 
     def restart(self) -> None:
-        """Forget what was, as the log begins again."""
+        """Reset the state, as the log begins again."""
 
 
 class LogPlayer(Generic[Entry]):
     """Plays a log, once or again and again.
 
     Attributes:
-        seeking: What comes is before the place at which it is to begin.
+        seeking: Whether the entries lie before the requested start.
         on_tick: Called in the thread of :meth:`play`, some ten times a second at least.
     """
 
@@ -56,8 +56,8 @@ class LogPlayer(Generic[Entry]):
         Args:
             replay: Gets the entries.
             read: Yields the entries of the log with their times in [s], from the first one.
-            name: What errors call the log: its file.
-            rate: How many seconds of the log go by in one.
+            name: Name of the log in errors: its file.
+            rate: Seconds of the log played per second.
             start: How far from its beginning it is played in time, in [s]; what comes before is
                 taken at once, so that states are known.
         """

@@ -20,7 +20,7 @@ _SEPARATOR = '---'  # between request and response of a service
 
 
 def nested_type(line: str, package: str) -> str | None:
-    """The message type of the field that a line declares.
+    """Return the message type of the field that a line declares.
 
     Returns:
         `package/msg/Name`, or None for constants, primitive types and comments.
@@ -32,14 +32,14 @@ def nested_type(line: str, package: str) -> str | None:
 
 
 def concatenated(name: str, read: Callable[[str], str]) -> str:
-    """A definition with those of all messages in it behind, as recordings carry them (`ros2msg`).
+    """Return a definition with those of all nested messages, as in recordings (`ros2msg`).
 
     Args:
         name: `package/msg/Name`.
-        read: Gives the definition's text for such a name.
+        read: Returns the text of a definition by its name.
 
     Returns:
-        The texts, each nested one once and below a line with its name.
+        The texts; each nested one appears once, below a line with its name.
     """
     found: dict[str, str] = {}
     wanted = [name]
@@ -61,11 +61,11 @@ class DefinitionError(LookupError):
 
 @dataclass(frozen=True, slots=True)
 class ServiceDefinitions:
-    """Both halves of a service, each with the messages in it.
+    """Definitions of a service, each followed by those of nested messages.
 
     Attributes:
-        request: What a client sends.
-        response: What it gets.
+        request: Definition of the request.
+        response: Definition of the response.
     """
 
     request: str

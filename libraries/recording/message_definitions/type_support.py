@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What message types need of rosidl at run time, and no more."""
+"""Loads the part of rosidl that message types need at run time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _GENERATOR = 'rosidl_generator_py.generate_py_impl'
 
 
 def load_type_support() -> None:
-    """Load what imports the type support of messages, without the generator of their code.
+    """Load the importer of type supports without the code generator.
 
     The package goes without its generator where that cannot be imported. With it come templates
     and a parser for interface files: 10 MB and a tenth of a second for each process, for

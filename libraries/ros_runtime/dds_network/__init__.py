@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which network interfaces DDS uses: loopback, and those that a person names.
+"""The network interfaces that DDS uses: loopback, and those that the user names.
 
 DDS of Fast DDS has no authentication: all who reach its sockets can call every service. So a
 process of this workspace opens UDP sockets on the loopback interface only, unless the variable

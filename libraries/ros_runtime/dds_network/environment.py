@@ -27,7 +27,7 @@ _PROFILE_DECIDES = 'SYSTEM_DEFAULT'
 
 
 def own_transports(environ: Mapping[str, str]) -> str:
-    """Return by what a person configures the transports himself; empty when he does not."""
+    """Return the variable with which the user configures the transports; empty without one."""
     rmw, profile = environ.get(_RMW_VARIABLE, ''), environ.get(PROFILE_VARIABLE, '')
     if rmw and not rmw.startswith(_FAST_DDS):
         return f'{_RMW_VARIABLE}={rmw}'
@@ -35,10 +35,10 @@ def own_transports(environ: Mapping[str, str]) -> str:
 
 
 def selected_reach(environ: Mapping[str, str]) -> Reach:
-    """Return what a person has opened.
+    """Return the reach that the user has chosen.
 
     Raises:
-        NetworkChoiceError: He names what does not exist, or what his own transports would ignore.
+        NetworkChoiceError: A name does not exist, or the user's own transports would ignore it.
     """
     own, text = own_transports(environ), environ.get(NETWORK_VARIABLE, '').strip()
     if not text:
@@ -55,7 +55,7 @@ def dds_variables(environ: Mapping[str, str], reach: Reach) -> dict[str, str]:
     """Return the variables that keep DDS to a reach.
 
     Args:
-        environ: The environment as it is; transports that a person configured are left alone.
+        environ: The environment; transports that the user configured stay as they are.
         reach: What DDS may use.
 
     Raises:
@@ -72,7 +72,7 @@ def dds_variables(environ: Mapping[str, str], reach: Reach) -> dict[str, str]:
 
 
 def restrict_dds(environ: MutableMapping[str, str]) -> Reach:
-    """Keep DDS of this process and of those that it starts to what a person has opened.
+    """Restrict DDS of this process and its children to the reach that the user has chosen.
 
     Call it before rclpy.init: Fast DDS reads its profile once.
 
@@ -88,7 +88,7 @@ def restrict_dds(environ: MutableMapping[str, str]) -> Reach:
 
 
 def open_dds(environ: MutableMapping[str, str], names: str | None) -> str:
-    """Do the same for a program with the option ``--network``, which goes before the variable.
+    """Do the same for a program with the option ``--network``, which overrides the variable.
 
     Raises:
         NetworkChoiceError: As of :func:`selected_reach`.
@@ -99,7 +99,7 @@ def open_dds(environ: MutableMapping[str, str], names: str | None) -> str:
 
 
 def is_this_host(environ: Mapping[str, str]) -> bool:
-    """Whether DDS of a process with this environment reaches nothing but this host.
+    """Return whether DDS of a process with this environment reaches this host only.
 
     Raises:
         NetworkChoiceError: As of :func:`selected_reach`.

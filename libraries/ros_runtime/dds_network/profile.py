@@ -23,12 +23,12 @@ _NAMESPACE = 'http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles'
 
 
 def is_own_profile(path: str) -> bool:
-    """Whether a profile is one of this package, in whatever checkout."""
+    """Return whether a profile belongs to this package, in any checkout."""
     return Path(path).name.startswith(PREFIX)
 
 
 def profile_file(reach: Reach) -> Path:
-    """Return the file with a profile; it is written where it is not there.
+    """Return the file of a profile; write it if it does not exist.
 
     Raises:
         NetworkChoiceError: It cannot be written.
@@ -70,7 +70,7 @@ def _add(parent: ET.Element, tag: str) -> ET.Element:
 
 
 def _private(folder: Path) -> Path:
-    """Make a folder that only this user writes to; another user may have made it before."""
+    """Make a folder that this user alone can write to; refuse one that another user has made."""
     folder.mkdir(mode=0o700, exist_ok=True)
     found = folder.lstat()
     if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid():

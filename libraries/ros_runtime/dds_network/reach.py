@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""From what a person names to the interfaces and peers of DDS."""
+"""Resolves the names that the user gives to interfaces and peers of DDS."""
 
 from __future__ import annotations
 
@@ -124,11 +124,11 @@ class Reach:
 
     @property
     def is_this_host(self) -> bool:
-        """Whether nothing but loopback is used."""
+        """Whether only loopback is used."""
         return not self.interfaces and not self.own_transports
 
     def describe(self) -> str:
-        """Return what is open, and what that means, for people."""
+        """Return a sentence on what is open and what that means."""
         if own := self.own_transports:
             return f'{own} decides which networks DDS uses; it may be open to all of them'
         left_out = ''.join(

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What env.sh evaluates: the variables of this package as commands of a shell."""
+"""The variables of this package as shell commands, for env.sh to evaluate."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _UDP = 'UDPv4'
 
 
 def notices(environ: Mapping[str, str], reach: Reach) -> Iterator[str]:
-    """Report what is open, and which of his settings does not open anything."""
+    """Report what is open, and which settings of the user have no effect."""
     if reach.own_transports:
         yield reach.describe()
         return

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Messages that come and go often, as bytes in which only stamp and numbers change."""
+"""Frequent messages as serialized bytes in which only the stamp and numbers change."""
 
 from .serialized import FastPublisher, FastReader, MessageTemplate, SerializedTemplate
 

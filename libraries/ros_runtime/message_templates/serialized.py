@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Messages that come and go often: serialized once, and only their numbers looked at.
+"""Frequent messages: serialized once; afterwards only the stamp and numbers are written or read.
 
 To make a message object of ROS, or to have rclpy take one apart, costs several times as much as
 everything that a controller computes for it. So one message of a form is serialized with marks in
@@ -29,7 +29,7 @@ _ENCAPSULATION, _LITTLE_ENDIAN = 1, 1  # byte of a serialized message of its ord
 
 
 class MessageTemplate(Hashable, Protocol):
-    """What messages that differ by their numbers have in common."""
+    """The form of messages that differ in their numbers only."""
 
     @property
     def count(self) -> int:
@@ -162,7 +162,7 @@ class FastReader:
     """
 
     def __init__(self, kind: type, *paths: str) -> None:
-        """Know where the numbers are.
+        """Create a reader for the given numbers.
 
         Args:
             kind: Class of the messages.

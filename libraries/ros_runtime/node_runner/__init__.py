@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What every node's program has to do, once: start, end, and refuse parameters with words."""
+"""What the programs of all nodes share: start, end, and refusal of parameters in words."""
 
 from .construction import destroyed_if_refused, destroyed_when_refused
 from .deferred_service import create_deferred_service

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Goals of actions that a control loop carries out, so that no callback waits for their end."""
+"""Action goals that a control loop carries out, so that no callback waits for their end."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Nodes that are whole, or gone: a constructor that raises leaves no node in the graph."""
+"""Destroys a node whose constructor raises, so that it leaves the graph."""
 
 from __future__ import annotations
 

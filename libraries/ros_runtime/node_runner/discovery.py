@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Other nodes: those that publish the same, and those whose services know our clients."""
+"""Discovers other nodes, by name, and whether their services have matched our clients."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PROBE_PERIOD = 1.0
 
 
 def other_nodes(node: Node, names: Iterable[str], own: Sequence[str]) -> list[str]:
-    """Return the nodes of some names that others run."""
+    """Return the nodes with the given names that other processes run."""
     graph = [
         f'{namespace.rstrip("/")}/{name}'
         for name, namespace in node.get_node_names_and_namespaces()
@@ -35,7 +35,7 @@ def other_nodes(node: Node, names: Iterable[str], own: Sequence[str]) -> list[st
 def discover_other_nodes(
     node: Node, names: Iterable[str], own: Sequence[str], stop: threading.Event
 ) -> list[str]:
-    """Wait for as long as discovery takes; return what is found as soon as there is any."""
+    """Wait until discovery is over, or one of the nodes is found; return those found."""
     wanted, deadline = set(names), time.monotonic() + DISCOVERY_TIME
     while time.monotonic() < deadline and not stop.wait(_LOOK_PERIOD):
         if found := other_nodes(node, wanted, own):
@@ -54,7 +54,7 @@ class ServerMatch:
     """
 
     def __init__(self, node: Node, services: Iterable[str]) -> None:
-        """Begin; the node has made its clients of the services, by these names."""
+        """Begin; the node has already created its clients of these services."""
         self._node = node
         self._services = {node.resolve_service_name(name) for name in services}
         self._probes: dict[str, Client] = {}

@@ -173,7 +173,7 @@ def _source(record: logging.LogRecord) -> str:
 
 
 def _log(logger: RcutilsLogger, level: int, message: str) -> None:
-    """Log at a level; rclpy wants each level to have a line of its own."""
+    """Log at a level; rclpy requires a call site of its own for each level."""
     if level >= logging.CRITICAL:
         logger.fatal(message)
     elif level >= logging.ERROR:

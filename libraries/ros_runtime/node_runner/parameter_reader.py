@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Declares parameters with meaning and range, and reads what they must be, or refuses it."""
+"""Declares parameters with meaning and range; reads their values or refuses them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _ALIKE = 0.6  # what is chosen from is known, so the suggestion may be a bold on
 
 
 class ParameterError(ValueError):
-    """A parameter of a node is misspelt, or its value makes no sense.
+    """A parameter of a node is misspelt, or its value is not allowed.
 
     Scenarios: a text where a number belongs, a rate beyond its range, a choice that there is not.
     """
@@ -68,7 +68,7 @@ def refuse_similar(unknown: Iterable[str], known: Iterable[str]) -> None:
 
 
 def closest(name: str, names: Iterable[str], alike: float = ALIKE) -> str:
-    """Return the name that is most like another one, at least `alike` (0 to 1); empty for none."""
+    """Return the name most similar to another, at least `alike` (0 to 1); empty for none."""
     return next(iter(difflib.get_close_matches(name, list(names), n=1, cutoff=alike)), '')
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the bring-ups of all robots have in common: their place, and processes of nodes."""
+"""Parts that all bring-ups share: exclusive use of a bus or port, and processes of nodes."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ VIEWER_STOP_STEPS = (
 
 @contextlib.contextmanager
 def exclusive(thing: str, remedy: str) -> Iterator[None]:
-    """Hold something, as long as the block runs.
+    """Hold a resource exclusively while the block runs.
 
     Args:
-        thing: What is used, as the user knows it: ``bus vcan0``.
-        remedy: What to take instead, for the message: ``another bus with --can``.
+        thing: Name of the resource for the user: ``bus vcan0``.
+        remedy: Alternative to name in the message: ``another bus with --can``.
 
     Raises:
         StartError: Another process holds it; the message names it.
@@ -93,7 +93,7 @@ def _process_of(name: bytes) -> str:
 
 @contextlib.contextmanager
 def bring_up_place(package: str, ros: RosOptions) -> Iterator[Path]:
-    """Hold a namespace of the ROS domain, and lend a temporary folder, as long as the block runs.
+    """Hold a namespace of the ROS domain, and provide a temporary folder, while the block runs.
 
     Raises:
         StartError: Another bring-up is in this namespace.

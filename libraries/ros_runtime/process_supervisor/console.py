@@ -54,7 +54,7 @@ def join_in_time(thread: threading.Thread) -> str:
 
 
 def leave() -> None:
-    """End the program at its end, with exit code 1.
+    """End the program with exit code 1, without finalising the interpreter.
 
     A thread that comes back from C++ into an interpreter that is being taken down aborts it.
     """

@@ -85,18 +85,18 @@ class Demo(ABC, Generic[ClientT]):
         """Join the ROS graph; waiting ends when ``given_up`` returns True."""
 
     def prepare(self) -> None:  # a demo may need nothing
-        """Do what can be done while the processes start."""
+        """Do the work that needs no process, while the processes start."""
 
     @abstractmethod
     def perform(self) -> None:
-        """Do it all, from when the processes are ready to the standstill of the robot."""
+        """Run the demo, from the time the processes are ready until the robot stands still."""
 
     def stopping(self) -> None:
-        """End what would go on while the processes stop."""
+        """End activities of the demo when the processes begin to stop."""
 
     @abstractmethod
     def table(self, width: int) -> Sequence[RenderableType]:
-        """Draw the table into so many columns, at least 80."""
+        """Draw the table with a given number of columns, at least 80."""
 
     @abstractmethod
     def progress(self) -> str:
@@ -104,7 +104,7 @@ class Demo(ABC, Generic[ClientT]):
 
     @property
     def left(self) -> bool:
-        """The user requested the end."""
+        """Whether the user has requested the end."""
         return self._ending.is_set()
 
     def leave(self) -> bool:
@@ -113,7 +113,7 @@ class Demo(ABC, Generic[ClientT]):
         return self.moving
 
     def enter(self, phase: str) -> None:
-        """Show what is going on from now on."""
+        """Show a new phase of the demo."""
         if self._screen is not None and phase != self._phase:
             self._phase = phase
             self._screen.enter(phase)
@@ -131,7 +131,7 @@ class Demo(ABC, Generic[ClientT]):
             self._screen.show()
 
     def wait(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
-        """Wait for something while pictures are drawn.
+        """Wait for a condition and redraw the table meanwhile.
 
         Raises:
             CallError: It did not come within the timeout in [s].
@@ -282,7 +282,7 @@ class _Screen:
 
 
 def second_terminal(commands: Sequence[str]) -> list[str]:
-    """Return commands to try in a second terminal, after those that make it find this one."""
+    """Return commands for a second terminal, preceded by those that connect it to this domain."""
     domain = os.environ.get('ROS_DOMAIN_ID', '')
     first = f'source env.sh; export ROS_DOMAIN_ID={domain}' if domain else 'source env.sh'
     return [first, *commands]
@@ -306,7 +306,7 @@ def make_table(*columns: tuple[str, int, bool]) -> Table:
 
 
 def signed(value: float) -> str:
-    """Write a number with sign and three digits; what is unknown as a dash."""
+    """Format a number with sign and three digits, and an unknown one as a dash."""
     # adding 0.0 turns a rounded -0.0 into 0.0
     return f'{round(value, 3) + 0.0:+.3f}' if math.isfinite(value) else '-'
 

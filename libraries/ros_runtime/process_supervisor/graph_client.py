@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A ROS client that waits: for programs that call running nodes, step by step.
+"""A blocking ROS client for programs that call running nodes step by step.
 
 This module is not imported by the package: it loads rclpy, which a mere bring-up does not need.
 """

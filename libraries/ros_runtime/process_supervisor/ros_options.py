@@ -44,7 +44,7 @@ class RosOptions:
 
     @property
     def node_arguments(self) -> tuple[str, ...]:
-        """Words for the command line of a node, behind its ``--ros-args``.
+        """Return the arguments of a node that follow its ``--ros-args``.
 
         Raises:
             StartError: ``-p NODE:NAME:=VALUE`` in a namespace, where rcl finds no node by it.
@@ -59,7 +59,7 @@ class RosOptions:
 
     @property
     def hint(self) -> str:
-        """What a person appends to ``ros2 run`` for a node beside these; begins with a blank."""
+        """Text to append to ``ros2 run`` for a node in this namespace; begins with a blank."""
         return f' --ros-args -r __ns:=/{self.namespace}' if self.namespace else ''
 
     def resolve(self, name: str) -> str:
@@ -86,7 +86,7 @@ class RosOptions:
         return full[1:]
 
     def within(self, namespace: str) -> RosOptions:
-        """Return the same in another namespace, unless a person has named one."""
+        """Return these options in another namespace, unless the user has named one."""
         return self if self.namespace else replace(self, namespace=namespace.strip('/'))
 
 

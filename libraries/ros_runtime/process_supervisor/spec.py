@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is to be run, and how it is stopped."""
+"""Processes of a bring-up: how each is started and stopped."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from signal import Signals
 
 @dataclass(frozen=True, slots=True)
 class StopStep:
-    """One rung of the ladder by which a process is stopped.
+    """One step of the escalation that stops a process.
 
     Attributes:
         signal: The signal that is sent to its process group.

@@ -41,7 +41,7 @@ class Phase(Enum):
 
 
 class Severity(Enum):
-    """How loud a notice is."""
+    """Severity of a notice."""
 
     INFO = 'info'
     WARNING = 'warning'

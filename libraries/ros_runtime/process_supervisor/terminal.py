@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a terminal can do, and lines with the name of their process in front."""
+"""Capabilities of a terminal, and output lines prefixed with the name of their process."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def wants_colour(stream: TextIO, environment: Mapping[str, str]) -> bool:
 
 
 def severity_of(line: str) -> Severity:
-    """Return how loud a line of a ROS node's output is.
+    """Return the severity of an output line of a ROS node.
 
     Args:
         line: A line of its output; one that is no log line, such as that of a traceback, is a

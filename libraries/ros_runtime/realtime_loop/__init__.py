@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What every thread that owns a cycle needs: deadlines without bursts, priority, memory."""
+"""Deadlines without bursts, priority and locked memory for threads that own a cycle."""
 
 from .cycle_timer import Cycle, CycleTimer
 from .privileges import Outcome, PRIORITY_MAX, raise_priority, settle_memory, unsettle_memory

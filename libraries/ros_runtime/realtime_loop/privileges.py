@@ -27,7 +27,7 @@ LIMITS = (
 
 
 class Outcome(NamedTuple):
-    """What became of a request."""
+    """Outcome of a request for a privilege."""
 
     granted: bool  # whether the system has granted it
     text: str  # the outcome in words; empty when nothing was requested

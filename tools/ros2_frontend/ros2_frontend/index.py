@@ -165,7 +165,7 @@ def expand(
 
     Args:
         name: The type.
-        read: Gives the definition's text for such a name.
+        read: Returns the text of a definition by its name.
         comments: Whether to show comments and blank lines of the type itself.
         nested_comments: Whether to show those of the types of its fields.
         depth: How deep the definition stands; one tab each.
