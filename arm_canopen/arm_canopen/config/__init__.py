@@ -44,7 +44,7 @@ from .model.checks.drive_units import (
 )
 from .model.checks.traffic import LoadEstimate, Traffic
 from .model.factor_group import FACTOR_ADDRESSES, FACTOR_OBJECTS, FactorGroup, UNSET
-from .model.pdo_direction import Direction, RPDO, TPDO
+from .model.pdo import Direction, RPDO, TPDO
 from .model.si_unit import NamedUnit, position_unit, RPM
 from .resolve.eds_files import DEFAULT_DRIVE
 from .resolve.pdo_mapping import eds_mapping, is_fixed, mapping_slots

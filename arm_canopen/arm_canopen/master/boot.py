@@ -20,11 +20,10 @@ from canopen_core.standard import Index, NmtCommand, NmtState
 
 from ..config.model import BusConfig, SdoWrite
 from ..config.model.bus import Identity
-from .bus_sender import Send
 from .configuration import Configurator
 from .events import EventKind, Severity
+from .frame_sender import Send, SendNmt
 from .life_signs import guarding_request
-from .nmt_sender import SendNmt
 from .remote_node import BootPhase, RemoteNode
 from .scheduler import Scheduler, Task
 from .sdo_channel import SECOND_ANSWER_TIME

@@ -10,7 +10,7 @@ from canopen_core.can import Frame
 from canopen_core.standard import CobId, NmtState
 
 from ..config.model import NodeConfig
-from .bus_sender import Send
+from .frame_sender import Send
 
 TOGGLE = 0x80  # bit of an answer that changes with each
 

@@ -31,13 +31,11 @@ from canopen_core.standard import (
 
 from ..config.model import BusConfig
 from .boot import BootManager
-from .bus_sender import BusSender
 from .controller_watch import ControllerWatch
 from .events import Event, EventKind, Report, Severity
-from .nmt_sender import NmtSender
+from .frame_sender import BusSender, NmtSender, PeriodicFrame
 from .other_master import OtherMasterWatch
 from .process_image import SyncRound
-from .producers import PeriodicFrame
 from .remote_node import RemoteNode
 from .scheduler import completed, Promise, Scheduler
 from .sdo_client import SdoClient

@@ -20,9 +20,9 @@ from canopen_core.standard import (
 )
 
 from ..config.model import NodeConfig
-from .bus_sender import Send
 from .emergency_log import EmergencyLog
 from .events import Event, EventKind, Report, Severity
+from .frame_sender import Send
 from .life_signs import LifeSigns
 from .pdo_watch import PdoWatch
 from .process_image import SentRpdo, SyncRound

@@ -26,9 +26,9 @@ from canopen_core.standard import (
 )
 
 from ..config.model import NodeConfig
-from ..config.model.tpdo_freshness import PERIODS_MISSED, STALE_AFTER
-from .bus_sender import Send
+from ..config.model.pdo import PERIODS_MISSED, STALE_AFTER
 from .events import EventKind, Severity
+from .frame_sender import Send
 from .process_image import InputReader, Limits, limits_of, ProcessImage, SyncRound, Writer
 from .scheduler import Promise, Scheduler
 from .sdo_client import SdoClient

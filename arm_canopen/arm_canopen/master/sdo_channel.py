@@ -26,7 +26,7 @@ from canopen_core.standard import (
     UploadResponse,
 )
 
-from .bus_sender import Send
+from .frame_sender import Send
 from .scheduler import Promise, Scheduler
 
 T = TypeVar('T')

@@ -27,7 +27,7 @@ from canopen_core.standard import (
     UploadSegmentRequest,
 )
 
-from .bus_sender import Send
+from .frame_sender import Send
 from .scheduler import Promise, Scheduler, Task
 from .sdo_block_client import read_blocks, write_blocks
 from .sdo_channel import response, SdoChannel, SdoCounters

@@ -11,7 +11,7 @@ from canopen_core.standard import ALL_NODES, NmtCommand
 
 from ..config.model.bus import MasterConfig
 from .events import Event, EventKind, Report, Severity
-from .nmt_sender import SendNmt
+from .frame_sender import SendNmt
 from .remote_node import RemoteNode
 from .scheduler import Promise, Scheduler
 

@@ -33,7 +33,7 @@ from arm_canopen.cia402.following_watch import Following, FollowingWatch
 from arm_canopen.config import boot_writes, BusConfig, load_bus, NodeConfig
 from arm_canopen.config.model import Place
 from arm_canopen.config.model.checks import check_bus
-from arm_canopen.config.model.tpdo_freshness import with_event_timer
+from arm_canopen.config.model.pdo import with_event_timer
 from arm_canopen.master.process_image import ReceivedTpdo, SyncRound
 from canopen_core.can import Frame
 from canopen_core.standard import ObjectDictionary, Statusword

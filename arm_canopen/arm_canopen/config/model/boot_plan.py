@@ -29,9 +29,8 @@ from canopen_core.standard import (
 )
 
 from ..units import HUNDRED_MICROSECONDS, MILLISECONDS
-from .bus import BusConfig, NodeConfig, PdoConfig, SdoWrite
-from .pdo_direction import Direction, RPDO, TPDO
-from .tpdo_freshness import EVENT_TIMER_SUBINDEX
+from .bus import BusConfig, NodeConfig, SdoWrite
+from .pdo import Direction, EVENT_TIMER_SUBINDEX, PdoConfig, RPDO, TPDO
 
 COB_ID_BITS = COB_ID_INVALID | COB_ID_EXTENDED | CAN_ID_MASK
 """Bits that bus.yml decides of a COB-ID; the device has bit 30 as it can."""

@@ -19,7 +19,6 @@ from canopen_core.standard import (
     DataType,
     decode,
     Index,
-    MappedObject,
     object_address,
     ObjectDictionary,
     slow_timeout,
@@ -29,7 +28,7 @@ from canopen_core.standard import (
 from ..keys import key, Kind, Use
 from ..units import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS
 from .drive import DriveConfig
-from .pdo_direction import Direction, RPDO, TPDO
+from .pdo import Direction, PdoConfig, RPDO, TPDO
 
 U16_MAX, U32_MAX = 0xFFFF, 0xFFFF_FFFF
 BITRATES = dict.fromkeys(BIT_RATES_KBIT, 'kbit/s')
@@ -163,29 +162,6 @@ class MasterConfig:
 
 
 RETRY_FACTOR = 3
-
-
-@dataclass(frozen=True, slots=True)
-class PdoConfig:
-    """One PDO of a device, named from the device's side."""
-
-    number: int  # 1 for the objects 0x1400/0x1600 or 0x1800/0x1A00, and so on
-    enabled: bool  # the PDO exists (bit 31 of its COB-ID is clear)
-    cob_id: int  # its 11-bit CAN identifier; 0 when it is disabled and has none
-    transmission: int  # transmission type 0 to 255 (CiA 301, tables 69 and 71)
-    # shortest time between two transmissions in [s]; None leaves the device's
-    inhibit_time: float | None = None
-    # event timer of a TPDO, deadline of an RPDO in [s]; None leaves the device's
-    event_time: float | None = None
-    # SYNC counter value at which it starts; None leaves the device's
-    sync_start: int | None = None
-    mapping: tuple[MappedObject, ...] = ()
-    configured: bool = False  # bus.yml names this PDO, so the master writes it at boot
-    fixed_mapping: bool = False  # the device's mapping is read-only (and equal to ``mapping``)
-    # the EDS gives the COB-ID of another node id, and ``cob_id`` is that of this one
-    assumed: bool = False
-    # where bus.yml has its COB-ID, else the PDO or the device
-    place: Place = field(default=Place(), compare=False)
 
 
 @dataclass(frozen=True, slots=True)

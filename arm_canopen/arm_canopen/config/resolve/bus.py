@@ -10,7 +10,7 @@ from pathlib import Path
 from canopen_core import Findings, Place
 
 from ..model import BusConfig, MasterConfig, NodeConfig
-from ..model.pdo_direction import RPDO, TPDO
+from ..model.pdo import RPDO, TPDO
 from ..read.document import Item, YamlMap
 from ..read.section import read_section
 from ..sections import OPTION_KEYS, Options

@@ -10,8 +10,8 @@ from dataclasses import replace
 from canopen_core import Findings
 from canopen_core.standard import CAN_ID_MASK
 
-from ..model.bus import NodeConfig, PdoConfig
-from ..model.pdo_direction import Direction, RPDO, TPDO
+from ..model.bus import NodeConfig
+from ..model.pdo import Direction, PdoConfig, RPDO, TPDO
 from .pdos import AUTO_ID
 
 FREE_RANGE = range(0x680, 0x6E0)

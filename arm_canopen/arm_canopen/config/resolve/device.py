@@ -27,8 +27,7 @@ from canopen_core.standard import (
 from ..keys import keys_of
 from ..model.bus import Identity, MasterConfig, NodeConfig, POLL_PERIOD
 from ..model.drive import DriveConfig
-from ..model.pdo_direction import RPDO, TPDO
-from ..model.tpdo_freshness import with_event_timer
+from ..model.pdo import RPDO, TPDO, with_event_timer
 from ..read.document import YamlMap
 from ..read.section import read_section, texts
 from ..sections import DEVICE_KEYS, DeviceSettings, DRIVE_KEYS, MasterSettings, Options

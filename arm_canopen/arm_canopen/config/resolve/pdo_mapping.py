@@ -22,7 +22,7 @@ from canopen_core.standard import (
     UNSIGNED_BITS,
 )
 
-from ..model.pdo_direction import Direction, RPDO
+from ..model.pdo import Direction, RPDO
 from ..read.document import Item, YamlList
 from ..sections import MAPPING_KEYS
 from .sdo_list import find_entry, read_object

@@ -20,8 +20,7 @@ from canopen_core.standard import (
     SYNCHRONOUS_MAX,
 )
 
-from ..model.bus import PdoConfig
-from ..model.pdo_direction import Direction, RPDO, TPDO
+from ..model.pdo import Direction, PdoConfig, RPDO, TPDO
 from ..read.document import Item, Scalar, YamlList, YamlMap
 from ..read.scalars import describe, integer, key_number
 from ..read.section import block, listing, read_section

@@ -14,7 +14,7 @@ from canopen_core.standard import (
     TARGET_OBJECTS,
 )
 
-from ..pdo_direction import RPDO, TPDO
+from ..pdo import RPDO, TPDO
 from .subject import object_name, Subject, UsedMode
 
 PERIOD_EXPONENTS = (-3, -4, -5, -6)

@@ -6,9 +6,7 @@ from __future__ import annotations
 
 from canopen_core.standard import axis_of, Index, SYNCHRONOUS_MAX
 
-from ..bus import PdoConfig
-from ..pdo_direction import Direction, TPDO
-from ..tpdo_freshness import longest_silence, loss_unnoticed
+from ..pdo import Direction, longest_silence, loss_unnoticed, PdoConfig, TPDO
 from .subject import object_name, Subject
 
 RESTLESS = frozenset({Index.POSITION_ACTUAL, Index.VELOCITY_ACTUAL, Index.TORQUE_ACTUAL})

@@ -11,9 +11,9 @@ from canopen_core import Findings, Place
 from canopen_core.standard import axis_of, AXIS_OFFSET, Index, object_address, OperationMode
 
 from ...units import HUNDRED_MICROSECONDS, MILLISECONDS
-from ..bus import BusConfig, NodeConfig, PdoConfig
+from ..bus import BusConfig, NodeConfig
 from ..drive import DriveConfig
-from ..pdo_direction import Direction
+from ..pdo import Direction, PdoConfig
 
 
 @dataclass(frozen=True, slots=True)

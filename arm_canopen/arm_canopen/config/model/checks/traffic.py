@@ -18,8 +18,8 @@ from canopen_core.standard import (
     SYNCHRONOUS_MAX,
 )
 
-from ..bus import BusConfig, NodeConfig, PdoConfig
-from ..pdo_direction import Direction, TPDO
+from ..bus import BusConfig, NodeConfig
+from ..pdo import Direction, PdoConfig, TPDO
 from .subject import Subject
 
 POLLED = (Index.STATUSWORD, Index.MODE_OF_OPERATION_DISPLAY, Index.POSITION_ACTUAL)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""NMT commands one after another, as far apart as the inhibit time demands (CiA 301, 0x102A)."""
+"""How frames of the master leave: all of them, those sent periodically, and NMT commands."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ from canopen_core import BusError
 from canopen_core.can import Frame
 from canopen_core.standard import ALL_NODES, CobId, nmt_frame, NmtCommand
 
-from .bus_sender import Send
+from .events import Event, EventKind, Report, Severity
 from .scheduler import Promise, Scheduler
 
+Send: TypeAlias = Callable[[Frame], BusError | None]
+"""Hands a frame to the bus; returns why the bus has not taken it, None when it has."""
 SendNmt: TypeAlias = Callable[[NmtCommand, int], Promise[None]]
 """Sends a command to a node id, or to all with 0; the promise is resolved when it has left,
 rejected with a BusError when the bus has not taken it."""
@@ -22,8 +24,55 @@ REPEAT_AFTER = 0.01  # [s] before a command that the bus refused is sent again
 REFUSAL_TIMEOUT = 0.5  # [s] in which the bus has to take a command; it would come too late then
 
 
+class BusSender:
+    """Sends frames; a bus that refuses them is reported once, until it works again."""
+
+    def __init__(self, send: Callable[[Frame], None], report: Report) -> None:
+        """``send`` may raise BusError."""
+        self._send = send
+        self._report = report
+        self._failed = False
+
+    def send(self, frame: Frame) -> BusError | None:
+        """Send a frame; return why the bus has not taken it."""
+        try:
+            self._send(frame)
+        except BusError as error:
+            if not self._failed:
+                self._failed = True
+                self._report(Event(EventKind.BUS, Severity.ERROR, '', str(error)))
+            return error
+        if self._failed:
+            self._failed = False
+            self._report(Event(EventKind.BUS, Severity.INFO, '', 'the bus takes frames again'))
+        return None
+
+
+class PeriodicFrame:
+    """A frame that is sent periodically; after a pause the series begins anew.
+
+    So nothing is made up for, and nothing crowds.
+    """
+
+    def __init__(self, can_id: int, period: float, data: Callable[[], bytes], send: Send) -> None:
+        """Send ``data`` with an identifier every ``period`` in [s]; 0 for never."""
+        self._can_id = can_id
+        self._period = period
+        self._data = data
+        self._send = send
+        self._next = 0.0
+
+    def advance(self, now: float) -> None:
+        """Send it when it is due."""
+        if self._period <= 0.0 or now < self._next:
+            return
+        due = self._next + self._period
+        self._next = due if due > now else now + self._period
+        self._send(Frame(self._can_id, self._data()))
+
+
 class NmtSender:
-    """Sends NMT commands; with an inhibit time those that come too early wait in order.
+    """Sends NMT commands; with an inhibit time (0x102A) those that come too early wait in order.
 
     A command counts as sent when the bus has taken its frame. One whose promise was abandoned
     meanwhile does not leave any more.
