@@ -153,6 +153,8 @@ def test_a_package_that_is_not_installed_is_given_a_folder(folder: Path, tmp_pat
     (shared / 'arm.xacro').write_text(
         f'<robot {XACRO}><link name="base"><visual><geometry>'
         '<mesh filename="package://vendor_description/base.stl"/></geometry></visual></link>'
+        '<link name="file://$(find vendor_description)/tip.stl"/>'
+        '<link name="file:///$(find vendor)/tip.stl"/>'
         '<link name="$(find arm_model)"/></robot>'
     )
     (folder / 'arm.urdf').unlink()
@@ -167,10 +169,12 @@ def test_a_package_that_is_not_installed_is_given_a_folder(folder: Path, tmp_pat
         read_description(found(folder))
     assert len(str(refused.value)) < 400  # not every folder that was searched
     (folder / 'robot.yaml').write_text(
-        'packages:\n  vendor_description: ../share/vendor_description\n'
+        'packages:\n  vendor_description: ../share/vendor_description\n  vendor: ../share\n'
     )
     urdf = read_description(found(folder))
     assert f'"{shared.as_uri()}/base.stl"' in urdf
+    for name in (f'file://{shared}/tip.stl', f'file:///{shared.parent}/tip.stl'):
+        assert f'<link name="{name}"/>' in urdf  # not a temporary folder
     assert os.environ['AMENT_PREFIX_PATH'] == before
 
 

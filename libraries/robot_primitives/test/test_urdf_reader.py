@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import pytest
-from urdf_reader import DescriptionError, JointKind, Mimic, read_urdf
+from urdf_reader import DescriptionError, JointKind, Mimic, parse_srdf, read_urdf
 from urdf_robots import ARM
 
 TWO = '<robot name="r"><link name="a"/><link name="b"/>{}</robot>'
@@ -61,6 +61,10 @@ def test_a_chain_of_mimics_leads_to_its_first_joint() -> None:
         ('<robot', 'no XML'),
         ('<sdf/>', '<sdf>'),
         ('<robot name="r"/>', 'no <link>'),
+        (
+            '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:include/></robot>',
+            'still has <xacro:include>; expand it',
+        ),
         ('<robot name="r"><link/></robot>', '<link> has no name'),
         ('<robot name="r"><link name="a"/><link name="a"/></robot>', 'several links called a'),
         ('<robot name="r"><link name="a"/><link name="b"/></robot>', 'no parent.*a, b'),
@@ -100,3 +104,14 @@ def test_a_fixed_joint_follows_nothing() -> None:
     """Grippers are fixed by the type of their joints, and keep their <mimic>."""
     (joint,) = read_urdf(two_links('fixed', inner='<mimic joint="elsewhere"/>')).joints
     assert joint.mimic is None
+
+
+def test_a_pose_of_the_srdf_with_several_values_for_a_joint() -> None:
+    """Those of floating and planar joints, which no group moves, are left out."""
+    joint = '<joint name="{}" value="{}"/>'
+    joints = joint.format('base', '0 0 0 0 0 0 1') + joint.format('j', ' 0.5 ')
+    srdf = f'<robot name="r"><group_state name="p" group="g">{joints}</group_state></robot>'
+    assert parse_srdf(srdf).poses == {'g': {'p': {'j': 0.5}}}
+    for value in ('', '0 high'):
+        with pytest.raises(DescriptionError, match="pose 'p'"):
+            parse_srdf(srdf.replace(' 0.5 ', value))

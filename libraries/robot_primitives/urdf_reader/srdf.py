@@ -139,10 +139,12 @@ def _group(element: ET.Element) -> Group:
 
 
 def _pose(state: ET.Element) -> Mapping[str, float]:
+    """Return the positions of a pose, without joints of several directions: no group has these."""
     try:
-        return {
-            joint.get('name', ''): float(joint.get('value', ''))
+        values = {
+            joint.get('name', ''): [*map(float, joint.get('value', '').split() or [''])]
             for joint in state.findall('joint')
         }
+        return {name: each[0] for name, each in values.items() if len(each) == 1}
     except ValueError as error:
         raise DescriptionError(f'pose {state.get("name")!r} of the SRDF: {error}') from error

@@ -13,6 +13,7 @@ from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from enum import Enum
 import math
+import re
 from typing import TypeAlias
 from xml.etree import ElementTree as ET
 
@@ -20,6 +21,7 @@ from .exceptions import DescriptionError
 from .transforms import from_rpy, Transform, Vector
 
 DEFAULT_AXIS = '1 0 0'  # axis of a joint without ``<axis>`` (URDF)
+XACRO_TAG = re.compile(r'\{[^}]*xacro[^}]*\}')  # namespace of elements that xacro replaces
 
 
 class JointKind(Enum):
@@ -310,6 +312,13 @@ def _parse(text: str) -> ET.Element:
         ) from error
     if robot.tag != 'robot':
         raise DescriptionError(f'the robot description begins with <{robot.tag}>, not <robot>')
+    for element in robot.iter():
+        if XACRO_TAG.match(element.tag):
+            tag = XACRO_TAG.sub('xacro:', element.tag)
+            raise DescriptionError(
+                f'the robot description still has <{tag}>; expand it with xacro, or name the file'
+                ' .xacro'
+            )
     return robot
 
 

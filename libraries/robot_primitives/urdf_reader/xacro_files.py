@@ -16,6 +16,7 @@ from pathlib import Path
 import re
 import tempfile
 from typing import Any
+from xml.sax.saxutils import escape
 
 from .exceptions import XacroError
 
@@ -41,11 +42,12 @@ def expand_xacro(
     """
     import xacro
 
+    packages = packages or {}
     complaints = io.StringIO()  # xacro writes to stderr where in the file it was
     try:
         with (
             contextlib.redirect_stderr(complaints),
-            _package_overlay(packages or {}),
+            _package_overlay(packages) as overlay,
             _without_other_hardware(xacro),
         ):
             document = xacro.process_file(str(path), mappings=dict(arguments or {}))
@@ -55,7 +57,10 @@ def expand_xacro(
             raise refusal from error
         reason = f'{type(error).__name__}: {error} {place}'.strip()
         raise XacroError(f'{path}: {reason}') from error
-    return str(document.toprettyxml(indent='  '))
+    expanded = str(document.toprettyxml(indent='  '))
+    # the overlay is gone: files in it are named where they are
+    inside = re.compile(re.escape(f'{overlay}/') + r'([\w-]+)')
+    return inside.sub(lambda found: escape(str(packages[found[1]])), expanded)
 
 
 def _missing(path: Path, words: str) -> XacroError | None:
@@ -72,20 +77,25 @@ def _missing(path: Path, words: str) -> XacroError | None:
 
 
 @contextlib.contextmanager
-def _package_overlay(packages: Mapping[str, Path]) -> Iterator[None]:
-    """Make ``$(find ...)`` find folders as if they were installed, while the block runs."""
-    with contextlib.ExitStack() as stack:
-        if packages:
-            prefix = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix='packages-')))
-            index = prefix / 'share' / 'ament_index' / 'resource_index' / 'packages'
-            index.mkdir(parents=True)
-            for name, folder in packages.items():
-                (index / name).touch()
-                (prefix / 'share' / name).symlink_to(folder)
-            before = os.environ.get('AMENT_PREFIX_PATH', '')
-            os.environ['AMENT_PREFIX_PATH'] = f'{prefix}{os.pathsep}{before}'
-            stack.callback(os.environ.__setitem__, 'AMENT_PREFIX_PATH', before)
-        yield
+def _package_overlay(packages: Mapping[str, Path]) -> Iterator[Path]:
+    """Make ``$(find ...)`` find folders as if they were installed, while the block runs.
+
+    Yields:
+        The folder in which it finds them.
+    """
+    with tempfile.TemporaryDirectory(prefix='packages-') as prefix:
+        share = Path(prefix, 'share')
+        index = share / 'ament_index' / 'resource_index' / 'packages'
+        index.mkdir(parents=True)
+        for name, folder in packages.items():
+            (index / name).touch()
+            (share / name).symlink_to(folder)
+        before = os.environ.get('AMENT_PREFIX_PATH', '')
+        os.environ['AMENT_PREFIX_PATH'] = f'{prefix}{os.pathsep}{before}'
+        try:
+            yield share
+        finally:
+            os.environ['AMENT_PREFIX_PATH'] = before
 
 
 @contextlib.contextmanager
