@@ -148,6 +148,21 @@ def test_a_changed_side_file_changes_the_digest(tmp_path: Path) -> None:
         load(path)
 
 
+def test_a_policy_may_be_a_link(tmp_path: Path) -> None:
+    """Its weights lie beside the link, as in the cache of a download, or beside the file."""
+    tool = TOOLS['rl_sar']()
+    write_network(tool, tmp_path / 'policy.onnx', external=True)
+    assert run(attached(tool, tmp_path)) == 0
+    digest = load(tmp_path / 'policy.onnx').digest
+    for folder in ('linked', 'snapshot'):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / 'policy.onnx').symlink_to(tmp_path / 'policy.onnx')
+    assert load(tmp_path / 'linked' / 'policy.onnx').digest == digest
+    blob = (tmp_path / 'policy.onnx.data').rename(tmp_path / '4f5e')
+    (tmp_path / 'snapshot' / 'policy.onnx.data').symlink_to(blob)
+    assert load(tmp_path / 'snapshot' / 'policy.onnx').digest == digest
+
+
 def test_weights_that_are_overwritten_do_not_count(tmp_path: Path) -> None:
     """A new export is copied over the old one while the robot walks."""
     tool = TOOLS['playground']()

@@ -115,11 +115,12 @@ def side_files(path: Path, data: bytes) -> dict[str, Path]:
         names = sorted(set(_locations(memoryview(data))))
     except (IndexError, ValueError):
         return {}  # no ONNX; ONNX Runtime says so better
-    folder = path.resolve().parent
-    files = {name: (folder / name).resolve() for name in names}
-    for name, file in files.items():
-        if folder not in file.parents:
+    files = {}
+    for name in names:
+        if Path(name).is_absolute() or '..' in Path(name).parts:
             raise PolicyError(f'policy {path}: its weights lie in {name!r}, outside of its folder')
+        beside = path.parent / name  # where the policy is a link, such as in a download cache
+        files[name] = beside if beside.exists() else path.resolve().parent / name
     return files
 
 
