@@ -8,11 +8,42 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy.action.server import ActionServer, CancelResponse
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
+from rclpy.task import Future
 
 RESULT_TIMEOUT = 10.0
 """Time in [s] that an ended goal is kept for late requests, as by rcl; rclpy keeps it for 900."""
+
+ANSWER_DELAY = 0.005
+"""Least time in [s] from a request to its answer.
+
+Clients of rclpy 7.1 note a request after it was sent, and drop an answer that another thread gets
+before: 1 of 40 motions of pymoveit2 waited for ever. Python switches threads every 5 ms.
+"""
+
+
+class _Server(ActionServer):
+    """Does not answer at once, see ``ANSWER_DELAY``."""
+
+    async def _execute_goal_request(self, request: Any) -> None:  # noqa: ANN401  # rclpy has no types
+        await self._delayed()
+        await super()._execute_goal_request(request)
+
+    async def _execute_get_result_request(self, request: Any) -> None:  # noqa: ANN401
+        await self._delayed()
+        await super()._execute_get_result_request(request)
+
+    async def _delayed(self) -> None:
+        elapsed = Future()
+        steady = Clock(clock_type=ClockType.STEADY_TIME)  # simulated time may stand still
+        timer = self._node.create_timer(
+            ANSWER_DELAY, lambda: elapsed.set_result(None), clock=steady
+        )
+        await elapsed
+        self._node.destroy_timer(timer)
 
 
 def serve_goals(
@@ -41,7 +72,7 @@ def serve_goals(
         goal._update_state(rclpy_implementation.GoalEvent.EXECUTE)  # noqa: SLF001
         start(goal)
 
-    return ActionServer(
+    return _Server(
         node,
         action,
         name,

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 import threading
+import time
 from typing import Any
 
 from action_msgs.msg import GoalStatus
@@ -62,6 +63,71 @@ def test_a_goal_goes_on_after_its_callback_and_is_forgotten_after_its_end(
             lambda: result_of(goal).status == GoalStatus.STATUS_UNKNOWN, TIMEOUT, 'its end'
         )
         server.destroy()  # type: ignore[no-untyped-call]
+
+
+class _SlowClient:
+    """The handle of a client whose thread is held up for 3 ms after it has sent a request."""
+
+    def __init__(self, handle: Any) -> None:
+        self._handle = handle
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._handle, name)
+
+    def send_goal_request(self, request: Any) -> Any:
+        number = self._handle.send_goal_request(request)
+        time.sleep(0.003)
+        return number
+
+    def send_result_request(self, request: Any) -> Any:
+        number = self._handle.send_result_request(request)
+        time.sleep(0.003)
+        return number
+
+
+@pytest.mark.slow
+def test_no_answer_is_lost_that_a_client_expects_too_late(isolation: Isolation) -> None:
+    """Rclpy drops an answer that one thread gets before another has noted the request."""
+
+    def conclude(goal: Any) -> LookupTransform.Result:
+        goal.succeed()
+        return LookupTransform.Result()
+
+    def start(goal: Any) -> None:
+        server.notify_execute(goal, None)  # type: ignore[no-untyped-call]
+
+    with RosClient(isolation.domain_id) as serving, RosClient(isolation.domain_id) as client:
+        server = action_goals.serve_goals(
+            serving.node,
+            LookupTransform,
+            'look_up',
+            start=start,
+            conclude=conclude,
+            cancel=lambda _: CancelResponse.REJECT,
+        )
+        caller = client.action(LookupTransform, 'look_up')
+        caller._client_handle = _SlowClient(caller._client_handle)
+        ended = threading.Event()
+        with ThreadPoolExecutor(2) as threads:
+            for each in (serving, client):
+                threads.submit(each.spin_until, ended.is_set, 60.0, 'the end')
+            try:
+                assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
+                for _ in range(10):
+                    goal = caller.send_goal_async(LookupTransform.Goal())  # type: ignore[no-untyped-call]
+                    assert eventually(goal.done)
+                    assert eventually(goal.result().get_result_async().done)
+            finally:
+                ended.set()
+        server.destroy()  # type: ignore[no-untyped-call]
+
+
+def eventually(condition: Callable[[], bool]) -> bool:
+    """Wait until something is so."""
+    end = time.monotonic() + TIMEOUT
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.001)
+    return condition()
 
 
 @pytest.mark.slow
