@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+import difflib
 from typing import Any, TYPE_CHECKING
 
 from urdf_reader import find_group, KinematicTree, SemanticDescription
@@ -91,6 +92,7 @@ def check_motion(
         if is_arm:
             notes.update(dict.fromkeys(filter(None, [model.assumption(drives)])))
             findings += _start(robot, model)
+        findings += _poses(robot, model)
     findings += [warning(*_note(robot, note)) for note in notes]
     return findings + list(_controllers(robot, groups, models))
 
@@ -119,14 +121,17 @@ def _note(robot: Robot, note: str) -> tuple[str, str, str]:
 
 
 def _limits(robot: Robot, limits: Mapping[str, Any], tree: KinematicTree) -> Iterable[Finding]:
+    """Find limits of joints that the description does not have: misspelt ones are errors."""
     joints = {joint.name for joint in tree.joints}
-    if lost := [name for name in limits if name not in joints]:
-        known = ', '.join(joint.name for joint in tree.movable())
-        yield error(
-            robot.limits.name,
-            f'{robot.description.name} has no joint {", ".join(map(repr, lost))}',
-            f'take it out, or name it as the joint; joints: {known}',
-        )
+    idle = [joint.name for joint in tree.movable() if joint.name not in limits]
+    for name in limits:
+        if name not in joints:
+            close = difflib.get_close_matches(name, idle, n=1)
+            make, meant = (error, f'; is {close[0]!r} meant?') if close else (warning, '')
+            problem = f'{robot.description.name} has no joint {name!r}{meant}'
+            without = ', '.join(idle) or 'none'
+            remedy = f'take it out, or name it as the joint; joints without limits: {without}'
+            yield make(robot.limits.name, problem, remedy)
 
 
 def _found_start(robot: Robot, model: RobotModel) -> Finding:
@@ -185,6 +190,17 @@ def _start(robot: Robot, model: RobotModel) -> Iterable[Finding]:
         problem = f'{pair[0]} and {pair[1]} collide, by {-1e3 * clearance:.0f} mm'
         remedy = 'move them apart, or disable the pair in the SRDF if they can never meet'
         yield error(place, problem, remedy)
+
+
+def _poses(robot: Robot, model: RobotModel) -> Iterable[Finding]:
+    """Find poses in collision, besides the start."""
+    for name, positions in model.poses.items():
+        for each in model.nearest(positions, 0.0, 1) if name != START else ():
+            place = f'{robot.semantic.name}, group {model.group}, pose {name!r}'
+            depth = f'{-1e3 * each.distance:.0f} mm'
+            problem = f'{" and ".join(each.links)} collide, by {depth}: no motion goes there'
+            remedy = 'correct the pose, or disable the pair in the SRDF if they can never meet'
+            yield warning(place, problem, remedy)
 
 
 def _controllers(

@@ -4,14 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 
 import urdf_reader
 from urdf_reader import Group, KinematicTree, parse_srdf, SemanticDescription
 
 from .description import read_semantic
 from .exceptions import DescriptionError
-from .findings import error, Finding
+from .findings import error, Finding, Severity, warning
 from .robots import Robot
 
 
@@ -26,41 +26,55 @@ def check_semantic(
     """Compare the SRDF of a robot with its description.
 
     Returns:
-        What is wrong, and the SRDF where all names in its groups are those of the description.
+        What is wrong, and the SRDF where no group mixes names of the description with others.
     """
     place = robot.semantic.name
     try:
         semantic = parse_srdf(read_semantic(robot))
     except (DescriptionError, urdf_reader.DescriptionError) as problem:
         return [error(place, str(problem), 'correct it: the arm has no group without')], None
-    wrong = [
-        finding
-        for group in semantic.groups.values()
-        for finding in _group(place, group, semantic, tree)
-    ]
+    found = list(_groups(place, semantic, tree))
     if not semantic.groups:
         remedy = f'{srdf_command(robot)} adds groups from the chains of the description'
-        wrong.append(error(place, 'it has no group', remedy))
-    return wrong, None if wrong else semantic
+        found.append(error(place, 'it has no group', remedy))
+    wrong = any(finding.severity is Severity.ERROR for finding in found)
+    return found, None if wrong else semantic
 
 
-def _group(
-    place: str, group: Group, semantic: SemanticDescription, tree: KinematicTree
-) -> Iterable[Finding]:
-    """Find names of a group that the description does not have."""
-    joints = {joint.name for joint in tree.joints}
-    links = [link for chain in group.chains for link in chain] + list(group.links)
-    lost = {
-        'joint': [name for name in group.joints if name not in {*joints, *semantic.virtual}],
-        'link': [name for name in dict.fromkeys(links) if name not in tree.links],
-        'group': [name for name in group.subgroups if name not in semantic.groups],
-    }
+def _groups(place: str, semantic: SemanticDescription, tree: KinematicTree) -> Iterable[Finding]:
+    """Find names of groups that the description does not have."""
+    joints = {joint.name for joint in tree.joints} | set(semantic.virtual)
     known = {'joint': sorted(joints), 'link': sorted(tree.links), 'group': list(semantic.groups)}
-    for kind, names in lost.items():
-        if names:
-            yield error(
-                f'{place}, group {group.name}',
-                f'there is no {kind} {", ".join(map(repr, names))}',
-                f'name links and joints as the description does; {kind}s: '
-                f'{", ".join(known[kind])}',
-            )
+    named = {name: _named(group) for name, group in semantic.groups.items()}
+    lost = {
+        name: {kind: [each for each in names[kind] if each not in known[kind]] for kind in known}
+        for name, names in named.items()
+    }
+    absent = [name for name in named if lost[name] == named[name]]
+    if len(absent) == len(named):
+        absent = []  # the SRDF is that of another robot
+    for name in absent:
+        yield warning(
+            f'{place}, group {name}',
+            'the description has no joint or link of it: it is left out',
+            'fine where the robot comes without, such as a gripper that is not mounted',
+        )
+    for name, kinds in lost.items():
+        for kind, names in kinds.items():
+            if names and name not in absent:
+                yield error(
+                    f'{place}, group {name}',
+                    f'there is no {kind} {", ".join(map(repr, names))}',
+                    f'name links and joints as the description does; {kind}s: '
+                    f'{", ".join(known[kind])}',
+                )
+
+
+def _named(group: Group) -> Mapping[str, Sequence[str]]:
+    """Return what a group names, each once."""
+    links = [link for chain in group.chains for link in chain] + list(group.links)
+    return {
+        'joint': [*group.joints],
+        'link': [*dict.fromkeys(links)],
+        'group': [*group.subgroups],
+    }

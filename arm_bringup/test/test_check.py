@@ -31,6 +31,11 @@ CAMERA = """
 <material name="red"><color rgba="1 0 0"/></material></visual></link>
 <joint name="camera" type="fixed"><parent link="tool0"/><child link="camera"/></joint>"""
 
+PARKED = """<group_state name="parked" group="gp110_arm">
+<joint name="joint_1_s" value="0"/><joint name="joint_2_l" value="2"/>
+<joint name="joint_3_u" value="-1"/><joint name="joint_4_r" value="0"/>
+<joint name="joint_5_b" value="-1.57"/><joint name="joint_6_t" value="0"/></group_state></robot>"""
+
 
 @pytest.fixture
 def robot(tmp_path: Path) -> Robot:
@@ -81,8 +86,26 @@ def test_nothing_is_wrong_with_our_robots(name: str, warnings: list[str]) -> Non
             f'{CAMERA}</robot>',
             [(WARNING, 'link camera: <color rgba="1 0 0">'), (WARNING, 'no file /lost.stl')],
         ),
-        ('limits.yaml', '  joint_3_u:\n', '  joint_3:\n', [(ERROR, 'joint_3')]),
+        (
+            'limits.yaml',
+            '  joint_3_u:\n',
+            '  joint_3:\n',
+            [(ERROR, "'joint_3'; is 'joint_3_u' meant"), (WARNING, 'no max_acceleration in')],
+        ),
+        ('limits.yaml', 'joint_limits:', 'joint_limits:\n  finger: {}', [(WARNING, "'finger'")]),
         ('gp110.srdf', '"tool0"', '"tool9"', [(ERROR, 'tool9')]),
+        (
+            'gp110.srdf',
+            '</robot>',
+            '<group name="hand"><joint name="finger_1"/><joint name="finger_2"/></group></robot>',
+            [(WARNING, 'group hand: the description has no joint or link of it')],
+        ),
+        (
+            'gp110.srdf',
+            '</robot>',
+            PARKED,
+            [(WARNING, "pose 'parked': base_link and link_6_t collide, by 10 mm")],
+        ),
         ('gp110.srdf', 'name="ready"', 'name="home"', [(WARNING, 'no pose')]),
         ('gp110.srdf', 'value="-1.5708"', 'value="0"', [(ERROR, 'singular')]),
         (
@@ -255,7 +278,7 @@ def test_joints_that_mimic_are_joints(robot: Robot) -> None:
     assert 'follows left_joint' in wrong.problem
 
 
-def test_a_gripper_without_limits_is_found_before_it_ends_the_master(robot: Robot) -> None:
+def test_a_gripper_without_limits_has_defaults_that_are_named(robot: Robot) -> None:
     """End effectors that have drives are moved, so they are checked as arms are."""
     finger = (
         '<link name="finger"/><joint name="finger_joint" type="prismatic"><parent link="tool0"/>'
@@ -267,9 +290,9 @@ def test_a_gripper_without_limits_is_found_before_it_ends_the_master(robot: Robo
     replace(robot.semantic, '</robot>', hand)
     with robot.bus_config.open('a') as file:
         file.write('  finger_joint:\n    node_id: 9\n')
-    (found,) = check_robot(robot)
-    assert (found.severity, found.place) == (ERROR, 'limits.yaml')
-    assert 'joint finger_joint is missing' in found.problem
+    found = check_robot(robot)
+    assert [(each.severity, each.place) for each in found] == [(WARNING, 'limits.yaml')] * 2
+    assert all('finger_joint' in each.problem for each in found)
     with robot.limits.open('a') as file:
         file.write('  finger_joint: {max_velocity: 0.1, max_acceleration: 1.0, max_jerk: 9.0}\n')
     assert check_robot(robot) == []

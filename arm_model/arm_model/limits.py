@@ -16,8 +16,9 @@ The file has MoveIt's format (joint_limits.yaml)::
 Position limits (``has_position_limits``, ``min_position``, ``max_position``) and velocities may be
 narrower than those of the description, never wider. Metres stand for radians at a sliding joint.
 
-What neither file says has a default, which is noted: MoveIt's files have no jerk and often no
-acceleration, and some descriptions write velocity 0.
+The table may stand in the parameters of a node (``move_group: {ros__parameters: ...}``), and may
+leave joints out. What neither file says has a default, which is noted: MoveIt's files have no jerk
+and often no acceleration, and some descriptions write velocity 0.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+import difflib
 import math
 from pathlib import Path
 from typing import Any
@@ -143,10 +145,19 @@ def load_limits(path: Path | str) -> Mapping[str, Any]:
         document = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
     except (OSError, yaml.YAMLError) as error:
         raise LimitsError(f'{path}: {error}') from error
-    table = document.get('joint_limits') if isinstance(document, dict) else None
+    table = _table(document)
     if not isinstance(table, dict):
         raise LimitsError(f'{path}: there is no table joint_limits')
     return table
+
+
+def _table(document: object) -> object:
+    """Return the first ``joint_limits``, at whatever depth; None where there is none."""
+    if not isinstance(document, dict):
+        return None
+    if 'joint_limits' in document:
+        return document['joint_limits']
+    return next(filter(None, map(_table, document.values())), None)
 
 
 def merge_limits(
@@ -158,10 +169,13 @@ def merge_limits(
         notes: Gets a line for each kind of limit that has a default, with the joints.
 
     Raises:
-        LimitsError: A joint is missing, a number is not positive, misspelt or wider than the
-            description's.
+        LimitsError: The table has no joint of the description, a number is not positive, misspelt
+            or wider than the description's.
     """
     joints = {joint.name: joint for joint in tree.joints}
+    if joints.keys().isdisjoint(table):
+        known = ', '.join(table) or 'none'
+        raise LimitsError(f'joint {names[0]} is missing in the limits file, which has: {known}')
     defaults: dict[str, list[str]] = {}
     rows: list[_Row] = []
     problems: list[str] = []
@@ -188,12 +202,13 @@ def _collected(problems: list[str]) -> Iterator[None]:
 
 def _row(joint: Joint, table: Mapping[str, Any], defaults: dict[str, list[str]]) -> _Row:
     name, span = joint.name, joint.range
-    entry = table.get(name)
+    entry = table.get(name, {})
     if not isinstance(entry, dict):
-        known = ', '.join(table) or 'none'
-        raise LimitsError(f'joint {name} is missing in the limits file, which has: {known}')
+        raise LimitsError(f'joint {name} of the limits file is {entry!r}, a table is needed')
     if unknown := sorted(set(entry) - KNOWN_KEYS):
-        raise LimitsError(f'joint {name}: unknown key {unknown[0]!r} in the limits file')
+        close = difflib.get_close_matches(unknown[0], KNOWN_KEYS, n=1)
+        meant = f' (is {close[0]!r} meant?)' if close else ''
+        raise LimitsError(f'joint {name}: unknown key {unknown[0]!r}{meant} in the limits file')
 
     def default(words: str, value: float) -> float:
         defaults.setdefault(words, []).append(name)

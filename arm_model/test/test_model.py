@@ -189,12 +189,13 @@ def entry(**values: object) -> Callable[[Texts], Texts]:
 
 
 BROKEN: dict[str, tuple[Callable[[Texts], Texts], str]] = {
-    'no joint': (lambda t: (*t[:2], {'j1': t[2]['j1'], 'j3': t[2]['j3']}), 'joint j2 is missing'),
+    'no joint': (lambda t: (*t[:2], {'other': t[2]['j1']}), 'joint j1 is missing'),
+    'no table': (lambda t: (*t[:2], {**t[2], 'j2': None}), 'j2 .*a table is needed'),
     'negative jerk': (entry(max_jerk=-1.0), 'max_jerk is -1'),
     'word for a number': (entry(max_jerk='high'), "'high'"),
     'wider velocity': (entry(max_velocity=3.0), 'wider than the description'),
     'wider positions': (entry(min_position=-3, max_position=1), 'wider than the description'),
-    'misspelt key': (entry(max_yerk=1.0), "'max_yerk'"),
+    'misspelt key': (entry(max_yerk=1.0), r"'max_yerk' \(is 'max_jerk' meant"),
     'no group': (lambda t: (t[0], '<robot name="chain"/>', t[2]), 'groups none'),
     'srdf no xml': (lambda t: (t[0], '<robot', t[2]), 'SRDF is no XML'),
     'urdf no xml': (lambda t: ('<robot', *t[1:]), 'description is no XML'),
@@ -230,6 +231,8 @@ def test_what_no_file_says_has_a_default_that_is_noted_once() -> None:
     assert joints == ['j1, j2', 'j1', 'j1, j2, j3', 'j3', 'j3']
     units = [note.partition(':')[0].rpartition(' ')[2] for note in defaults]
     assert units == ['rad/s', 'rad/s2', 'max_acceleration', 'm/s', 'm/s2']
+    del table['j1']  # the wizard leaves joints out that it asks no limits of
+    assert RobotModel(urdf, srdf, table).limits.velocity.tolist() == [2.0] * 3
 
 
 def test_unknown_names_are_refused_with_the_known_ones() -> None:
@@ -303,9 +306,19 @@ def test_a_limits_file_that_is_none(tmp_path: Any) -> None:
     path = tmp_path / 'limits.yaml'
     with pytest.raises(ModelError, match=r'limits\.yaml'):
         load_limits(path)
-    path.write_text('joints: {}\n', encoding='utf-8')
-    with pytest.raises(ModelError, match='joint_limits'):
-        load_limits(path)
+    for text in ('joints: {}', '[1]', 'joint_limits: 3', 'a: {joint_limits: {}}'):
+        path.write_text(text, encoding='utf-8')
+        with pytest.raises(ModelError, match='joint_limits'):
+            load_limits(path)
+
+
+def test_limits_of_a_parameter_file(tmp_path: Path) -> None:
+    """As packages of ROS 2 have them, at the depth at which move_group reads them."""
+    path = tmp_path / 'limits.yaml'
+    for above in ('', 'robot_description_planning: ', '/**: {ros__parameters: '):
+        table = '{joint_limits: {j1: {max_jerk: 9.0}}}'
+        path.write_text(f'{above}{table}{"}" * above.count("{")}', encoding='utf-8')
+        assert load_limits(path) == {'j1': {'max_jerk': 9.0}}
 
 
 def test_links_may_be_checked_by_name_only() -> None:
