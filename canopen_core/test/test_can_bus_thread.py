@@ -38,7 +38,7 @@ def test_all_that_is_handed_over_around_the_end_is_answered(
         return [thread.call(lambda: None) for _ in range(CALLS)]
 
     thread = BusThread(VirtualBus('here', VirtualWire()), 'owner', serve, 'the owner')
-    running: Future[None] = thread.run(lambda future: begun.set())
+    running: Future[None] = thread.run_later(lambda future: begun.set())
     thread.start()
     begun.set()
     with ThreadPoolExecutor(CALLERS) as pool:

@@ -4,11 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future
+from collections.abc import Sequence
 import logging
 import time
-from typing import TypeVar
 
 from canopen_core import BusError
 from canopen_core.can import Bus, BusThread, Frame
@@ -17,15 +15,13 @@ from canopen_core.standard import CobId, NODE_ID_MAX
 from .device import Device
 from .host import DeviceHost
 
-Result = TypeVar('Result')
-
 IDLE_WAIT = 1.0  # [s] longest wait when no device has a deadline
 STALL = 0.1  # [s] without a processor from which on devices count as having stood still
 
 logger = logging.getLogger(__name__)
 
 
-class DeviceRunner:
+class DeviceRunner(BusThread):
     """Waits for frames and deadlines, and gives them to the devices of a host.
 
     A bus that goes away (interface down) is waited for; the devices go on meanwhile, as real
@@ -34,41 +30,24 @@ class DeviceRunner:
 
     def __init__(self, bus: Bus) -> None:
         """Prepare; :meth:`start` starts the thread, and the caller closes the bus."""
+        super().__init__(bus, 'devices', self._serve, 'the simulation')
         # the devices; add them before :meth:`start`, and leave them to the thread then:
         # :meth:`call` gets at them
         self.host = DeviceHost(self._send, _log_defect)
-        self._bus = bus
-        self._thread = BusThread(bus, 'devices', self._serve, 'the simulation')
 
     @property
     def bus_name(self) -> str:
         """Where the devices are, as `can_interface_name` writes it."""
         return self._bus.name
 
-    def start(self, begin: Callable[[], None] = lambda: None) -> None:
-        """Switch the devices on, in a thread of their own that calls ``begin`` first."""
-        self._thread.start(begin)
-
-    def stop(self) -> None:
-        """Fall silent, as if the power of all devices was cut, and end the thread."""
-        self._thread.stop()
-
-    def call(self, function: Callable[[], Result]) -> Future[Result]:
-        """Run a function in the thread of the devices, between two of their steps.
-
-        It may use :attr:`host` and its devices, and must not wait for anything. Its result is a
-        BusError when the thread has ended or ends before.
-        """
-        return self._thread.call(function)
-
     def _serve(self) -> None:
         host, woken = self.host, time.monotonic()
-        while not self._thread.stopping:
+        while not self.stopping:
             host.advance(time.monotonic())
-            self._thread.do_work()
+            self.do_work()
             rest = time.monotonic()
             due = min(host.deadline, rest + IDLE_WAIT)
-            frames = self._thread.receive(max(0.0, due - rest))
+            frames = self.receive(max(0.0, due - rest))
             now = time.monotonic()
             first = frames[0].timestamp or now if frames else due
             stalled = (rest - woken) + max(0.0, now - max(rest, min(due, first)))
@@ -82,7 +61,7 @@ class DeviceRunner:
         try:
             self._bus.send(frame)
         except BusError as error:
-            self._thread.note_failure(error)
+            self.note_failure(error)
 
 
 def _pass_over(frames: list[Frame], now: float) -> list[Frame]:

@@ -81,16 +81,16 @@ class Clock:
     future: Callable[[], Future[Any]] = Future  # of what another thread hands over
 
 
-class NetworkThread:
+class NetworkThread(BusThread):
     """Owns the cycle, and all reading and writing of the bus.
 
-    Other threads hand work to it with ``call`` and ``run`` and get a future; nothing is locked.
     Without a thread, :meth:`begin` and then :meth:`step`, again and again, do the same.
     """
 
     def __init__(self, bus: Bus, network: Network, clock: Clock | None = None) -> None:
         """The bus is open, and stays the caller's to close."""
         clock = clock or Clock()
+        super().__init__(bus, 'canopen', self._serve, OWNER, clock.future)
         self.now = clock.now  # steady time in [s]
         self.network = network  # the network that it runs
         self.period = network.config.master.cycle_period  # length of the cycle in [s]
@@ -98,28 +98,9 @@ class NetworkThread:
         self.failure: BusError | None = None
         # called in the thread, for what can still be done; returns what was, in words
         self.on_defect: Callable[[], str] = lambda: ''
-        self.on_failure: Callable[[], None] = lambda: None
         self._statistics = CycleStatistics(self.period)
         self._cycle_time = 0.0
         self._timer = CycleTimer(self.period, clock.now())
-        self._thread = BusThread(bus, 'canopen', self._serve, OWNER, clock.future)
-        self._thread.on_failure = self._fail  # called in the thread when there is one
-
-    def refuse_before_start(self, reason: str) -> None:
-        """Refuse what is handed over before the start, with a BusError of this text."""
-        self._thread.refuse_before_start(reason)
-
-    def start(self, begin: Callable[[], None] = lambda: None) -> None:
-        """Call ``begin`` in the thread, which may want a priority, and start the cycle."""
-        self._thread.start(begin)
-
-    def stop(self) -> None:
-        """End the thread after the cycle that runs, and wait for it."""
-        self._thread.stop()
-
-    def call(self, function: Callable[[], T]) -> Future[T]:
-        """Run a function in the thread of the cycle; it must not wait."""
-        return self._thread.call(function)
 
     def run(self, sequence: Callable[[], Promise[T]]) -> Future[T]:
         """Call ``sequence`` in the thread of the cycle; the future gets what its promise gets."""
@@ -135,7 +116,7 @@ class NetworkThread:
 
             sequence().when_done(finish)
 
-        return self._thread.run(begin)
+        return self.run_later(begin)
 
     def run_coroutine(self, make: Callable[[], Coroutine[Promise[Any], None, T]]) -> Future[T]:
         """As :meth:`run`, for a coroutine that is made in the thread of the cycle."""
@@ -145,14 +126,13 @@ class NetworkThread:
         """Return the figures of the cycle; call it in the thread of the cycle."""
         return self._statistics.figures()
 
-    def _fail(self, error: Exception) -> None:
+    def _defect(self, error: Exception) -> None:
         text = f'{OWNER} has ended by a defect: {type(error).__name__}: {error}'
         try:
             text += self.on_defect()
         except Exception:
             logger.exception('a second defect, after the end of the CANopen cycle')
         self.failure = BusError(text)
-        self.on_failure()
 
     def begin(self) -> None:
         """Begin to boot the devices; the first cycle is due at once."""
@@ -169,7 +149,7 @@ class NetworkThread:
         """Receive until something is due, and do that; SYNC comes before all else."""
         now = self.now()
         if now < self._timer.deadline:
-            self._take(self._thread.receive(max(0.0, self.next_due - now)))
+            self._take(self.receive(max(0.0, self.next_due - now)))
             now = self.now()
             if now < self._timer.deadline:
                 self._log_defects(partial(self.network.advance, now))
@@ -182,7 +162,7 @@ class NetworkThread:
 
     def _serve(self) -> None:
         self.begin()
-        while not self._thread.stopping:
+        while not self.stopping:
             self.step()
 
     def _begin_cycle(self, cycle: Cycle, now: float) -> None:
@@ -192,7 +172,7 @@ class NetworkThread:
         seem to have missed.
         """
         self._cycle_time = cycle.time
-        frames = self._thread.receive(0.0)
+        frames = self.receive(0.0)
         self._take([frame for frame in frames if frame.timestamp < now])
         if cycle.late > REPORTED_LATENESS:
             self._log_defects(partial(self.network.note_pause, cycle.late, now))
@@ -212,7 +192,7 @@ class NetworkThread:
                 receive(frame)
             except Exception:  # noqa: PERF203  # one frame must not cost the next
                 logger.exception('a defect in the CANopen master, at the frame %s', frame)
-        self._thread.do_work()
+        self.do_work()
 
     def _log_defects(self, work: Callable[[], object]) -> None:
         """Contain a defect in one cycle, so that the drives stay under control."""

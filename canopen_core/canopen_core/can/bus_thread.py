@@ -39,10 +39,9 @@ class BusThread:
     ) -> None:
         """Prepare; serve is the owner's loop until :attr:`stopping`. The caller closes the bus."""
         self.stopping = False
-        # called in the thread, at its end, with the defect that has ended it
-        self.on_failure: Callable[[Exception], None] = lambda error: None
+        self.on_failure: Callable[[], None] = lambda: None  # called when a defect has ended it
         self._bus = bus
-        self._serve = serve
+        self._loop = serve
         self._owner = owner
         self._future = future
         self._work: deque[tuple[Future[Any], Callable[[], None]]] = deque()
@@ -83,7 +82,7 @@ class BusThread:
         self._hand_over(future, lambda: future.set_result(function()))
         return future
 
-    def run(self, begin: Callable[[Future[T]], None]) -> Future[T]:
+    def run_later(self, begin: Callable[[Future[T]], None]) -> Future[T]:
         """Start something in the thread that ends later, there it sets the result of the future.
 
         Returns:
@@ -154,14 +153,18 @@ class BusThread:
         failure: Exception | None = None
         try:
             self._begin()
-            self._serve()
+            self._loop()
         except Exception as error:
             logger.exception('%s has ended by a defect', self._owner)
             failure = error
         finally:
             self._end()
         if failure is not None:
-            self.on_failure(failure)
+            self._defect(failure)
+            self.on_failure()
+
+    def _defect(self, error: Exception) -> None:
+        """Do what can still be done after a defect that has ended the thread, in the thread."""
 
     def _end(self) -> None:
         self._ended = True
