@@ -12,9 +12,10 @@ remedy, and is the outcome of the motion that it ends.
 
 from __future__ import annotations
 
-from .core.execution import Execution, ExecutionSettings, Feedback, Phase
+from .controllers.controller import ArmState, Controller, Outcome, SetPoint, Source
+from .controllers.jog import JointCommand, PoseCommand, ServoSettings, TwistCommand
+from .controllers.trajectory import Execution, ExecutionSettings, Feedback, Phase
 from .core.motion_core import check_arm, MotionCore
-from .core.outcome import Outcome
 from .core.requests import (
     DisplacementRequest,
     JogRequest,
@@ -23,17 +24,17 @@ from .core.requests import (
     StopRequest,
     TargetRequest,
 )
-from .core.set_point import SetPoint, Source
 from .core.settings import CoreSettings
 from .exceptions import NotReadyError
-from .jog.servo_source import JointCommand, PoseCommand, ServoSettings, TwistCommand
 from .jog.velocity_bounds import VelocityBoundsSettings
 from .jog.velocity_ik import IkSettings
 from .report import Cause, Limiter, MotionReport
 from .ros.parameter_check import check_parameters
 
 __all__ = [
+    'ArmState',
     'Cause',
+    'Controller',
     'CoreSettings',
     'DisplacementRequest',
     'Execution',

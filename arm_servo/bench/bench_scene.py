@@ -37,7 +37,7 @@ from shape_msgs.msg import SolidPrimitive
 from arm_model import Array, Clearances, Mesh, octomap_shapes, Places, PlanningScene
 from arm_model.ros import apply_planning_scene, hull_of
 from arm_model.ros.planning_scene import MAX_CORNERS
-from arm_servo.core.prepared_scene import PreparedScene
+from arm_servo.core.preparation import PreparedScene
 
 BOXES = 100
 

@@ -23,8 +23,7 @@ from arm_servo import (
     TargetRequest,
     TwistCommand,
 )
-from arm_servo.core.commands import by_joint
-from arm_servo.core.requests import ImmediateRequest, MotionRequest
+from arm_servo.core.requests import by_joint, ImmediateRequest, MotionRequest
 from arm_trajectory import TrajectoryGoal
 
 TIMEOUT = 0.1  # time for which a jog counts in [s]

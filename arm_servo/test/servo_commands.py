@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from arm_servo import DisplacementRequest, JogRequest, JointCommand, Outcome, TwistCommand
-from arm_servo.core.commands import by_joint
 from arm_servo.core.gateway import CommandGateway
 from arm_servo.core.motion_queue import MotionCommand
+from arm_servo.core.requests import by_joint
 
 
 class InlineWorker(Executor):

@@ -12,8 +12,8 @@ import pinocchio as pin
 
 from arm_model import Array, RobotModel, RobotState
 from arm_servo import Limiter, MotionReport
+from arm_servo.controllers.jog import Command, ServoSource
 from arm_servo.core.safety_filter import SafetyFilter
-from arm_servo.jog.servo_source import Command, ServoSource
 from arm_trajectory import OnlineTrajectoryGenerator
 
 PERIOD = 0.01  # cycle of the tests in [s]: slower than in use, so that they are quick

@@ -30,12 +30,12 @@ from arm_servo import (
     SpeedRequest,
     StopRequest,
 )
-from arm_servo.core.commands import by_joint
+from arm_servo.controllers.target import SingleTarget
 from arm_servo.core.gateway import start_worker
 from arm_servo.core.motion_queue import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand
 from arm_servo.core.preparation import CommandBasis, Prepared
+from arm_servo.core.requests import by_joint
 from arm_servo.core.safety_filter import SafetyFilter
-from arm_servo.core.single_target import SingleTarget
 from arm_servo.core.snapshot import MAX_CYCLE_AGE
 from arm_trajectory import GoalCode, GoalError, GoalPoint, StateMovedError, TrajectoryGoal
 

@@ -7,17 +7,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from hypothesis import given
-from hypothesis import strategies as st
 import pytest
 from servo_drives import Drives, PERIOD
 
 from arm_canopen import Refusal, RefusalCause
-from arm_servo import JogRequest, JointCommand, NotReadyError, Source
-from arm_servo.core.commands import by_joint
-from arm_servo.core.hold_to_run import BEGIN_MARGIN, GONE_AFTER, HoldToRun, LET_GO_MARGIN
-
-PAUSES = st.floats(0.0, GONE_AFTER - LET_GO_MARGIN - 0.1)
+from arm_servo import JogRequest, JointCommand, Source
+from arm_servo.core.requests import by_joint
 
 
 class Stick:
@@ -140,30 +135,6 @@ def test_others_need_not_let_go() -> None:
     assert stick.position > rest + 0.02
 
 
-@given(st.floats(0.0, LET_GO_MARGIN), st.lists(PAUSES, max_size=20))
-def test_no_pause_is_letting_go(before: float, pauses: list[float]) -> None:
-    """Whatever the pauses after the stop, and short ones before: a zero, or a person's request."""
-    holds, now = HoldToRun(), 100.0
-    holds.command('stick', now, is_zero=False)
-    now += before
-    holds.interrupt('halted', now)
-    for pause in pauses:
-        now += pause
-        with pytest.raises(NotReadyError, match='halted; a jog that was held before moves'):
-            holds.command('stick', now, is_zero=False)
-    holds.command('stick', now, is_zero=True)
-    holds.command('stick', now, is_zero=False)
-
-
-def test_a_person_lets_everybody_in() -> None:
-    """A keyboard that sends no zero needs a request."""
-    holds = HoldToRun()
-    holds.command('keys', 1.0, is_zero=False)
-    holds.interrupt('halted', 2.0)
-    holds.renew()
-    holds.command('keys', 3.0, is_zero=False)
-
-
 @pytest.mark.parametrize('pause', [1.0, 3.0, 6.0])
 @pytest.mark.parametrize('happens', [halt, is_enabled, faults])
 def test_who_was_silent_before_a_stop_moves_the_arm_after_it(
@@ -179,38 +150,3 @@ def test_who_was_silent_before_a_stop_moves_the_arm_after_it(
     stick.push(0.2, 50)
     assert stick.refusals == []
     assert stick.position > rest + 0.02
-
-
-def test_silence_is_letting_go_in_the_end() -> None:
-    """A program that ended without a zero while the arm was stopped, and begins another day."""
-    holds = HoldToRun()
-    holds.command('keys', 1.0, is_zero=False)
-    holds.interrupt('halted', 1.1)
-    with pytest.raises(NotReadyError, match='silence counts after 10 s only'):
-        holds.command('keys', 1.2, is_zero=False)
-    holds.begin(1.3 + GONE_AFTER)
-    holds.command('keys', 1.3 + GONE_AFTER, is_zero=False)
-
-
-@given(st.floats(0.0, 10.0))
-def test_silence_counts_from_when_a_command_has_expired(lasts: float) -> None:
-    """A command that counts for long moves the arm for as long."""
-    for late, held in ((-0.1, True), (0.1, False)):
-        holds = HoldToRun()
-        holds.command('keys', 1.0, is_zero=False, expires=1.0 + lasts)
-        holds.interrupt('halted', 1.0 + lasts + LET_GO_MARGIN + late)
-        assert holds.begin(1.0 + lasts + LET_GO_MARGIN + late) is held
-
-
-@given(st.floats(0.0, 1.0).filter(lambda ahead: abs(ahead - BEGIN_MARGIN) > 1e-9))
-def test_an_arm_that_begins_to_follow_moves_for_a_new_push_only(ahead: float) -> None:
-    """The push that gets the drives back is some cycles older than that."""
-    holds = HoldToRun()
-    holds.command('stick', 100.0, is_zero=False)
-    holds.command('stick', 100.0 + ahead, is_zero=False)
-    holds.begin(100.0 + ahead)
-    if ahead < BEGIN_MARGIN:
-        holds.command('stick', 100.0 + ahead, is_zero=False)
-    else:
-        with pytest.raises(NotReadyError):
-            holds.command('stick', 100.0 + ahead, is_zero=False)

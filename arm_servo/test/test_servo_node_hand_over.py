@@ -15,8 +15,8 @@ from servo_drives import Drives, PERIOD
 
 from arm_model import ArmError
 from arm_servo import PauseRequest, SpeedRequest, StopRequest
+from arm_servo.controllers.controller import MOTIONS
 from arm_servo.core.requests import ImmediateRequest
-from arm_servo.core.set_point import MOTIONS
 from arm_trajectory import GoalPoint, TrajectoryGoal
 
 pytestmark = pytest.mark.slow

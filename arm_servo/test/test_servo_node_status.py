@@ -95,11 +95,12 @@ def test_a_stop_of_the_safety_filter_is_no_free_motion() -> None:
     )
     gateway = CommandGateway(core, InlineWorker(), lambda: 100.0)
     core.reset(ready('panda'))
+    gateway.update(100.0, PERIOD, core.state, core.state.position, '')
     jog(gateway, {'panda_joint6': -1.0}, 100.0, 60.0)
     reported = set()
     for cycle in range(250):
         state = core.state
-        gateway.step(100.0 + cycle * PERIOD, PERIOD, state, '')
+        gateway.update(100.0 + cycle * PERIOD, PERIOD, state, state.position, '')
         code, words = status_of(gateway.snapshot, '', '', '')
         reported.add(code)
         if code == StatusCode.HALT_FOR_COLLISION:

@@ -17,7 +17,7 @@ import pytest
 from servo_streams import kept, PERIOD
 
 from arm_model import Array, JointLimits, RobotState
-from arm_servo import CoreSettings, Execution, ExecutionSettings, MotionCore, Phase
+from arm_servo import ArmState, CoreSettings, Execution, ExecutionSettings, MotionCore, Phase
 from arm_trajectory import (
     GoalCode,
     GoalError,
@@ -267,7 +267,8 @@ def test_set_points_that_leave_the_path_end_the_trajectory() -> None:
     state = RobotState.at_rest(begin)
     for step in range(300):
         held = state if step < 150 else RobotState.at_rest(state.position)
-        after = execution.step(held, held, 1.0, PERIOD)
+        arm = ArmState(held, held, 0.0, 1.0, is_paused=False, is_held=False)
+        after = execution.update(arm, PERIOD)
         state = after if step < 150 and after is not None else held
     assert execution.ending is not None
     assert execution.ending.code is GoalCode.PATH_TOLERANCE_VIOLATED

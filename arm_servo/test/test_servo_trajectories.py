@@ -46,7 +46,7 @@ def off_the_path(states: list[RobotState], path: Path) -> float:
 def path_of(core: MotionCore) -> Path:
     """Return the path that a core follows."""
     assert core.execution is not None
-    return core.execution._path
+    return core.execution.path
 
 
 @pytest.mark.parametrize('name', ROBOTS)
@@ -246,7 +246,7 @@ def test_a_later_begin_is_planned_before_it(name: str, seed: int, ahead: float) 
     goal = replace(wave(robot(name), ready(name), 'q'), age=-ahead)
     execution = core_commands.follow(core, goal)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr('arm_servo.core.execution.build_path', None)
+        patch.setattr('arm_servo.controllers.trajectory.build_path', None)
         followed = follow_to_the_end(core, execution)
     assert execution.ending is not None
     assert execution.ending.code is GoalCode.SUCCESSFUL, execution.ending

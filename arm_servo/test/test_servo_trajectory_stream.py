@@ -9,8 +9,6 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
-from hypothesis import given
-from hypothesis import strategies as st
 from isolation import Isolation
 import numpy as np
 import pytest
@@ -22,9 +20,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_canopen import Refusal, RefusalCause
 from arm_model import JointLimits
-from arm_servo import NotReadyError
-from arm_servo.core.hold_to_run import GONE_AFTER
-from arm_servo.core.trajectory_stream import TOGETHER, TrajectoryStream
+from arm_servo.core.mailbox import TOGETHER
 from arm_servo.ros.trajectory.controller import TrajectoryController
 from arm_servo.ros.trajectory.parameters import declare_trajectory
 
@@ -210,50 +206,3 @@ def test_an_empty_trajectory_stops(arm: Arm) -> None:
     arm.wait(1.0)
     assert arm.position == rest
     assert max(abs(b[0] - a[0]) for a, b in pairwise(arm.drives.path)) < 0.02
-
-
-class Clock:
-    """Steady time that the test moves."""
-
-    def __init__(self) -> None:
-        self.now = 100.0
-
-    def __call__(self) -> float:
-        """Return it in [s]."""
-        return self.now
-
-
-PAUSES = st.floats(0.0, GONE_AFTER - 0.1)
-
-
-@given(PAUSES, st.lists(PAUSES, max_size=20))
-def test_no_pause_lets_a_stream_in(before: float, pauses: list[float]) -> None:
-    """Only silence with a request, or one so long that whoever sent it is gone."""
-    clock = Clock()
-    stream = TrajectoryStream(clock)
-    stream.take()
-    stream.take()
-    last = clock.now
-    clock.now += before
-    stream.interrupt('halted')
-    for pause in pauses:
-        clock.now = max(clock.now, last + pause)
-        last = clock.now
-        with pytest.raises(NotReadyError, match='halted; a stream of trajectories does not go on'):
-            stream.take()
-        stream.renew()  # it has just come
-    clock.now += GONE_AFTER + 0.1
-    stream.take()
-
-
-def test_who_gets_the_drives_back_for_a_stream_counts_once() -> None:
-    """The next time they are enabled, it was somebody else."""
-    stream = TrajectoryStream(Clock())
-    for _ in range(2):
-        stream.take()
-        stream.ask(lambda: True)
-    stream.begin()
-    stream.take()
-    stream.begin()
-    with pytest.raises(NotReadyError, match='begun to follow'):
-        stream.take()

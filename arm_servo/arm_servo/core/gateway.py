@@ -10,26 +10,29 @@ what was under way.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from itertools import count
+import math
 import time
 
 from arm_model import ArmError, Array, PlanningScene, RobotModel, RobotState
 from arm_trajectory import GoalCode
 
+from ..controllers.controller import JOGGING, MOTIONS, SetPoint, Source
+from ..controllers.trajectory import Execution
 from ..exceptions import NotReadyError
-from .hold_to_run import BEGINS, HoldToRun
+from .mailbox import BEGINS, Cycle, Mailbox, TOGETHER
 from .motion_core import MotionCore
 from .motion_queue import MotionCommand, MotionQueue
 from .moving_arms import Neighbours
-from .orders import CommandOrder, Cycle, OrderQueue
+from .preparation import PreparedScene
 from .requests import ImmediateRequest, JogRequest, MotionRequest, PauseRequest, StopRequest
-from .scene_exchange import SceneExchange
-from .set_point import JOGGING, MOTIONS, SetPoint, Source
 from .snapshot import Snapshot
-from .trajectory_stream import TrajectoryStream
 
 MAX_QUEUED_JOGS = 1000  # jog commands that may wait for the cycle
+
+Loss = tuple[str, GoalCode]  # why an arm that followed does not go on, and the code of its motion
 
 
 def start_worker() -> Executor:
@@ -42,13 +45,13 @@ def start_worker() -> Executor:
 class CommandGateway:
     """Commands to one motion core from any thread, carried out by the thread that steps it.
 
-    The commands and :attr:`snapshot`, :attr:`model` are for any thread; :meth:`begin`,
-    :meth:`step`, :meth:`fail` and :meth:`idle` for the cycle. The kinematics of the core's model
-    belong to the cycle too. Times are steady times in [s].
+    :meth:`update`, :meth:`reset` and :meth:`abandon` are for the cycle, and the kinematics of the
+    core's model belong to it; the rest is for any thread. Times are steady times in [s].
 
     Attributes:
-        holds: Which clients hold a jog, and have to let go after the arm had stopped following.
-        stream: What comes on the topic of trajectories, and ends in the same way.
+        model: The arm.
+        snapshot: What the core did in the last cycle.
+        is_following: Whether the arm is commanded, also to bring it to rest.
     """
 
     def __init__(
@@ -62,33 +65,21 @@ class CommandGateway:
             clock: Steady time, the one of the cycle.
         """
         self.model: RobotModel = core.model
-        self._core = core
-        self._orders = OrderQueue()
-        self._clock = clock
-        self._order = CommandOrder()
-        self.holds = HoldToRun()
-        self.stream = TrajectoryStream(clock)
-        self._scenes = SceneExchange(core, self._orders, worker)
+        self.snapshot = Snapshot(0.0, None, None, 'the cycle has not begun yet')
+        self.is_following = False
+        self._lost = ''  # why an arm that followed comes to rest
+        self._core, self._worker, self._clock = core, worker, clock
+        self._mailbox = Mailbox()
+        self._gate = self._mailbox.gate
+        self._versions = count(1)
         self._motions = MotionQueue(
-            core,
-            self._orders,
-            self._order,
-            worker,
-            clock,
-            rest=self._rest,
-            recheck=self._scenes.recheck,
+            core, self._mailbox, worker, clock, rest=self._rest, recheck=self._recheck
         )
-        self._snapshot = Snapshot(0.0, None, None, 'the cycle has not begun yet')
 
     @property
     def refused(self) -> float:
         """When a motion was refused last, as the arm did not follow, in [s]."""
-        return self._order.refused
-
-    @property
-    def snapshot(self) -> Snapshot:
-        """What the core did in the last cycle."""
-        return self._snapshot
+        return self._mailbox.refused
 
     def command(
         self, request: ImmediateRequest, get_ready: Callable[[], object] = lambda: None
@@ -104,43 +95,38 @@ class CommandGateway:
             Nothing once it counts; the ArmError with which it was refused.
         """
         future: Future[None] = Future()
-        number = self._order.number()  # first: a stop during what follows counts
+        number = self._gate.number()  # first: a stop during what follows counts
+        moves = isinstance(request, JogRequest) and not request.is_zero
         try:
             prepared = self._core.prepare(request)
-            if isinstance(request, JogRequest) and len(self._orders) >= MAX_QUEUED_JOGS:
-                raise NotReadyError(f'{MAX_QUEUED_JOGS} commands wait for the cycle')
             if isinstance(request, JogRequest):
-                self.holds.command(
-                    request.client,
-                    self._clock(),
-                    is_zero=request.is_zero,
-                    expires=request.expires,
-                )
+                if len(self._mailbox) >= MAX_QUEUED_JOGS:
+                    raise NotReadyError(f'{MAX_QUEUED_JOGS} commands wait for the cycle')
+                self.stream(Source.JOG, request.client, is_zero=not moves, expires=request.expires)
             get_ready()
         except ArmError as error:
             future.set_exception(error)
             return future
         since = self._clock()
         if isinstance(request, StopRequest):
-            self._order.void(request.sources or MOTIONS, request.reason)
+            self._gate.stop(request.sources or MOTIONS, request.reason)
         elif isinstance(request, PauseRequest) and request.is_paused:
-            self._order.void(JOGGING, 'the arm was paused')
+            self._gate.stop(JOGGING, 'the arm was paused')
 
         def commit(cycle: Cycle) -> bool:
             try:
-                if isinstance(request, JogRequest) and not request.is_zero:
-                    self._order.admit(Source.JOG, number, since, cycle)
+                if moves:
+                    self._mailbox.admit(Source.JOG, number, since, cycle)
                 self._core.commit(prepared, cycle.now)
             except Exception as error:  # noqa: BLE001  # its future carries it
                 future.set_exception(error)
                 return True
-            if isinstance(request, JogRequest) and not request.is_zero:
-                # the newest command counts: older ones never begin
-                self._order.void((Source.TARGET, Source.TRAJECTORY), 'a jog took over', number)
+            if moves:  # the newest command counts: older ones never begin
+                self._gate.stop((Source.TARGET, Source.TRAJECTORY), 'a jog took over', number)
             future.set_result(None)
             return True
 
-        self._orders.append(commit)
+        self._mailbox.post(commit)
         return future
 
     def request(
@@ -158,6 +144,48 @@ class CommandGateway:
         """End a motion: before its begin it does not begin, later the arm comes to rest."""
         self._motions.cancel(command, reason)
 
+    def stream(
+        self,
+        source: Source,
+        client: Hashable,
+        *,
+        is_zero: bool = False,
+        expires: float = -math.inf,
+    ) -> None:
+        """Record a command of a client that may send one after the other.
+
+        Args:
+            is_zero: Whether it commands standing still, with which the client lets go.
+            expires: Steady time until which it moves the arm in [s]; by default not beyond now.
+
+        Raises:
+            NotReadyError: The arm has stopped since the client began; it has to let go first.
+        """
+        if is_zero:
+            self._gate.release(source, client)
+        elif reason := self._gate.command(source, client, self._clock(), expires):
+            raise NotReadyError(reason)
+
+    def get_ready_for(
+        self, source: Source, client: Hashable, get_ready: Callable[[], bool]
+    ) -> None:
+        """Get back the drives for a client whose stream begins.
+
+        Args:
+            get_ready: Gets them back; returns whether they were away.
+        """
+        self._gate.ask(source, client, self._clock())  # first: the cycle may be quicker
+        if not get_ready():
+            self._gate.ask(source, client, -math.inf)
+
+    def renew(self, source: Source) -> None:
+        """Treat the next command as a new one: a person has requested it.
+
+        A stream of trajectories that goes on is not let in by that.
+        """
+        silence = TOGETHER if source is Source.TRAJECTORY else -math.inf
+        self._gate.renew(source, self._clock(), silence)
+
     def use_scene(self, scene: PlanningScene) -> Future[int]:
         """Use another scene from the next cycle on, for jogs, targets and trajectories.
 
@@ -170,107 +198,163 @@ class CommandGateway:
         Raises:
             SceneError: The scene is of another arm.
         """
-        reference = self._snapshot.reference
-        return self._scenes.use(scene, None if reference is None else reference.position)
+        version, reference = next(self._versions), self.snapshot.reference
+        near = None if reference is None else reference.position
+        prepared = self._core.prepare_scene(scene, version, near)
+        future: Future[int] = Future()
+
+        def take(_cycle: Cycle) -> bool:
+            # to free a large scene takes milliseconds: in the worker, not in the cycle
+            before = [self._core.scene]
+            execution = self._core.use_scene(prepared)
+            if execution is not None:
+                self._recheck(execution)
+            self._worker.submit(before.clear)
+            future.set_result(version)
+            return True
+
+        self._mailbox.post(take)
+        return future
 
     def keep_apart(self, neighbours: Neighbours) -> None:
         """Heed from now on how other arms of the robot move; before the first cycle."""
         self._core.keep_apart(neighbours)
 
-    def begin(self, positions: Array) -> None:
-        """Begin to command the arm where it stands.
+    def interrupt(self, reason: str) -> None:
+        """Refuse what was requested so far and has not begun, and end the streams of clients."""
+        self._gate.interrupt(reason, self._clock())
+
+    def update(
+        self,
+        now: float,
+        period: float,
+        measured: RobotState | None,
+        begin: Array | None,
+        blocked: str,
+        *,
+        explain: Callable[[], Loss] | None = None,
+        is_gone: bool = False,
+        ages: Array | None = None,
+    ) -> SetPoint | None:
+        """Carry out what was commanded, and return the set-point of this cycle.
+
+        It takes the arm over at rest when nothing is in the way. When something comes in the way
+        the arm comes to rest, a trajectory on its path, and commands are refused.
 
         Args:
-            positions: Positions last commanded to the drives in [rad].
+            measured: What the drives report; None while that is not whole.
+            begin: Positions last commanded to the drives in [rad], where it takes over.
+            blocked: Why the arm cannot follow, with the remedy; empty when it can.
+            explain: What to report of an arm that followed; by default why it cannot.
+            is_gone: No drive is left to be brought to rest.
+            ages: How old the measured values of each joint are in [s].
+
+        Returns:
+            None while the arm does not follow.
         """
-        self._core.reset(positions)
-        if self.stream.begin():
-            self._order.void((Source.TRAJECTORY,), BEGINS)
-        if self.holds.begin(self._clock()):
-            self._order.void((Source.JOG,), BEGINS)
+        if not (self.is_following or blocked) and measured is not None and begin is not None:
+            self._core.reset(begin)
+            self._gate.begin(BEGINS, self._clock())
+            self.is_following, self._lost = True, ''
+        if not self.is_following or measured is None:
+            self._idle(now, measured, self._lost or blocked, ages)
+            return None
+        if blocked and not self._lost:
+            self._lost, code = (blocked, GoalCode.INVALID_GOAL) if explain is None else explain()
+            self.interrupt(self._lost)
+            self._core.fail(self._lost, code)
+        if is_gone:
+            self._idle(now, measured, self._lost, ages)
+            self.is_following, self._lost = False, ''
+            return None
+        point = self._step(now, period, measured, ages)
+        if self._lost and point.source is Source.NONE and not point.state.moving:
+            self.is_following, self._lost = False, ''
+        return point
 
     def reset(self, positions: Array) -> None:
         """Go on from where others have moved the arm while it was at rest."""
         self._core.reset(positions)
 
-    def step(
-        self,
-        now: float,
-        period: float,
-        measured: RobotState,
-        blocked: str,
-        ages: Array | None = None,
-    ) -> SetPoint:
-        """Carry out what was commanded, and return the set-point of this cycle.
+    def abandon(self, now: float, reason: str) -> None:
+        """End all that was commanded, for a cycle that has failed: none may follow."""
+        self.is_following, self._lost = False, ''
+        self.interrupt(reason)
+        self._motions.clear(reason)
+        self._idle(now, self.snapshot.measured, reason, None)
 
-        Args:
-            blocked: Why the arm comes to rest and takes no commands; empty when it does.
-            ages: How old the measured values of each joint are in [s].
-        """
-        self._orders.carry_out(Cycle(now, period, blocked))
-        set_point = self._core.step(now, period, measured)
+    def _step(
+        self, now: float, period: float, measured: RobotState, ages: Array | None
+    ) -> SetPoint:
+        core, blocked = self._core, self._lost
+        self._mailbox.carry_out(Cycle(now, period, blocked))
+        point = core.step(now, period, measured)
         self._motions.report_ends()
-        self._snapshot = Snapshot(
+        self.snapshot = Snapshot(
             now,
-            set_point,
+            point,
             measured,
             blocked,
-            set_point.source,
-            self._core.paused,
-            self._core.speed,
-            self._snapshot.cycles + 1,
+            point.source,
+            core.paused,
+            core.speed,
+            self.snapshot.cycles + 1,
             period,
-            self._core.execution,
+            core.execution,
             ages,
         )
-        return set_point
+        return point
 
-    def refuse_earlier(self, reason: str) -> None:
-        """Refuse what was requested so far and has not begun; for any thread."""
-        self._interrupt(reason)
-
-    def fail(self, reason: str, code: GoalCode = GoalCode.INVALID_GOAL) -> None:
-        """Bring the arm to rest, a trajectory on its path; the motion ends with the reason."""
-        self._interrupt(reason)
-        self._core.fail(reason, code)
-
-    def idle(
-        self, now: float, measured: RobotState | None, blocked: str, ages: Array | None = None
+    def _idle(
+        self, now: float, measured: RobotState | None, blocked: str, ages: Array | None
     ) -> None:
-        """Pass a cycle in which the arm does not follow; commands are refused.
-
-        Args:
-            ages: How old the measured values of each joint are in [s].
-        """
-        if self._snapshot.set_point is not None:
-            self._interrupt(blocked)
-        self._core.stands(measured)
-        self._core.abandon(blocked)  # it ended at the latest when the arm came to rest
+        """Pass a cycle in which the arm does not follow; commands are refused."""
+        core, before = self._core, self.snapshot
+        if before.set_point is not None:
+            self.interrupt(blocked)
+        core.stands(measured)
+        core.abandon(blocked)  # it ended at the latest when the arm came to rest
         self._motions.report_ends()
-        self._orders.carry_out(Cycle(now, self._snapshot.period, blocked))
-        self._snapshot = Snapshot(
+        self._mailbox.carry_out(Cycle(now, before.period, blocked))
+        self.snapshot = Snapshot(
             now,
             None,
             measured,
             blocked,
-            paused=self._core.paused,
-            speed=self._core.speed,
-            cycles=self._snapshot.cycles,
+            paused=core.paused,
+            speed=core.speed,
+            cycles=before.cycles,
             ages=ages,
         )
 
-    def abandon(self, now: float, reason: str) -> None:
-        """End all that was commanded, for a cycle that has failed: none may follow."""
-        self._interrupt(reason)
-        self._motions.clear(reason)
-        self.idle(now, self._snapshot.measured, reason)
-
-    def _interrupt(self, reason: str) -> None:
-        self._order.void(MOTIONS, reason)
-        self.holds.interrupt(reason, self._clock())
-        self.stream.interrupt(reason)
-
     def _rest(self) -> RobotState | None:
         """Return where the arm stands while others have its drives; None where it follows."""
-        snapshot = self._snapshot
+        snapshot = self.snapshot
         return snapshot.reference if snapshot.blocked else None
+
+    def _recheck(self, execution: Execution) -> None:
+        """Check the rest of a path in the present scene, in the worker's thread; for the cycle."""
+        begin, scene = execution.feedback.time, self._core.scene
+        self._worker.submit(lambda: self._check(execution, begin, scene))
+
+    def _check(self, execution: Execution, begin: float, scene: PreparedScene) -> None:
+        """Check the rest of a path for contact; in the worker's thread."""
+        if scene is not self._core.scene:
+            return  # a newer one counts, in which it is checked as well
+        try:
+            found = None if scene.check is None else execution.contact(scene.check, begin)
+            problem = found and (
+                f'{" and ".join(found.links)} would collide at {found.time:.2f} s of the'
+                ' trajectory: the scene changed; lead it around that'
+            )
+        except Exception as error:  # noqa: BLE001  # what is not known to be clear ends
+            problem = (
+                'the scene changed, and the rest of the trajectory could not be checked:'
+                f' {type(error).__name__}: {error}'
+            )
+
+        def conclude(_cycle: Cycle) -> bool:
+            self._core.conclude_check(execution, scene, problem or '')
+            return True
+
+        self._mailbox.post(conclude)

@@ -21,6 +21,7 @@ from arm_model import (
     Array,
     checked,
     CommandError,
+    frozen,
     ModelError,
     PlanningScene,
     RobotModel,
@@ -28,17 +29,25 @@ from arm_model import (
 )
 from arm_trajectory import GoalCode, OnlineTrajectoryGenerator, StateMovedError
 
+from ..controllers.controller import (
+    ArmState,
+    CONTINUED,
+    Controller,
+    Outcome,
+    SetPoint,
+    Source,
+    toward,
+)
+from ..controllers.jog import Jog
+from ..controllers.target import SingleTarget
+from ..controllers.trajectory import Execution, Feedback
 from ..exceptions import NotReadyError
-from ..report import Cause, Limiter
-from .arbiter import CommandArbiter, Motion
-from .commands import in_base
-from .execution import Execution, Feedback
+from ..report import Cause, Limiter, MotionReport
 from .moving_arms import Neighbours
-from .outcome import Outcome
-from .preparation import CommandBasis, Preparation, Prepared
-from .prepared_scene import PreparedScene
+from .preparation import CommandBasis, Motion, Preparation, Prepared, PreparedScene
 from .requests import (
     ImmediateRequest,
+    in_base,
     JogRequest,
     MotionRequest,
     PauseRequest,
@@ -46,12 +55,16 @@ from .requests import (
     StopRequest,
 )
 from .safety_filter import SafetyFilter
-from .set_point import SetPoint, Source
 from .settings import CoreSettings
-from .stop_distances import StopDistances
 
 PREPARED_STATE_TOLERANCE = 0.01
 """How far the arm may be from where a trajectory was prepared in [rad]."""
+
+ARM_DISTANCE = 0.005  # least distance to another arm that moves, for what is no jog, in [m]
+
+UNCHECKED_CLEARANCE = 0.001
+"""Least distance between links on a path that is not checked in a new scene yet in [m]: the arm
+that is stopped there is not in contact and can be led away. Planned paths keep as much."""
 
 MAX_JOINTS = 8  # joints of the longest chain that is jogged
 
@@ -74,11 +87,18 @@ def check_arm(model: RobotModel) -> None:
 
 
 class MotionCore:
-    """Set-points for an arm, cycle by cycle.
+    """Set-points for an arm, cycle by cycle: one controller moves it, and hands it over.
 
     Times are steady times in [s] that the owner hands over; it reads no clock. All methods are for
     the thread of the cycle but :meth:`prepare`, which is for any one other thread, and
     :meth:`prepare_scene`, for any.
+
+    Attributes:
+        model: The arm.
+        scene: What may collide.
+        execution: The trajectory that was followed last, with its outcome; None before the first.
+        speed: Speed override of trajectories and targets, 0 to 1.
+        paused: Whether it is paused.
     """
 
     def __init__(self, model: RobotModel, settings: CoreSettings | None = None) -> None:
@@ -88,24 +108,24 @@ class MotionCore:
             ModelError: The core cannot move such an arm.
         """
         check_arm(model)
-        self._model = model
+        self.model = model
+        self.speed = 1.0
+        self.paused = False
+        self.execution: Execution | None = None
         self._settings = settings or CoreSettings()
-        generator = OnlineTrajectoryGenerator(model.limits)
+        self._generator = generator = OnlineTrajectoryGenerator(model.limits)
         self._preparation = Preparation(model, generator, self._settings)
-        self._arbiter = CommandArbiter(model, generator, self._settings)
         self._filter = SafetyFilter(model, generator)
+        self._jog = Jog(model, generator, self._settings.servo)
+        self._active: Controller | None = None
+        self._held = False  # whether a jog or a target comes to rest for what is prepared
+        self._jogged = False  # whether the arm moves because of a jog, or out of one
+        self._unchecked: Execution | None = None  # whose path is not checked in the present scene
         self._state: RobotState | None = None
-        self._speed = 1.0
-        self._paused = False
+        self._still = frozen(np.zeros(len(model)))
         self._sequence = 0
         self._last_change = ''
-        self._distances = StopDistances(self._settings, self._arbiter)
-        self._scene = self.prepare_scene(model.scene, 0, None)
-
-    @property
-    def model(self) -> RobotModel:
-        """The arm."""
-        return self._model
+        self.scene = self.prepare_scene(model.scene, 0, None)
 
     @property
     def state(self) -> RobotState:
@@ -121,22 +141,13 @@ class MotionCore:
     @property
     def source(self) -> Source:
         """What moves the arm."""
-        return self._arbiter.active
-
-    @property
-    def scene(self) -> PreparedScene:
-        """What may collide."""
-        return self._scene
-
-    @property
-    def execution(self) -> Execution | None:
-        """The trajectory that was followed last, with its outcome; None before the first."""
-        return self._arbiter.execution
+        return Source.NONE if self._active is None else self._active.source
 
     @property
     def motion(self) -> Motion | None:
         """The trajectory or the single target that moves the arm; None without one."""
-        return self._arbiter.motion
+        active = self._active
+        return active if isinstance(active, Execution | SingleTarget) else None
 
     @property
     def feedback(self) -> Feedback | None:
@@ -144,14 +155,9 @@ class MotionCore:
         return None if self.execution is None else self.execution.feedback
 
     @property
-    def speed(self) -> float:
-        """Speed override of trajectories and targets, 0 to 1."""
-        return self._speed
-
-    @property
-    def paused(self) -> bool:
-        """Whether it is paused."""
-        return self._paused
+    def speed_scaling(self) -> float:
+        """Speed override that counts, 0 to 1: none while it is paused."""
+        return 0.0 if self.paused else self.speed
 
     @property
     def basis(self) -> CommandBasis:
@@ -160,16 +166,15 @@ class MotionCore:
         Raises:
             NotReadyError: The position of the arm is not known yet.
         """
-        is_at_rest = self._arbiter.held and not self.state.moving
-        source = Source.NONE if is_at_rest else self.source
-        target = self._arbiter.target if source is Source.TARGET else None
+        is_at_rest = self._held and not self.state.moving
+        active = None if is_at_rest else self._active
         return CommandBasis(
             self.state,
-            self._scene,
+            self.scene,
             self._sequence,
-            source,
+            Source.NONE if active is None else active.source,
             self.speed_scaling,
-            None if target is None else target.target,
+            active.target if isinstance(active, SingleTarget) else None,
             self.execution,
             None if self.execution is None else self.execution.timer(self.speed_scaling),
         )
@@ -180,9 +185,9 @@ class MotionCore:
         Raises:
             CommandError: The count is wrong, or a position is not finite.
         """
-        where = checked(positions, len(self._model), 'positions')
+        where = checked(positions, len(self.model), 'positions')
         self._changed('the arm was moved by something else')
-        self._arbiter.release(reason)
+        self._release(reason)
         self._state = RobotState.at_rest(where)
         self._filter.reset(self._state)
 
@@ -205,7 +210,7 @@ class MotionCore:
         Raises:
             SceneError: It is of another arm.
         """
-        self._model.check_scene(scene)
+        self.model.check_scene(scene)
         checks_paths = self._settings.check_self_collision
         return PreparedScene.of(scene, version, near=near, checks_paths=checks_paths)
 
@@ -217,12 +222,12 @@ class MotionCore:
             :meth:`conclude_check`. The safety filter keeps it from contact until then. None where
             there is nothing to check.
         """
-        self._model.use_scene(scene.clearances)
-        self._scene = scene
+        self.model.use_scene(scene.clearances)
+        self.scene = scene
         self._filter.forget()
         is_checked = self.source is Source.TRAJECTORY and scene.check is not None
-        self._distances.unchecked = self.execution if is_checked else None
-        return self._distances.unchecked
+        self._unchecked = self.execution if is_checked else None
+        return self._unchecked
 
     def conclude_check(self, execution: Execution, scene: PreparedScene, problem: str) -> None:
         """Go on with a trajectory whose path is clear in a scene, or end it on its path.
@@ -230,16 +235,16 @@ class MotionCore:
         Args:
             scene: The scene; nothing is done when it does not count any more.
         """
-        if scene is not self._scene or execution is not self._distances.unchecked:
+        if scene is not self.scene or execution is not self._unchecked:
             return
         if not problem:
-            self._distances.unchecked = None
-        elif self.motion is execution and execution.ending is None:
+            self._unchecked = None
+        elif self._active is execution and execution.ending is None:
             self._end(Outcome(GoalCode.PATH_TOLERANCE_VIOLATED, problem))
 
     def hold(self, *, is_held: bool = True) -> None:
         """Bring a jog or a single target to rest for what is prepared, or let it go on."""
-        self._arbiter.held = is_held
+        self._held = is_held
 
     def prepare(
         self, request: MotionRequest | ImmediateRequest, basis: CommandBasis | None = None
@@ -275,13 +280,15 @@ class MotionCore:
         """
         request = prepared.request
         if isinstance(request, JogRequest):
-            self._jog(request, now)
+            self._begin_jog(request, now)
         elif isinstance(request, StopRequest):
             self._stop(request)
         elif isinstance(request, PauseRequest):
-            self._pause(request)
+            if request.is_paused:
+                self._changed('the arm was paused')
+            self.paused = request.is_paused
         elif isinstance(request, SpeedRequest):
-            self._speed = request.speed
+            self.speed = request.speed
         elif prepared.motion is not None and prepared.basis is not None:
             self._begin(prepared.motion, prepared.basis, elapsed, in_any_scene)
 
@@ -293,7 +300,7 @@ class MotionCore:
         """End at once what moves the arm, which does not follow any more."""
         if self.source is not Source.NONE:
             self._changed('the arm did not follow')
-            self._arbiter.release(reason)
+            self._release(reason)
 
     def step(self, now: float, period: float, measured: RobotState | None = None) -> SetPoint:
         """Return the set-point of a cycle.
@@ -304,100 +311,130 @@ class MotionCore:
         Raises:
             NotReadyError: The position of the arm is not known yet.
         """
-        state = self.state
-        wanted, report = self._arbiter.step(
-            state,
-            measured or state,
-            now,
-            period,
-            speed_scaling=self.speed_scaling,
-            paused=self._paused,
-        )
-        self._distances.update(moving=state.moving)
+        state, active = self.state, self._active
+        arm = ArmState(state, measured or state, now, self.speed_scaling, self.paused, self._held)
+        wanted = None if active is None else active.update(arm, period)
+        report = MotionReport() if active is None else active.report
+        if wanted is None:
+            wanted = toward(self._generator, state, self._still, period)
+        if active is None or active is self._jog:
+            self._jogged = True
+        else:  # a jog counts until the arm rests after it
+            self._jogged = self._jogged and state.moving and active.brakes
         after, limiter = self._filter.step(
-            state,
-            wanted,
-            period,
-            self._distances.between_links,
-            now=now,
-            apart=self._distances.between_arms,
+            state, wanted, period, self._clearance, now=now, apart=self._apart
         )
         self._state = after
         if limiter is not None:
             report = report.with_limiter(limiter)
             self._give_up(limiter, is_at_rest=not (state.moving or after.moving))
-        source = self._arbiter.ended(after, now, paused=self._paused)
-        return SetPoint(after, source, report)
+        if active is not None and active.conclude(arm, after):
+            self._release('')
+        return SetPoint(after, Source.NONE if active is None else active.source, report)
 
     @property
-    def speed_scaling(self) -> float:
-        """Speed override that counts, 0 to 1: none while it is paused."""
-        return 0.0 if self._paused else self._speed
+    def _clearance(self) -> float | None:
+        """Least distance between links on a stop in [m]; any on a path that was checked."""
+        if self._jogged:
+            return self._settings.clearance
+        is_unchecked = self._unchecked is not None and self._unchecked is self.execution
+        is_clear = self._active is not None and self._active.on_path and not is_unchecked
+        if is_clear or not self._settings.check_self_collision:
+            return None
+        return UNCHECKED_CLEARANCE if is_unchecked else 0.0
+
+    @property
+    def _apart(self) -> float | None:
+        """Least distance to other arms on a stop of all in [m]."""
+        if self._jogged:
+            return self._settings.clearance
+        return ARM_DISTANCE if self._settings.check_self_collision else None
 
     def _give_up(self, limiter: Limiter, *, is_at_rest: bool) -> None:
         """End a motion that the safety filter does not let go on; the arm comes to rest."""
-        code = GoalCode.PATH_TOLERANCE_VIOLATED
+        if self._active is None or self._active is self._jog:
+            return
         if limiter.cause is Cause.COLLISION:
-            near_arm = self._filter.is_near_neighbour
-            self._arbiter.end(Outcome(code, self._distances.refusal(limiter, near_arm=near_arm)))
+            reason = self._refusal(limiter)
         elif self.source is Source.TARGET and is_at_rest:
-            self._arbiter.end(Outcome(code, f'no way to the target from here: {limiter}'))
+            reason = f'no way to the target from here: {limiter}'
+        else:
+            return
+        self._active.end(Outcome(GoalCode.PATH_TOLERANCE_VIOLATED, reason))
 
-    def _jog(self, request: JogRequest, now: float) -> None:
+    def _refusal(self, limiter: Limiter) -> str:
+        """Explain why a motion cannot go on, and what to do."""
+        if self._filter.is_near_neighbour:
+            return (
+                f'{limiter.name} would come nearer than {ARM_DISTANCE * 1e3:g} mm to another arm; '
+                'begin when that is out of the way, or keep more distance'
+            )
+        if self.source is Source.TARGET:
+            where = 'on the way to the target from where the arm is; go around that'
+        elif self._unchecked is self.execution:
+            where = 'on the trajectory: the scene changed; lead it around that'
+        else:
+            where = (
+                'while the arm catches up with the path; begin at rest, or give the first point '
+                'more time'
+            )
+        return f'{limiter.name} would collide {where}'
+
+    def _begin_jog(self, request: JogRequest, now: float) -> None:
         """Jog from now on; the safety filter sees every step.
 
         A zero is a stop: it is not refused, and ends only the jog of its client.
         """
         if request.is_zero:
-            if self.source is not Source.JOG or self._arbiter.jogger != request.client:
+            if self._active is not self._jog or self._jog.client != request.client:
                 return
         elif now > request.expires:
             raise NotReadyError(
                 f'expired {now - request.expires:.2f} s before the cycle; send commands more'
                 ' often than they expire (incoming_command_timeout)'
             )
-        elif self._paused:
+        elif self.paused:
             raise CommandError(PAUSED)
-        command = in_base(self._model, self.state.position, request)
+        command = in_base(self.model, self.state.position, request)
         if not request.is_zero:
             self._changed('a jog took over')
-        self._arbiter.jog(command, request.expires, request.client)
+        if self._active is not self._jog:
+            self._release('jogging took over')
+            self._jog.begin()
+            self._active = self._jog
+        self._jog.take(command, request.expires, request.client)
 
     def _begin(
         self, motion: Motion, basis: CommandBasis, elapsed: float, in_any_scene: bool
     ) -> None:
-        state = self.state
         if basis.sequence != self._sequence:
             raise StateMovedError(
                 GoalCode.INVALID_GOAL,
                 f'{self._last_change} before this command had begun; send it again',
             )
-        is_old = basis.scene is not self._scene
+        is_old = basis.scene is not self.scene
         if is_old and not in_any_scene:
             raise StateMovedError(
                 GoalCode.INVALID_GOAL,
-                f'the scene changed (version {basis.scene.version} to {self._scene.version}) while'
+                f'the scene changed (version {basis.scene.version} to {self.scene.version}) while'
                 ' this motion was prepared; send it again',
             )
         if isinstance(motion, Execution):
-            self._check_place(basis.state, state)
-            self._changed('another command came')
+            self._check_place(basis.state, self.state)
             motion.elapse(elapsed)
-            self._arbiter.follow(motion)
-            is_unchecked = is_old and self._scene.check is not None
-            self._distances.unchecked = motion if is_unchecked else None
+            self._release('a new trajectory took over')
+            self.execution = motion
+            self._unchecked = motion if is_old and self.scene.check is not None else None
         else:
             self._check_held()
-            self._changed('another command came')
-            self._arbiter.aim(motion)
-
-    def _pause(self, request: PauseRequest) -> None:
-        if request.is_paused:
-            self._changed('the arm was paused')
-        self._paused = request.is_paused
+            if isinstance(self._active, SingleTarget):  # what was asked before is in this one
+                self._active.end(CONTINUED)
+            self._release('a single target took over')
+        self._changed('another command came')
+        self._active = motion
 
     def _stop(self, request: StopRequest) -> None:
-        if request.motion is not None and request.motion is not self.motion:
+        if request.motion is not None and request.motion is not self._active:
             return
         if request.sources is None or self.source in request.sources:
             self._end(Outcome(GoalCode.SUCCESSFUL, request.reason, canceled=True))
@@ -405,13 +442,22 @@ class MotionCore:
     def _end(self, outcome: Outcome) -> None:
         """Bring the arm to rest; what moves it ends so."""
         self._changed('the arm was stopped')
-        self._arbiter.stop(outcome)
+        if self._active is not None:
+            self._active.stop(outcome)
+            if self._active.outcome is not None:
+                self._release(outcome.reason)
+
+    def _release(self, reason: str) -> None:
+        """End what moves the arm; it comes to rest unless something else takes over."""
+        if self._active is not None:
+            self._active.end(Outcome(GoalCode.INVALID_GOAL, reason))
+        self._active, self._held = None, False
 
     def _check_held(self) -> None:
         """Refuse what would wait, and begin when it is no longer expected."""
-        if self._paused:
+        if self.paused:
             raise CommandError(PAUSED)
-        if self._speed == 0.0:
+        if self.speed == 0.0:
             raise CommandError('the speed override is 0; raise it first (~/speed_scaling_input)')
 
     def _changed(self, what: str) -> None:
@@ -426,7 +472,7 @@ class MotionCore:
         if off[joint] > PREPARED_STATE_TOLERANCE:
             raise StateMovedError(
                 GoalCode.INVALID_GOAL,
-                f'{self._model.joints[joint]} was moved by {off[joint]:.3f} rad while the'
+                f'{self.model.joints[joint]} was moved by {off[joint]:.3f} rad while the'
                 ' trajectory was planned, and its path was checked from there only; send it'
                 ' again, or end what moves the arm first',
             )

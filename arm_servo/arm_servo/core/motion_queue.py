@@ -16,15 +16,13 @@ from typing import Any
 from arm_model import RobotState
 from arm_trajectory import GoalCode, StateMovedError, TrajectoryGoal
 
+from ..controllers.controller import Outcome, refused, Source
+from ..controllers.trajectory import Execution
 from ..exceptions import NotReadyError
-from .arbiter import Motion
-from .execution import Execution
+from .mailbox import Cycle, Mailbox
 from .motion_core import MotionCore
-from .orders import CommandOrder, Cycle, OrderQueue
-from .outcome import Outcome, refused
-from .preparation import CommandBasis, Prepared
+from .preparation import CommandBasis, Motion, Prepared
 from .requests import MotionRequest, StopRequest
-from .set_point import Source
 
 MAX_QUEUED_MOTIONS = 50  # motions that may wait to be prepared
 
@@ -96,8 +94,7 @@ class MotionQueue:
     def __init__(
         self,
         core: MotionCore,
-        orders: OrderQueue,
-        order: CommandOrder,
+        mailbox: Mailbox,
         worker: Executor,
         clock: Callable[[], float],
         *,
@@ -112,7 +109,7 @@ class MotionQueue:
                 before the drives are taken from them. None where the arm follows.
             recheck: Has a trajectory checked in the present scene that was prepared in an old one.
         """
-        self._core, self._orders, self._order = core, orders, order
+        self._core, self._mailbox = core, mailbox
         self._worker, self._clock, self._rest, self._recheck = worker, clock, rest, recheck
         self._begun: list[MotionCommand] = []  # of the cycle
         self._lock = threading.Lock()  # of the two below; held for a few instructions only
@@ -122,7 +119,7 @@ class MotionQueue:
     def request(self, request: MotionRequest, get_ready: Callable[[], object]) -> MotionCommand:
         """Prepare a motion, and begin it when its path is clear."""
         with self._lock:
-            command = MotionCommand(request, self._order.number(), self._clock(), get_ready)
+            command = MotionCommand(request, self._mailbox.gate.number(), self._clock(), get_ready)
             is_full = len(self._waiting) >= MAX_QUEUED_MOTIONS
             if not is_full:
                 self._waiting.append(command)
@@ -147,7 +144,7 @@ class MotionQueue:
         command.is_canceled = True
         if command.future.cancel():
             command.end(CANCELED)
-        self._orders.append(stop)
+        self._mailbox.post(stop)
 
     def clear(self, reason: str) -> None:
         """Refuse all that waits, for a cycle that has failed: its turn does not come."""
@@ -188,7 +185,7 @@ class MotionQueue:
         """Get the drives back for a motion, unless it is void already."""
 
         def get_ready() -> None:
-            self._order.check(command.source, command.number)
+            self._mailbox.check(command.source, command.number)
             command.get_ready()
 
         if self._guarded(command, get_ready):
@@ -201,11 +198,11 @@ class MotionQueue:
             self._guarded(command, lambda: self._hand_out(command, ordered, cycle))
             return True
 
-        self._orders.append(hand_out)
+        self._mailbox.post(hand_out)
 
     def _hand_out(self, command: MotionCommand, since: float, cycle: Cycle) -> None:
         """Prepare a motion from the state of this cycle."""
-        self._order.admit(command.source, command.number, since, cycle)
+        self._mailbox.admit(command.source, command.number, since, cycle)
         basis = self._core.basis
         self._submit(command, lambda: self._prepare(command, basis, cycle))
 
@@ -242,7 +239,7 @@ class MotionQueue:
         def rest(cycle: Cycle) -> bool:
             since = cycle.now if command.holds else ordered
             if not self._guarded(
-                command, lambda: self._order.admit(command.source, command.number, since, cycle)
+                command, lambda: self._mailbox.admit(command.source, command.number, since, cycle)
             ):
                 return True
             if not command.holds:
@@ -262,15 +259,15 @@ class MotionQueue:
             )
             return True
 
-        self._orders.append(rest)
+        self._mailbox.post(rest)
 
     def _order_commit(self, command: MotionCommand, prepared: Prepared, planned: float) -> None:
         """Begin a motion at the time for which it was planned, or as soon as possible."""
-        self._order.check(command.source, command.number)  # no cycle may come that does
+        self._mailbox.check(command.source, command.number)  # no cycle may come that does
         ordered = max(self._clock(), planned)
 
         def begin(cycle: Cycle) -> None:
-            self._order.admit(command.source, command.number, ordered, cycle)
+            self._mailbox.admit(command.source, command.number, ordered, cycle)
             self._core.commit(
                 prepared,
                 cycle.now,
@@ -293,7 +290,7 @@ class MotionQueue:
                 self._end(command)
             return True
 
-        self._orders.append(commit)
+        self._mailbox.post(commit)
 
     def _guarded(self, command: MotionCommand, step: Callable[[], Any]) -> bool:
         """Run a step of a motion; return whether it was accepted."""
@@ -321,7 +318,7 @@ class MotionQueue:
             return True
 
         if command.holds:
-            self._orders.append(go_on)
+            self._mailbox.post(go_on)
         with suppress(InvalidStateError):  # canceled already
             if isinstance(error, CancelledError):
                 command.future.cancel()

@@ -15,30 +15,65 @@ import math
 
 import numpy as np
 
-from arm_model import Array, CommandError, Mask, RobotModel, RobotState
+from arm_model import (
+    Array,
+    Clearances,
+    CommandError,
+    Mask,
+    PlanningScene,
+    RobotModel,
+    RobotState,
+)
 from arm_trajectory import (
     GoalCode,
     GoalError,
     OnlineTrajectoryGenerator,
+    PathCheck,
     Plan,
     TimerState,
     TrajectoryGoal,
 )
 
-from .arbiter import Motion
-from .commands import by_joint, check_command
-from .execution import Execution
-from .prepared_scene import PreparedScene
+from ..controllers.controller import Source
+from ..controllers.target import SingleTarget
+from ..controllers.trajectory import Execution
 from .requests import (
+    by_joint,
+    check_command,
     DisplacementRequest,
     ImmediateRequest,
     JogRequest,
     MotionRequest,
     SpeedRequest,
 )
-from .set_point import Source
 from .settings import CoreSettings
-from .single_target import SingleTarget
+
+Motion = Execution | SingleTarget  # what has a goal, and an outcome once it ended
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PreparedScene:
+    """What measures a scene: one thing for each thread."""
+
+    version: int  # number of the scene; 0 is the robot alone
+    clearances: Clearances  # of the cycle
+    # looks for contact on paths, in the thread that prepares motions; None where nobody wants that
+    check: PathCheck | None
+
+    @classmethod
+    def of(
+        cls, scene: PlanningScene, version: int, *, near: Array | None, checks_paths: bool
+    ) -> PreparedScene:
+        """Prepare a scene.
+
+        Args:
+            near: Where the arm is in [rad]: every pair is measured there, so that the cycle has
+                not to. None where that is not known.
+        """
+        clearances = Clearances(scene)
+        if near is not None:
+            clearances.least(near, 0.0)
+        return cls(version, clearances, PathCheck(scene) if checks_paths else None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,15 +163,12 @@ class Preparation:
             if request.is_zero:
                 return None
         else:
-            target = self._aimed(*self._by_joint(request.positions, 'positions'), basis)
+            target = self._aimed(*by_joint(self._model, request.positions, 'positions'), basis)
         return self._single_target(target, request.max_speed, basis)
-
-    def _by_joint(self, values: Mapping[str, float], what: str) -> tuple[Array, Mask]:
-        return by_joint(self._model, values, what)
 
     def _displaced(self, displacements: Mapping[str, float], basis: CommandBasis) -> Array:
         """Return where displacements lead, beyond where the arm is going already."""
-        values, moved = self._by_joint(displacements, 'displacements')
+        values, moved = by_joint(self._model, displacements, 'displacements')
         if basis.target is not None:
             ends: Array = basis.target + values
             return ends

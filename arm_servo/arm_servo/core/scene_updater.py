@@ -10,7 +10,8 @@ lift) are checked where they are, or were half a second ago.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 import math
 
 from urdf_reader import Pair
@@ -18,13 +19,33 @@ from urdf_reader import Pair
 from arm_model import Array, PlanningScene
 
 from .gateway import CommandGateway
-from .joint_places import JointPlaces, PLACE_TOLERANCE
 from .moving_arms import MovingArms
 
 SceneChange = Callable[[PlanningScene, Array], PlanningScene]
 """Makes a scene of the one before and the positions of the group's joints in [rad]."""
 
 MOVING_PERIOD = 0.5  # time between two scenes for a joint beside the group that moves in [s]
+
+PLACE_TOLERANCE = 1e-3
+"""How far a joint that stands still may seem to move in [rad] or [m]: noise of its sensor."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointPlaces:
+    """One look at the joints of a robot."""
+
+    # where they are in [rad] or [m], by joint
+    places: Mapping[str, float] = field(default_factory=dict)
+    moving: Collection[str] = frozenset()  # those that move
+
+    def next(self, places: Mapping[str, float], commanded: Collection[str]) -> JointPlaces:
+        """Return the next look; a joint that was not there before counts as one that moves."""
+        moved = {
+            joint
+            for joint, place in places.items()
+            if not abs(place - self.places.get(joint, math.nan)) <= PLACE_TOLERANCE
+        }
+        return JointPlaces(places, moved.union(commanded))
 
 
 class SceneUpdater:

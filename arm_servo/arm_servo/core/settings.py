@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ..jog.servo_source import ServoSettings
-from .execution import ExecutionSettings
+from ..controllers.jog import ServoSettings
+from ..controllers.trajectory import ExecutionSettings
 
 
 @dataclass(frozen=True, slots=True)

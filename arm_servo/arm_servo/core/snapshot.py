@@ -10,8 +10,8 @@ import numpy as np
 
 from arm_model import Array, RobotState
 
-from .execution import Execution
-from .set_point import SetPoint, Source
+from ..controllers.controller import SetPoint, Source
+from ..controllers.trajectory import Execution
 
 MAX_CYCLE_AGE = 0.25
 """Age of a cycle at which the cycle stands still: commands are refused, as they would surprise."""

@@ -12,8 +12,8 @@ import numpy as np
 
 from arm_model import frozen, RobotState
 
+from ..controllers.controller import Source
 from ..core.gateway import CommandGateway
-from ..core.set_point import Source
 from .drive_reasons import (
     before_first_command,
     COMMAND,
@@ -50,9 +50,7 @@ class DriveSource:
         self._gateway = gateway
         self._axes = list(gateway.model.joints)
         self._released: dict[str, Refusal | str] = dict.fromkeys(self._axes, NOT_ATTACHED)
-        self._following = False
         self._left: set[str] = set()  # drives that dropped out since all of them followed
-        self._lost = ''
         self._has_moved = False  # on behalf of anybody
 
     @property
@@ -88,7 +86,7 @@ class DriveSource:
         """
         reason = refusal if self._has_moved else before_first_command(refusal)
         self._released = {axis: reason, **self._released}
-        self._gateway.refuse_earlier(taken_away(axis, refusal))
+        self._gateway.interrupt(taken_away(axis, refusal))
 
     def update(
         self, now: float, period: float, feedback: Sequence[AxisFeedback]
@@ -104,45 +102,39 @@ class DriveSource:
             what = f'{type(error).__name__}: {error}'
             reason = f'was let go, because the motion core raised {what}; {COMMAND}'
             self._released = dict.fromkeys(self._axes, reason)
-            self._following, self._lost = False, ''
             self._gateway.abandon(now, reason)
             raise
 
     def _update(
         self, now: float, period: float, feedback: Sequence[AxisFeedback]
     ) -> Sequence[Setpoint | None]:
-        measured, ages = measured_state(feedback), frozen([axis.age for axis in feedback])
+        gateway = self._gateway
         blocked = why_not(feedback, self._released)
-        if not self._following and not blocked:
-            blocked = too_fast(feedback, self._gateway.model.limits.velocity)
-        if not self._following and not blocked:
-            self._take_over(feedback)
-        if not self._following or measured is None:
-            self._gateway.idle(now, measured, self._lost or blocked, ages)
+        if not gateway.is_following:
+            blocked = blocked or too_fast(feedback, gateway.model.limits.velocity)
+            self._left.clear()
+        elif blocked:
+            self._left.update(axis.name for axis in feedback if not axis.followable)
+        point = gateway.update(
+            now,
+            period,
+            measured_state(feedback),
+            None if gateway.is_following else frozen([axis.setpoint for axis in feedback]),
+            blocked,
+            explain=lambda: what_happened(feedback, self._released),
+            is_gone=len(self._left) == len(feedback),
+            ages=frozen([axis.age for axis in feedback]),
+        )
+        if point is None:
             return [None] * len(feedback)
-        if blocked and not self._lost:
-            self._lost, code = what_happened(feedback, self._released)
-            self._gateway.fail(self._lost, code)
-        self._left.update(axis.name for axis in feedback if not axis.followable)
-        if len(self._left) == len(feedback):  # nothing is left to be brought to rest
-            self._gateway.idle(now, measured, self._lost, ages)
-            self._following, self._lost = False, ''
-            return [None] * len(feedback)
-        point = self._gateway.step(now, period, measured, self._lost, ages)
         self._has_moved |= point.source is not Source.NONE
-        if self._lost and point.source is Source.NONE and not point.state.moving:
-            self._following, self._lost = False, ''
-        rows = zip(point.state.position, point.state.velocity, feedback, strict=True)
+        rows = zip(
+            point.state.position.tolist(), point.state.velocity.tolist(), feedback, strict=True
+        )
         return [
-            None if axis.name in self._left else self._make(float(position), float(velocity))
+            None if axis.name in self._left else self._make(position, velocity)
             for position, velocity, axis in rows
         ]
-
-    def _take_over(self, feedback: Sequence[AxisFeedback]) -> None:
-        """Begin at rest at the set-points of the drives."""
-        self._gateway.begin(frozen([axis.setpoint for axis in feedback]))
-        self._following, self._lost = True, ''
-        self._left.clear()
 
 
 def measured_state(feedback: Sequence[AxisFeedback]) -> RobotState | None:

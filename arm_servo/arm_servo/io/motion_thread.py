@@ -16,8 +16,8 @@ from arm_model import Array, RobotState
 from arm_trajectory import GoalCode, hard_brake
 from realtime_loop import CycleTimer
 
+from ..controllers.controller import SetPoint, Source
 from ..core.gateway import CommandGateway
-from ..core.set_point import SetPoint, Source
 from ..report import MotionReport
 from .following import FollowingWatch
 from .joint_feedback import JointFeedback
@@ -53,14 +53,12 @@ class MotionCycle:
         self.closing = ''
         self._compared = -math.inf
         self._failure, self._failed = '', -math.inf
-        self._following = False
-        self._lost = ''
         self._quiet = True
 
     @property
     def at_rest(self) -> bool:
         """Whether nothing moves."""
-        return not self._following or self._quiet
+        return not self._gateway.is_following or self._quiet
 
     def step(self, now: float, period: float) -> None:
         """Run a cycle."""
@@ -72,21 +70,21 @@ class MotionCycle:
 
     def _step(self, now: float, period: float) -> None:
         measured, blocked = self._feedback.state(now)
-        blocked = self.closing or blocked or self._kept(now)
-        if not self._following and not blocked and measured is not None:
-            self._gateway.begin(measured.position)
-            self._watch.begin(measured.position)
-            self._following, self._lost = True, ''
-        if not self._following or measured is None:
-            self._gateway.idle(now, measured, blocked)
-            return
-        code = GoalCode.INVALID_GOAL
-        if not blocked:
+        blocked, code = self.closing or blocked or self._kept(now), GoalCode.INVALID_GOAL
+        if not blocked and measured is not None:
+            if not self._gateway.is_following:
+                self._watch.begin(measured.position)
             blocked, code = self._compare(measured.position, now), GoalCode.PATH_TOLERANCE_VIOLATED
-        if blocked and not self._lost:
-            self._lost = blocked
-            self._gateway.fail(blocked, code)
-        self._put(self._gateway.step(now, period, measured, self._lost))
+        point = self._gateway.update(
+            now,
+            period,
+            measured,
+            None if measured is None else measured.position,
+            blocked,
+            explain=lambda: (blocked, code),
+        )
+        if point is not None:
+            self._put(point)
 
     def brake(self, period: float) -> None:
         """Slow the last set-point down, without the core; for when the core has failed."""
@@ -120,8 +118,6 @@ class MotionCycle:
         if not (idle and self._quiet):
             self._output(point)
         self._quiet = idle
-        if idle and self._lost:
-            self._following, self._lost = False, ''
 
 
 class MotionThread:

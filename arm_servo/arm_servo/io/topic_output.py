@@ -14,7 +14,7 @@ from arm_model import ModelError
 from arm_model.ros import duration_fields
 from node_runner import ParameterReader
 
-from ..core.set_point import SetPoint
+from ..controllers.controller import SetPoint
 
 TRAJECTORY = 'trajectory_msgs/JointTrajectory'
 ARRAY = 'std_msgs/Float64MultiArray'

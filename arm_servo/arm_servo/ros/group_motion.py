@@ -15,9 +15,9 @@ from arm_model import ModelError, RobotModel
 from arm_model.ros import GroupModels, same_robot
 from node_runner import ParameterReader
 
+from ..controllers.controller import Source
 from ..core.gateway import CommandGateway
 from ..core.requests import StopRequest
-from ..core.set_point import Source
 from ..core.settings import CoreSettings
 from .controller_manager import Controller
 from .gripper.controller import GripperController

@@ -20,11 +20,10 @@ from arm_model import PlanningScene as Scene
 from arm_model.ros import apply_planning_scene
 from node_runner import LATCHED
 
+from ..controllers.controller import Source
 from ..core.gateway import CommandGateway
-from ..core.joint_places import JointPlaces
 from ..core.moving_arms import MovingArms
-from ..core.scene_updater import SceneUpdater
-from ..core.set_point import Source
+from ..core.scene_updater import JointPlaces, SceneUpdater
 
 TOPIC = 'collision_scene'
 """Where move_group of arm_planning publishes what may collide, latched: after each change, meshes

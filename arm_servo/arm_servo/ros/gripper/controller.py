@@ -19,11 +19,10 @@ from arm_model import ArmError, RobotState
 from arm_trajectory import GoalCode
 from node_runner.action_goals import serve_goals
 
+from ...controllers.controller import CONTINUED, Source
 from ...core.gateway import CommandGateway
 from ...core.motion_queue import MotionCommand
-from ...core.outcome import CONTINUED
 from ...core.requests import TargetRequest
-from ...core.set_point import Source
 from .interfaces import GripperInterface, GripperState, ParallelGripper, SingleGripper
 from .parameters import GripperParameters
 

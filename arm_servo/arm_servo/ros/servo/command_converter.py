@@ -12,9 +12,8 @@ import numpy as np
 from arm_model import Array, checked, CommandError, Pose, RobotModel, rotation_of
 from arm_model.ros import xyz, xyzw
 
-from ...core.commands import by_joint
-from ...core.requests import DisplacementRequest, JogRequest
-from ...jog.servo_source import JointCommand, PoseCommand, TwistCommand
+from ...controllers.jog import JointCommand, PoseCommand, TwistCommand
+from ...core.requests import by_joint, DisplacementRequest, JogRequest
 from .parameters import DEFAULT_ANGULAR_SPEED, DEFAULT_LINEAR_SPEED, Scales, ServoParameters, Units
 
 MAX_DURATION = 60.0  # longest duration of a joint jog in [s]

@@ -23,10 +23,9 @@ from arm_model import ArmError, ModelError
 from arm_model.ros import seconds, TfListener
 from arm_trajectory import GoalCode
 
+from ...controllers.controller import JOGGING, Outcome, Source
 from ...core.gateway import CommandGateway
-from ...core.outcome import Outcome
 from ...core.requests import DisplacementRequest, JogRequest, StopRequest
-from ...core.set_point import JOGGING
 from ...exceptions import NotReadyError
 from ..refusals import Refusals
 from .command_converter import CommandConverter
@@ -51,7 +50,7 @@ class Servo:
     ) -> None:
         self._node, self._gateway, self._prepare = node, gateway, prepare
         self._parameters = parameters
-        self._modes = ServoModes(node, self._stop, gateway.holds.renew)
+        self._modes = ServoModes(node, self._stop, lambda: gateway.renew(Source.JOG))
         model = gateway.model
         frames = TfListener(node, model.kinematics, parameters.frame_prefix, model.base)
         self.converter = CommandConverter(model, frames, parameters, read_scales(node))
@@ -93,7 +92,7 @@ class Servo:
             self._gateway.command(request, get_ready).add_done_callback(self._note)
             return
         # a stream of displacements is held like a jog
-        self._gateway.holds.command(client, time.monotonic(), is_zero=request.is_zero)
+        self._gateway.stream(Source.JOG, client, is_zero=request.is_zero)
         command = self._gateway.request(request, get_ready)
         command.future.add_done_callback(self._note)
         command.ended.add_done_callback(self._note_end)

@@ -13,7 +13,7 @@ from rclpy.node import Node
 from arm_model import JointLimits, ModelError, RobotModel
 from node_runner import ParameterReader
 
-from ...jog.servo_source import ServoSettings
+from ...controllers.jog import ServoSettings
 from ...jog.velocity_bounds import VelocityBoundsSettings
 from ...jog.velocity_ik import IkSettings
 

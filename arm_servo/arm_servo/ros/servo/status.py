@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from ...core.set_point import Source
+from ...controllers.controller import Source
 from ...core.snapshot import Snapshot
 from ...report import Cause, MotionReport
 

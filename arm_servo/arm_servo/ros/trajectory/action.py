@@ -18,10 +18,10 @@ from arm_model import ArmError
 from arm_trajectory import GoalCode, TrajectoryGoal
 from node_runner.action_goals import serve_goals
 
-from ...core.execution import Execution
+from ...controllers.controller import Outcome, refused
+from ...controllers.trajectory import Execution
 from ...core.gateway import CommandGateway
 from ...core.motion_queue import MotionCommand
-from ...core.outcome import Outcome, refused
 from .messages import difference, point_of
 
 START_TIMEOUT = 5.0  # time in which a goal must be planned and taken by the cycle in [s]

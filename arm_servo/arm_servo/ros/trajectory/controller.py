@@ -23,17 +23,19 @@ from arm_model.ros import seconds
 from arm_trajectory import TrajectoryGoal
 from node_runner import LATCHED
 
-from ...core.execution import Execution
+from ...controllers.controller import Source
+from ...controllers.trajectory import Execution
 from ...core.gateway import CommandGateway
 from ...core.motion_queue import MotionCommand
 from ...core.requests import SpeedRequest, StopRequest
-from ...core.set_point import Source
 from ...exceptions import NotReadyError
 from ..refusals import LoggedReasons
 from .action import TrajectoryAction
 from .messages import difference, goal_of_action, goal_of_trajectory, point_of
 from .parameters import TrajectoryParameters
 from .pause import TrajectoryPause
+
+TOPIC = 'joint_trajectory'  # stands for all who publish there: their names are not known
 
 
 class TrajectoryController:
@@ -82,7 +84,7 @@ class TrajectoryController:
         """Accept trajectories, or stop on the path and accept none."""
         self.active = active
         if active:
-            self._gateway.stream.renew()
+            self._gateway.renew(Source.TRAJECTORY)
         else:
             self._stop('the controller was deactivated')
 
@@ -101,6 +103,9 @@ class TrajectoryController:
         command = self._gateway.request(goal, get_ready)
         command.future.add_done_callback(self._remember)
         return command
+
+    def _get_ready(self) -> None:
+        self._gateway.get_ready_for(Source.TRAJECTORY, TOPIC, self._prepare)
 
     def _stop(self, reason: str) -> None:
         self._gateway.command(StopRequest(reason, (Source.TRAJECTORY,)))
@@ -122,12 +127,12 @@ class TrajectoryController:
     def _take(self, message: JointTrajectory) -> None:
         if not message.joint_names and not message.points:
             self._stop('an empty trajectory came')
-            self._gateway.stream.renew()
+            self._gateway.renew(Source.TRAJECTORY)
             return
         try:
-            self._gateway.stream.take()
+            self._gateway.stream(Source.TRAJECTORY, TOPIC)
             goal = goal_of_trajectory(message, self._now, self._parameters)
-            command = self._request(goal, lambda: self._gateway.stream.ask(self._prepare))
+            command = self._request(goal, self._get_ready)
         except ArmError as error:
             self._news.append(f'trajectory refused: {error}')
             return

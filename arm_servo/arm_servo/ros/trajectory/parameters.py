@@ -13,7 +13,7 @@ from arm_model import JointLimits, ModelError
 from arm_trajectory import GoalRules, JointTolerance
 from node_runner import ParameterReader
 
-from ...core.execution import ExecutionSettings
+from ...controllers.trajectory import ExecutionSettings
 
 RATE_RANGE = (0.1, 1000.0)  # span of rates in [Hz]
 

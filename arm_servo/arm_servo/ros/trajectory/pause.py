@@ -11,9 +11,9 @@ import time
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
+from ...controllers.controller import Source
 from ...core.gateway import CommandGateway
 from ...core.requests import PauseRequest
-from ...core.set_point import Source
 from ...core.snapshot import Snapshot
 
 SOURCE_WORDS = {

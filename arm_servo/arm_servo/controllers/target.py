@@ -9,18 +9,16 @@ import numpy as np
 from arm_model import Array, frozen, RobotState
 from arm_trajectory import GoalCode, OnlineTrajectoryGenerator, Plan
 
-from .outcome import Outcome
+from .controller import ArmState, Controller, Outcome, Source
 
 ARRIVAL_TOLERANCE = 1e-6  # how near to the target the set-points must be to have arrived in [rad]
 MIN_SPEED_FACTOR = 0.01  # least share of the speed that a target is approached with
 
 
-class SingleTarget:
-    """Plans to one target, anew in every cycle.
+class SingleTarget(Controller):
+    """Plans to one target, anew in every cycle."""
 
-    Attributes:
-        outcome: How it ended; None while it goes on.
-    """
+    source = Source.TARGET
 
     def __init__(
         self, target: Array, max_speed: float, generator: OnlineTrajectoryGenerator
@@ -31,7 +29,6 @@ class SingleTarget:
             max_speed: Greatest speed of a joint on the way there in [rad/s].
         """
         self.target = frozen(target)
-        self.outcome: Outcome | None = None
         self._max_speed, self._generator = max_speed, generator
         self._planned_for, self._planner = 0.0, generator
 
@@ -49,26 +46,20 @@ class SingleTarget:
             )
         return self._planner.to_state(state, RobotState.at_rest(self.target))
 
-    def step(self, state: RobotState, speed_scaling: float, period: float) -> RobotState | None:
-        """Return the next state; None to come to rest.
-
-        Args:
-            speed_scaling: Share of the speed, 0 to 1.
-        """
-        if speed_scaling == 0.0:
+    def update(self, arm: ArmState, period: float) -> RobotState | None:
+        """Return the next state; None to come to rest."""
+        state = arm.commanded
+        if arm.is_held or arm.speed_scaling == 0.0:
             return None
-        plan = self.plan(state, speed_scaling)
+        plan = self.plan(state, arm.speed_scaling)
         if plan is None:
             if not state.moving:
                 self.end(Outcome(GoalCode.INVALID_GOAL, 'no motion leads to the target'))
             return None
         return RobotState.at_rest(self.target) if plan.duration <= period else plan.at(period)
 
-    def arrive(self, state: RobotState) -> None:
-        """End where a state rests at the target."""
+    def conclude(self, arm: ArmState, state: RobotState) -> bool:
+        """Return whether it is over: it ends where the arm rests at the target."""
         if not state.moving and np.allclose(state.position, self.target, atol=ARRIVAL_TOLERANCE):
             self.end(Outcome(GoalCode.SUCCESSFUL, 'the target is reached'))
-
-    def end(self, outcome: Outcome) -> None:
-        """End, unless it has ended."""
-        self.outcome = self.outcome or outcome
+        return super().conclude(arm, state)

@@ -1,18 +1,24 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Jogging: an asked speed of the tool or of joints, or a pose to track, as joint speeds."""
+"""Jogging: a command while it is fresh, as joint speeds, and the stop behind it.
+
+A command is a speed of the tool or of joints, or a pose to track.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Hashable
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pinocchio as pin
 
 from arm_model import Array, Mask, Pose, RobotModel, RobotState, turned_twists
+from arm_trajectory import OnlineTrajectoryGenerator
 
+from ..jog.velocity_ik import IkAnswer, IkSettings, TwistTask, VelocityIk
 from ..report import Cause, Limiter, MotionReport
-from .velocity_ik import IkAnswer, IkSettings, TwistTask, VelocityIk
+from .controller import ArmState, Controller, Source, toward
 
 NO_AXES: Mask = np.zeros(6, dtype=np.bool_)  # mask of no axis of a twist
 BASE = np.eye(3)  # the axes of the base
@@ -24,6 +30,12 @@ MIN_COMMAND_FACTOR = 0.1  # least share of a command that is carried out while h
 
 SLOWED, HASTENED = 0.1, 0.4
 """Least times in which the share of a command falls to nothing and comes back in [s]."""
+
+REST_SPEED_FACTOR = 0.02
+"""Share of a joint's speed below which a released jog needs no line any more."""
+
+MAX_SLOW_DOWN_TIME = 1.0
+"""Longest time for which a released jog is slowed down along its line in [s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -169,6 +181,71 @@ class ServoSource:
         return self._ik.cartesian(
             state, TwistTask(twist, np.eye(3), ~self._drift, self._drift), period
         )
+
+
+class Jog(Controller):
+    """Carries out the latest jog command; without a fresh one it brings the arm to rest.
+
+    Attributes:
+        client: Who sent the command.
+    """
+
+    source = Source.JOG
+
+    def __init__(
+        self, model: RobotModel, generator: OnlineTrajectoryGenerator, settings: ServoSettings
+    ) -> None:
+        self._servo = ServoSource(model, settings)
+        self._generator, self._limits = generator, model.limits
+        self._command: Command | None = None
+        self._fresh_until = 0.0
+        self._slowing_since: float | None = None
+        self.client: Hashable = None
+
+    def begin(self) -> None:
+        """Begin to jog: nothing is held yet."""
+        self._servo.reset()
+        self._command, self.outcome = None, None
+
+    def take(self, command: Command, fresh_until: float, client: Hashable) -> None:
+        """Set the command.
+
+        Args:
+            fresh_until: Steady time until which it counts in [s].
+        """
+        self._command, self._fresh_until, self.client = command, fresh_until, client
+        self._slowing_since = None
+
+    def update(self, arm: ArmState, period: float) -> RobotState | None:
+        """Return the next state; None to come to rest."""
+        state, command = arm.commanded, self._command
+        if arm.is_held or self._stops(arm):
+            command = self._slowing(state, arm.now)
+        if command is None:
+            self._servo.reset()
+            self.report = MotionReport()
+            return None
+        answer = self._servo.step(state, command, period)
+        self.report = answer.report
+        return toward(self._generator, state, answer.velocity, period)
+
+    def conclude(self, arm: ArmState, state: RobotState) -> bool:
+        """Return whether it is over: it ends where the arm rests without a command."""
+        return self._stops(arm) and not state.moving
+
+    def _stops(self, arm: ArmState) -> bool:
+        return arm.is_paused or arm.now > self._fresh_until
+
+    def _slowing(self, state: RobotState, now: float) -> Command | None:
+        """Return what slows a stale jog down along its line; None for the last of it."""
+        calm = np.all(np.abs(state.velocity) < REST_SPEED_FACTOR * self._limits.velocity)
+        if calm or not isinstance(self._command, TwistCommand):
+            return None
+        if self._slowing_since is None:
+            self._slowing_since = now
+        if now - self._slowing_since > MAX_SLOW_DOWN_TIME:
+            return None
+        return replace(self._command, twist=np.zeros(6))
 
 
 def _approach(error: Array, gain: float, fastest: float, deceleration: float) -> Array:

@@ -1,19 +1,44 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What other threads leave for the cycle, and the order in which commands and stops count."""
+"""The one way to the cycle: orders from any thread, and the order in which they count."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import count
 import math
-import threading
 
+from robot_primitives import StreamGate, StreamRules
+
+from ..controllers.controller import MOTIONS, Source
 from ..exceptions import NotReadyError
-from .set_point import MOTIONS, Source
 from .snapshot import MAX_CYCLE_AGE
+
+BEGINS = 'the arm has just begun to follow'
+
+TOGETHER = 1.0
+"""Trajectories of a topic that follow each other within so many [s] are a stream; so long it has
+to be silent before it can be let in again."""
+
+GONE_AFTER = 10.0  # silence after which who had to let go has done so in [s]
+
+RULES = {
+    Source.JOG: StreamRules(
+        'a jog that was held before moves nothing: release and jog again, with a command of zero'
+        f' between (silence counts after {GONE_AFTER:g} s only), or call ~/start_servo',
+        gone_after=GONE_AFTER,
+    ),
+    Source.TRAJECTORY: StreamRules(
+        'a stream of trajectories does not go on after that: send none for'
+        f' {TOGETHER:g} s, then an empty one, or none for {GONE_AFTER:g} s',
+        together=TOGETHER,
+        let_go=GONE_AFTER,
+        gone_after=GONE_AFTER,
+        begin_margin=5.0,  # in which drives are got back
+    ),
+}
+"""Clients that send streams: those that jog, and the topic of trajectories."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,15 +53,22 @@ class Cycle:
 Order = Callable[[Cycle], bool]  # carried out in a cycle; False for again in the next one
 
 
-class OrderQueue:
-    """Orders from any thread, carried out by the thread of the cycle."""
+class Mailbox:
+    """Orders from any thread, carried out by the thread of the cycle.
+
+    Attributes:
+        gate: Refuses what a stop or a newer command has made void.
+        refused: When a motion was refused last, as the arm did not follow, in [s].
+    """
 
     def __init__(self) -> None:
         self._orders: deque[Order] = deque()
-        self.append = self._orders.append
+        self.post = self._orders.append
+        self.gate = StreamGate[Source](MOTIONS, RULES)
+        self.refused = -math.inf
 
     def __len__(self) -> int:
-        """Return how many wait."""
+        """Return how many orders wait."""
         return len(self._orders)
 
     def carry_out(self, cycle: Cycle) -> None:
@@ -46,46 +78,14 @@ class OrderQueue:
             if not order(cycle):
                 self._orders.append(order)
 
-
-class CommandOrder:
-    """Numbers commands and stops, and refuses what a later one has made void; for any thread.
-
-    Attributes:
-        refused: When a motion was refused last, as the arm did not follow, in [s].
-    """
-
-    def __init__(self) -> None:
-        self.refused = -math.inf
-        self._lock = threading.Lock()  # held for a few instructions only
-        self._numbers = count(1)
-        self._void_up_to: dict[Source, tuple[int, str]] = dict.fromkeys(MOTIONS, (0, ''))
-
-    def number(self) -> int:
-        """Return the number of a command that comes now."""
-        with self._lock:
-            return next(self._numbers)
-
-    def void(self, sources: Iterable[Source], reason: str, number: int | None = None) -> None:
-        """Refuse what was requested for some sources before a number.
-
-        Args:
-            number: The number; by default all that was requested so far is refused.
-        """
-        with self._lock:
-            number = next(self._numbers) if number is None else number
-            for source in sources:
-                if self._void_up_to[source][0] < number:
-                    self._void_up_to[source] = number, reason
-
     def check(self, source: Source, number: int) -> None:
         """Refuse what another command or a stop has made void.
 
         Raises:
             NotReadyError: It is void.
         """
-        up_to, reason = self._void_up_to[source]
-        if number < up_to:
-            raise NotReadyError(f'stopped before it had begun: {reason}')
+        if reason := self.gate.refusal(source, number):
+            raise NotReadyError(reason)
 
     def admit(self, source: Source, number: int, since: float, cycle: Cycle) -> None:
         """Refuse a motion that is void before it began, or that the arm cannot follow.

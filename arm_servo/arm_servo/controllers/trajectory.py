@@ -19,7 +19,6 @@ from arm_trajectory import (
     JointTolerance,
     merge_tolerances,
     OnlineTrajectoryGenerator,
-    Path,
     PathCheck,
     PathContact,
     TimerState,
@@ -27,7 +26,7 @@ from arm_trajectory import (
     TrajectoryTimer,
 )
 
-from .outcome import Outcome
+from .controller import ArmState, Controller, Outcome, Source
 
 ARRIVAL_TOLERANCE = 1e-6  # how near to the end the set-points must be to have arrived in [rad]
 MAX_CATCH_UP_SCALING = 0.7  # speed scaling at most while the arm catches up with the path
@@ -74,16 +73,18 @@ class Feedback:
         return self.timer.speed_scaling
 
 
-class Execution:
+class Execution(Controller):
     """One trajectory on its way.
 
     Pause, speed and cancel act on the speed scaling of the path, so the arm stays on it.
 
     Attributes:
         feedback: Where it is on the path, as of the last step.
-        on_path: Whether the last step was taken exactly on the path, which was checked.
+        path: The path that it follows.
         ending: How it ends or has ended; None while nothing is decided.
     """
+
+    source = Source.TRAJECTORY
 
     def __init__(
         self,
@@ -106,11 +107,10 @@ class Execution:
         """
         self._limits, self._waiting = limits, wait
         planned = build_path(goal, limits, state, settings.rules)
-        self._path, self._late = planned.path, planned.late
+        self.path, self._late = planned.path, planned.late
         # an arm that moves goes on as it does, and changes its speed from there
         self._timer = TrajectoryTimer(limits, 1.0 if state.moving else speed_scaling)
         self._begins_at_rest = not state.moving
-        self._begun = False
         self._catch_up = CatchUpInterpolator(limits, generator)
         self._path_tolerance = merge_tolerances(limits, goal.path_tolerance, settings.path)
         self._goal_tolerance = merge_tolerances(limits, goal.goal_tolerance, settings.goal)
@@ -121,25 +121,14 @@ class Execution:
         self._rested = False
         self.ending: Outcome | None = None
         self.phase = Phase.FOLLOWING
-        self.on_path = False
-        begin_point = self._path.at(0.0)
+        begin_point = self.path.at(0.0)
         timer = TimerState(0.0, self._timer.speed_scaling, 0.0, speed_scaling, wait)
         self.feedback = Feedback(0.0, RobotState.at_rest(begin_point.position), state, timer)
 
     @property
-    def outcome(self) -> Outcome | None:
-        """How it ended; None while it goes on."""
-        return self.ending if self.phase is Phase.DONE else None
-
-    @property
-    def path(self) -> Path:
-        """The path that it follows."""
-        return self._path
-
-    @property
     def duration(self) -> float:
         """How long its path lasts at full speed in [s]."""
-        return self._path.duration
+        return self.path.duration
 
     def contact(self, check: PathCheck, begin: float = 0.0) -> PathContact | None:
         """Return the first contact on its path; for any thread.
@@ -148,14 +137,14 @@ class Execution:
             begin: Time of the path from which on it is looked for in [s].
         """
         found = check.contact(
-            lambda times: self._path.positions(times + begin), max(self.duration - begin, 0.0)
+            lambda times: self.path.positions(times + begin), max(self.duration - begin, 0.0)
         )
         return found and replace(found, time=found.time + begin)
 
     def foreseen(self, ahead: float, timer: TimerState | None = None) -> RobotState:
         """Return where it will be when nothing comes in between; for any thread."""
         timer = timer or self.feedback.timer
-        return self._state(*TrajectoryTimer.foreseen(self._limits, self._path, timer, ahead)[:3])
+        return self._state(*TrajectoryTimer.foreseen(self._limits, self.path, timer, ahead)[:3])
 
     def timer(self, speed_scaling: float) -> TimerState:
         """Return how it runs from now on.
@@ -179,36 +168,27 @@ class Execution:
         """End at once, unless it has ended: something else moves the arm now, or nothing."""
         if self.phase is not Phase.DONE:
             self.ending = self.ending or outcome
-            self.phase = Phase.DONE
+            self._finish()
 
-    def step(
-        self, state: RobotState, measured: RobotState, speed_scaling: float, period: float
-    ) -> RobotState | None:
+    def update(self, arm: ArmState, period: float) -> RobotState | None:
         """Advance.
-
-        Args:
-            speed_scaling: Wanted speed scaling, 0 to 1.
 
         Returns:
             The state to command next; None to come to rest: it does not begin yet, or there is no
             way to follow.
         """
-        if not self._begun and self._waits(speed_scaling, period):
+        state, speed_scaling = arm.commanded, arm.speed_scaling
+        if self.brakes and self._waits(speed_scaling, period):
             return self._wait(state, speed_scaling, period)
-        self._begun = True
-        self._check(state, measured, period)
-        self._timer.step(self._path, self._wanted(speed_scaling), period)
+        self.brakes = False
+        self._check(state, arm.measured, period)
+        self._timer.step(self.path, self._wanted(speed_scaling), period)
         following = self._catch_up.step(state, self._ahead(period), period)
         self.on_path = following is not None and self._catch_up.exact
         desired = self._ahead(period)(period)
-        self.feedback = Feedback(self._timer.time, desired, measured, self._timer.state)
+        self.feedback = Feedback(self._timer.time, desired, arm.measured, self._timer.state)
         self._advance(following)
         return following
-
-    @property
-    def waits(self) -> bool:
-        """Whether it is yet to begin."""
-        return not self._begun
 
     def _wanted(self, speed_scaling: float) -> float:
         """Return the speed scaling to go to where another one is wanted."""
@@ -236,12 +216,12 @@ class Execution:
         timer = TimerState(0.0, speed_scaling, 0.0, speed_scaling, max(self._waiting, 0.0))
         self.feedback = replace(self.feedback, timer=timer)
         if self.phase is Phase.STOPPING:
-            self.phase = Phase.DONE
+            self._finish()
             return None
         self._rested = self._rested or not state.moving
         if not self._rested or speed_scaling == 0.0:
             return None  # the joints slow down in step; in a pause they stay where they are
-        rest = RobotState.at_rest(self._path.at(0.0).position)
+        rest = RobotState.at_rest(self.path.at(0.0).position)
         return self._catch_up.step(state, lambda _: rest, period)
 
     def _ahead(self, period: float) -> Callable[[float], RobotState]:
@@ -255,7 +235,7 @@ class Execution:
 
     def _state(self, time: float, speed_scaling: float, change: float) -> RobotState:
         """Return the state at a time of the path that runs at a speed scaling."""
-        here = self._path.at(time)
+        here = self.path.at(time)
         return RobotState(
             here.position,
             here.velocity * speed_scaling,
@@ -288,11 +268,11 @@ class Execution:
 
     def _settle(self, state: RobotState, violation: str | None, period: float) -> None:
         """Wait at the end until the arm has arrived, or the time for that is over."""
-        arrived = np.allclose(state.position, self._path.end.position, atol=ARRIVAL_TOLERANCE)
+        arrived = np.allclose(state.position, self.path.end.position, atol=ARRIVAL_TOLERANCE)
         if violation is None and arrived and not state.moving:
             late = f', {self._late}' if self._late else ''
             self.ending = Outcome(GoalCode.SUCCESSFUL, f'the goal is reached{late}')
-            self.phase = Phase.DONE
+            self._finish()
             return
         self._settling += period
         if 0.0 < self._goal_time < self._settling:
@@ -301,12 +281,15 @@ class Execution:
                 GoalCode.GOAL_TOLERANCE_VIOLATED,
                 f'{what}, {self._settling:.3f} s after the end (goal_time {self._goal_time:g} s)',
             )
-            self.phase = Phase.DONE
+            self._finish()
 
     def _advance(self, state: RobotState | None) -> None:
         """Go on to the next phase at the end of the path, or where it stands still."""
-        if self.phase is Phase.FOLLOWING and self._timer.time >= self._path.duration:
+        if self.phase is Phase.FOLLOWING and self._timer.time >= self.path.duration:
             self.phase = Phase.SETTLING
-        at_rest = self._timer.stopped or self._timer.time >= self._path.duration
+        at_rest = self._timer.stopped or self._timer.time >= self.path.duration
         if self.phase is Phase.STOPPING and at_rest and (state is None or not state.moving):
-            self.phase = Phase.DONE
+            self._finish()
+
+    def _finish(self) -> None:
+        self.phase, self.outcome = Phase.DONE, self.ending

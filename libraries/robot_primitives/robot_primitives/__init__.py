@@ -1,0 +1,9 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What arms and quadrupeds share, each once: pure, without ROS, threads or clocks of its own."""
+
+from __future__ import annotations
+
+from .stream_gate import StreamGate, StreamRules
+
+__all__ = ['StreamGate', 'StreamRules']
