@@ -333,6 +333,10 @@ def test_a_hull_that_is_far_too_large_is_named(
     (tmp_path / 'hollow.obj').write_text('\n'.join([ring, *outside, *inside]), encoding='utf-8')
     model = arm('<mesh filename="hollow.obj" scale="0.1 0.1 0.1"/>', tmp_path)
     assert any('link_1 (27 %)' in note and 'convex parts' in note for note in model.notes)
+    assert not all(hull.final for hull in meshes.load_hulls(tmp_path / 'hollow.obj'))
+    folder = meshes.cache_folder()
+    assert folder is not None
+    assert not list(folder.glob('*.npz'))  # the next start, when others are done, cuts it
 
 
 def _extruded(outline: list[tuple[int, int]], flat: list[tuple[int, int, int]]) -> str:

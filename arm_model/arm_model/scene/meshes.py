@@ -63,6 +63,8 @@ class Hull:
     points: Array  # its corners (m, 3), in the unit of the mesh
     # volume of the body as a share of its hull's, or of its pieces'; 1 where it has no inside
     fullness: float
+    # False where a busy computer did not cut the body in time: the next start tries it again
+    final: bool = True
 
 
 def load_hulls(path: Path) -> Sequence[Hull]:
@@ -87,8 +89,9 @@ def _hulls(digest: str, path: Path) -> Sequence[Hull]:
     hulls = _stored(cached)
     if not hulls:
         hulls = hulls_of_file(path)
-        with contextlib.suppress(OSError):  # such as a full disk: it is made the next time, too
-            _store(cached, hulls)
+        if all(hull.final for hull in hulls):
+            with contextlib.suppress(OSError):  # such as a full disk: made the next time, too
+                _store(cached, hulls)
     return hulls
 
 
@@ -171,14 +174,17 @@ def _hulls_of_body(points: Array, triangles: Places) -> Sequence[Hull]:
     a, b, c = corners.transpose(1, 0, 2)
     solid = abs(float((a * np.cross(b, c)).sum()) / 6.0)
     hull = convex(corners.reshape(-1, 3))
-    whole = hull.computeVolume()
+    whole, final = hull.computeVolume(), True
     if 0.0 < solid < MIN_FULLNESS * whole:
         used, places = np.unique(triangles, return_inverse=True)
-        pieces = _around_triangles(corners, cut(points[used], places.reshape(-1, 3)))
+        try:
+            pieces = _around_triangles(corners, cut(points[used], places.reshape(-1, 3)))
+        except TimeoutError:
+            pieces, final = (), False
         volume = sum(piece.computeVolume() for piece in pieces)
         if pieces and volume < whole:
             return [Hull(frozen(each.points()), min(solid / volume, 1.0)) for each in pieces]
-    return (Hull(frozen(hull.points()), min(solid / whole, 1.0) if solid else 1.0),)
+    return (Hull(frozen(hull.points()), min(solid / whole, 1.0) if solid else 1.0, final),)
 
 
 def _around_triangles(triangles: Array, pieces: Sequence[Array]) -> Sequence[Native]:

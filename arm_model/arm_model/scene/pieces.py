@@ -41,11 +41,14 @@ SETTINGS = {
 
 
 def cut(corners: Array, triangles: Places) -> Sequence[Array]:
-    """Return the corners of each piece; nothing for a body that is open, or not cut in time.
+    """Return the corners of each piece; nothing for a body that is open or too intricate.
 
     Args:
         corners: Those of the body (n, 3), each once.
         triangles: Indices of their corners (m, 3).
+
+    Raises:
+        TimeoutError: The computer is too busy; another attempt may do it.
     """
     if not _closed(triangles):
         return ()
@@ -61,6 +64,8 @@ def cut(corners: Array, triangles: Places) -> Sequence[Array]:
             )
             with np.load(pieces) as stored:
                 return [stored[name] for name in stored.files]
+        except subprocess.TimeoutExpired as error:
+            raise TimeoutError from error
         except (OSError, ValueError, subprocess.SubprocessError):
             return ()
 
