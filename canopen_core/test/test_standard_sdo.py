@@ -9,87 +9,71 @@ from hypothesis import strategies as st
 import pytest
 
 from canopen_core import CodecError
-from canopen_core.standard import (
-    Abort,
-    abort_text,
-    AbortCode,
-    DataType,
-    decode_request,
-    decode_response,
-    DownloadRequest,
-    DownloadResponse,
-    DownloadSegmentResponse,
-    fitted,
-    Response,
-    Segment,
-    UploadRequest,
-    UploadResponse,
-    UploadSegmentRequest,
-)
+from canopen_core.standard import abort_text, AbortCode, DataType, sdo
 from canopen_core.standard.sdo import Request
 
 INDEX = st.integers(0, 0xFFFF)
 SUBINDEX = st.integers(0, 0xFF)
 EXPEDITED = st.binary(min_size=1, max_size=4)
-SEGMENTS = st.builds(Segment, st.booleans(), st.binary(max_size=7), st.booleans())
-ABORTS = st.builds(Abort, INDEX, SUBINDEX, st.integers(0, 0xFFFF_FFFF))
+SEGMENTS = st.builds(sdo.Segment, st.booleans(), st.binary(max_size=7), st.booleans())
+ABORTS = st.builds(sdo.Abort, INDEX, SUBINDEX, st.integers(0, 0xFFFF_FFFF))
 SIZES = st.none() | st.integers(0, 0xFFFF_FFFF)
 
 
-def _expedited_download(index: int, subindex: int, data: bytes) -> DownloadRequest:
-    return DownloadRequest(index, subindex, data, len(data))
+def _expedited_download(index: int, subindex: int, data: bytes) -> sdo.DownloadRequest:
+    return sdo.DownloadRequest(index, subindex, data, len(data))
 
 
-def _expedited_upload(index: int, subindex: int, data: bytes) -> UploadResponse:
-    return UploadResponse(index, subindex, data, len(data))
+def _expedited_upload(index: int, subindex: int, data: bytes) -> sdo.UploadResponse:
+    return sdo.UploadResponse(index, subindex, data, len(data))
 
 
 REQUESTS: st.SearchStrategy[Request] = st.one_of(
     st.builds(_expedited_download, INDEX, SUBINDEX, EXPEDITED),
-    st.builds(DownloadRequest, INDEX, SUBINDEX, st.none(), SIZES),
-    st.builds(UploadRequest, INDEX, SUBINDEX),
+    st.builds(sdo.DownloadRequest, INDEX, SUBINDEX, st.none(), SIZES),
+    st.builds(sdo.UploadRequest, INDEX, SUBINDEX),
     SEGMENTS,
-    st.builds(UploadSegmentRequest, st.booleans()),
+    st.builds(sdo.UploadSegmentRequest, st.booleans()),
     ABORTS,
 )
-RESPONSES: st.SearchStrategy[Response] = st.one_of(
+RESPONSES: st.SearchStrategy[sdo.Response] = st.one_of(
     st.builds(_expedited_upload, INDEX, SUBINDEX, EXPEDITED),
-    st.builds(UploadResponse, INDEX, SUBINDEX, st.none(), SIZES),
-    st.builds(DownloadResponse, INDEX, SUBINDEX),
+    st.builds(sdo.UploadResponse, INDEX, SUBINDEX, st.none(), SIZES),
+    st.builds(sdo.DownloadResponse, INDEX, SUBINDEX),
     SEGMENTS,
-    st.builds(DownloadSegmentResponse, st.booleans()),
+    st.builds(sdo.DownloadSegmentResponse, st.booleans()),
     ABORTS,
 )
 
 
 @given(request=REQUESTS, response=RESPONSES)
-def test_messages_survive_the_round_trip(request: Request, response: Response) -> None:
+def test_messages_survive_the_round_trip(request: Request, response: sdo.Response) -> None:
     """Each has 8 bytes and is read as what it was."""
     frames = request.encode(), response.encode()
-    assert (decode_request(frames[0]), decode_response(frames[1])) == (request, response)
+    assert (sdo.decode_request(frames[0]), sdo.decode_response(frames[1])) == (request, response)
     assert [len(frame) for frame in frames] == [8, 8]
 
 
 @given(data=st.binary(max_size=10))
 def test_reading_fails_with_codec_error_only(data: bytes) -> None:
     """Whatever a peer sends is a message or a CodecError."""
-    for decode in (decode_request, decode_response):
+    for decode in (sdo.decode_request, sdo.decode_response):
         try:
             message = decode(data)
         except CodecError:
             continue
-        assert len(data) == 8 or (decode is decode_response and len(data) < 8)
+        assert len(data) == 8 or (decode is sdo.decode_response and len(data) < 8)
         assert len(message.encode()) == 8
 
 
 @given(message=RESPONSES)
-def test_an_answer_without_its_unused_bytes_is_read(message: Response) -> None:
+def test_an_answer_without_its_unused_bytes_is_read(message: sdo.Response) -> None:
     """As far as it is complete; one byte less is none."""
     frame = message.encode()
     sizes = []
     for size in range(9):
         with suppress(CodecError):
-            if decode_response(frame[:size]) == message:
+            if sdo.decode_response(frame[:size]) == message:
                 sizes.append(size)
     assert sizes == list(range(sizes[0], 9))
     assert not any(frame[sizes[0] :])
@@ -110,58 +94,58 @@ def test_an_expedited_value_is_cut_to_its_type(
     data_type: DataType, data: bytes, value: bytes
 ) -> None:
     """What is too short, or came in segments, is left for the codec to refuse."""
-    assert fitted(data_type, data) == value
+    assert sdo.fitted(data_type, data) == value
 
 
-TRANSCRIPTS: tuple[tuple[Request | Response, str], ...] = (
-    (UploadRequest(0x1000, 0), '40 00 10 00 00 00 00 00'),
-    (DownloadRequest(0x6040, 0, b'\x0f\x00', 2), '2B 40 60 00 0F 00 00 00'),
-    (DownloadRequest(0x6060, 0, b'\x08', 1), '2F 60 60 00 08 00 00 00'),
-    (DownloadRequest(0x607A, 0, b'\x01\x02\x03\x04', 4), '23 7A 60 00 01 02 03 04'),
-    (DownloadRequest(0x1008, 0, None, 10), '21 08 10 00 0A 00 00 00'),
-    (Segment(False, b'abcdefg', False), '00 61 62 63 64 65 66 67'),
-    (Segment(True, b'abc', True), '19 61 62 63 00 00 00 00'),
-    (UploadSegmentRequest(False), '60 00 00 00 00 00 00 00'),
-    (UploadSegmentRequest(True), '70 00 00 00 00 00 00 00'),
-    (Abort(0x1000, 0, AbortCode.NO_OBJECT), '80 00 10 00 00 00 02 06'),
+TRANSCRIPTS: tuple[tuple[Request | sdo.Response, str], ...] = (
+    (sdo.UploadRequest(0x1000, 0), '40 00 10 00 00 00 00 00'),
+    (sdo.DownloadRequest(0x6040, 0, b'\x0f\x00', 2), '2B 40 60 00 0F 00 00 00'),
+    (sdo.DownloadRequest(0x6060, 0, b'\x08', 1), '2F 60 60 00 08 00 00 00'),
+    (sdo.DownloadRequest(0x607A, 0, b'\x01\x02\x03\x04', 4), '23 7A 60 00 01 02 03 04'),
+    (sdo.DownloadRequest(0x1008, 0, None, 10), '21 08 10 00 0A 00 00 00'),
+    (sdo.Segment(False, b'abcdefg', False), '00 61 62 63 64 65 66 67'),
+    (sdo.Segment(True, b'abc', True), '19 61 62 63 00 00 00 00'),
+    (sdo.UploadSegmentRequest(False), '60 00 00 00 00 00 00 00'),
+    (sdo.UploadSegmentRequest(True), '70 00 00 00 00 00 00 00'),
+    (sdo.Abort(0x1000, 0, AbortCode.NO_OBJECT), '80 00 10 00 00 00 02 06'),
 )
-ANSWERS: tuple[tuple[Request | Response, str], ...] = (
-    (UploadResponse(0x1000, 0, b'\x92\x01\x02\x00', 4), '43 00 10 00 92 01 02 00'),
-    (UploadResponse(0x6041, 0, b'\x37\x06', 2), '4B 41 60 00 37 06 00 00'),
-    (UploadResponse(0x1008, 0, None, 26), '41 08 10 00 1A 00 00 00'),
-    (DownloadResponse(0x6040, 0), '60 40 60 00 00 00 00 00'),
-    (DownloadSegmentResponse(False), '20 00 00 00 00 00 00 00'),
-    (DownloadSegmentResponse(True), '30 00 00 00 00 00 00 00'),
+ANSWERS: tuple[tuple[Request | sdo.Response, str], ...] = (
+    (sdo.UploadResponse(0x1000, 0, b'\x92\x01\x02\x00', 4), '43 00 10 00 92 01 02 00'),
+    (sdo.UploadResponse(0x6041, 0, b'\x37\x06', 2), '4B 41 60 00 37 06 00 00'),
+    (sdo.UploadResponse(0x1008, 0, None, 26), '41 08 10 00 1A 00 00 00'),
+    (sdo.DownloadResponse(0x6040, 0), '60 40 60 00 00 00 00 00'),
+    (sdo.DownloadSegmentResponse(False), '20 00 00 00 00 00 00 00'),
+    (sdo.DownloadSegmentResponse(True), '30 00 00 00 00 00 00 00'),
 )
 
 
 @pytest.mark.parametrize(('message', 'frame'), TRANSCRIPTS + ANSWERS)
-def test_messages_are_those_of_the_standard(message: Request | Response, frame: str) -> None:
+def test_messages_are_those_of_the_standard(message: Request | sdo.Response, frame: str) -> None:
     """The bytes of well-known requests and responses, as bus analysers show them."""
     assert message.encode() == bytes.fromhex(frame)
 
 
 def test_expedited_data_without_a_size_are_four_bytes() -> None:
     """A frame that does not have the size hands over all four bytes."""
-    message = decode_request(bytes.fromhex('22 40 60 00 0F 00 00 00'))
-    assert message == DownloadRequest(0x6040, 0, b'\x0f\x00\x00\x00', None)
+    message = sdo.decode_request(bytes.fromhex('22 40 60 00 0F 00 00 00'))
+    assert message == sdo.DownloadRequest(0x6040, 0, b'\x0f\x00\x00\x00', None)
 
 
 def test_data_that_no_frame_carries_are_refused() -> None:
     """They would corrupt the command byte: 1 to 4 bytes expedited, 7 at most in a segment."""
     for data in (b'', b'12345'):
-        for kind in (DownloadRequest, UploadResponse):
+        for kind in (sdo.DownloadRequest, sdo.UploadResponse):
             with pytest.raises(CodecError, match='1 to 4'):
                 kind(0x2000, 0, data, len(data)).encode()
     with pytest.raises(CodecError, match='7 bytes'):
-        Segment(False, bytes(8), True).encode()
+        sdo.Segment(False, bytes(8), True).encode()
 
 
 @pytest.mark.parametrize('specifier', [5, 6, 7])
 def test_the_block_protocol_is_refused(specifier: int) -> None:
     """Command specifiers that are not handled are named in the error."""
     frame = bytes((specifier << 5, 0, 0x10, 0, 0, 0, 0, 0))
-    for decode in (decode_request, decode_response):
+    for decode in (sdo.decode_request, sdo.decode_response):
         with pytest.raises(CodecError, match=str(specifier)):
             decode(frame)
 

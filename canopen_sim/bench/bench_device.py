@@ -15,7 +15,7 @@ from time import process_time
 
 from canopen_core.can import Frame
 from canopen_core.eds import load_eds
-from canopen_core.standard import DownloadRequest
+from canopen_core.standard import sdo
 from canopen_sim import DeviceHost
 
 EDS = Path(__file__).parents[2] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
@@ -60,7 +60,7 @@ class Network:
     def write(self, node_id: int, index: int, subindex: int, value: int, size: int) -> None:
         """Write an object by SDO."""
         data = (value % (1 << 8 * size)).to_bytes(size, 'little')
-        self.receive(0x600 + node_id, DownloadRequest(index, subindex, data, size).encode())
+        self.receive(0x600 + node_id, sdo.DownloadRequest(index, subindex, data, size).encode())
 
     def _configure(self, node_id: int) -> None:
         for number in range(4):

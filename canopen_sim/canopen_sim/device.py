@@ -9,17 +9,17 @@ from collections.abc import Callable, Mapping
 from arm_canopen.config import FactorGroup
 from canopen_core.can import Frame
 from canopen_core.standard import (
-    Abort,
     AXIS_OFFSET,
     CobId,
     drive_axes,
     is_drive,
-    LSS_REQUEST,
+    lss,
     NmtCommand,
     NmtState,
     NODE_ID_MAX,
     NODE_ID_MIN,
     ObjectDictionary,
+    sdo,
     UNCONFIGURED,
 )
 
@@ -315,7 +315,7 @@ class Device:
         state = self._nmt.state
         handlers: dict[int, Handler] = {
             CobId.NMT: self._nmt.receive,
-            LSS_REQUEST: self._lss.receive,
+            lss.REQUEST: self._lss.receive,
         }
         if state is not NmtState.BOOT_UP:
             watched = self._error_control
@@ -357,7 +357,7 @@ class Device:
             return
         self._tpdos.request(frame.can_id, now)
 
-    def _send_abort(self, abort: Abort) -> None:
+    def _send_abort(self, abort: sdo.Abort) -> None:
         self._send(Frame(self._sdo.default.response_id, abort.encode()))
 
     def _on_sdo(self, frame: Frame, now: float) -> None:

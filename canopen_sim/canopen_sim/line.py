@@ -13,7 +13,7 @@ import struct
 from typing import NamedTuple
 
 from canopen_core.can import Frame
-from canopen_core.standard import Abort
+from canopen_core.standard import sdo
 
 from .deviations import Effect, FaultInjection, FRAME_BYTES, Service
 from .timed import NEVER
@@ -86,7 +86,7 @@ class FaultLine:
     def __init__(
         self,
         send: Callable[[Frame], None],
-        abort: Callable[[Abort], None],
+        abort: Callable[[sdo.Abort], None],
         identify: Callable[[Frame, bool], Traffic],
     ) -> None:
         """Begin as a good line; ``identify`` gets whether a frame is outgoing."""
@@ -144,7 +144,7 @@ class FaultLine:
                     self._postpone(OTHER_DEVICE_DELAY, partial(self._send_at, frame))
                 case Effect.ABORT:
                     index, subindex = sdo_object(frame.data, SDO_INITIATIONS) or (0, 0)
-                    self._abort(Abort(index, subindex, fault.injection.abort))
+                    self._abort(sdo.Abort(index, subindex, fault.injection.abort))
                     return
                 case Effect.LOSE:
                     return

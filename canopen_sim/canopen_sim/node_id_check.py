@@ -15,7 +15,7 @@ import time
 
 from canopen_core import BusError, CanopenError
 from canopen_core.can import Bus, Frame
-from canopen_core.standard import CobId, Index, UNCONFIGURED, UploadRequest
+from canopen_core.standard import CobId, Index, sdo, UNCONFIGURED
 
 ANSWER_TIME = 0.15  # [s] a device answers an SDO within some milliseconds, unless it is too busy
 EVIDENCE = {CobId.SDO_RESPONSE: 'SDO response', CobId.HEARTBEAT: 'heartbeat or boot-up'}
@@ -45,7 +45,7 @@ class NodeIdCheck:
         self._receive(0.0)
         with contextlib.suppress(BusError):  # a bus that is down has no devices
             for node_id in [] if self.found else ids:
-                request = UploadRequest(Index.DEVICE_TYPE, 0).encode()
+                request = sdo.UploadRequest(Index.DEVICE_TYPE, 0).encode()
                 bus.send(Frame(CobId.SDO_REQUEST + node_id, request))
 
     def finish(self) -> None:

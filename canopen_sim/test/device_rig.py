@@ -12,21 +12,12 @@ from arm_canopen import DriveState
 from canopen_core.can import Frame
 from canopen_core.eds import load_eds
 from canopen_core.standard import (
-    Abort,
-    decode_response,
-    DownloadRequest,
-    DownloadResponse,
-    DownloadSegmentResponse,
     drive_state,
     nmt_frame,
     NmtCommand,
     NmtState,
     ObjectDictionary,
-    Response,
-    Segment,
-    UploadRequest,
-    UploadResponse,
-    UploadSegmentRequest,
+    sdo,
 )
 from canopen_sim import Device, Drive, Fault, FaultInjection
 
@@ -177,39 +168,39 @@ class Rig:
         ]
         return answers[0].data if answers else None
 
-    def sdo(self, request: bytes) -> Response:
+    def sdo(self, request: bytes) -> sdo.Response:
         """Send an SDO frame and return the decoded answer; an abort raises RefusedError."""
         answer = self.raw_sdo(request)
         assert answer is not None, 'no SDO answer'
-        response = decode_response(answer)
-        if isinstance(response, Abort):
+        response = sdo.decode_response(answer)
+        if isinstance(response, sdo.Abort):
             raise RefusedError(response.code)
         return response
 
     def write(self, index: int, subindex: int, data: bytes) -> None:
         """Write an object, expedited or segmented."""
         if 1 <= len(data) <= 4:
-            request = DownloadRequest(index, subindex, data, len(data))
-            assert isinstance(self.sdo(request.encode()), DownloadResponse)
+            request = sdo.DownloadRequest(index, subindex, data, len(data))
+            assert isinstance(self.sdo(request.encode()), sdo.DownloadResponse)
             return
-        self.sdo(DownloadRequest(index, subindex, None, len(data)).encode())
+        self.sdo(sdo.DownloadRequest(index, subindex, None, len(data)).encode())
         toggle = False
         for start in range(0, max(1, len(data)), 7):
             part = data[start : start + 7]
-            segment = Segment(toggle, part, start + 7 >= len(data))
-            assert self.sdo(segment.encode()) == DownloadSegmentResponse(toggle)
+            segment = sdo.Segment(toggle, part, start + 7 >= len(data))
+            assert self.sdo(segment.encode()) == sdo.DownloadSegmentResponse(toggle)
             toggle = not toggle
 
     def read(self, index: int, subindex: int = 0) -> bytes:
         """Read an object, expedited or segmented."""
-        response = self.sdo(UploadRequest(index, subindex).encode())
-        assert isinstance(response, UploadResponse)
+        response = self.sdo(sdo.UploadRequest(index, subindex).encode())
+        assert isinstance(response, sdo.UploadResponse)
         if response.data is not None:
             return response.data
         data, toggle, last = b'', False, False
         while not last:
-            segment = self.sdo(UploadSegmentRequest(toggle).encode())
-            assert isinstance(segment, Segment)
+            segment = self.sdo(sdo.UploadSegmentRequest(toggle).encode())
+            assert isinstance(segment, sdo.Segment)
             data, last, toggle = data + segment.data, segment.last, not toggle
         return data
 

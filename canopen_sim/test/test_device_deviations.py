@@ -22,19 +22,12 @@ import pytest
 from arm_canopen import DriveState
 from canopen_core.can import Frame
 from canopen_core.eds import load_eds
-from canopen_core.standard import (
-    Abort,
-    AbortCode,
-    decode_response,
-    NmtCommand,
-    NmtState,
-    UploadRequest,
-)
+from canopen_core.standard import AbortCode, NmtCommand, NmtState, sdo
 from canopen_sim import Device, DeviceHost, Fault, FaultInjection
 from canopen_sim.deviations import FAULTS, parse_fault
 
 SDO_ANSWER, TPDO1, HEARTBEAT = 0x580 + NODE_ID, 0x180 + NODE_ID, 0x700 + NODE_ID
-READ_DEVICE_TYPE = UploadRequest(0x1000, 0).encode()
+READ_DEVICE_TYPE = sdo.UploadRequest(0x1000, 0).encode()
 CODES = [fault for fault in Fault if fault.value.code]
 
 
@@ -162,7 +155,7 @@ def test_slow_sdo_answers_late_and_right(rig: Rig) -> None:
 def test_silence_of_sdos(rig: Rig) -> None:
     """About one object, until it is ended; or for a number of requests."""
     rig.inject(Fault.SDO_SILENCE, object=(0x6064, 0))
-    assert rig.raw_sdo(UploadRequest(0x6064, 0).encode()) is None
+    assert rig.raw_sdo(sdo.UploadRequest(0x6064, 0).encode()) is None
     assert answers(rig)
     rig.cure(Fault.SDO_SILENCE)
     assert rig.get(0x6064) == 0
@@ -175,9 +168,9 @@ def test_abort_names_object_and_code(rig: Rig) -> None:
     """The abort code of the fault comes, at the first frame of a transfer."""
     rig.inject(Fault.SDO_ABORT, object=(0x6098, 0), abort=AbortCode.HARDWARE)
     assert rig.refused(0x6098, 35) == AbortCode.HARDWARE
-    answer = rig.raw_sdo(UploadRequest(0x6098, 0).encode())
+    answer = rig.raw_sdo(sdo.UploadRequest(0x6098, 0).encode())
     assert answer is not None
-    assert decode_response(answer) == Abort(0x6098, 0, AbortCode.HARDWARE)
+    assert sdo.decode_response(answer) == sdo.Abort(0x6098, 0, AbortCode.HARDWARE)
 
 
 def test_an_empty_frame_is_none_to_a_server_that_deviates(rig: Rig) -> None:

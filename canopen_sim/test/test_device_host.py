@@ -21,7 +21,7 @@ from canopen_core.can import (
     VirtualBus,
     VirtualWire,
 )
-from canopen_core.standard import DownloadRequest, NmtState
+from canopen_core.standard import NmtState, sdo
 from canopen_sim import DeviceHost, DeviceRunner
 
 ARRIVAL = 10.0  # [s] a deadline, no measure
@@ -41,7 +41,7 @@ def host_of(*node_ids: int) -> tuple[DeviceHost, list[Frame]]:
 
 def write(host: DeviceHost, node_id: int, index: int, subindex: int, data: bytes) -> None:
     """Write an object of one device."""
-    request = DownloadRequest(index, subindex, data, len(data)).encode()
+    request = sdo.DownloadRequest(index, subindex, data, len(data)).encode()
     host.receive(Frame(0x600 + node_id, request), 1.0)
 
 
@@ -126,7 +126,7 @@ def test_runner_serves_a_real_bus(buses: tuple[Bus, Bus]) -> None:
     before = threading.active_count()
     runner.start()
     expect(master, Frame(0x708, b'\x00'))
-    request = DownloadRequest(0x1017, 0, b'\x32\x00', 2).encode()
+    request = sdo.DownloadRequest(0x1017, 0, b'\x32\x00', 2).encode()
     master.send(Frame(0x605, request))
     expect(master, Frame(0x585, b'\x60\x17\x10\x00\x00\x00\x00\x00'))
     expect(master, Frame(0x705, b'\x7f'))

@@ -16,11 +16,9 @@ from canopen_core.standard import (
     AbortCode,
     COB_ID_INVALID,
     DataType,
-    decode_response,
     ObjectDictionary,
     ObjectEntry,
-    UploadRequest,
-    UploadResponse,
+    sdo,
 )
 
 FILE = 0x2100
@@ -217,13 +215,13 @@ def test_little_data_by_the_other_protocol() -> None:
     rig = make_rig()
     begin = struct.pack('<BHBBB2x', 0xA4, 0x1000, 0, 127, 4)
     (answer,) = query(rig, begin)
-    assert decode_response(answer) == UploadResponse(0x1000, 0, b'\x92\x01\x02\x00', 4)
+    assert sdo.decode_response(answer) == sdo.UploadResponse(0x1000, 0, b'\x92\x01\x02\x00', 4)
 
 
 def test_more_channels_are_independent() -> None:
     """A transfer on each channel at the same time; a channel exists as 0x1201 says."""
     rig = make_rig()
-    read = UploadRequest(0x1008, 0).encode()
+    read = sdo.UploadRequest(0x1008, 0).encode()
     rig.send(0x6C0, read)
     assert rig.take() == []
     for index, request, response in ((0x1201, 0x6C0, 0x6D0), (0x1202, 0x6C1, 0x6D1)):

@@ -13,24 +13,7 @@ from collections.abc import Callable
 from arm_canopen import Scheduler
 from canopen_core import LssError
 from canopen_core.can import Frame
-from canopen_core.standard import (
-    ADDRESS_BITS,
-    BIT_RATES,
-    decode_lss,
-    FastScan,
-    lss_bytes,
-    lss_number,
-    LSS_REQUEST,
-    LSS_RESPONSE,
-    LssAddress,
-    LssCommand,
-    LssMessage,
-    LssState,
-    NODE_ID_MAX,
-    NODE_ID_MIN,
-    STANDARD_TABLE,
-    UNCONFIGURED,
-)
+from canopen_core.standard import lss, NODE_ID_MAX, NODE_ID_MIN, UNCONFIGURED
 
 TIMEOUT = 0.5  # [s] for an answer; storing may take some time
 SCAN_TIMEOUT = 0.05  # [s] for an answer to a step of fast scan, whose absence means something
@@ -53,7 +36,7 @@ class LssMaster:
         scan_timeout: float = SCAN_TIMEOUT,
     ) -> None:
         """Time-outs in [s]: the longest of an answer, and of a step of fast scan at first."""
-        self.answers: list[LssMessage] = []  # answers since the last request
+        self.answers: list[lss.Message] = []  # answers since the last request
         self._scheduler = scheduler
         self._send = send
         self._timeout = timeout
@@ -63,34 +46,40 @@ class LssMaster:
 
     def receive(self, frame: Frame) -> None:
         """Process a frame from the bus; others than LSS answers are ignored."""
-        if frame.can_id != LSS_RESPONSE or frame.is_extended or frame.is_remote:
+        if frame.can_id != lss.RESPONSE or frame.is_extended or frame.is_remote:
             return
-        message = decode_lss(frame.data)
+        message = lss.decode(frame.data)
         if message is not None and message.command in self._expected:
             self.answers.append(message)
             self._last = max(self._scheduler.now, frame.timestamp)
 
-    def switch_all(self, state: LssState) -> None:
+    def switch_all(self, state: lss.State) -> None:
         """Switch every device to a state; none answers."""
-        self._put(lss_bytes(LssCommand.SWITCH_GLOBAL, state))
+        self._put(lss.with_bytes(lss.Command.SWITCH_GLOBAL, state))
 
-    async def select(self, address: LssAddress) -> None:
+    async def select(self, address: lss.Address) -> None:
         """Switch the device of an address to the configuration state.
 
         Raises:
             LssError: No device has this address.
         """
         for part, number in enumerate(address):
-            self._put(lss_number(LssCommand.SELECT_VENDOR + part, number), LssCommand.SELECTED)
+            self._put(
+                lss.with_number(lss.Command.SELECT_VENDOR + part, number),
+                lss.Command.SELECTED,
+            )
         if not await self._answered(self._timeout):
             raise LssError(f'no device has the LSS address {address}')
 
     async def has_unconfigured(self) -> bool:
         """Return whether there is a device without a node id."""
-        self._put(lss_bytes(LssCommand.IDENTIFY_UNCONFIGURED), LssCommand.UNCONFIGURED_IDENTIFIED)
+        self._put(
+            lss.with_bytes(lss.Command.IDENTIFY_UNCONFIGURED),
+            lss.Command.UNCONFIGURED_IDENTIFIED,
+        )
         return await self._answered(self._scan_timeout)
 
-    async def fast_scan(self) -> LssAddress | None:
+    async def fast_scan(self) -> lss.Address | None:
         """Find a device without a node id, and switch it to the configuration state.
 
         Each bit of its address is tested: silence means that it is set. Of several devices the
@@ -113,25 +102,25 @@ class LssMaster:
             attempts += 1
         return await self._search(timeout)
 
-    async def _search(self, timeout: float) -> LssAddress | None:
-        if not await self._scan(FastScan(), self._timeout):
+    async def _search(self, timeout: float) -> lss.Address | None:
+        if not await self._scan(lss.FastScan(), self._timeout):
             return None
         numbers = []
         for part in range(len(PARTS)):
             number = 0
-            for bit in reversed(range(ADDRESS_BITS)):
-                if not await self._scan(FastScan(number, bit, part, part), timeout):
+            for bit in reversed(range(lss.ADDRESS_BITS)):
+                if not await self._scan(lss.FastScan(number, bit, part, part), timeout):
                     number |= 1 << bit
             following = (part + 1) % len(PARTS)
-            if not await self._scan(FastScan(number, 0, part, following), timeout):
+            if not await self._scan(lss.FastScan(number, 0, part, following), timeout):
                 raise LssError(
                     f'the device that was being scanned no longer answers ({PARTS[part]} '
                     f'0x{number:08X}); is it slower than {timeout * 1e3:g} ms?'
                 )
             numbers.append(number)
-        return LssAddress(*numbers)
+        return lss.Address(*numbers)
 
-    async def inquire_address(self) -> LssAddress:
+    async def inquire_address(self) -> lss.Address:
         """Query the device in the configuration state for its address.
 
         Raises:
@@ -139,9 +128,9 @@ class LssMaster:
         """
         numbers = []
         for part, title in enumerate(PARTS):
-            message = lss_bytes(LssCommand.INQUIRE_VENDOR + part)
+            message = lss.with_bytes(lss.Command.INQUIRE_VENDOR + part)
             numbers.append((await self._only_answer(message, title)).number)
-        return LssAddress(*numbers)
+        return lss.Address(*numbers)
 
     async def inquire_node_id(self) -> int:
         """Query the device in the configuration state for its node id; 255 for none.
@@ -149,7 +138,7 @@ class LssMaster:
         Raises:
             LssError: None answers, or several do.
         """
-        message = lss_bytes(LssCommand.INQUIRE_NODE_ID)
+        message = lss.with_bytes(lss.Command.INQUIRE_NODE_ID)
         return (await self._only_answer(message, 'node id')).byte
 
     async def set_node_id(self, node_id: int) -> None:
@@ -160,7 +149,7 @@ class LssMaster:
         """
         if not NODE_ID_MIN <= node_id <= NODE_ID_MAX and node_id != UNCONFIGURED:
             raise LssError(f'{node_id} is no node id; take 1 to 127, or 255 for none')
-        message = lss_bytes(LssCommand.CONFIGURE_NODE_ID, node_id)
+        message = lss.with_bytes(lss.Command.CONFIGURE_NODE_ID, node_id)
         await self._configure(message, f'node id {node_id}')
 
     async def set_bit_rate(self, bit_rate: int) -> None:
@@ -169,12 +158,14 @@ class LssMaster:
         Raises:
             LssError: It is not in the table, or is refused, or none answers, or several do.
         """
-        for index, rate in BIT_RATES.items():
+        for index, rate in lss.BIT_RATES.items():
             if rate == bit_rate:
-                message = lss_bytes(LssCommand.CONFIGURE_BIT_TIMING, STANDARD_TABLE, index)
+                message = lss.with_bytes(
+                    lss.Command.CONFIGURE_BIT_TIMING, lss.STANDARD_TABLE, index
+                )
                 await self._configure(message, f'{rate // 1000} kbit/s')
                 return
-        known = ', '.join(str(rate // 1000) for rate in BIT_RATES.values())
+        known = ', '.join(str(rate // 1000) for rate in lss.BIT_RATES.values())
         raise LssError(f'{bit_rate / 1000:g} kbit/s is no bit rate of LSS; take {known}')
 
     async def store(self) -> None:
@@ -183,7 +174,7 @@ class LssMaster:
         Raises:
             LssError: It cannot, or none answers, or several do.
         """
-        await self._configure(lss_bytes(LssCommand.STORE), 'storing')
+        await self._configure(lss.with_bytes(lss.Command.STORE), 'storing')
 
     def activate_bit_rate(self, delay: float) -> None:
         """Activate the new bit rate of all devices in the configuration state; none answers.
@@ -192,18 +183,18 @@ class LssMaster:
         switch, too.
         """
         milliseconds = round(delay * 1e3).to_bytes(2, 'little')
-        self._put(lss_bytes(LssCommand.ACTIVATE_BIT_TIMING, *milliseconds))
+        self._put(lss.with_bytes(lss.Command.ACTIVATE_BIT_TIMING, *milliseconds))
 
-    async def _scan(self, step: FastScan, timeout: float) -> bool:
-        self._put(step.message(), LssCommand.IDENTIFIED)
+    async def _scan(self, step: lss.FastScan, timeout: float) -> bool:
+        self._put(step.message(), lss.Command.IDENTIFIED)
         return await self._answered(timeout)
 
-    async def _configure(self, message: LssMessage, title: str) -> None:
+    async def _configure(self, message: lss.Message, title: str) -> None:
         code = (await self._only_answer(message, title)).byte
         if code:
             raise LssError(f'{title}: {ERROR_TEXTS.get(code, "error")} (LSS error {code})')
 
-    async def _only_answer(self, message: LssMessage, title: str) -> LssMessage:
+    async def _only_answer(self, message: lss.Message, title: str) -> lss.Message:
         """Send a request, and make sure that it is one device that answers."""
         self._put(message, message.command)
         if not await self._answered(self._timeout):
@@ -227,7 +218,7 @@ class LssMaster:
             await self._scheduler.timer(rest)
         return True
 
-    def _put(self, message: LssMessage, *expected: int) -> None:
+    def _put(self, message: lss.Message, *expected: int) -> None:
         self.answers = []
         self._expected = frozenset(expected)
-        self._send(Frame(LSS_REQUEST, message.encode()))
+        self._send(Frame(lss.REQUEST, message.encode()))

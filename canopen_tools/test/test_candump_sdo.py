@@ -10,15 +10,7 @@ from hypothesis import strategies as st
 import pytest
 
 from canopen_core.can import Frame
-from canopen_core.standard import (
-    DownloadRequest,
-    DownloadResponse,
-    DownloadSegmentResponse,
-    Segment,
-    UploadRequest,
-    UploadResponse,
-    UploadSegmentRequest,
-)
+from canopen_core.standard import sdo
 from canopen_tools.monitor import FrameDescriber
 from canopen_tools.monitor.object_names import ObjectNames
 from canopen_tools.monitor.sdo_follower import SdoFollower
@@ -188,15 +180,15 @@ def test_a_segmented_value_is_put_together(name: str) -> None:
     content = name.encode()
     parts = [content[at : at + 7] for at in range(0, len(content), 7)]
     reading, writing = (SdoFollower(ObjectNames(DRIVE_OBJECTS)) for _ in range(2))
-    reading.request(UploadRequest(0x1008, 0).encode())
-    reading.response(UploadResponse(0x1008, 0, None, len(content)).encode())
-    writing.request(DownloadRequest(0x1008, 0, None, len(content)).encode())
-    writing.response(DownloadResponse(0x1008, 0).encode())
+    reading.request(sdo.UploadRequest(0x1008, 0).encode())
+    reading.response(sdo.UploadResponse(0x1008, 0, None, len(content)).encode())
+    writing.request(sdo.DownloadRequest(0x1008, 0, None, len(content)).encode())
+    writing.response(sdo.DownloadResponse(0x1008, 0).encode())
     for number, part in enumerate(parts):
         toggle, last = bool(number % 2), number == len(parts) - 1
-        segment = Segment(toggle, part, last).encode()
-        reading.request(UploadSegmentRequest(toggle).encode())
+        segment = sdo.Segment(toggle, part, last).encode()
+        reading.request(sdo.UploadSegmentRequest(toggle).encode())
         read = reading.response(segment).text
         written = writing.request(segment).text
-        writing.response(DownloadSegmentResponse(toggle).encode())
+        writing.response(sdo.DownloadSegmentResponse(toggle).encode())
     assert read == written == f'last segment, {NAME} = "{name}"'

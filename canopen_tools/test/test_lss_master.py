@@ -16,21 +16,7 @@ import pytest
 
 from arm_canopen import LssError, Promise, Scheduler
 from canopen_core.can import Frame
-from canopen_core.standard import (
-    BIT_RATES,
-    decode_lss,
-    fast_scan,
-    FastScan,
-    lss_bytes,
-    lss_number,
-    LSS_REQUEST,
-    LSS_RESPONSE,
-    LssAddress,
-    LssCommand,
-    LssMessage,
-    LssState,
-    UNCONFIGURED,
-)
+from canopen_core.standard import lss, UNCONFIGURED
 from canopen_sim import DeviceHost
 from canopen_tools.lss_master import LssMaster
 from canopen_tools.monitor import FrameDescriber
@@ -39,16 +25,16 @@ pytestmark = pytest.mark.slow
 
 T = TypeVar('T')
 
-FIRST = LssAddress(0x555, 0x1234, 0x10002, 0xCAFE)
+FIRST = lss.Address(0x555, 0x1234, 0x10002, 0xCAFE)
 SECOND = FIRST._replace(serial=0xCAFF)
 NUMBER = st.integers(0, 0xFFFF_FFFF)
-ADDRESS = st.builds(LssAddress, NUMBER, NUMBER, NUMBER, NUMBER)
+ADDRESS = st.builds(lss.Address, NUMBER, NUMBER, NUMBER, NUMBER)
 
 
 class LssNetwork:
     """A master and simulated devices on a bus that takes some time, in virtual time."""
 
-    def __init__(self, addresses: Iterable[LssAddress]) -> None:
+    def __init__(self, addresses: Iterable[lss.Address]) -> None:
         """Switch devices of these identities on, without a node id."""
         # how late frames of the devices arrive in [s], one after another; 1 ms after these
         self.delays: list[float] = []
@@ -87,7 +73,7 @@ class LssNetwork:
 
 @settings(max_examples=30)
 @given(st.sets(ADDRESS, max_size=3))
-def test_fast_scan_finds_every_device(addresses: set[LssAddress]) -> None:
+def test_fast_scan_finds_every_device(addresses: set[lss.Address]) -> None:
     """Whatever their numbers, one call after another finds each once, lowest first."""
     network = LssNetwork(addresses)
     found = [network.run(network.master.fast_scan()) for _ in range(len(addresses) + 1)]
@@ -111,13 +97,13 @@ def test_refusals_are_reported() -> None:
     master = network.master
     with pytest.raises(LssError, match='node id 17: no device answers; none is in the config'):
         network.run(master.set_node_id(17))
-    master.switch_all(LssState.CONFIGURATION)
+    master.switch_all(lss.State.CONFIGURATION)
     for node_id in (0, 128, 254):
         with pytest.raises(LssError, match=f'{node_id} is no node id'):
             network.run(master.set_node_id(node_id))
     with pytest.raises(LssError, match='300 kbit/s is no bit rate of LSS; take 1000, 800, 500'):
         network.run(master.set_bit_rate(300_000))
-    for bit_rate in BIT_RATES.values():
+    for bit_rate in lss.BIT_RATES.values():
         network.run(master.set_bit_rate(bit_rate))
 
 
@@ -130,7 +116,7 @@ def test_error_codes_of_a_device(code: int, text: str) -> None:
     sent: list[Frame] = []
     master = LssMaster(scheduler, sent.append)
     task = scheduler.spawn(master.store())
-    master.receive(Frame(LSS_RESPONSE, lss_bytes(LssCommand.STORE, code).encode()))
+    master.receive(Frame(lss.RESPONSE, lss.with_bytes(lss.Command.STORE, code).encode()))
     scheduler.advance(0.1)
     with pytest.raises(LssError, match=text):
         task.result()
@@ -157,12 +143,12 @@ def test_frames_that_are_no_answer_are_passed_over() -> None:
     sent: list[Frame] = []
     master = LssMaster(scheduler, sent.append)
     task = scheduler.spawn(master.has_unconfigured())
-    answer = lss_bytes(LssCommand.UNCONFIGURED_IDENTIFIED).encode()
+    answer = lss.with_bytes(lss.Command.UNCONFIGURED_IDENTIFIED).encode()
     for frame in (
         Frame(0x7E5, answer),
-        Frame(LSS_RESPONSE, answer[:7]),
-        Frame(LSS_RESPONSE, answer, is_extended=True),
-        Frame(LSS_RESPONSE, lss_bytes(LssCommand.IDENTIFIED).encode()),
+        Frame(lss.RESPONSE, answer[:7]),
+        Frame(lss.RESPONSE, answer, is_extended=True),
+        Frame(lss.RESPONSE, lss.with_bytes(lss.Command.IDENTIFIED).encode()),
     ):
         master.receive(frame)
     scheduler.advance(1.0)
@@ -172,16 +158,16 @@ def test_frames_that_are_no_answer_are_passed_over() -> None:
 @pytest.mark.parametrize(
     ('message', 'data'),
     [
-        (lss_bytes(LssCommand.SWITCH_GLOBAL, 1), '04 01 00 00 00 00 00 00'),
-        (lss_number(LssCommand.SELECT_VENDOR, 0x12345678), '40 78 56 34 12 00 00 00'),
-        (lss_bytes(LssCommand.CONFIGURE_NODE_ID, 17), '11 11 00 00 00 00 00 00'),
-        (lss_bytes(LssCommand.CONFIGURE_BIT_TIMING, 0, 2), '13 00 02 00 00 00 00 00'),
-        (lss_bytes(LssCommand.STORE), '17 00 00 00 00 00 00 00'),
-        (FastScan().message(), '51 00 00 00 00 80 00 00'),
-        (FastScan(0xCAFE, 5, 3, 0).message(), '51 FE CA 00 00 05 03 00'),
+        (lss.with_bytes(lss.Command.SWITCH_GLOBAL, 1), '04 01 00 00 00 00 00 00'),
+        (lss.with_number(lss.Command.SELECT_VENDOR, 0x12345678), '40 78 56 34 12 00 00 00'),
+        (lss.with_bytes(lss.Command.CONFIGURE_NODE_ID, 17), '11 11 00 00 00 00 00 00'),
+        (lss.with_bytes(lss.Command.CONFIGURE_BIT_TIMING, 0, 2), '13 00 02 00 00 00 00 00'),
+        (lss.with_bytes(lss.Command.STORE), '17 00 00 00 00 00 00 00'),
+        (lss.FastScan().message(), '51 00 00 00 00 80 00 00'),
+        (lss.FastScan(0xCAFE, 5, 3, 0).message(), '51 FE CA 00 00 05 03 00'),
     ],
 )
-def test_bytes_of_messages(message: LssMessage, data: str) -> None:
+def test_bytes_of_messages(message: lss.Message, data: str) -> None:
     """As CiA 305 draws them: specifier, parameters little-endian, padded to 8 bytes."""
     assert message.encode() == bytes.fromhex(data)
 
@@ -189,38 +175,38 @@ def test_bytes_of_messages(message: LssMessage, data: str) -> None:
 @given(st.binary(min_size=8, max_size=8))
 def test_any_8_bytes_are_a_message(data: bytes) -> None:
     """Reading and writing are inverse; reserved specifiers are reported as such."""
-    message = decode_lss(data)
+    message = lss.decode(data)
     assert message is not None
     assert message.encode() == data
-    assert (data[0] in set(LssCommand)) == ('unknown' not in message.text)
+    assert (data[0] in set(lss.Command)) == ('unknown' not in message.text)
 
 
 @given(st.binary().filter(lambda data: len(data) != 8))
 def test_other_lengths_are_none(data: bytes) -> None:
     """A message has 8 bytes; the monitor has words for what is none."""
-    assert decode_lss(data) is None
-    assert FrameDescriber().describe(Frame(LSS_REQUEST, data)).text
+    assert lss.decode(data) is None
+    assert FrameDescriber().describe(Frame(lss.REQUEST, data)).text
 
 
 @given(
     st.builds(
-        FastScan,
+        lss.FastScan,
         st.integers(0, 0xFFFF_FFFF),
         st.integers(0, 0xFF),
         st.integers(0, 0xFF),
         st.integers(0, 0xFF),
     )
 )
-def test_a_step_of_fast_scan_survives(step: FastScan) -> None:
+def test_a_step_of_fast_scan_survives(step: lss.FastScan) -> None:
     """What a master sends is what a device reads."""
-    message = decode_lss(step.message().encode())
+    message = lss.decode(step.message().encode())
     assert message is not None
-    assert fast_scan(message) == step
+    assert lss.fast_scan(message) == step
 
 
 def test_tables_are_complete() -> None:
     """Every command has words; the standard table has no doubles."""
-    assert len({command.text for command in LssCommand}) == len(LssCommand)
-    assert set(BIT_RATES) == set(range(9))
-    assert len(set(BIT_RATES.values())) == len(BIT_RATES)
-    assert str(LssAddress(1, 2, 3, 0xCAFE)).endswith(' 0x0000CAFE')
+    assert len({command.text for command in lss.Command}) == len(lss.Command)
+    assert set(lss.BIT_RATES) == set(range(9))
+    assert len(set(lss.BIT_RATES.values())) == len(lss.BIT_RATES)
+    assert str(lss.Address(1, 2, 3, 0xCAFE)).endswith(' 0x0000CAFE')

@@ -16,7 +16,7 @@ from tool_environment import Output
 
 from canopen_core.can import Bus, Frame, open_bus
 from canopen_core.eds import load_eds
-from canopen_core.standard import LssState
+from canopen_core.standard import lss
 from canopen_sim import DeviceRunner
 from canopen_tools.cli.main import main
 
@@ -52,7 +52,7 @@ def runner(name: str) -> Iterator[DeviceRunner]:
         devices.stop()
 
 
-def states(runner: DeviceRunner) -> list[LssState]:
+def states(runner: DeviceRunner) -> list[lss.State]:
     """Return the LSS states of all devices."""
     return runner.call(lambda: [device._lss.state for device in runner.host.devices]).result(
         DEADLINE
@@ -79,7 +79,7 @@ def test_a_device_is_found_and_numbered(name: str, runner: DeviceRunner, capsys:
     assert head.split() == ['vendor', 'product', 'revision', 'serial']
     assert row.split() == ['0x00000001', '0x00000002', '0x00000004', '0x00000100']
     assert count == '1 device without node id'
-    assert set(states(runner)) == {LssState.WAITING}
+    assert set(states(runner)) == {lss.State.WAITING}
     assert main(['lss', 'set', '--node-id', '5', '--can', name]) == 1
     assert 'node id 5 is taken' in capsys.readouterr().err
     assert main(['lss', 'set', '--node-id', '10', '--store', '--can', name]) == 0
@@ -111,7 +111,7 @@ def test_a_device_with_an_id_is_selected_by_its_address(
     assert 'node id 6: accepted\nbit rate 250 kbit/s: accepted\n' in captured.out
     assert 'not stored' in captured.err
     assert 'takes effect with the next reset' in captured.err
-    assert set(states(runner)) == {LssState.WAITING}
+    assert set(states(runner)) == {lss.State.WAITING}
     assert main(['lss', 'inquire', *ADDRESS[:-1], '0x108', '--can', name]) == 1
     assert 'no device has the LSS address' in capsys.readouterr().err
 
@@ -122,7 +122,7 @@ def test_the_only_device_is_not_one_of_two(
     """Several devices that answer are noticed before any of them is set, and let go."""
     assert main(['lss', 'set', '--only', '--node-id', '9', '--can', name]) == 1
     assert '2 devices answer; select one of them by its address' in capsys.readouterr().err
-    assert set(states(runner)) == {LssState.WAITING}
+    assert set(states(runner)) == {lss.State.WAITING}
 
 
 @pytest.mark.parametrize('bitrate', ['500000', '100000'])
@@ -136,7 +136,7 @@ def test_the_bit_rate_is_activated(
         requests = [f.data for f in witness.receive(0.0) if f.can_id == 0x7E5]
     assert requests[-1] == bytes.fromhex('15C8000000000000')
     assert f'bitrate {bitrate}' in capsys.readouterr().err
-    assert LssState.CONFIGURATION in states(runner)
+    assert lss.State.CONFIGURATION in states(runner)
 
 
 @pytest.mark.parametrize(

@@ -13,13 +13,12 @@ from canopen_core.can import BusCounters, BusLoad, Frame
 from canopen_core.standard import (
     CAN_ID_MASK,
     CobId,
-    decode_response,
     DriveState,
     error_code_text,
     Index,
     NmtState,
     OperationMode,
-    UploadResponse,
+    sdo,
 )
 
 from ..cia402.drive_view import DriveView, FAULTY
@@ -225,10 +224,10 @@ class BusReplay:
     def _note_answer(self, node: RemoteNode, frame: Frame) -> None:
         """Store what an SDO has read, where it is part of the state."""
         try:
-            answer = decode_response(frame.data)
+            answer = sdo.decode_response(frame.data)
         except CodecError:
             return
-        if not isinstance(answer, UploadResponse) or answer.data is None:
+        if not isinstance(answer, sdo.UploadResponse) or answer.data is None:
             return
         node.objects.note_value(answer.index, answer.subindex, answer.data)
         for axis in self.axes.get(node.name, ()):

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 from black_box import BlackBox, BlackBoxSettings
 from canopen_core import BootError, BusError, CanopenError, DriveError
 from canopen_core.can import Bus, BusLoad, Frame, open_bus
-from canopen_core.standard import CobId, DownloadRequest, Index
+from canopen_core.standard import CobId, Index, sdo
 from realtime_loop import raise_priority
 
 from ..cia402.drive import Drive
@@ -437,7 +437,7 @@ class CanopenMaster:
         refused: dict[str, BusError] = {}
         for drive in powered:
             index = drive.objects.at(Index.CONTROLWORD)
-            request = DownloadRequest(index, 0, QUICK_STOP)
+            request = sdo.DownloadRequest(index, 0, QUICK_STOP)
             cob_id = CobId.SDO_REQUEST + drive.node.config.node_id
             if (refusal := self._insist(Frame(cob_id, request.encode()))) is not None:
                 refused[drive.name] = refusal

@@ -11,26 +11,15 @@ from typing import Any, TypeAlias, TypeVar
 
 from canopen_core import BusError, CodecError, SdoAbortError, SdoTimeoutError
 from canopen_core.can import Frame
-from canopen_core.standard import (
-    Abort,
-    abort_text,
-    AbortCode,
-    CobId,
-    decode_response,
-    DownloadResponse,
-    DownloadSegmentResponse,
-    FRAME_BYTES,
-    object_address,
-    Segment,
-    UploadRequest,
-    UploadResponse,
-)
+from canopen_core.standard import abort_text, AbortCode, CobId, object_address, sdo
 
 from .frame_sender import Send
 from .scheduler import Promise, Scheduler
 
 T = TypeVar('T')
-Answer = TypeVar('Answer', UploadResponse, Segment, DownloadResponse, DownloadSegmentResponse)
+Answer = TypeVar(
+    'Answer', sdo.UploadResponse, sdo.Segment, sdo.DownloadResponse, sdo.DownloadSegmentResponse
+)
 Address: TypeAlias = tuple[int, int]
 Match: TypeAlias = Callable[[bytes], T | None]
 
@@ -111,7 +100,7 @@ class SdoChannel:
         What does not answer the open question is passed over: it is the late answer to one that
         timed out, or meant for another client.
         """
-        if len(data) < FRAME_BYTES:
+        if len(data) < sdo.FRAME_BYTES:
             self.note_odd(
                 'length',
                 f'sends SDO answers of {len(data)} bytes where CiA 301 has 8; they are read where '
@@ -188,7 +177,7 @@ class SdoChannel:
             SdoError: The transfer was cancelled.
         """
         answer = await self._request(question, match, timeout, repeat=repeat)
-        if not isinstance(answer, Abort):
+        if not isinstance(answer, sdo.Abort):
             return answer
         self.counters.aborted += 1
         text = f'{self._title} refused {_place(self.address)}: {abort_text(answer.code)}'
@@ -196,9 +185,9 @@ class SdoChannel:
 
     async def _request(
         self, question: bytes | None, match: Match[T], timeout: float, *, repeat: bool
-    ) -> T | Abort:
+    ) -> T | sdo.Abort:
         self._match, self._strays, sent = match, 0, 0
-        promise: Promise[T | Abort] = Promise()
+        promise: Promise[T | sdo.Abort] = Promise()
         self._answered = promise
         begin, refusal = self._scheduler.now, None
         for end in _ends_of_waits(timeout, repeat=repeat):
@@ -244,30 +233,35 @@ class SdoChannel:
             (place for place in MARKERS if place not in self._pending_replies), MARKERS[0]
         )
         self.address = marker
-        question = UploadRequest(*marker).encode()
+        question = sdo.UploadRequest(*marker).encode()
         try:
             # a refusal is an answer all the same
-            await self._request(question, response(UploadResponse, marker), timeout, repeat=True)
+            await self._request(
+                question, response(sdo.UploadResponse, marker), timeout, repeat=True
+            )
         except SdoTimeoutError:
             raise SdoTimeoutError(self._silence((index, subindex), timeout)) from None
 
     def _await_late_replies(self, sent: int) -> None:
         self._pending_replies = [*self._pending_replies, *[self.address] * sent][-PENDING_MAX:]
 
-    def _abort_of(self, data: bytes) -> Abort | None:
+    def _abort_of(self, data: bytes) -> sdo.Abort | None:
         if data[:1] != _ABORT:  # what ends a block has the same command specifier
             return None
         try:
-            abort = decode_response(data)
+            abort = sdo.decode_response(data)
         except CodecError:
             return None
         # python-canopen's peers send aborts with index 0, so such an abort counts for any
-        if isinstance(abort, Abort) and (abort.index, abort.subindex) in (self.address, (0, 0)):
+        if isinstance(abort, sdo.Abort) and (abort.index, abort.subindex) in (
+            self.address,
+            (0, 0),
+        ):
             return abort
         return None
 
     def _send_abort(self, code: AbortCode) -> None:
-        self.send(Abort(*self.address, code).encode())
+        self.send(sdo.Abort(*self.address, code).encode())
 
     def _silence(self, address: Address, timeout: float) -> str:
         strays = (
@@ -286,12 +280,12 @@ def response(kind: type[Answer], address: Address) -> Match[Answer]:
 
     def match(data: bytes) -> Answer | None:
         try:
-            answer = decode_response(data)
+            answer = sdo.decode_response(data)
         except CodecError:
             return None
         if not isinstance(answer, kind):
             return None
-        if isinstance(answer, (UploadResponse, DownloadResponse)):
+        if isinstance(answer, (sdo.UploadResponse, sdo.DownloadResponse)):
             return answer if (answer.index, answer.subindex) == address else None
         return answer
 

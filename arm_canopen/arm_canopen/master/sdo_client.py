@@ -11,21 +11,7 @@ from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from canopen_core import SdoAbortError, SdoError, SdoTimeoutError
 from canopen_core.can import Frame
-from canopen_core.standard import (
-    AbortCode,
-    DownloadRequest,
-    DownloadResponse,
-    DownloadSegmentResponse,
-    EXPEDITED_MAX,
-    fitted,
-    object_address,
-    ObjectDictionary,
-    Segment,
-    SEGMENT_MAX,
-    UploadRequest,
-    UploadResponse,
-    UploadSegmentRequest,
-)
+from canopen_core.standard import AbortCode, object_address, ObjectDictionary, sdo
 
 from .frame_sender import Send
 from .scheduler import Promise, Scheduler, Task
@@ -212,8 +198,8 @@ class SdoClient:
             except (SdoAbortError, SdoTimeoutError) as error:
                 failure = error
                 await channel.begin(index, subindex, timeout)
-        request = UploadRequest(index, subindex).encode()
-        match = response(UploadResponse, channel.address)
+        request = sdo.UploadRequest(index, subindex).encode()
+        match = response(sdo.UploadResponse, channel.address)
         answer = await channel.exchange(request, match, timeout, repeat=True)
         data = (
             await self._upload_segments(answer.size, timeout)
@@ -229,7 +215,7 @@ class SdoClient:
         entry = self._dictionary.get(*address) if self._dictionary is not None else None
         if entry is None:
             return data
-        value = fitted(entry.data_type, data)
+        value = sdo.fitted(entry.data_type, data)
         if size is not None and len(value) < size:
             self._channel.note_odd(
                 'size',
@@ -248,13 +234,13 @@ class SdoClient:
             )
 
     async def _upload_segments(self, size: int | None, timeout: float) -> bytes:
-        channel, match = self._channel, response(Segment, self._channel.address)
+        channel, match = self._channel, response(sdo.Segment, self._channel.address)
         limit = UNANNOUNCED_MAX if size is None else size
         if limit > SIZE_MAX:
             raise channel.refuse(AbortCode.OUT_OF_MEMORY, f' ({size} bytes announced)')
         data, toggle, last = bytearray(), False, False
         while not last:
-            request = UploadSegmentRequest(toggle).encode()
+            request = sdo.UploadSegmentRequest(toggle).encode()
             segment = await channel.exchange(request, match, timeout)
             if segment.toggle != toggle:
                 raise channel.refuse(AbortCode.TOGGLE_BIT)
@@ -287,21 +273,26 @@ class SdoClient:
                 await channel.begin(index, subindex, timeout)
             else:
                 return
-        short = 0 < len(data) <= EXPEDITED_MAX
-        request = DownloadRequest(index, subindex, data if short else None, len(data))
-        match = response(DownloadResponse, channel.address)
+        short = 0 < len(data) <= sdo.EXPEDITED_MAX
+        request = sdo.DownloadRequest(index, subindex, data if short else None, len(data))
+        match = response(sdo.DownloadResponse, channel.address)
         await channel.exchange(request.encode(), match, timeout, repeat=repeat)
         if not short:
             await self._download_segments(data, timeout)
         self._give_up_blocks(failure)
 
     async def _download_segments(self, data: bytes, timeout: float) -> None:
-        channel, match = self._channel, response(DownloadSegmentResponse, self._channel.address)
+        channel, match = (
+            self._channel,
+            response(sdo.DownloadSegmentResponse, self._channel.address),
+        )
         toggle = False
-        for start in range(0, max(len(data), 1), SEGMENT_MAX):
-            chunk = data[start : start + SEGMENT_MAX]
-            last = start + SEGMENT_MAX >= len(data)
-            answer = await channel.exchange(Segment(toggle, chunk, last).encode(), match, timeout)
+        for start in range(0, max(len(data), 1), sdo.SEGMENT_MAX):
+            chunk = data[start : start + sdo.SEGMENT_MAX]
+            last = start + sdo.SEGMENT_MAX >= len(data)
+            answer = await channel.exchange(
+                sdo.Segment(toggle, chunk, last).encode(), match, timeout
+            )
             if answer.toggle != toggle:
                 raise channel.refuse(AbortCode.TOGGLE_BIT)
             toggle = not toggle

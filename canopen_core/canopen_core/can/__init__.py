@@ -10,20 +10,23 @@ from typing import Any, TYPE_CHECKING
 
 from .bus import Bus, BusCounters, wall_clock_offset
 from .bus_thread import BusThread
-from .error_frames import error_text
-from .frame import EXTENDED_ID_MAX, Frame, STANDARD_ID_MAX
+from .candump_format import format_line, log_channel
+from .error_frames import (
+    controller_state,
+    ControllerState,
+    error_counters,
+    error_text,
+    is_unacknowledged,
+)
+from .frame import EXTENDED_ID_MAX, Frame, PAYLOAD_MAX, STANDARD_ID_MAX
+from .frame_ring import FrameRing, RecordedFrame
 from .interfaces import can_interfaces, CanInterface, missing_interface_text
+from .load import BusLoad, frame_bits, LoadFigures, stuff_bits_mean, stuff_bits_worst
 from .opening import AUTO, auto_names, open_bus, resolve_name
 from .virtual import VirtualBus, VirtualWire
 
 if TYPE_CHECKING:
     from .frame_log import LogWriter, read_buses, read_log
-
-from .candump_format import format_line, log_channel
-from .error_frames import controller_state, ControllerState, error_counters, is_unacknowledged
-from .frame import PAYLOAD_MAX
-from .frame_ring import FrameRing, RecordedFrame
-from .load import BusLoad, frame_bits, LoadFigures, stuff_bits_mean, stuff_bits_worst
 
 __all__ = [
     'AUTO',

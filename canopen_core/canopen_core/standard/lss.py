@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 from .code_with_text import CodeWithText
 
-LSS_REQUEST = 0x7E5  # COB-ID from the master
-LSS_RESPONSE = 0x7E4  # COB-ID from the slaves
+REQUEST = 0x7E5  # COB-ID from the master
+RESPONSE = 0x7E4  # COB-ID from the slaves
 MESSAGE_BYTES = 8  # [byte]
 UNCONFIGURED = 255  # node id of a device that has none
 
@@ -39,7 +39,7 @@ WHOLE_NUMBER = 0x80  # BitCheck of fast scan: all unconfigured devices answer, a
 ADDRESS_BITS = 32  # of each of the four numbers
 
 
-class LssCommand(CodeWithText):
+class Command(CodeWithText):
     """Command specifiers, each with its service in words as ``text``."""
 
     SWITCH_GLOBAL = 0x04, 'switch state global'
@@ -69,14 +69,14 @@ class LssCommand(CodeWithText):
     INQUIRE_NODE_ID = 0x5E, 'inquire node id'
 
 
-class LssState(IntEnum):
+class State(IntEnum):
     """Whether a device takes configuration commands."""
 
     WAITING = 0
     CONFIGURATION = 1
 
 
-class LssAddress(NamedTuple):
+class Address(NamedTuple):
     """What makes a device unique: its identity object (0x1018) with all four numbers."""
 
     vendor: int
@@ -90,10 +90,10 @@ class LssAddress(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class LssMessage:
+class Message:
     """A message of either direction."""
 
-    command: int  # command specifier; others than those of :class:`LssCommand` are reserved
+    command: int  # command specifier; others than those of :class:`Command` are reserved
     parameters: bytes = bytes(MESSAGE_BYTES - 1)  # the 7 bytes behind it
 
     @property
@@ -110,7 +110,7 @@ class LssMessage:
     def text(self) -> str:
         """The service in words."""
         try:
-            return LssCommand(self.command).text
+            return Command(self.command).text
         except ValueError:
             return f'unknown command 0x{self.command:02X}'
 
@@ -119,19 +119,19 @@ class LssMessage:
         return bytes((self.command,)) + self.parameters.ljust(MESSAGE_BYTES - 1, b'\0')
 
 
-def decode_lss(data: bytes) -> LssMessage | None:
+def decode(data: bytes) -> Message | None:
     """Read a message, None when it is none: each has 8 bytes."""
-    return LssMessage(data[0], data[1:]) if len(data) == MESSAGE_BYTES else None
+    return Message(data[0], data[1:]) if len(data) == MESSAGE_BYTES else None
 
 
-def lss_bytes(command: int, *parameters: int) -> LssMessage:
+def with_bytes(command: int, *parameters: int) -> Message:
     """Return a message whose parameters are bytes."""
-    return LssMessage(command, bytes(parameters).ljust(MESSAGE_BYTES - 1, b'\0'))
+    return Message(command, bytes(parameters).ljust(MESSAGE_BYTES - 1, b'\0'))
 
 
-def lss_number(command: int, number: int) -> LssMessage:
+def with_number(command: int, number: int) -> Message:
     """Return a message whose parameter is an UNSIGNED32."""
-    return LssMessage(command, struct.pack('<I3x', number))
+    return Message(command, struct.pack('<I3x', number))
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,12 +144,12 @@ class FastScan:
     # part that devices take next when all bits agree; below ``part`` they are found
     following: int = 0
 
-    def message(self) -> LssMessage:
+    def message(self) -> Message:
         """Return the question of this step, as it goes over the bus (CiA 305, fast scan)."""
         parameters = struct.pack('<IBBB', self.number, self.bit, self.part, self.following)
-        return LssMessage(LssCommand.FAST_SCAN, parameters)
+        return Message(Command.FAST_SCAN, parameters)
 
 
-def fast_scan(message: LssMessage) -> FastScan:
+def fast_scan(message: Message) -> FastScan:
     """Read the parameters of a fast scan."""
     return FastScan(*struct.unpack('<IBBB', message.parameters))

@@ -7,25 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from canopen_core.can import Frame
-from canopen_core.standard import (
-    ADDRESS_BITS,
-    BIT_RATES,
-    decode_lss,
-    fast_scan,
-    FastScan,
-    Index,
-    lss_bytes,
-    lss_number,
-    LSS_RESPONSE,
-    LssCommand,
-    LssMessage,
-    LssState,
-    NODE_ID_MAX,
-    NODE_ID_MIN,
-    STANDARD_TABLE,
-    UNCONFIGURED,
-    WHOLE_NUMBER,
-)
+from canopen_core.standard import Index, lss, NODE_ID_MAX, NODE_ID_MIN, UNCONFIGURED
 
 from ..objects.object_store import ObjectStore
 from ..objects.parameter_storage import ParameterMemory
@@ -46,7 +28,7 @@ class LssSlave:
 
         ``apply`` is called with the time when a device without node id has got one.
         """
-        self.state = LssState.WAITING  # whether it takes configuration commands
+        self.state = lss.State.WAITING  # whether it takes configuration commands
         self.node_id = node_id
         self.pending_id = node_id  # node id that takes effect with the next initialisation
         self._store = store
@@ -59,103 +41,103 @@ class LssSlave:
 
     def reset(self) -> None:
         """Begin anew, as after a reset."""
-        self.state = LssState.WAITING
+        self.state = lss.State.WAITING
         self._matched.clear()
         self._scan_position = 0
 
     def receive(self, frame: Frame, now: float) -> None:
         """Process a request; those without meaning are ignored."""
-        message = decode_lss(frame.data)
+        message = lss.decode(frame.data)
         if message is None:
             return
         command, number = message.command, message.number
-        if command == LssCommand.SWITCH_GLOBAL:
+        if command == lss.Command.SWITCH_GLOBAL:
             self._switch(message.byte, now)
-        elif LssCommand.SELECT_VENDOR <= command <= LssCommand.SELECT_SERIAL:
-            self._select(command - LssCommand.SELECT_VENDOR, number)
-        elif LssCommand.IDENTIFY_VENDOR <= command <= LssCommand.IDENTIFY_SERIAL_HIGH:
+        elif lss.Command.SELECT_VENDOR <= command <= lss.Command.SELECT_SERIAL:
+            self._select(command - lss.Command.SELECT_VENDOR, number)
+        elif lss.Command.IDENTIFY_VENDOR <= command <= lss.Command.IDENTIFY_SERIAL_HIGH:
             self._identify(command, number)
-        elif command == LssCommand.IDENTIFY_UNCONFIGURED:
+        elif command == lss.Command.IDENTIFY_UNCONFIGURED:
             if self.node_id == UNCONFIGURED:
-                self._answer(lss_bytes(LssCommand.UNCONFIGURED_IDENTIFIED))
-        elif command == LssCommand.FAST_SCAN:
-            self._scan(fast_scan(message))
-        elif self.state is LssState.CONFIGURATION:
+                self._answer(lss.with_bytes(lss.Command.UNCONFIGURED_IDENTIFIED))
+        elif command == lss.Command.FAST_SCAN:
+            self._scan(lss.fast_scan(message))
+        elif self.state is lss.State.CONFIGURATION:
             self._configure(message)
 
-    def _configure(self, message: LssMessage) -> None:
+    def _configure(self, message: lss.Message) -> None:
         command, value = message.command, message.byte
-        if command == LssCommand.CONFIGURE_NODE_ID:
+        if command == lss.Command.CONFIGURE_NODE_ID:
             valid = NODE_ID_MIN <= value <= NODE_ID_MAX or value == UNCONFIGURED
             if valid:
                 self.pending_id = value
-            self._answer(lss_bytes(command, not valid))
-        elif command == LssCommand.CONFIGURE_BIT_TIMING:
+            self._answer(lss.with_bytes(command, not valid))
+        elif command == lss.Command.CONFIGURE_BIT_TIMING:
             rate = message.parameters[1]
-            valid = value == STANDARD_TABLE and rate in BIT_RATES
+            valid = value == lss.STANDARD_TABLE and rate in lss.BIT_RATES
             if valid:
                 self._timing = rate
-            self._answer(lss_bytes(command, not valid))
-        elif command == LssCommand.STORE:
+            self._answer(lss.with_bytes(command, not valid))
+        elif command == lss.Command.STORE:
             self._memory.node_id = self.pending_id
             if self._timing is not None:
                 self._memory.bit_timing = self._timing
             self._memory.commit()
-            self._answer(lss_bytes(command))
-        elif command == LssCommand.INQUIRE_NODE_ID:
-            self._answer(lss_bytes(command, self.node_id))
-        elif LssCommand.INQUIRE_VENDOR <= command <= LssCommand.INQUIRE_SERIAL:
-            number = self._number(command - LssCommand.INQUIRE_VENDOR)
-            self._answer(lss_number(command, number))
+            self._answer(lss.with_bytes(command))
+        elif command == lss.Command.INQUIRE_NODE_ID:
+            self._answer(lss.with_bytes(command, self.node_id))
+        elif lss.Command.INQUIRE_VENDOR <= command <= lss.Command.INQUIRE_SERIAL:
+            number = self._number(command - lss.Command.INQUIRE_VENDOR)
+            self._answer(lss.with_number(command, number))
 
     def _switch(self, mode: int, now: float) -> None:
-        if mode == LssState.CONFIGURATION:
-            self.state = LssState.CONFIGURATION
-        elif mode == LssState.WAITING:
-            was, self.state = self.state, LssState.WAITING
-            leaves = was is LssState.CONFIGURATION and self.node_id == UNCONFIGURED
+        if mode == lss.State.CONFIGURATION:
+            self.state = lss.State.CONFIGURATION
+        elif mode == lss.State.WAITING:
+            was, self.state = self.state, lss.State.WAITING
+            leaves = was is lss.State.CONFIGURATION and self.node_id == UNCONFIGURED
             if leaves and self.pending_id != UNCONFIGURED:
                 self._apply(now)
 
     def _select(self, part: int, number: int) -> None:
-        if self.state is LssState.CONFIGURATION:
+        if self.state is lss.State.CONFIGURATION:
             return
         if part == 0:
             self._matched.clear()
         self._matched[part] = self._number(part) == number
         if part == 3 and [self._matched.get(k) for k in range(4)] == [True] * 4:
             self._matched.clear()
-            self.state = LssState.CONFIGURATION
-            self._answer(lss_bytes(LssCommand.SELECTED))
+            self.state = lss.State.CONFIGURATION
+            self._answer(lss.with_bytes(lss.Command.SELECTED))
 
     def _identify(self, command: int, number: int) -> None:
         tests = {
-            LssCommand.IDENTIFY_VENDOR: self._number(0) == number,
-            LssCommand.IDENTIFY_PRODUCT: self._number(1) == number,
-            LssCommand.IDENTIFY_REVISION_LOW: self._number(2) >= number,
-            LssCommand.IDENTIFY_REVISION_HIGH: self._number(2) <= number,
-            LssCommand.IDENTIFY_SERIAL_LOW: self._number(3) >= number,
-            LssCommand.IDENTIFY_SERIAL_HIGH: self._number(3) <= number,
+            lss.Command.IDENTIFY_VENDOR: self._number(0) == number,
+            lss.Command.IDENTIFY_PRODUCT: self._number(1) == number,
+            lss.Command.IDENTIFY_REVISION_LOW: self._number(2) >= number,
+            lss.Command.IDENTIFY_REVISION_HIGH: self._number(2) <= number,
+            lss.Command.IDENTIFY_SERIAL_LOW: self._number(3) >= number,
+            lss.Command.IDENTIFY_SERIAL_HIGH: self._number(3) <= number,
         }
-        if command == LssCommand.IDENTIFY_VENDOR:
+        if command == lss.Command.IDENTIFY_VENDOR:
             self._matched.clear()
-        self._matched[command] = tests[LssCommand(command)]
-        if command == LssCommand.IDENTIFY_SERIAL_HIGH:
+        self._matched[command] = tests[lss.Command(command)]
+        if command == lss.Command.IDENTIFY_SERIAL_HIGH:
             found = all(self._matched.get(key, False) for key in tests)
             self._matched.clear()
             if found:
-                self._answer(lss_bytes(LssCommand.IDENTIFIED))
+                self._answer(lss.with_bytes(lss.Command.IDENTIFIED))
 
-    def _scan(self, step: FastScan) -> None:
+    def _scan(self, step: lss.FastScan) -> None:
         """Process a step of fast scan; only devices without a node id join (CiA 305, 6.6)."""
-        if self.node_id != UNCONFIGURED or self.state is LssState.CONFIGURATION:
+        if self.node_id != UNCONFIGURED or self.state is lss.State.CONFIGURATION:
             return
-        if step.bit == WHOLE_NUMBER:
+        if step.bit == lss.WHOLE_NUMBER:
             self._scan_position = 0
-            self._answer(lss_bytes(LssCommand.IDENTIFIED))
+            self._answer(lss.with_bytes(lss.Command.IDENTIFIED))
             return
         parts = range(4)
-        if step.bit >= ADDRESS_BITS or step.part not in parts or step.following not in parts:
+        if step.bit >= lss.ADDRESS_BITS or step.part not in parts or step.following not in parts:
             return
         other = step.part != self._scan_position
         if other or (step.number ^ self._number(step.part)) >> step.bit:
@@ -163,8 +145,8 @@ class LssSlave:
         if step.bit == 0:
             self._scan_position = step.following
             if step.following < step.part:
-                self.state = LssState.CONFIGURATION
-        self._answer(lss_bytes(LssCommand.IDENTIFIED))
+                self.state = lss.State.CONFIGURATION
+        self._answer(lss.with_bytes(lss.Command.IDENTIFIED))
 
     def _number(self, part: int) -> int:
         """Return vendor, product, revision or serial number, as clients read it."""
@@ -174,5 +156,5 @@ class LssSlave:
             return int.from_bytes(shown, 'little')
         return self._store.integer(*address).value
 
-    def _answer(self, message: LssMessage) -> None:
-        self._send(Frame(LSS_RESPONSE, message.encode()))
+    def _answer(self, message: lss.Message) -> None:
+        self._send(Frame(lss.RESPONSE, message.encode()))

@@ -6,25 +6,7 @@ from __future__ import annotations
 
 import struct
 
-from canopen_core.standard import (
-    AbortCode,
-    ACKNOWLEDGE_UPLOAD,
-    block_frames,
-    BLOCK_SEGMENTS_MAX,
-    checksum,
-    CRC_BIT,
-    DOWNLOAD_ACKNOWLEDGED,
-    DOWNLOAD_ENDED,
-    DOWNLOAD_INITIATED,
-    end_frame,
-    END_UPLOAD,
-    LAST,
-    SEGMENT_BYTES,
-    SIZE_BIT,
-    START_UPLOAD,
-    UPLOAD_END,
-    UPLOAD_INITIATED,
-)
+from canopen_core.standard import AbortCode, sdo
 
 from ..objects.object_store import refusal, STRING_BYTES_MAX
 
@@ -39,10 +21,10 @@ class BlockDownload:
 
     def __init__(self, request: bytes) -> None:
         command, self.index, self.subindex, size = struct.unpack('<BHBI', request)
-        self.size: int | None = size if command & SIZE_BIT else None
+        self.size: int | None = size if command & sdo.SIZE_BIT else None
         self.streaming = True  # the client sends segments, which have no command byte
         self.data = bytearray()  # what has come, after :meth:`end` without padding
-        self._with_crc = bool(command & CRC_BIT)
+        self._with_crc = bool(command & sdo.CRC_BIT)
         self._sequence = 0
         self._finished = False
 
@@ -50,10 +32,10 @@ class BlockDownload:
         """Return the answer to the initiation."""
         return struct.pack(
             '<BHBB3x',
-            DOWNLOAD_INITIATED | CRC_BIT,
+            sdo.DOWNLOAD_INITIATED | sdo.CRC_BIT,
             self.index,
             self.subindex,
-            BLOCK_SEGMENTS_MAX,
+            sdo.BLOCK_SEGMENTS_MAX,
         )
 
     def segment(self, frame: bytes) -> bytes | None:
@@ -62,7 +44,7 @@ class BlockDownload:
         Raises:
             SdoAbortError: The sequence number is 0, or the data are longer than announced.
         """
-        number, last = frame[0] & ~LAST, bool(frame[0] & LAST)
+        number, last = frame[0] & ~sdo.LAST, bool(frame[0] & sdo.LAST)
         if number == 0:
             raise refusal(AbortCode.SEQUENCE_NUMBER, 'SDO block')
         in_order = number == self._sequence + 1
@@ -70,14 +52,14 @@ class BlockDownload:
             self._sequence = number
             self.data += frame[1:]
             limit = STRING_BYTES_MAX if self.size is None else self.size
-            if len(self.data) - SEGMENT_BYTES >= max(limit, 1):
+            if len(self.data) - sdo.SEGMENT_BYTES >= max(limit, 1):
                 raise refusal(AbortCode.LENGTH_HIGH, 'SDO block')
-        if not last and number < BLOCK_SEGMENTS_MAX:
+        if not last and number < sdo.BLOCK_SEGMENTS_MAX:
             return None
         self._finished = last and in_order
         self.streaming = not self._finished
         taken, self._sequence = self._sequence, 0
-        return struct.pack('<BBB5x', DOWNLOAD_ACKNOWLEDGED, taken, BLOCK_SEGMENTS_MAX)
+        return struct.pack('<BBB5x', sdo.DOWNLOAD_ACKNOWLEDGED, taken, sdo.BLOCK_SEGMENTS_MAX)
 
     def end(self, request: bytes) -> bytes:
         """Process the client's end; check length and checksum, and return the answer.
@@ -90,12 +72,12 @@ class BlockDownload:
         command, crc = struct.unpack_from('<BH', request)
         unused = command >> 2 & 0x07
         del self.data[len(self.data) - unused :]
-        if self._with_crc and crc != checksum(bytes(self.data)):
+        if self._with_crc and crc != sdo.checksum(bytes(self.data)):
             raise refusal(AbortCode.CRC, 'SDO block')
         if self.size is not None and len(self.data) != self.size:
             low = len(self.data) < self.size
             raise refusal(AbortCode.LENGTH_LOW if low else AbortCode.LENGTH_HIGH, 'SDO block')
-        return bytes((DOWNLOAD_ENDED,)) + bytes(7)
+        return bytes((sdo.DOWNLOAD_ENDED,)) + bytes(7)
 
 
 class BlockUpload:
@@ -115,7 +97,7 @@ class BlockUpload:
         command, self.index, self.subindex, segments = struct.unpack_from('<BHBB', request)
         self.finished = False  # the client has confirmed the end
         self._data = data
-        self._with_crc = bool(command & CRC_BIT)
+        self._with_crc = bool(command & sdo.CRC_BIT)
         self._position = 0  # [byte] up to which the client has everything
         self._sent = 0  # segments of the present block
         self._segments = 0
@@ -124,7 +106,7 @@ class BlockUpload:
 
     def initiated(self) -> bytes:
         """Return the answer to the initiation."""
-        command = UPLOAD_INITIATED | SIZE_BIT | CRC_BIT
+        command = sdo.UPLOAD_INITIATED | sdo.SIZE_BIT | sdo.CRC_BIT
         return struct.pack('<BHBI', command, self.index, self.subindex, len(self._data))
 
     def proceed(self, request: bytes) -> list[bytes]:
@@ -134,11 +116,11 @@ class BlockUpload:
             SdoAbortError: It makes no sense at this point.
         """
         subcommand = request[0] & 0x03
-        if subcommand == START_UPLOAD and not self._sent and not self._position:
+        if subcommand == sdo.START_UPLOAD and not self._sent and not self._position:
             return self._block()
-        if subcommand == ACKNOWLEDGE_UPLOAD and self._sent:
+        if subcommand == sdo.ACKNOWLEDGE_UPLOAD and self._sent:
             return self._acknowledged(request[1], request[2])
-        if subcommand == END_UPLOAD and self._ended:
+        if subcommand == sdo.END_UPLOAD and self._ended:
             self.finished = True
             return []
         raise refusal(AbortCode.COMMAND_SPECIFIER, 'SDO block')
@@ -146,7 +128,7 @@ class BlockUpload:
     def _acknowledged(self, taken: int, segments: int) -> list[bytes]:
         if taken > self._sent:
             raise refusal(AbortCode.SEQUENCE_NUMBER, 'SDO block')
-        self._position += taken * SEGMENT_BYTES
+        self._position += taken * sdo.SEGMENT_BYTES
         complete = taken == self._sent and self._position >= len(self._data)
         self._sent = 0
         if complete:
@@ -156,14 +138,14 @@ class BlockUpload:
         return self._block()
 
     def _set_block(self, segments: int) -> None:
-        if not 1 <= segments <= BLOCK_SEGMENTS_MAX:
+        if not 1 <= segments <= sdo.BLOCK_SEGMENTS_MAX:
             raise refusal(AbortCode.BLOCK_SIZE, 'SDO block')
         self._segments = segments
 
     def _block(self) -> list[bytes]:
-        frames = block_frames(self._data, self._position, self._segments)
+        frames = sdo.block_frames(self._data, self._position, self._segments)
         self._sent = len(frames)
         return frames
 
     def _end(self) -> bytes:
-        return end_frame(UPLOAD_END, self._data, with_crc=self._with_crc)
+        return sdo.end_frame(sdo.UPLOAD_END, self._data, with_crc=self._with_crc)

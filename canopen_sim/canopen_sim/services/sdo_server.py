@@ -15,26 +15,7 @@ import struct
 
 from canopen_core import CodecError, SdoAbortError
 from canopen_core.can import Frame
-from canopen_core.standard import (
-    Abort,
-    AbortCode,
-    CAN_ID_MASK,
-    CLIENT_DOWNLOAD,
-    CLIENT_UPLOAD,
-    COB_ID_INVALID,
-    CobId,
-    decode_request,
-    DownloadRequest,
-    DownloadResponse,
-    DownloadSegmentResponse,
-    EXPEDITED_MAX,
-    Index,
-    Segment,
-    SEGMENT_MAX,
-    UploadRequest,
-    UploadResponse,
-    UploadSegmentRequest,
-)
+from canopen_core.standard import AbortCode, CAN_ID_MASK, COB_ID_INVALID, CobId, Index, sdo
 
 from ..objects.object_store import check_cob_id, ObjectStore, refusal, STRING_BYTES_MAX
 from ..timed import NEVER
@@ -45,7 +26,13 @@ ABORT = 0x80  # command byte of an abort
 CHANNELS_MAX = 128  # SDO servers of a device (CiA 301, 7.5.2.33)
 SILENCE_MAX = 1.0  # [s] how long a client may pause within a transfer
 
-Answer = Abort | DownloadResponse | DownloadSegmentResponse | Segment | UploadResponse
+Answer = (
+    sdo.Abort
+    | sdo.DownloadResponse
+    | sdo.DownloadSegmentResponse
+    | sdo.Segment
+    | sdo.UploadResponse
+)
 
 
 @dataclass(slots=True)
@@ -96,13 +83,13 @@ class SdoServer:
         transfer = self._transfer
         self.reset()
         if transfer is not None:
-            abort = Abort(transfer.index, transfer.subindex, AbortCode.TIMED_OUT)
+            abort = sdo.Abort(transfer.index, transfer.subindex, AbortCode.TIMED_OUT)
             self._send(Frame(self.response_id, abort.encode()))
 
     def _answer(self, data: bytes, now: float) -> list[bytes]:
         """Return the answer; an abort names the object of the request, else of the transfer."""
         transfer, specifier = self._transfer, data[0] >> 5
-        is_block = specifier in (CLIENT_UPLOAD, CLIENT_DOWNLOAD)
+        is_block = specifier in (sdo.CLIENT_UPLOAD, sdo.CLIENT_DOWNLOAD)
         names_none = specifier in (0, 3) or (is_block and data[0] & 0x03)
         index, subindex = struct.unpack_from('<xHB', data)
         streams = isinstance(transfer, BlockDownload) and transfer.streaming
@@ -117,11 +104,11 @@ class SdoServer:
             response = self._dispatch(data, now)
         except SdoAbortError as error:
             self._transfer = None
-            return [Abort(index, subindex, error.code).encode()]
+            return [sdo.Abort(index, subindex, error.code).encode()]
         return [response.encode()] if response is not None else []
 
     def _block(self, data: bytes, now: float) -> list[bytes]:
-        if data[0] >> 5 == CLIENT_DOWNLOAD:
+        if data[0] >> 5 == sdo.CLIENT_DOWNLOAD:
             return [self._block_download(data, now)]
         if not data[0] & 0x03:
             return [self._start_block_upload(data)]
@@ -157,47 +144,47 @@ class SdoServer:
         value = self._store.read(index, subindex)
         upload = BlockUpload(data, value)
         if 0 < len(value) <= threshold:  # the client prefers the other protocol for so little
-            return self._start_upload(UploadRequest(index, subindex)).encode()
+            return self._start_upload(sdo.UploadRequest(index, subindex)).encode()
         self._transfer = upload
         return upload.initiated()
 
     def _dispatch(self, data: bytes, now: float) -> Answer | None:
         try:
-            request = decode_request(data)
+            request = sdo.decode_request(data)
         except CodecError as error:
             raise refusal(AbortCode.COMMAND_SPECIFIER, 'SDO') from error
         match request:
-            case UploadRequest():
+            case sdo.UploadRequest():
                 return self._start_upload(request)
-            case UploadSegmentRequest():
+            case sdo.UploadSegmentRequest():
                 return self._send_segment(request)
-            case DownloadRequest():
+            case sdo.DownloadRequest():
                 return self._start_download(request, now)
-            case Segment():
+            case sdo.Segment():
                 return self._take_segment(request, now)
-            case Abort():
+            case sdo.Abort():
                 self._transfer = None
         return None
 
-    def _start_upload(self, request: UploadRequest) -> UploadResponse:
+    def _start_upload(self, request: sdo.UploadRequest) -> sdo.UploadResponse:
         index, subindex = request.index, request.subindex
         self._transfer = None
         value = self._store.read(index, subindex)
-        if 0 < len(value) <= EXPEDITED_MAX:
-            return UploadResponse(index, subindex, value, len(value))
+        if 0 < len(value) <= sdo.EXPEDITED_MAX:
+            return sdo.UploadResponse(index, subindex, value, len(value))
         self._transfer = Transfer(index, subindex, is_download=False, data=bytearray(value))
-        return UploadResponse(index, subindex, None, len(value))
+        return sdo.UploadResponse(index, subindex, None, len(value))
 
-    def _send_segment(self, request: UploadSegmentRequest) -> Segment:
+    def _send_segment(self, request: sdo.UploadSegmentRequest) -> sdo.Segment:
         transfer = self._expect(request.toggle, is_download=False)
-        part = bytes(transfer.data[transfer.position : transfer.position + SEGMENT_MAX])
+        part = bytes(transfer.data[transfer.position : transfer.position + sdo.SEGMENT_MAX])
         transfer.position += len(part)
         last = transfer.position >= len(transfer.data)
         if last:
             self._transfer = None
-        return Segment(request.toggle, part, last)
+        return sdo.Segment(request.toggle, part, last)
 
-    def _start_download(self, request: DownloadRequest, now: float) -> DownloadResponse:
+    def _start_download(self, request: sdo.DownloadRequest, now: float) -> sdo.DownloadResponse:
         index, subindex = request.index, request.subindex
         self._transfer = None
         variable = self._store.writable(index, subindex)
@@ -208,11 +195,11 @@ class SdoServer:
         else:
             data = request.data
             if request.size is None:  # the client leaves the length to us
-                data = data[: variable.size or EXPEDITED_MAX]
+                data = data[: variable.size or sdo.EXPEDITED_MAX]
             self._store.write(index, subindex, data, now)
-        return DownloadResponse(index, subindex)
+        return sdo.DownloadResponse(index, subindex)
 
-    def _take_segment(self, request: Segment, now: float) -> DownloadSegmentResponse:
+    def _take_segment(self, request: sdo.Segment, now: float) -> sdo.DownloadSegmentResponse:
         transfer = self._expect(request.toggle, is_download=True)
         transfer.data += request.data
         received = len(transfer.data)
@@ -224,7 +211,7 @@ class SdoServer:
                 raise refusal(AbortCode.LENGTH_LOW, 'SDO')
             self._transfer = None
             self._store.write(transfer.index, transfer.subindex, bytes(transfer.data), now)
-        return DownloadSegmentResponse(request.toggle)
+        return sdo.DownloadSegmentResponse(request.toggle)
 
     def _expect(self, toggle: bool, *, is_download: bool) -> Transfer:
         """Return the transfer that a segment belongs to, and turn its toggle bit."""

@@ -10,16 +10,7 @@ from contextlib import contextmanager
 
 from canopen_core import LssError, SdoAbortError, SdoTimeoutError
 from canopen_core.can import Frame, open_bus
-from canopen_core.standard import (
-    BIT_RATES,
-    CobId,
-    Index,
-    LssAddress,
-    LssState,
-    NmtState,
-    parse_heartbeat,
-    UNCONFIGURED,
-)
+from canopen_core.standard import CobId, Index, lss, NmtState, parse_heartbeat, UNCONFIGURED
 
 from ..lss_master import LssMaster, TIMEOUT
 from .arguments import (
@@ -100,9 +91,9 @@ def _add_choice(parser: argparse.ArgumentParser, *, required: bool) -> None:
 def run_scan(options: argparse.Namespace) -> int:
     """Find devices without node id; return the exit code."""
     with _lss(options) as (session, master):
-        master.switch_all(LssState.WAITING)
+        master.switch_all(lss.State.WAITING)
         session.listen(PAUSE)
-        found: list[LssAddress] = []
+        found: list[lss.Address] = []
         while (address := session.run(master.fast_scan())) is not None:
             found.append(address)
     if found:
@@ -127,8 +118,8 @@ def run_set(options: argparse.Namespace) -> int:
         raise UsageError('nothing to set: give --node-id, --bitrate or --store')
     if options.activate is not None and options.bitrate is None:
         raise UsageError('--activate needs --bitrate')
-    if options.bitrate is not None and options.bitrate not in BIT_RATES.values():
-        known = ', '.join(f'{rate // 1000}k' for rate in BIT_RATES.values())
+    if options.bitrate is not None and options.bitrate not in lss.BIT_RATES.values():
+        known = ', '.join(f'{rate // 1000}k' for rate in lss.BIT_RATES.values())
         raise UsageError(f'LSS has no bit rate {options.bitrate / 1000:g}k; take {known}')
     with _lss(options) as (session, master):
         if options.node_id is not None:
@@ -163,20 +154,20 @@ def _lss(options: argparse.Namespace) -> Iterator[tuple[Session, LssMaster]]:
         try:
             yield session, master
         except BaseException:
-            master.switch_all(LssState.WAITING)
+            master.switch_all(lss.State.WAITING)
             raise
         if getattr(options, 'activate', None) is None:  # else they are at another bit rate now
-            master.switch_all(LssState.WAITING)
+            master.switch_all(lss.State.WAITING)
 
 
 def _select(session: Session, master: LssMaster, options: argparse.Namespace) -> None:
     """Bring one device into the configuration state."""
-    master.switch_all(LssState.WAITING)
+    master.switch_all(lss.State.WAITING)
     session.listen(PAUSE)
     if options.address:
-        session.run(master.select(LssAddress(*options.address)))
+        session.run(master.select(lss.Address(*options.address)))
     elif options.only:
-        master.switch_all(LssState.CONFIGURATION)
+        master.switch_all(lss.State.CONFIGURATION)
         session.listen(PAUSE)
     elif session.run(master.fast_scan()) is None:
         raise LssError(
@@ -208,7 +199,7 @@ def _let_go(session: Session, master: LssMaster, new_id: int | None, before: int
             booted.append(frame.can_id & 0x7F)
 
     session.listeners.append(note)
-    master.switch_all(LssState.WAITING)
+    master.switch_all(lss.State.WAITING)
     if new_id is None:
         if before != UNCONFIGURED:
             warn('it takes effect with the next reset of the device, or its next power-on')

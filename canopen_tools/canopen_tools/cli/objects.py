@@ -9,7 +9,7 @@ import argparse
 from canopen_core import CodecError, SdoAbortError
 from canopen_core.can import open_bus
 from canopen_core.eds import bytes_from_text, text_from_bytes
-from canopen_core.standard import DataType, fitted, Index, ObjectEntry
+from canopen_core.standard import DataType, Index, ObjectEntry, sdo
 
 from ..monitor.object_names import ObjectNames
 from ..monitor.value_text import data_text
@@ -130,7 +130,7 @@ def _upload(session: Session, target: Target, entry: ObjectEntry) -> bytes:
     client = session.client(target.node_id, target.name, target.dictionary)
     long = entry.data_type in LONG_TYPES
     data = session.read(client, *entry.address, target.timeout, block=long)
-    return fitted(entry.data_type, data)  # of the type that --type names
+    return sdo.fitted(entry.data_type, data)  # of the type that --type names
 
 
 def _title(target: Target, entry: ObjectEntry) -> str:

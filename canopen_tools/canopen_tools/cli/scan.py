@@ -20,7 +20,7 @@ from canopen_core.standard import (
     NODE_ID_MAX,
     NODE_ID_MIN,
     PROFILE_MASK,
-    UploadRequest,
+    sdo,
 )
 
 from ..lss_master import LssMaster
@@ -168,7 +168,7 @@ def _find_silent(session: Session, found: dict[int, Found]) -> None:
 
     session.listeners.append(note)
     beside_master = bool(session.masters)
-    request = UploadRequest(Index.DEVICE_TYPE, 0).encode()
+    request = sdo.UploadRequest(Index.DEVICE_TYPE, 0).encode()
     others = [i for i in range(NODE_ID_MIN, NODE_ID_MAX + 1) if i not in session.states]
     for position, node_id in enumerate(others):
         if beside_master:

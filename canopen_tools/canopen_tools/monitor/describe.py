@@ -18,9 +18,7 @@ from canopen_core.standard import (
     decode_time_of_day,
     Emergency,
     Index,
-    LSS_REQUEST,
-    LSS_RESPONSE,
-    LssMessage,
+    lss,
     NmtCommand,
     NmtState,
     NODE_ID_MAX,
@@ -59,8 +57,8 @@ class FrameDescriber:
             CobId.NMT: self._nmt,
             CobId.SYNC: self._sync,
             CobId.TIME: self._time,
-            LSS_REQUEST: lambda frame: _lss('LSS >', frame),
-            LSS_RESPONSE: lambda frame: _lss('LSS <', frame),
+            lss.REQUEST: lambda frame: _lss('LSS >', frame),
+            lss.RESPONSE: lambda frame: _lss('LSS <', frame),
         }
         self._functions: dict[int, Callable[[int, Frame], Description]] = {
             CobId.EMCY: self._emcy,
@@ -190,7 +188,7 @@ class FrameDescriber:
 def _lss(label: str, frame: Frame) -> Description:
     """Describe an LSS message, also one of a wrong length; its parameters stay bytes."""
     data = frame.data
-    text = LssMessage(data[0], data[1:]).text if data else 'empty message'
+    text = lss.Message(data[0], data[1:]).text if data else 'empty message'
     return Description(FrameKind.LSS, label, '', text)
 
 

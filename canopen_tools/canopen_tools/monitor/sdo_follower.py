@@ -10,21 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from canopen_core import CodecError
-from canopen_core.standard import (
-    Abort,
-    abort_text,
-    decode_request,
-    decode_response,
-    DownloadRequest,
-    DownloadResponse,
-    DownloadSegmentResponse,
-    FRAME_BYTES,
-    Response,
-    Segment,
-    UploadRequest,
-    UploadResponse,
-    UploadSegmentRequest,
-)
+from canopen_core.standard import abort_text, sdo
 
 from .object_names import ObjectNames
 from .value_text import data_text
@@ -143,7 +129,7 @@ class _Transfer:
         self.size = size
         self.data = b''
 
-    def take(self, segment: Segment) -> str:
+    def take(self, segment: sdo.Segment) -> str:
         """Add a segment and return how far it is."""
         self.data += segment.data
         total = f' of {self.size}' if self.size is not None else ''
@@ -164,20 +150,20 @@ class SdoFollower:
         if block is not None:
             return SdoText(block)
         try:
-            message = decode_request(data)
+            message = sdo.decode_request(data)
         except CodecError as error:
             return SdoText(str(error))
         match message:
-            case UploadRequest(index, subindex):
+            case sdo.UploadRequest(index, subindex):
                 self._transfer = None
                 return SdoText(f'read {self._names.title(index, subindex)}')
-            case DownloadRequest(index, subindex, content, size):
+            case sdo.DownloadRequest(index, subindex, content, size):
                 return SdoText(f'write {self._initiated(index, subindex, content, size)}')
-            case Segment():
+            case sdo.Segment():
                 return SdoText(self._segment(message))
-            case UploadSegmentRequest():
+            case sdo.UploadSegmentRequest():
                 return SdoText(f'next segment{self._of_transfer()}')
-            case Abort():
+            case sdo.Abort():
                 return self._abort(message)
 
     def response(self, data: bytes) -> SdoText:
@@ -186,25 +172,25 @@ class SdoFollower:
         if block is not None:
             return SdoText(block)
         try:
-            message = decode_response(data)
+            message = sdo.decode_response(data)
         except CodecError as error:
             return SdoText(str(error))
         step = self._answer(message)
-        if len(data) == FRAME_BYTES:
+        if len(data) == sdo.FRAME_BYTES:
             return step
         return SdoText(f'{step.text} ({len(data)} bytes instead of 8)', step.is_abort)
 
-    def _answer(self, message: Response) -> SdoText:
+    def _answer(self, message: sdo.Response) -> SdoText:
         match message:
-            case UploadResponse(index, subindex, content, size):
+            case sdo.UploadResponse(index, subindex, content, size):
                 return SdoText(self._initiated(index, subindex, content, size))
-            case DownloadResponse(index, subindex):
+            case sdo.DownloadResponse(index, subindex):
                 return SdoText(f'accepts {self._names.title(index, subindex)}')
-            case Segment():
+            case sdo.Segment():
                 return SdoText(self._segment(message))
-            case DownloadSegmentResponse():
+            case sdo.DownloadSegmentResponse():
                 return SdoText(f'segment taken{self._of_transfer()}')
-            case Abort():
+            case sdo.Abort():
                 return self._abort(message)
 
     def _initiated(
@@ -217,7 +203,7 @@ class SdoFollower:
         self._transfer = _Transfer(index, subindex, size)
         return f'{title}, {size} bytes in segments' if size is not None else f'{title} in segments'
 
-    def _segment(self, segment: Segment) -> str:
+    def _segment(self, segment: sdo.Segment) -> str:
         transfer = self._transfer
         if transfer is None:
             return f'segment of a transfer whose start was not seen, {len(segment.data)} bytes'
@@ -236,7 +222,7 @@ class SdoFollower:
     def _value(self, index: int, subindex: int, data: bytes) -> str:
         return data_text(index, subindex, self._names.data_type(index, subindex), data)
 
-    def _abort(self, message: Abort) -> SdoText:
+    def _abort(self, message: sdo.Abort) -> SdoText:
         self._transfer = None
         title = self._names.title(message.index, message.subindex)
         return SdoText(f'abort {title}: {abort_text(message.code)}', is_abort=True)

@@ -17,12 +17,12 @@ from canopen_core.standard import (
     drive_state,
     error_code_text,
     error_register_text,
-    fitted,
     Index,
     mapped_place,
     mode_title,
     object_address,
     PDO_COUNT_MAX,
+    sdo,
     Value,
 )
 
@@ -156,7 +156,7 @@ def data_text(index: int, subindex: int, data_type: DataType | None, data: bytes
     if data_type is None:
         return data.hex(' ') or 'nothing'
     try:
-        value = decode(data_type, fitted(data_type, data))
+        value = decode(data_type, sdo.fitted(data_type, data))
     except CodecError as error:
         return f'{data.hex(" ")} ({error})'
     return value_text(index, subindex, value)
