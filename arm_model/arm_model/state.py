@@ -29,4 +29,4 @@ class RobotState:
     @property
     def moving(self) -> bool:
         """Whether a joint moves, or is about to."""
-        return bool(np.any(self.velocity) or np.any(self.acceleration))
+        return bool(self.velocity.any() or self.acceleration.any())

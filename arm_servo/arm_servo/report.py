@@ -51,8 +51,9 @@ class MotionReport:
 
     def __post_init__(self) -> None:
         """Sort the limiters, so that the first is the one that matters."""
-        strongest = tuple(sorted(self.limiters, key=lambda limiter: limiter.factor))
-        object.__setattr__(self, 'limiters', strongest)
+        if len(self.limiters) > 1:
+            strongest = tuple(sorted(self.limiters, key=lambda limiter: limiter.factor))
+            object.__setattr__(self, 'limiters', strongest)
 
     def with_limiter(self, limiter: Limiter) -> MotionReport:
         """Return the report with one limiter more."""

@@ -362,3 +362,28 @@ def test_what_is_no_chain_is_refused() -> None:
         MotionCore(two_arms())
     with pytest.raises(ModelError, match='9 joints, 8 at most'):
         MotionCore(chain('zyyzyyzyy'))
+
+
+@pytest.mark.parametrize('period', [0.001, 0.002, 0.004])
+def test_a_jog_of_short_cycles_is_as_straight_as_one_of_long_cycles(period: float) -> None:
+    """Joint speeds count for several cycles; held axes stay, a new command counts at once."""
+    model = robot('panda')
+    core = MotionCore(model)
+    core.reset(ready('panda'))
+    begin = model.pose(core.state.position)
+    states = []
+    for cycle in range(round(1.0 / period)):
+        now = cycle * period
+        if cycle % round(0.02 / period) == 0:
+            core_commands.twist(core, [0.0, 0.1, 0.0, 0.0, 0.0, 0.0], now)
+        states.append(core.step(now, period).state)
+    there = model.pose(core.state.position)
+    assert there.position[1] - begin.position[1] == pytest.approx(0.1, abs=0.02)
+    assert there.position[[0, 2]] == pytest.approx(begin.position[[0, 2]], abs=3e-4)
+    assert there.rotation == pytest.approx(begin.rotation, abs=1e-3)
+    speeds = np.array([state.velocity for state in states])
+    changes = np.abs(np.diff(speeds, axis=0)).max(axis=0) / period
+    assert (changes <= 1.01 * model.limits.acceleration).all()
+    core_commands.twist(core, [0.0, -0.1, 0.0, 0.0, 0.0, 0.0], 1.0)
+    slower = core.step(1.0, period).state
+    assert np.abs(slower.acceleration).max() > 0.0

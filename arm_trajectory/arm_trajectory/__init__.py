@@ -20,7 +20,7 @@ from .execution.catch_up import CatchUpInterpolator
 from .execution.speed_scaling import TimerState, TrajectoryTimer
 from .execution.tolerances import merge_tolerances, Tolerances
 from .goal import GoalPoint, GoalRules, JointTolerance, TrajectoryGoal
-from .otg import brakeable, brakeable_velocity, hard_brake, OnlineTrajectoryGenerator, Plan
+from .otg import brakeable, hard_brake, OnlineTrajectoryGenerator, Plan
 from .paths.goal_path import build_path
 from .paths.path import cubics, Excess, farthest_beyond, lines, Path, quintics
 from .paths.path_check import PathCheck, PathContact
@@ -47,7 +47,6 @@ __all__ = [
     'TrajectoryGoal',
     'TrajectoryTimer',
     'brakeable',
-    'brakeable_velocity',
     'build_path',
     'cubics',
     'farthest_beyond',

@@ -7,15 +7,17 @@ Way-points are never given to ruckig: it would send them to a service on the net
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import ruckig
 
 from arm_model import Array, JointLimits, Native, RobotState
 
-CONTINUOUS_DISTANCE = 1e6  # what counts for the way of a joint without end in [rad]
-
 MIN_ACCELERATION_FACTOR = 0.05
 """Least share of its acceleration that a joint keeps while others take longer."""
+
+SHORTEST_CHANGE = 1e-12  # time of a change of speed that counts for none in [s]
 
 
 class Plan:
@@ -74,6 +76,14 @@ class OnlineTrajectoryGenerator:
     def __init__(self, limits: JointLimits) -> None:
         count = len(limits)
         self.limits = limits
+        self._numbers = list(
+            zip(
+                limits.velocity.tolist(),
+                limits.acceleration.tolist(),
+                limits.jerk.tolist(),
+                strict=True,
+            )
+        )
         self._otg = ruckig.Ruckig(count)
         velocity, apart = ruckig.ControlInterface.Velocity, ruckig.Synchronization.No
         self._to_velocity = self._input(velocity, apart)
@@ -91,18 +101,33 @@ class OnlineTrajectoryGenerator:
         change of the joint that needs longest. Other than ruckig's own synchronisation this holds
         when the target changes in every cycle.
         """
-        limits, demand = self.limits, self._to_velocity
-        present = np.abs(state.acceleration) / limits.acceleration
-        share = _shares(velocity - state.velocity, limits.acceleration)
-        jerk = limits.jerk * np.maximum(share, present)  # what is there is taken back in time
-        unwound = state.acceleration * np.abs(state.acceleration) / (2.0 * jerk)
-        share = _shares(velocity - state.velocity - unwound, limits.acceleration)
-        # no time to lose where the speed would overrun its limit
-        share[np.abs(state.velocity + unwound) > limits.velocity] = 1.0
-        _start(demand, state)
-        demand.max_acceleration = limits.acceleration * share
-        demand.max_jerk = limits.jerk * np.maximum(share, np.minimum(present, 1.0))
-        demand.target_velocity = velocity
+        demand, target = self._to_velocity, velocity.tolist()
+        speeds, accelerations = state.velocity.tolist(), state.acceleration.tolist()
+        rows = list(zip(target, speeds, accelerations, self._numbers, strict=True))
+        changes = [abs(to - speed) / most for to, speed, _, (_, most, _) in rows]
+        longest = max(*changes, SHORTEST_CHANGE)
+        unwound = []
+        for change, (_, _, acceleration, (_, most, jerk)) in zip(changes, rows, strict=True):
+            # what is there is taken back in time
+            share = max(change / longest, MIN_ACCELERATION_FACTOR, abs(acceleration) / most)
+            unwound.append(acceleration * abs(acceleration) / (2.0 * jerk * share))
+        changes = [
+            abs(to - speed - back) / most
+            for back, (to, speed, _, (_, most, _)) in zip(unwound, rows, strict=True)
+        ]
+        longest = max(*changes, SHORTEST_CHANGE)
+        most_acceleration, most_jerk = [], []
+        for change, back, row in zip(changes, unwound, rows, strict=True):
+            _, speed, acceleration, (fastest, most, jerk) = row
+            share = max(change / longest, MIN_ACCELERATION_FACTOR)
+            if abs(speed + back) > fastest:  # no time to lose
+                share = 1.0
+            most_acceleration.append(most * share)
+            most_jerk.append(jerk * max(share, min(abs(acceleration) / most, 1.0)))
+        demand.current_position = state.position.tolist()
+        demand.current_velocity, demand.current_acceleration = speeds, accelerations
+        demand.max_acceleration, demand.max_jerk = most_acceleration, most_jerk
+        demand.target_velocity = target
         return self._plan(demand)
 
     def brake(self, state: RobotState) -> Plan | None:
@@ -111,8 +136,8 @@ class OnlineTrajectoryGenerator:
         It is planned from zero, since ruckig counts zero among the extremes of such a motion.
         """
         demand = self._to_standstill
-        demand.current_velocity = state.velocity
-        demand.current_acceleration = state.acceleration
+        demand.current_velocity = state.velocity.tolist()
+        demand.current_acceleration = state.acceleration.tolist()
         return self._plan(demand, state.position)
 
     def to_state(
@@ -124,7 +149,9 @@ class OnlineTrajectoryGenerator:
             target: Where to arrive, its velocity and acceleration within the limits.
         """
         demand = self._to_position
-        _start(demand, state)
+        demand.current_position = state.position.tolist()
+        demand.current_velocity = state.velocity.tolist()
+        demand.current_acceleration = state.acceleration.tolist()
         demand.target_position = target.position
         demand.target_velocity = target.velocity
         demand.target_acceleration = target.acceleration
@@ -151,19 +178,6 @@ class OnlineTrajectoryGenerator:
         return Plan(trajectory, begin)
 
 
-def _start(demand: Native, state: RobotState) -> None:
-    demand.current_position = state.position
-    demand.current_velocity = state.velocity
-    demand.current_acceleration = state.acceleration
-
-
-def _shares(change: Array, acceleration: Array) -> Array:
-    """Return the share of each joint's acceleration that changes all speeds in the same time."""
-    needed = np.abs(change) / acceleration
-    shares: Array = np.maximum(needed / max(float(needed.max()), 1e-12), MIN_ACCELERATION_FACTOR)
-    return shares
-
-
 def hard_brake(state: RobotState, limits: JointLimits, period: float) -> RobotState:
     """Slow down for a period with the greatest deceleration: for when ruckig has no answer.
 
@@ -180,30 +194,15 @@ def hard_brake(state: RobotState, limits: JointLimits, period: float) -> RobotSt
     )
 
 
-def brakeable_velocity(distance: Array, limits: JointLimits) -> Array:
-    """Return the velocity that can be braked to a standstill within a distance.
+def brakeable(way: float, acceleration: float, jerk: float) -> float:
+    """Return the velocity that can be braked to a standstill within a way, of any size.
 
     A stop from velocity v with a jerk j up to the deceleration a takes the way
-    v/2 (v/a + a/j) where a is reached (v >= a^2/j), v sqrt(v/j) where it is not.
-
-    Args:
-        distance: Ways left in [rad] (n) or (k, n); negative ones count as zero.
-
-    Returns:
-        Velocities in [rad/s], at most those of the limits.
+    v/2 (v/a + a/j) where a is reached (v >= a^2/j), v sqrt(v/j) where it is not. A way below zero
+    counts as zero.
     """
-    return np.minimum(brakeable(distance, limits.acceleration, limits.jerk), limits.velocity)
-
-
-def brakeable(distance: Array, acceleration: Array, jerk: Array) -> Array:
-    """Return the speed that can be braked to a standstill within a distance, of any size.
-
-    Args:
-        distance: Ways left in [rad]; negative ones count as zero.
-    """
-    way = np.minimum(np.maximum(distance, 0.0), CONTINUOUS_DISTANCE)
+    way = max(way, 0.0)
     half = 0.5 * acceleration * acceleration / jerk
-    short = np.cbrt(way * way * jerk)
-    long = np.sqrt(half * half + 2.0 * acceleration * way) - half
-    speeds: Array = np.where(way <= 2.0 * half * acceleration / jerk, short, long)
-    return speeds
+    if way * jerk <= 2.0 * half * acceleration:
+        return math.cbrt(way * way * jerk)
+    return math.sqrt(half * half + 2.0 * acceleration * way) - half

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from arm_model import Array, RobotState
-from arm_trajectory import brakeable_velocity, hard_brake, OnlineTrajectoryGenerator
+from arm_trajectory import brakeable, hard_brake, OnlineTrajectoryGenerator
 
 PERIOD = 0.004
 
@@ -70,7 +70,8 @@ def test_what_is_brakeable_can_be_braked(share: float) -> None:
     """A stop from the velocity that can be braked on a way takes just this way."""
     limits = robot('panda').limits
     way: Array = np.full(7, share)
-    velocity = brakeable_velocity(way, limits)
+    rows = zip(way, limits.acceleration, limits.jerk, strict=True)
+    velocity = np.minimum([brakeable(*row) for row in rows], limits.velocity)
     stop = OnlineTrajectoryGenerator(limits).brake(RobotState(np.zeros(7), velocity, np.zeros(7)))
     assert stop is not None
     _, upper = stop.extremes

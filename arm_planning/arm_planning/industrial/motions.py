@@ -42,7 +42,7 @@ def ptp_path(start: Array, goal: Array, limits: JointLimits) -> FullSpeedPath:
         for limit in (limits.velocity, limits.acceleration, limits.jerk)
     )
     # a short way ends before the full speed
-    peak = float(brakeable(np.array(0.5), np.array(acceleration), np.array(jerk)))
+    peak = brakeable(0.5, acceleration, jerk)
     speed = min(speed, peak)
     coefficients = np.zeros((6, len(way)))
     coefficients[0], coefficients[1] = start, way * speed
@@ -74,7 +74,7 @@ def curve_path(
     velocity, acceleration = factors
     most = acceleration * limits.max_trans_acc
     # a short way ends before the full speed
-    peak = float(brakeable(np.array(0.5 * length), np.array(most), np.array(JERK_RATIO * most)))
+    peak = brakeable(0.5 * length, most, JERK_RATIO * most)
     speed = min(velocity * limits.max_trans_vel, peak)
     traced = trace(link, curve, start, joints, duration=length / speed, name=name)
     rate = most / speed

@@ -16,12 +16,11 @@ import pinocchio as pin
 from arm_model import Array, Mask, Pose, RobotModel, RobotState, turned_twists
 from arm_trajectory import OnlineTrajectoryGenerator
 
-from ..jog.velocity_ik import IkAnswer, IkSettings, TwistTask, VelocityIk
+from ..jog.velocity_ik import BASE, IkAnswer, IkSettings, TwistTask, VelocityIk
 from ..report import Cause, Limiter, MotionReport
 from .controller import ArmState, Controller, Source, toward
 
 NO_AXES: Mask = np.zeros(6, dtype=np.bool_)  # mask of no axis of a twist
-BASE = np.eye(3)  # the axes of the base
 
 RELEASED_SPEED = np.array([2e-3] * 3 + [5e-3] * 3)
 """Speed below which a released axis is held again in [m/s] and [rad/s]."""
@@ -30,6 +29,9 @@ MIN_COMMAND_FACTOR = 0.1  # least share of a command that is carried out while h
 
 SLOWED, HASTENED = 0.1, 0.4
 """Least times in which the share of a command falls to nothing and comes back in [s]."""
+
+SOLVE_PERIOD = 8e-3
+"""How long joint speeds count where cycles are shorter, in [s]: each plans the way there."""
 
 REST_SPEED_FACTOR = 0.02
 """Share of a joint's speed below which a released jog needs no line any more."""
@@ -170,7 +172,7 @@ class ServoSource:
     def _toward(self, state: RobotState, command: PoseCommand, period: float) -> IkAnswer:
         """Approach a pose, slowing down so as to arrive at rest."""
         settings = self._settings
-        error = _error(command.pose, self._model.pose(state.position), np.eye(3))
+        error = _error(command.pose, self._model.pose(state.position), BASE)
         linear = _approach(
             error[:3], settings.approach, command.linear_speed, settings.linear_deceleration
         )
@@ -178,9 +180,7 @@ class ServoSource:
             error[3:], settings.approach, command.angular_speed, settings.angular_deceleration
         )
         twist = np.concatenate((linear, angular))
-        return self._ik.cartesian(
-            state, TwistTask(twist, np.eye(3), ~self._drift, self._drift), period
-        )
+        return self._ik.cartesian(state, TwistTask(twist, BASE, ~self._drift, self._drift), period)
 
 
 class Jog(Controller):
@@ -200,12 +200,16 @@ class Jog(Controller):
         self._command: Command | None = None
         self._fresh_until = 0.0
         self._slowing_since: float | None = None
+        self._slowed: Command | None = None
+        self._solved: Command | None = None  # of which there are joint speeds
+        self._velocity: Array = np.zeros(len(model))
+        self._due = 0.0
         self.client: Hashable = None
 
     def begin(self) -> None:
         """Begin to jog: nothing is held yet."""
         self._servo.reset()
-        self._command, self.outcome = None, None
+        self._command = self._solved = self.outcome = None
 
     def take(self, command: Command, fresh_until: float, client: Hashable) -> None:
         """Set the command.
@@ -223,11 +227,14 @@ class Jog(Controller):
             command = self._slowing(state, arm.now)
         if command is None:
             self._servo.reset()
-            self.report = MotionReport()
+            self._solved, self.report = None, MotionReport()
             return None
-        answer = self._servo.step(state, command, period)
-        self.report = answer.report
-        return toward(self._generator, state, answer.velocity, period)
+        cycles = max(1, round(SOLVE_PERIOD / period))
+        if cycles == 1 or command is not self._solved or arm.now > self._due - 0.5 * period:
+            answer = self._servo.step(state, command, cycles * period)
+            self._velocity, self.report = answer.velocity, answer.report
+            self._solved, self._due = command, arm.now + cycles * period
+        return toward(self._generator, state, self._velocity, period)
 
     def conclude(self, arm: ArmState, state: RobotState) -> bool:
         """Return whether it is over: it ends where the arm rests without a command."""
@@ -243,9 +250,8 @@ class Jog(Controller):
             return None
         if self._slowing_since is None:
             self._slowing_since = now
-        if now - self._slowing_since > MAX_SLOW_DOWN_TIME:
-            return None
-        return replace(self._command, twist=np.zeros(6))
+            self._slowed = replace(self._command, twist=np.zeros(6))
+        return self._slowed if now - self._slowing_since <= MAX_SLOW_DOWN_TIME else None
 
 
 def _approach(error: Array, gain: float, fastest: float, deceleration: float) -> Array:

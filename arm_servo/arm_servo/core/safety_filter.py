@@ -4,8 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 
 import numpy as np
 
@@ -154,43 +153,47 @@ class SafetyFilter:
         Returns:
             The state to command, and what held the wanted one up.
         """
-        with self._turn():
-            beyond, stop = self._beyond(wanted)
-            limiter, end = None, now + period
-            self.is_near_neighbour = False
-            if beyond.any():  # these joints brake, each for itself; the others go on
-                limiter = self._limit(wanted, int(np.argmax(beyond)))
-                wanted = _mixed(beyond, self._brake(state, period, now), wanted)
-                beyond, stop = self._beyond(wanted)
-            if stop is not None and not beyond.any():
-                if clearance is None and self._may_meet(stop, end, apart):
-                    clearance = 0.0  # it may have to leave its path for the other arm
-                near = self._floor.too_near(stop, end, state, now, clearance)
-                if near is None and self._neighbours is not None:
-                    near = self._apart.too_near(stop, end, state, now, apart)
-                    self.is_near_neighbour = near is not None
-                if near is None:
-                    self._remember(stop)
-                    self._announce(stop, end)
-                    return wanted, limiter
-                limiter = Limiter(Cause.COLLISION, ' - '.join(near.links), near.distance, 0.0)
-                eased = self._eased(state, period, now)
-                if eased is not None:
-                    return eased, limiter
-            return self._brake(state, period, now), limiter
-
-    @contextmanager
-    def _turn(self) -> Iterator[None]:
-        """Hold the lock of other arms, if any, so that none of them steps meanwhile."""
-        neighbours = self._neighbours
-        if neighbours is None:
-            yield
-            return
-        with neighbours.lock:
-            if neighbours.version != self._version:
-                self._version = neighbours.version
+        if self._neighbours is None:
+            return self._filtered(state, wanted, period, clearance, now=now, apart=apart)
+        with self._neighbours.lock:  # none of them steps meanwhile
+            if self._neighbours.version != self._version:
+                self._version = self._neighbours.version
                 self._apart.forget()
-            yield
+            return self._filtered(state, wanted, period, clearance, now=now, apart=apart)
+
+    def _filtered(
+        self,
+        state: RobotState,
+        wanted: RobotState,
+        period: float,
+        clearance: float | None,
+        *,
+        now: float,
+        apart: float | None,
+    ) -> tuple[RobotState, Limiter | None]:
+        beyond, stop = self._beyond(wanted)
+        limiter, end = None, now + period
+        self.is_near_neighbour = False
+        if beyond.any():  # these joints brake, each for itself; the others go on
+            limiter = self._limit(wanted, int(np.argmax(beyond)))
+            wanted = _mixed(beyond, self._brake(state, period, now), wanted)
+            beyond, stop = self._beyond(wanted)
+        if stop is not None and not beyond.any():
+            if clearance is None and self._may_meet(stop, end, apart):
+                clearance = 0.0  # it may have to leave its path for the other arm
+            near = self._floor.too_near(stop, end, state, now, clearance)
+            if near is None and self._neighbours is not None:
+                near = self._apart.too_near(stop, end, state, now, apart)
+                self.is_near_neighbour = near is not None
+            if near is None:
+                self._remember(stop)
+                self._announce(stop, end)
+                return wanted, limiter
+            limiter = Limiter(Cause.COLLISION, ' - '.join(near.links), near.distance, 0.0)
+            eased = self._eased(state, period, now)
+            if eased is not None:
+                return eased, limiter
+        return self._brake(state, period, now), limiter
 
     def _may_meet(self, stop: Plan, begin: float, apart: float | None) -> bool:
         """Whether another arm may soon be in the way of a stop."""

@@ -60,6 +60,8 @@ Released = Mapping[str, Refusal | str]  # drives that were taken away, with what
 
 def why_not(feedback: Sequence[AxisFeedback], released: Released) -> str:
     """Return why the arm cannot follow now; empty when it can."""
+    if not released and all(axis.followable and axis.refusal is None for axis in feedback):
+        return ''
     return _sentence(
         (axis.name, axis.refusal or released.get(axis.name)) for axis in feedback
     ) or _sentence((axis.name, UNKNOWN) for axis in feedback if not axis.followable)

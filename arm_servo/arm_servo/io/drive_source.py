@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -139,8 +140,8 @@ class DriveSource:
 
 def measured_state(feedback: Sequence[AxisFeedback]) -> RobotState | None:
     """Return what the drives measure; None while one of them has sent nothing yet."""
-    positions = frozen([axis.position for axis in feedback])
-    if not np.isfinite(positions).all():
+    positions = [axis.position for axis in feedback]
+    if not math.isfinite(sum(positions)):
         return None
-    velocities = frozen([axis.velocity for axis in feedback])
-    return RobotState(positions, velocities, np.zeros(len(feedback)))
+    velocities = [axis.velocity for axis in feedback]
+    return RobotState(frozen(positions), frozen(velocities), np.zeros(len(feedback)))

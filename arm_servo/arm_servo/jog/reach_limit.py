@@ -11,12 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-import math
 
 import numpy as np
 
 from arm_model import Array, JointLimits
-from arm_trajectory import brakeable, brakeable_velocity
+from arm_trajectory import brakeable
 
 from .singularity import Directions, distance_to_singularity, LOST_SPEED_FACTOR, way_out
 
@@ -102,17 +101,13 @@ class ReachLimit:
         The last of the way fades, so that the arm rests there and does not hunt about it.
         """
         parts = np.maximum(np.abs(found.joints[-1]), MIN_COMPONENT)
-        acceleration = self._braking * np.min(self._limits.acceleration / parts)
-        jerk = self._braking * np.min(self._limits.jerk / parts)
-        return min(float(brakeable(np.asarray(way), acceleration, jerk)), MAX_APPROACH_RATE * way)
+        acceleration = self._braking * float(np.min(self._limits.acceleration / parts))
+        jerk = self._braking * float(np.min(self._limits.jerk / parts))
+        return min(brakeable(way, acceleration, jerk), MAX_APPROACH_RATE * way)
 
     def _surely_stoppable(self, way: float) -> float:
         """Return a speed in any joint direction that ends within a way in [rad/s], quickly."""
-        half = 0.5 * self._least_acceleration**2 / self._least_jerk
-        return min(
-            math.sqrt(half * half + 2.0 * self._least_acceleration * way) - half,
-            math.pow(way * way * self._least_jerk, 1.0 / 3.0),
-        )
+        return brakeable(way, self._least_acceleration, self._least_jerk)
 
     def way_out(
         self, jacobian_at: JacobianAt, position: Array, found: Directions, command: Array
@@ -157,11 +152,13 @@ class ReachLimit:
         back = 0.0 if self._good is None else float(way @ (self._good - position))
         if abs(back) > MIN_SIDE_DISTANCE:
             return 1.0 if back > 0 else -1.0
-        ways = np.array((self._limits.upper - position, position - self._limits.lower))
-        upper, lower = brakeable_velocity(ways, self._limits)
+        return 1.0 if self._room(way, position) >= self._room(-way, position) else -1.0
+
+    def _room(self, way: Array, position: Array) -> float:
+        """Return the speed that can be braked at the limits of each joint that a way moves."""
+        limits = self._limits
+        left = np.where(way > 0.0, limits.upper - position, position - limits.lower)
+        rows = zip(left, limits.acceleration, limits.jerk, limits.velocity, strict=True)
+        speeds = [min(brakeable(*row), fastest) for *row, fastest in rows]
         concerned = np.abs(way) > 0.1
-        forth, aback = (
-            float(np.min(np.where(sense * way > 0, upper, lower)[concerned], initial=np.inf))
-            for sense in (1.0, -1.0)
-        )
-        return 1.0 if forth >= aback else -1.0
+        return float(np.min(np.array(speeds)[concerned], initial=np.inf))

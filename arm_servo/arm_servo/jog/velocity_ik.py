@@ -17,6 +17,7 @@ standing still or leaving is feasible.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 import math
 
@@ -33,6 +34,7 @@ from .velocity_bounds import Bounds, VelocityBounds, VelocityBoundsSettings
 AXES = ('x', 'y', 'z', 'rotation x', 'rotation y', 'rotation z')  # names of the axes of a twist
 OPTIMAL = 1  # exit flag of daqp
 FREE = 1e30  # what daqp takes for no bound
+BASE = np.eye(3)  # the axes of the base
 REGULARIZATION = 1e-5  # weight of the joint speeds that keeps the program definite
 
 SELF_MOTION_WEIGHT = 2e-3
@@ -92,6 +94,9 @@ class VelocityIk:
         self._identity = np.eye(len(model))
         self._regularization = REGULARIZATION * self._identity
         settings = self._settings
+        # bounds of joints, then of near pairs, as daqp reads them
+        self._above = np.full(len(model) + settings.brakes.pairs, FREE)
+        self._below = np.zeros_like(self._above)
         self._reach_limit = ReachLimit(model.limits, settings.escape, settings.brakes.braking)
 
     def cartesian(self, state: RobotState, task: TwistTask, period: float) -> IkAnswer:
@@ -144,7 +149,10 @@ class VelocityIk:
 
     def _turned(self, position: Array, axes: Array, weights: Array) -> Array:
         """Return the weighted Jacobian along a task's axes."""
-        return turned_twists(axes, self._model.jacobian(position)) * weights[:, None]
+        jacobian = self._model.jacobian(position)
+        if axes is not BASE:
+            jacobian = turned_twists(axes, jacobian)
+        return jacobian * weights[:, None]
 
     def _answer(
         self,
@@ -158,11 +166,10 @@ class VelocityIk:
         """Solve, and name what limits; ``asked`` are weighted Jacobian and command."""
         jacobian, command = asked
         hessian += self._regularization
-        rows = bounds.rows, bounds.least
-        solution = _minimum(hessian, gradient, (bounds.lower, bounds.upper), *rows)
+        solution = self._minimum(hessian, gradient, bounds, bounds.lower, bounds.upper)
         if solution is None:  # too fast for the rows; standing still is feasible
             box = np.minimum(bounds.lower, 0.0), np.maximum(bounds.upper, 0.0)
-            solution = _minimum(hessian, gradient, box, *rows)
+            solution = self._minimum(hessian, gradient, bounds, *box)
         if solution is None:
             stuck = Limiter(Cause.SOLVER, 'no answer; standing still', 0.0, 0.0)
             return IkAnswer(np.zeros(len(gradient)), MotionReport(0.0, (stuck,)))
@@ -174,23 +181,23 @@ class VelocityIk:
             limiters += _losses(found, command, factor)
         return IkAnswer(velocity, MotionReport(factor, tuple(limiters)))
 
+    def _minimum(
+        self, hessian: Array, gradient: Array, bounds: Bounds, lower: Array, upper: Array
+    ) -> tuple[Array, Sequence[float]] | None:
+        """Minimise x'Hx/2 + g'x with x in a box and rows x >= least, by daqp.
 
-def _minimum(
-    hessian: Array, gradient: Array, box: tuple[Array, Array], rows: Array, least: Array
-) -> tuple[Array, Array] | None:
-    """Minimise x'Hx/2 + g'x with x in a box and rows x >= least, by daqp.
-
-    Returns:
-        The variables (n), and how hard each bound (n), then each row (m) presses: above zero where
-        the upper bound presses, below zero where the lower one does. None where no x is feasible.
-    """
-    lower, upper = box
-    above = np.concatenate((upper, np.full(len(least), FREE)))
-    below = np.concatenate((lower, least))
-    values, _, flag, info = daqp.solve(hessian, gradient, rows, above, below)
-    if flag != OPTIMAL or not math.isfinite(values.sum()):
-        return None
-    return np.minimum(np.maximum(values, lower), upper), np.array(info['lam'])
+        Returns:
+            The variables (n), and how hard each bound (n), then each row (m) presses: above zero
+            where the upper bound presses, below zero where the lower one does. None where no x is
+            feasible.
+        """
+        joints, count = len(lower), len(lower) + len(bounds.least)
+        above, below = self._above[:count], self._below[:count]
+        above[:joints], below[:joints], below[joints:] = upper, lower, bounds.least
+        values, _, flag, info = daqp.solve(hessian, gradient, bounds.rows, above, below)
+        if flag != OPTIMAL or not math.isfinite(values.sum()):
+            return None
+        return np.minimum(np.maximum(values, lower), upper), np.asarray(info['lam']).tolist()
 
 
 def _losses(found: Directions, command: Array, factor: float) -> list[Limiter]:
