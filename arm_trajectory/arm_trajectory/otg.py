@@ -204,5 +204,5 @@ def brakeable(way: float, acceleration: float, jerk: float) -> float:
     way = max(way, 0.0)
     half = 0.5 * acceleration * acceleration / jerk
     if way * jerk <= 2.0 * half * acceleration:
-        return math.cbrt(way * way * jerk)
+        return float((way * way * jerk) ** (1.0 / 3.0))
     return math.sqrt(half * half + 2.0 * acceleration * way) - half
