@@ -145,6 +145,8 @@ def _bridge_parameters(stack: Stack) -> dict[str, str]:
 
 def _controller_parameters(stack: Stack) -> dict[str, str]:
     values = {'gait': stack.gait}
+    if stack.servo is not None:
+        values['servo_compensation.kp'] = str(_stiffness(stack.servo))
     if stack.policy is not None:
         values['policy'] = str(stack.policy)
     if stack.record is not None:
@@ -183,8 +185,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--servo',
         metavar='MODEL',
-        help='servos of a simulated robot: firm (like the real ones), vendor_rl (soft, which '
-        'policies of the vendor are trained with), or kp=10,kv=0.25 (default: firm)',
+        help='servos of a simulated robot: nominal (as published), firm (which trot_ppo was '
+        'trained with), vendor_rl (soft, of the vendor), or kp=4,delay=0.04 (default: nominal)',
     )
     way = parser.add_mutually_exclusive_group()
     way.add_argument(
@@ -278,7 +280,20 @@ def _protocol(wanted: str, *, simulate: bool) -> str:
 def _servo(model: str | None, port: str | None) -> str | None:
     if model is not None and port is not None:
         raise ArgumentError(f'--servo {model} is for a simulated robot; leave it out, or --port')
+    if model is not None:
+        _stiffness(model)  # refuses what is no servo
     return model
+
+
+def _stiffness(servo: str) -> float:
+    """Return how stiff a servo of the simulation is [N m/rad]."""
+    # only here, as it takes a while and most runs choose none
+    from quad_sim import parse_servo, SetupError
+
+    try:
+        return parse_servo(servo).stiffness
+    except SetupError as error:
+        raise ArgumentError(str(error)) from error
 
 
 def _existing(name: str, path: Path | None) -> Path | None:

@@ -92,6 +92,8 @@ def test_hardware_has_no_simulator_and_simulation_has(tmp_path: Path) -> None:
     assert set(real) == {'hardware', 'controller', 'robot_state'}
     assert set(simulated) == {'fake_xgo', *real, 'viewer'}
     assert not simulated['viewer'].required
+    compensated = controller_of(real).gait.servo, controller_of(simulated).gait.servo
+    assert [servo and servo.kp for servo in compensated] == [2.45, 1.1]
     argv = simulated['fake_xgo'].argv
     assert argv[argv.index('--servo') + 1] == 'vendor_rl'
     assert bridge_of(real).robot.link == bridge_of(simulated).robot.link

@@ -21,10 +21,11 @@ import os
 
 import numpy as np
 
-from quad_controller import Controller, GaitParameters, State, StateParameters
+from quad_controller import Controller, GaitParameters, ServoModel, State, StateParameters
 from quad_controller.states.get_up_poses import Lying, lying_on
 from quad_description import quadruped, robot_urdf
 from quad_description.rotations import down_in_body, normalized, Quaternion
+from quad_sim import parse_servo
 from quad_sim.physics import PhysicsBackend, Robot, Variation
 
 FRICTION = (0.4, 1.3)  # of the ground
@@ -56,14 +57,15 @@ def attitude(random: np.random.Generator, side: Lying | None) -> Quaternion:
             return rotation
 
 
-def fallen(seed: int, side: Lying | None) -> PhysicsBackend:
+def fallen(seed: int, side: Lying | None, servo: str) -> PhysicsBackend:
     """Return a robot that was dropped and came to rest.
 
     Args:
         side: With which side below it is dropped; None for any attitude.
+        servo: Its servos, as fake_xgo takes them.
     """
     random = np.random.default_rng(seed)
-    robot = Robot(URDF)
+    robot = Robot(URDF, parse_servo(servo))
     pose = tuple(random.uniform(limits.lower, limits.upper) for limits in MODEL.limits)
     robot.reset(
         pose=dict(zip(MODEL.names, pose, strict=True)),
@@ -77,21 +79,25 @@ def fallen(seed: int, side: Lying | None) -> PhysicsBackend:
     return backend
 
 
-def get_up(seed: int, side: Lying | None = None, only: bool = False) -> Outcome:
+def get_up(
+    seed: int, side: Lying | None = None, only: bool = False, servo: str = 'nominal'
+) -> Outcome:
     """Drop a robot, and let it get up.
 
     Args:
         side: With which side below it is dropped; None for any attitude.
         only: Do nothing where it came to rest on another side.
+        servo: Its servos, as fake_xgo takes them.
     """
-    backend = fallen(seed, side)
+    backend = fallen(seed, side, servo)
     state = backend.observe()
     if state.imu is None:
         raise ValueError('a robot in physics measures its attitude')
     lay = lying_on(state.imu.down)
     if only and lay is not side:
         return Outcome(lay, False, 0.0, '')
-    controller = Controller(MODEL, GaitParameters(), StateParameters(get_up_swings=True))
+    gait = GaitParameters(servo=ServoModel(kp=parse_servo(servo).stiffness))
+    controller = Controller(MODEL, gait, StateParameters(get_up_swings=True))
     state = backend.step(controller.step(state, backend.period).targets)
     answer = controller.set_mode('get_up')
     begun = state.time
@@ -128,16 +134,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--drops', type=int, default=60, help='with any attitude')
     parser.add_argument('--each', type=int, default=50, help='with each side below')
+    parser.add_argument('--servo', default='nominal', help='as of fake_xgo')
     options = parser.parse_args()
+    dropped_robot = partial(get_up, servo=options.servo)
     context = multiprocessing.get_context('spawn')
     with ProcessPoolExecutor(len(os.sched_getaffinity(0)), mp_context=context) as pool:
-        outcomes = list(pool.map(get_up, range(options.drops)))
-        print('dropped with any attitude, by where they came to rest')
+        outcomes = list(pool.map(dropped_robot, range(options.drops)))
+        print(f'servos {options.servo}; dropped with any attitude, by where they came to rest')
         for side in Lying:
             report(side.value, [outcome for outcome in outcomes if outcome.lay is side])
         print('dropped with that side below, those that stayed on it')
         for side in Lying:
-            dropped = pool.map(partial(get_up, side=side, only=True), range(options.each))
+            lying = partial(dropped_robot, side=side, only=True)
+            dropped = pool.map(lying, range(options.each))
             report(side.value, [outcome for outcome in dropped if outcome.lay is side])
 
 

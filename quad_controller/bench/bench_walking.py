@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""How the gait and the shipped policies walk: three speeds of each axis, on several grounds.
+"""How the gait and the shipped policies walk: on servos of any kind, and on several grounds.
 
-The grounds are tried in virtual time on all cores; `--chain-minutes` adds the course over the
-serial line of a robot in real time, with the timing of its commands. The goals stand beside the
-figures; none is judged here: `check_policy` does that.
+Servos and grounds are tried in virtual time on all cores; `--chain-minutes` adds the course over
+the serial line of a robot in real time, with the timing of its commands. The goals stand beside
+the figures; none is judged here: `check_policy` does that.
 
     python bench_walking.py --duration 30 --chain-minutes 5     # for figures that are steadier
 """
@@ -13,11 +13,13 @@ figures; none is judged here: `check_policy` does that.
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 
+from quad_controller import Velocity
 from quad_controller.exceptions import CheckError
 from quad_controller.gait.parameters import LOW_AND_WIDE
 from quad_controller.policy.report import table_text
-from quad_controller.policy_check.arenas import AS_MADE, Conditions, TIPPING_PUSH
+from quad_controller.policy_check.arenas import AS_MADE, Conditions, RobotChoice, TIPPING_PUSH
 from quad_controller.policy_check.course import course_for, CourseFigures
 from quad_controller.policy_check.findings import Table
 from quad_controller.policy_check.trial import (
@@ -28,6 +30,7 @@ from quad_controller.policy_check.trial import (
     shipped_walkers,
     Trial,
 )
+from quad_sim import ServoModel
 
 GROUNDS = {
     'level': AS_MADE,
@@ -37,6 +40,9 @@ GROUNDS = {
     'wire of 20 ms': Conditions(delay=0.02),
     'rough and pushed': Conditions(roughness=0.02, push=TIPPING_PUSH),
 }
+STIFFNESSES = (1.1, 1.7, 2.45, 4.0, 8.0, 10.0)  # [N m/rad]
+DELAYS = (0.02, 0.04, 0.06)  # [s]
+SERVO_COMMANDS = (Velocity(0.2), Velocity(-0.15), Velocity(0.0, 0.1), Velocity(0.0, 0.0, 1.0))
 HEADINGS = (
     *('', 'ground', 'forward [m/s]', 'lateral [m/s]', 'turn [rad/s]'),
     *('falls/min', 'success', 'transport'),
@@ -55,6 +61,41 @@ def row(who: str, ground: str, figures: CourseFigures) -> tuple[str, ...]:
         f'{upright:.0%}',
         f'{figures.mean("cost_of_transport"):.2f}',
     )
+
+
+def servo(stiffness: float, delay: float) -> str:
+    """Return the nominal servos with another stiffness and delay, as fake_xgo takes them."""
+    nominal = ServoModel.NOMINAL.parameters
+    return (
+        f'kp={stiffness},kv={nominal.velocity_gain * stiffness / nominal.stiffness:.4g},'
+        f'interpolation={nominal.interpolation},deadband={nominal.deadband},'
+        f'backlash={nominal.backlash},delay={delay}'
+    )
+
+
+def servos(walkers: dict[str, Candidate], duration: float) -> None:
+    """Print how servos decide: speed error, falls, cost of transport."""
+    trials = {
+        (name, kp, delay): Trial(
+            replace(who, robot=RobotChoice(servo=servo(kp, delay))), SERVO_COMMANDS, duration
+        )
+        for name, who in walkers.items()
+        for kp in STIFFNESSES
+        for delay in DELAYS
+    }
+    found = dict(zip(trials, run_trials(list(trials.values())), strict=True))
+    table: Table = [('', 'N m/rad', *(f'after {delay * 1e3:.0f} ms' for delay in DELAYS))]
+    for name in walkers:
+        for kp in STIFFNESSES:
+            cells = (found[name, kp, delay] for delay in DELAYS)
+            texts = (
+                f'{each.mean("error"):.3f} m/s {each.falls_per_minute:.0f}/min '
+                f'{each.mean("cost_of_transport"):.1f}'
+                for each in cells
+            )
+            table.append((name, f'{kp:g}', *texts))
+    print('\nby stiffness and delay of the servos: speed error, falls a minute, cost of transport')
+    print(table_text(table, numbers=True))
 
 
 def main() -> None:
@@ -76,6 +117,7 @@ def main() -> None:
     table += [row(*key, each) for key, each in zip(trials, figures, strict=True)]
     print(f'off by, falls, commands without one; {len(commands)} commands of {options.duration} s')
     print(table_text(table, numbers=True))
+    servos({'gait': Candidate()} | shipped_walkers(), options.duration)
     if options.chain_minutes:
         chain(walkers, options.chain_minutes)
 

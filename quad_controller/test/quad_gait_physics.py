@@ -7,15 +7,32 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from quad_controller import Controller, GaitParameters, State, StateParameters, Velocity
+from quad_controller import (
+    Controller,
+    GaitParameters,
+    ServoModel,
+    State,
+    StateParameters,
+    Velocity,
+)
 from quad_controller.gait.velocity import REST
 from quad_controller.policy.runner import PolicyRunner
-from quad_description import quadruped, robot_urdf, RobotState
+from quad_description import quadruped, robot_urdf, RobotState, Targets
+from quad_sim import ServoModel as Servos
+from quad_sim import Terrain
 from quad_sim.physics import Meter, PhysicsBackend, Robot
+from quad_sim.plant.terrain import FLAT
 
 PERIOD = 0.02  # [s]
 URDF = robot_urdf()
 MODEL = quadruped(URDF)
+FIRM = GaitParameters(servo=ServoModel(kp=Servos.FIRM.parameters.stiffness))
+"""A gait for servos that hardly give way."""
+
+
+def firm(terrain: Terrain = FLAT) -> Robot:
+    """Return a robot with such servos."""
+    return Robot(URDF, Servos.FIRM, terrain)
 
 
 @dataclass(frozen=True)
@@ -63,12 +80,14 @@ class PhysicsRig:
         answer = self.controller.set_mode(mode)
         assert answer.accepted, answer.message
 
-    def step(self, velocity: Velocity) -> None:
-        """Pass one period."""
+    def step(self, velocity: Velocity) -> Targets:
+        """Pass one period; return the targets that were sent."""
         self.controller.set_velocity(velocity)
         state = self._sense(self._backend.observe())
-        self._backend.step(self.controller.step(state, PERIOD).targets)
+        targets = self.controller.step(state, PERIOD).targets
+        self._backend.step(targets)
         self.tilt = max(self.tilt, self.robot.base_pose.tilt)
+        return targets or ()
 
     def run(self, duration: float, velocity: Velocity = REST) -> None:
         """Pass some seconds with a velocity."""

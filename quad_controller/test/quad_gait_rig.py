@@ -97,6 +97,7 @@ class Rig:
         self.imu: ImuSample | None = UPRIGHT
         self.joints = True
         self.battery: float | None = None
+        self.servo_problem: str | None = None
         self.largest_step = 0.0
         self.log: list[str] = []
 
@@ -113,6 +114,7 @@ class Rig:
             joints=JointSample(self.positions, still) if self.joints else None,
             imu=self.imu,
             battery=self.battery,
+            servo_problem=self.servo_problem,
         )
         output = self.controller.step(measured, PERIOD)
         self.log += [event.text for event in output.events]

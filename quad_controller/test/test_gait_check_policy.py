@@ -22,7 +22,7 @@ from quad_gait_policies import joined, metadata, write_policy
 from quad_gait_rig import ROBOT
 
 SHIPPED = str(find_policy('trot_imitation'))
-TURN = ['--walk', '0.2', '0', '0.3', '--duration', '4']
+TURN = ['--walk', '0.2', '0', '0.3', '--duration', '4', '--servo', 'firm']
 """A way and a turn, for which left is not right."""
 DAMPING = -0.2
 """Of an action by the angular velocity in [s/rad]."""
@@ -38,7 +38,7 @@ def load_contract() -> PolicyContract:
 
 def test_the_shipped_policy_passes_and_walks(capsys: pytest.CaptureFixture[str]) -> None:
     """The table is printed, and what the walk came to."""
-    assert run([SHIPPED, '--walk', '0.2', '0', '0', '--duration', '3']) == 0
+    assert run([SHIPPED, '--walk', '0.2', '0', '0', '--duration', '3', '--servo', 'firm']) == 0
     output = capsys.readouterr().out
     assert 'REFUSE' not in output
     assert 'sha256' in output
@@ -170,7 +170,7 @@ def test_a_wrong_layout_of_the_history_is_found(
         (['--phase-period', '-0.1'], 'must be 0 or more'),
         (['--report', '/nowhere/at/all.csv'], 'No such file'),
         (['--minutes', '0.1'], 'must be 0.7 to 120'),
-        (['--servo', 'soft'], 'invalid choice'),
+        (['--servo', 'soft'], 'give nominal or firm'),
     ],
 )
 def test_wrong_use_ends_with_two(

@@ -141,6 +141,25 @@ def robot(isolation: Isolation) -> Iterator[Robot]:
         yield Robot(client, process)
 
 
+def test_cmd_vel_is_served_as_twist_stamped_too(robot: Robot, isolation: Isolation) -> None:
+    """As Nav2 publishes it, without a remap, and beside a publisher of Twist."""
+    robot.begin()
+    robot.until_ready()
+    assert robot.mode('walk').success
+    robot.until_state('walk')
+    with RosClient(isolation.domain_id) as nav2:
+        publisher = nav2.node.create_publisher(TwistStamped, 'cmd_vel', 1)
+        message, before = TwistStamped(), list(robot.commands[-1].position)
+        message.twist.linear.x = 0.2
+
+        def steps() -> bool:
+            publisher.publish(message)
+            pairs = zip(robot.positions, before, strict=True)
+            return max(abs(a - b) for a, b in pairs) > 0.2
+
+        robot.client.spin_until(steps, 20.0, 'steps')
+
+
 def test_from_lying_to_walking_and_back(robot: Robot) -> None:
     """Services and topics lead through the modes; commands do not jump."""
     answer = robot.mode('walk')

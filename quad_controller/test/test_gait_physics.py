@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 import math
+from random import Random
 
 import pytest
 
@@ -21,11 +22,12 @@ from quad_controller import (
 from quad_controller.gait.parameters import AS_TUNED, LOW_AND_WIDE
 from quad_description import Backend, RecordedBackend, robot_urdf, RobotState, Targets
 from quad_description.rotations import about_z, multiply, roll_pitch_yaw
-from quad_gait_physics import MODEL, PhysicsRig
-from quad_hardware.estimation import ImuMounting
+from quad_gait_physics import FIRM, firm, MODEL, PhysicsRig
+from quad_hardware.estimation import ImuMounting, OdometrySettings
 from quad_hardware.estimation.imu_mounting import UNCHECKED_DEVIATION
+from quad_hardware.estimation.odometry import LegOdometry
 from quad_sim import ServoModel as ServoModels
-from quad_sim import ServoParameters, Terrain
+from quad_sim import Terrain
 from quad_sim.physics import PhysicsBackend, Robot
 
 pytestmark = pytest.mark.slow
@@ -100,7 +102,7 @@ def test_other_builds_of_the_robot_walk_too(preset: str, arm: bool) -> None:
 )
 def test_other_gaits_go_as_commanded(gait: str, velocity: Velocity) -> None:
     """Crawl and pace keep a fifth of the speed, at least, and do not fall."""
-    rig = PhysicsRig()
+    rig = PhysicsRig(firm(), FIRM)
     rig.mode(f'gait:{gait}')
     rig.run(2.0, velocity)
     travel = rig.travel(8.0, velocity)
@@ -184,7 +186,7 @@ def test_levelling_turns_the_body_towards_level_on_a_slope() -> None:
     tilts = []
     for gain in (0.0, 0.8):
         slope = Terrain.slope(math.radians(8.0), math.pi / 2)
-        rig = PhysicsRig(Robot(robot_urdf(), terrain=slope), GaitParameters(level_gain=gain))
+        rig = PhysicsRig(firm(slope), replace(FIRM, level_gain=gain))
         rig.mode('walk')
         rig.run(2.0, Velocity(0.1))
         assert not rig.faulted
@@ -192,20 +194,56 @@ def test_levelling_turns_the_body_towards_level_on_a_slope() -> None:
     assert tilts[1] < 0.75 * tilts[0]
 
 
-def test_compensation_makes_soft_servos_keep_their_speed() -> None:
-    """Servos that lose a third of the speed keep it when their softness is known."""
-    soft = ServoParameters(
-        stiffness=2.45, velocity_gain=0.042, damping=0.05, armature=0.001, interpolation=0.02
-    )
-    errors = []
-    for model in (None, ServoModel(kp=2.45, damping=0.092, inertia=0.001)):
-        gait = replace(GaitParameters(), servo=model)
-        rig = PhysicsRig(Robot(robot_urdf(), servo=soft), gait)
+def test_without_compensation_the_nominal_servos_lose_a_third_of_the_speed() -> None:
+    """What the default is for."""
+    rig = PhysicsRig(gait=GaitParameters(servo=None))
+    rig.mode('walk')
+    rig.run(1.0, Velocity(0.2))
+    assert rig.travel(5.0, Velocity(0.2)).x < 0.15
+
+
+@pytest.mark.parametrize(
+    ('stiffness', 'delay', 'most'),
+    [(1.1, 0.06, 0.05), (2.45, 0.02, 0.02), (2.45, 0.06, 0.02), (10.0, 0.04, 0.02)],
+)
+def test_the_gait_keeps_its_speed_on_servos_of_any_stiffness(
+    stiffness: float, delay: float, most: float
+) -> None:
+    """With the dead band, backlash and delay of the nominal ones, when it knows how stiff."""
+    nominal = ServoModels.NOMINAL.parameters
+    gain = nominal.velocity_gain * stiffness / nominal.stiffness
+    servo = replace(nominal, stiffness=stiffness, velocity_gain=gain, delay=delay)
+    for velocity in (Velocity(0.1), Velocity(0.3), Velocity(-0.2), Velocity(0.0, 0.1)):
+        gait = GaitParameters(servo=ServoModel(kp=stiffness))
+        rig = PhysicsRig(Robot(robot_urdf(), servo), gait)
         rig.mode('walk')
-        rig.run(1.0, Velocity(0.2))
-        errors.append(abs(rig.travel(5.0, Velocity(0.2)).x - 0.2))
-    assert errors[0] > 0.04
-    assert errors[1] < 0.03
+        rig.run(2.0, velocity)
+        travel = rig.travel(3.0, velocity)
+        assert math.hypot(travel.x - velocity.x, travel.y - velocity.y) < most, velocity
+        assert not rig.faulted
+
+
+@pytest.mark.parametrize('velocity', [Velocity(0.2), Velocity(-0.15), Velocity(0.0, 0.1)])
+def test_odometry_follows_the_gait_on_the_nominal_servos(velocity: Velocity) -> None:
+    """Within 10 % of the way, by noisy joints and the targets that were sent."""
+    rig, random = PhysicsRig(), Random(1)
+    odometry = LegOdometry(OdometrySettings(), MODEL.foot_radius)
+
+    def go(duration: float) -> tuple[float, float]:
+        for _ in range(round(duration / 0.02)):
+            joints = [q + random.gauss(0.0, 0.0017) for q in rig.robot.joint_positions]
+            feet, attitude = MODEL.foot_poses(joints), rig.robot.base_pose.orientation
+            state = odometry.update(rig.robot.time, feet, attitude)
+            sent_at = rig.robot.time
+            odometry.command(sent_at, MODEL.feet(rig.step(velocity)))
+        return state.x, state.y
+
+    rig.mode('walk')
+    begun, start = go(3.0), rig.robot.base_pose.position
+    ended, end = go(5.0), rig.robot.base_pose.position
+    went = end[0] - start[0], end[1] - start[1]
+    found = ended[0] - begun[0], ended[1] - begun[1]
+    assert math.dist(found, went) < 0.1 * math.hypot(*went)
 
 
 def yawed_imu(mounting: ImuMounting, state: RobotState) -> RobotState:
@@ -230,8 +268,8 @@ def test_an_imu_that_sits_otherwise_tilts_nobody(
     mounting: ImuMounting, least: float, most: float
 ) -> None:
     """On a slope of 8 degrees; taken for an IMU that sits right, it tilts the body by 16."""
-    slope = Robot(robot_urdf(), terrain=Terrain.slope(math.radians(8.0)))
-    rig = PhysicsRig(slope, sense=partial(yawed_imu, mounting))
+    slope = firm(Terrain.slope(math.radians(8.0)))
+    rig = PhysicsRig(slope, FIRM, sense=partial(yawed_imu, mounting))
     rig.run(3.0)
     assert rig.state == 'stand'
     assert least < math.degrees(rig.robot.base_pose.tilt) < most

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 import math
 
 from hypothesis import given, settings
@@ -157,7 +158,7 @@ def test_the_same_gait_by_all_of_its_names() -> None:
 def test_the_gait_is_tuned_while_nothing_walks() -> None:
     """Lying, another height is taken and stood up to; on its legs the robot refuses it."""
     rig = standing()
-    higher = GaitParameters(nominal_height=0.1)
+    higher = GaitParameters(nominal_height=0.1, servo=None)
     assert 'not in stand' in rig.controller.retune(higher).message
     rig.ask('gait:crawl')
     rig.until(State.WALK)
@@ -496,6 +497,37 @@ def test_what_lasts_is_a_fault_with_its_reaction(
     rig.imu, rig.battery = UPRIGHT, 0.9
     rig.step()
     assert rig.controller.clear_fault().message == f'cleared; the mode is {mode}'
+
+
+def test_a_servo_that_gives_up_ends_the_walk_and_lies_down() -> None:
+    """Limp or hot, as the hardware node says; it stands up again when that is over."""
+    rig = standing(mode='walk')
+    rig.servo_problem = 'servo silent: look at the cable of the leg that hangs limp'
+    rig.until(State.FAULT, FORWARD)
+    rig.run(5.0, FORWARD)
+    assert ROBOT.feet(rig.positions)[0][2] == pytest.approx(ROBOT.legs[0].hip[2] - 0.055, abs=1e-6)
+    assert 'servo silent' in rig.controller.set_mode('stand').message
+    rig.servo_problem = ''
+    rig.step()
+    assert rig.controller.clear_fault().accepted
+    rig.ask('stand')
+
+
+def test_limits_and_slew_of_velocities_count_for_a_policy() -> None:
+    """As for the gait; a stop is one at once."""
+    gait = GaitParameters(max_linear_velocity_x=0.1, linear_acceleration=0.5)
+    policy = StillPolicy(STAND)
+    rig = standing(Rig(Controller(ROBOT, gait, StateParameters(), policy=policy)))
+    rig.ask('policy')
+    rig.run(2.0, Velocity())
+    policy.velocities.clear()
+    rig.run(1.0, Velocity(0.35, 0.0, 9.0))
+    steps = [b.x - a.x for a, b in pairwise(policy.velocities)]
+    assert max(steps) == pytest.approx(0.5 * PERIOD)
+    assert policy.velocities[-1] == pytest.approx((0.1, 0.0, 1.5))
+    rig.controller.stop()
+    rig.step(Velocity(0.35))
+    assert policy.velocities[-1] == Velocity()
 
 
 def test_an_attitude_may_be_done_without() -> None:

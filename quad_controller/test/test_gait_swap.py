@@ -11,14 +11,13 @@ import pytest
 from quad_controller import (
     find_policy,
     GaitGenerator,
-    GaitParameters,
     load_policy,
     PolicyOptions,
     State,
     Velocity,
 )
 from quad_description import Targets
-from quad_gait_physics import MODEL, PhysicsRig
+from quad_gait_physics import FIRM, firm, MODEL, PhysicsRig
 from quad_gait_rig import PERIOD, policy_rig, STAND, standing, StillPolicy, tilted
 
 CROUCHED = tuple(angle + 0.1 for angle in STAND)
@@ -133,10 +132,10 @@ def test_a_policy_that_misses_a_measurement_is_refused_before_the_robot_stands()
 @pytest.mark.slow
 def test_gait_policy_and_gait_walk_on_in_physics() -> None:
     """From one to the other at 0.15 m/s, the robot goes on as commanded and stays level."""
-    stand = GaitGenerator(MODEL, GaitParameters()).stand_targets
+    stand = GaitGenerator(MODEL, FIRM).stand_targets
     path = find_policy('trot_imitation')
     policy = load_policy(path, MODEL, stand, PolicyOptions(), PERIOD).runner
-    rig = PhysicsRig()
+    rig = PhysicsRig(firm(), FIRM)
     rig.mode('walk')
     rig.run(1.0, FORWARD)
     for each, state in ((policy, State.POLICY), (None, State.WALK)):

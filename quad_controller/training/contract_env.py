@@ -221,7 +221,7 @@ class TaughtEnv(gymnasium.ObservationWrapper[Floats, Floats, Floats]):
 
 def walking_env(randomization: Randomization) -> ContractEnv:
     """Make an environment to practise walking in."""
-    env = WalkingEnv(randomization=randomization, period=PERIOD)
+    env = WalkingEnv(servo=ServoModel.FIRM, randomization=randomization, period=PERIOD)
     return ContractEnv(env, walking_contract(quadruped(robot_urdf())))
 
 

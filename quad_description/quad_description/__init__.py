@@ -22,12 +22,24 @@ from .backend import Backend, RecordedBackend
 from .kinematics.leg import FEET, foot_position, jacobian, LegGeometry, LEGS, LegSolution, solve
 from .kinematics.quadruped import Feet, FootPose, Quadruped, quadruped, raised_feet, Targets
 from .presets import Pose, pose_positions, PresetError, PRESETS, robot_urdf, STREAM_TIMEOUT
-from .state import ContactSource, ImuSample, JointSample, OdometryState, RobotState
+from .state import (
+    ContactSource,
+    EMPTY_BATTERY,
+    ImuSample,
+    JointSample,
+    LOW_BATTERY,
+    MAX_TILT,
+    OdometryState,
+    RobotState,
+)
 from .urdf import Joint, JointLimits, movable_joints
 
 __all__ = [
+    'EMPTY_BATTERY',
     'FEET',
     'LEGS',
+    'LOW_BATTERY',
+    'MAX_TILT',
     'PRESETS',
     'STREAM_TIMEOUT',
     'Backend',

@@ -23,8 +23,8 @@ from .rotations import (
     yaw_of,
 )
 
-DRIFT = 0.07  # share of the way that is the standard deviation of the position
-MIN_VARIANCE = 1e-4  # [m²]
+MAX_TILT = 0.9  # [rad] beyond which the legs find no ground
+LOW_BATTERY, EMPTY_BATTERY = 0.2, 0.1  # charge below which it is to be charged, and useless
 NORM_TOLERANCE = 0.1  # of a quaternion's length; beyond it the message is no orientation
 MAX_DEVIATION = 0.35  # [rad] of an orientation that may be acted upon
 
@@ -122,17 +122,14 @@ class OdometryState:
     # feet that are taken to stand, in the order of :data:`.FEET`
     standing: tuple[bool, ...]
     contact_source: ContactSource  # how that is known
+    position_variance: float = 0.0  # of x and y [m²]; grows with the way and with each gap
+    yaw_variance: float = 0.0  # [rad²]; grows with time
 
     @property
     def velocity_in_base(self) -> Vector:
         """Velocity over the ground in base_link [m/s]."""
         level = multiply(about_z(-yaw_of(self.rotation)), self.rotation)
         return rotate(conjugate(level), (self.velocity_x, self.velocity_y, 0.0))
-
-    @property
-    def position_variance(self) -> float:
-        """Variance of x and y [m²], which grows with the way."""
-        return MIN_VARIANCE + (DRIFT * self.distance) ** 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,5 +154,7 @@ class RobotState:
     imu_problem: str = ''  # why the IMU is of no use; empty while it works
     voltage: float | None = None  # of the battery in [V]; None where it is not reported
     faults: int = 0  # bits that the board reports
+    # why the servos may carry it no longer; empty while they may, None where it is unknown
+    servo_problem: str | None = None
     # of the servos in [°C], by motor id; empty where they are not reported
     temperatures: Mapping[int, float] = field(default_factory=dict)

@@ -36,4 +36,6 @@ class Report:
     faults: int = 0  # fault bits of protocol v2
     # of the servos by motor id [°C]; empty where they are not reported
     temperatures: Mapping[int, float] | None = None
+    # of the servos by motor id, share of their stall torque [%]; empty where not reported
+    loads: Mapping[int, float] | None = None
     joints_age: float = 0.0  # by how much the angles were measured before the rest [s]

@@ -30,6 +30,8 @@ from .report import Report
 
 LINK, ROBOT, COMMANDS = 'serial link', 'robot', 'joint commands'
 """What a fault is of; diagnostics have the same names."""
+LIMP_TIMEOUT = 0.5  # [s] for servos to let go, and for a report that shows it
+NO_LOAD = 1.0  # [%] of the stall torque
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +131,7 @@ class SerialRobot(ObservedRobot):
         )
         self.counters = self._commander.counters  # what became of joint commands
         self._last_note = ''
+        self._loads: Mapping[int, float] = {}  # of the newest report [%]
         self._recorders: list[SerialMemory | SerialLogFile] = []
         self._log_file: SerialLogFile | None = None
         # writes the last bytes when a fault happens; None without
@@ -233,6 +236,15 @@ class SerialRobot(ObservedRobot):
             self._commander.let_go()
         return sent
 
+    def wait_until_limp(self) -> bool | None:
+        """Wait until the servos report no load; return whether they do, None if they never do."""
+        until = time.monotonic() + LIMP_TIMEOUT
+        while (loads := self._loads) and time.monotonic() < until:
+            if max(abs(loads.get(servo.motor, 0.0)) for servo in self._joints.servos) <= NO_LOAD:
+                return True
+            time.sleep(NOMINAL_PERIOD)
+        return None if not loads else False
+
     # -- for the black box
 
     def fault(self, subject: str, text: str) -> None:
@@ -255,6 +267,8 @@ class SerialRobot(ObservedRobot):
     def _opened(self, session: Session) -> None:
         port, protocol = session.port, session.dialect.protocol
         now, name, model = time.monotonic(), protocol.name, session.model
+        spans = session.dialect.spans
+        self._commander.limit_to(self._joints.within(spans) if spans else self._joints)
         opened = Opened(now, port.path, port.baud, name, session.firmware, model)
         for recorder in self._recorders:
             recorder.event(opened)
@@ -262,6 +276,7 @@ class SerialRobot(ObservedRobot):
 
     def _report(self, report: Report) -> str:
         arrived, self._arrived_at = self._arrived_at, report.arrival
+        self._loads = report.loads or {}
         refusal = super()._report(report)
         if refusal:
             self._arrived_at = arrived

@@ -58,6 +58,7 @@ class Behaviour:
         acceleration: Specific force [m/s²].
         gyro: Signs of the gyro of protocol v1.
         latency: Latency timer of the adapter between robot and host [s]; 0 for none.
+        load: Of each servo, share of its stall torque [%].
     """
 
     silent: bool = False
@@ -66,6 +67,7 @@ class Behaviour:
     acceleration: tuple[float, float, float] = (0.0, 0.0, 9.8)
     gyro: tuple[float, float, float] = (1.0, 1.0, 1.0)
     latency: float = 0.0
+    load: float = 0.0
 
 
 @dataclass
@@ -190,6 +192,7 @@ class PtyPeer:
             battery=80,
             battery_voltage=7.4,
             position=tuple(self.angles[motor] for motor in MOTOR_ORDER),
+            load=(self.behaviour.load,) * len(MOTOR_ORDER),
             sequence=self._sequence % 65536,
             device_time=round(time.monotonic() * 1e3) % 2**32,
         )

@@ -8,8 +8,9 @@ from dataclasses import replace
 import math
 import subprocess
 import sys
+from typing import Any
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 import pytest
 
@@ -286,6 +287,44 @@ def test_a_jump_is_believed_when_it_stays() -> None:
     assert plausibility.check(later) == ''
     wrapped = replace(turned, arrival=1.02, attitude=(0.0, 0.0, -179.0))
     assert plausibility.check(wrapped) == ''
+
+
+@given(st.floats(-180.0, 180.0), st.floats(-180.0, 180.0), st.floats(88.0, 90.0))
+@example(0.0, 170.0, 90.0)
+def test_an_attitude_nose_up_is_no_jump(roll: float, other: float, pitch: float) -> None:
+    """Roll and yaw may leap there from one report to the next, and the body hardly turns."""
+    plausibility = Plausibility(LEG_MOTORS)
+    plausibility.check(replace(STATE, attitude=(roll, pitch, 0.0)))
+    leapt = replace(STATE, arrival=0.02, attitude=(other, pitch, other - roll))
+    assert plausibility.check(leapt) == ''
+
+
+@pytest.mark.parametrize(
+    ('wrong', 'words'),
+    [
+        ({'faults': 8}, 'servo silent'),
+        ({'faults': 4}, 'overheated'),
+        ({'temperatures': {12: 74.0}}, 'motor 12 above 70 degrees'),
+        ({'temperatures': {99: 74.0}}, ''),
+        ({'faults': 1}, ''),
+    ],
+)
+def test_servos_that_carry_no_longer_are_a_problem_of_the_robot(
+    wrong: dict[str, Any], words: str
+) -> None:
+    """When several reports in a row say so, until as many say otherwise."""
+    joints = JointMap(map(servo_of, movable_joints(robot_urdf('lite'))))
+    estimator = Estimator(robot_urdf('lite'), joints, EstimatorSettings())
+    said = []
+    for tick in range(9):
+        report = replace(STATE, arrival=0.02 * tick, **(wrong if 0 < tick < 5 else {}))
+        state = estimator.step(report)
+        assert state is not None
+        said.append(state.servo_problem)
+    assert said[:3] == ['', '', '']
+    assert words in said[3]
+    assert bool(said[3]) is bool(said[6]) is bool(words)
+    assert said[7:] == ['', '']
 
 
 def test_a_joint_that_is_not_reported_is_where_it_was_sent() -> None:

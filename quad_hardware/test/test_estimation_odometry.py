@@ -13,8 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 
-from quad_description import ContactSource, FootPose, movable_joints, quadruped, robot_urdf
-from quad_description.rotations import from_rpy, IDENTITY, yaw_of
+from quad_description import (
+    ContactSource,
+    FootPose,
+    movable_joints,
+    OdometryState,
+    quadruped,
+    robot_urdf,
+)
+from quad_description.rotations import from_rpy, IDENTITY, Quaternion, yaw_of
 from quad_hardware import CommandError
 from quad_hardware.estimation import Estimator, EstimatorSettings, OdometrySettings
 from quad_hardware.estimation.odometry import ground_normal, LegOdometry
@@ -36,6 +43,50 @@ def test_standing_goes_nowhere() -> None:
         angles = [rng.gauss(0.0, math.radians(0.1)) for _ in ROBOT.names]
         state = odometry.update(tick * PERIOD, ROBOT.foot_poses(angles), IDENTITY)
     assert math.hypot(state.x, state.y) < 0.01
+
+
+def stand(
+    odometry: LegOdometry, begin: float, end: float, attitude: Quaternion = IDENTITY
+) -> OdometryState:
+    """Stand with noisy joints from one time to another [s]."""
+    rng = random.Random(1)
+    for tick in range(round(begin / PERIOD), round(end / PERIOD)):
+        angles = [rng.gauss(0.0, math.radians(0.1)) for _ in ROBOT.names]
+        state = odometry.update(tick * PERIOD, ROBOT.foot_poses(angles), attitude)
+    return state
+
+
+def test_ten_minutes_of_standing_make_the_place_no_less_sure() -> None:
+    """Noise is no way; the heading drifts meanwhile."""
+    odometry = LegOdometry(OdometrySettings(), 0.01)
+    feet = ROBOT.feet([0.0] * 12)
+    for second in range(600):
+        odometry.command(float(second), feet)
+        state = stand(odometry, second, second + 1.0)
+    assert math.sqrt(state.position_variance) < 0.02
+    assert math.radians(1.0) < math.sqrt(state.yaw_variance) < math.radians(20.0)
+
+
+def test_a_gap_makes_the_place_less_sure() -> None:
+    """The robot may have gone on while nothing was reported."""
+    odometry = LegOdometry(OdometrySettings(), 0.01)
+    before = stand(odometry, 0.0, 1.0)
+    after = stand(odometry, 3.0, 3.1)
+    assert (after.x, after.y) == pytest.approx((before.x, before.y), abs=1e-3)
+    assert math.sqrt(after.position_variance) > 0.3
+
+
+@pytest.mark.parametrize(
+    ('attitude', 'lying_height'), [(from_rpy(2.5, 0.0, 0.0), 0.0), (IDENTITY, 0.2)]
+)
+def test_legs_that_carry_nothing_move_no_body(attitude: Quaternion, lying_height: float) -> None:
+    """Of a robot that rolls, or lies on its belly."""
+    odometry = LegOdometry(OdometrySettings(), 0.01, lying_height)
+    for tick in range(100):
+        angles = [0.005 * tick] * 12
+        state = odometry.update(tick * PERIOD, ROBOT.foot_poses(angles), attitude)
+    assert (state.x, state.y, state.velocity_x, state.velocity_y) == (0.0, 0.0, 0.0, 0.0)
+    assert (math.sqrt(state.position_variance) > 0.09) is (lying_height == 0.0)
 
 
 @pytest.mark.parametrize('yaw', [0.0, 1.0, 3.1])

@@ -18,6 +18,7 @@ from nav_msgs.msg import Odometry
 import pytest
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Imu
+from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
 from message_templates import MessageTemplate, SerializedTemplate
@@ -127,8 +128,10 @@ def test_joints_are_stamped_when_they_were_measured(monkeypatch: pytest.MonkeyPa
     state = Report(5.0, 0.0, (0.0, 0.0, 0.0), None, angles, {}, joints_age=0.008)
     stamps: dict[str, float] = {}
 
-    def create_publisher(kind: Any, topic: str, _: int) -> Any:
-        def publish(data: bytes) -> None:
+    def create_publisher(kind: Any, topic: str, _: Any) -> Any:
+        def publish(data: Any) -> None:
+            if kind is String:
+                return
             message = deserialize_message(data, kind)
             header = message.transforms[0].header if kind is TFMessage else message.header
             stamps[topic] = header.stamp.sec + header.stamp.nanosec * 1e-9
@@ -175,8 +178,12 @@ def test_both_children_turn_and_go_the_same_way(rotation: Rotation) -> None:
 
 def test_odometry_is_less_sure_the_farther_it_went() -> None:
     """No covariance is all zeros; what nobody measures has a huge one."""
-    near, far = odometry(PLACE, FRAMES), odometry(replace(PLACE, distance=30.0), FRAMES)
-    assert 0.0 < near.pose.covariance[0] < far.pose.covariance[0]
+    near, far = (
+        odometry(replace(PLACE, position_variance=place, yaw_variance=yaw), FRAMES)
+        for place, yaw in ((1e-4, 0.0), (4.0, 0.01))
+    )
+    assert 0.0 < near.pose.covariance[0] < far.pose.covariance[0] == 4.0
+    assert far.pose.covariance[35] == pytest.approx(near.pose.covariance[35] + 0.01)
     assert near.twist.covariance[14] == messages.UNUSED
     assert all(near.pose.covariance[::7] > 0.0)
     level = odometry(PLACE, PARENT)

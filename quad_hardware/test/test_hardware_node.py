@@ -202,6 +202,15 @@ def test_a_timer_that_waited_behind_a_command_counts_nothing(*, commanded: bool)
     assert said == ([] if commanded else ['ended', 'lies down', 'begun'])
 
 
+def test_servos_that_still_pull_are_not_said_to_be_without_torque(rig: NodeRig) -> None:
+    """The answer comes of what they report, and not of what was sent."""
+    rig.peer.behaviour.load = 12.0
+    rig.receive('/joint_states', 5)
+    answer = rig.client.call(SetBool, '/hardware_node/torque', SetBool.Request(data=False))
+    assert not answer.success
+    assert 'still report load' in answer.message
+
+
 def test_torque_is_taken_and_given_by_service(rig: NodeRig) -> None:
     """Without torque no command is sent; with it, the servos hold where they were put."""
     answer = rig.client.call(SetBool, '/hardware_node/torque', SetBool.Request(data=False))

@@ -17,7 +17,7 @@ from quad_hardware.backend import SerialBackend
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.link import LinkOptions
 from quad_hardware.protocol import LEG_MOTORS, Protocol, V1, V2
-from quad_hardware.serial_robot import RobotSettings
+from quad_hardware.serial_robot import RobotSettings, SerialRobot
 from quad_pty_peer import PtyPeer
 
 URDF = robot_urdf('lite')
@@ -98,3 +98,25 @@ def test_a_robot_that_is_lost_is_reported(peer: PtyPeer) -> None:
         peer.behaviour.silent = True
         with pytest.raises(NoAnswerError):
             step_for_ever()
+
+
+def test_what_protocol_v1_cannot_send_is_a_limit_of_the_joint(tmp_path: Path) -> None:
+    """Its byte reaches to 93 degrees, the thigh of the mini to 109: the clamp is reported."""
+    urdf = robot_urdf('mini')
+    joints = JointMap(map(servo_of, movable_joints(urdf)))
+    beyond = [1.9 if name == 'fl_thigh_joint' else q for name, q in POSE.items()]
+    with PtyPeer(tmp_path / 'port', V1, firmware='M-4.3.3') as peer:
+        robot = SerialRobot(RobotSettings(LinkOptions(str(peer.link)), urdf, joints))
+        warnings: list[str] = []
+        robot.on_warning = warnings.append
+        robot.start()
+        until = time.monotonic() + 15.0
+        while time.monotonic() < until and peer.angles[12] < 92.0:
+            if robot.latest is not None:
+                robot.command(beyond)
+            time.sleep(0.02)
+        sent = robot._estimator._sent['fl_thigh_joint']
+        robot.end(warnings.append)
+    assert robot.counters.clamped > 0
+    assert any('beyond limits, taken to them: fl_thigh_joint' in text for text in warnings)
+    assert sent == pytest.approx(math.radians(93.0), abs=0.01)

@@ -19,7 +19,7 @@ damage.
 
 from .exceptions import SetupError, SimulationError, TargetError
 from .line.command_times import CommandTiming
-from .plant.servo import ServoModel, ServoParameters
+from .plant.servo import parse_servo, ServoModel, ServoParameters
 from .plant.terrain import Terrain
 from .served import ServedRobot, Watched
 
@@ -33,4 +33,5 @@ __all__ = [
     'TargetError',
     'Terrain',
     'Watched',
+    'parse_servo',
 ]

@@ -12,7 +12,7 @@ import sys
 from quad_description import DescriptionError, PRESETS, robot_urdf
 
 from .exceptions import SetupError
-from .options import parse_servo
+from .plant.servo import parse_servo
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -23,7 +23,7 @@ def run(arguments: Sequence[str]) -> int:
     )
     parser.add_argument('path', type=Path, help='file to write')
     parser.add_argument('--preset', choices=list(PRESETS), default='lite', help='the robot')
-    parser.add_argument('--servo', default='firm', help='as of fake_xgo')
+    parser.add_argument('--servo', default='nominal', help='as of fake_xgo')
     parser.add_argument('--floor', action='store_true', help='with level ground')
     options = parser.parse_args(arguments)
     try:

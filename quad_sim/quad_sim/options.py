@@ -19,7 +19,7 @@ from .exceptions import SetupError, SimulationError
 from .line.faults import FaultKind, FaultPlan, parse_fault, SETTINGS
 from .line.robot_line import RobotLine
 from .plant.plant import KinematicRobot
-from .plant.servo import ServoModel, ServoParameters
+from .plant.servo import parse_servo
 from .plant.state import BOARD, NONE
 from .plant.terrain import Terrain
 
@@ -61,7 +61,7 @@ def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:
     add('--trunk-mass', type=float, metavar='KG', help="mass of the trunk, not the preset's")
     add('--firmware', default='', help='version that the board reports, e.g. L-4.3.3')
     add('--physics', choices=('mujoco', 'none'), default='mujoco', help='none: in the air')
-    add('--servo', default='firm', help='firm, vendor_rl, or kp=10,kv=0.25,interpolation=0.02')
+    add('--servo', default='nominal', help='nominal, firm, vendor_rl, or kp=2.45,delay=0.04,...')
     add('--slope', type=float, default=0.0, metavar='DEG', help='of the ground, uphill ahead')
     add('--friction', type=float, default=0.8, help='of the ground (%(default)s)')
     add('--start', choices=[pose.value for pose in Pose], default='lie', help='how it begins')
@@ -124,32 +124,6 @@ def build(options: argparse.Namespace) -> Simulation:
         seed=options.seed,
     )
     return Simulation(plant, board, line)
-
-
-def parse_servo(text: str) -> ServoModel | ServoParameters:
-    """Return a servo from its name, or from ``name=value,...``.
-
-    Raises:
-        SetupError: The text has no sense; the message names what has.
-    """
-    names = {'kp': 'stiffness', 'kv': 'velocity_gain'} | {
-        name: name for name in ('damping', 'armature', 'friction', 'interpolation')
-    }
-    known = [model.value for model in ServoModel]
-    if text in known:
-        return ServoModel(text)
-    values: dict[str, float] = {}
-    for word in text.split(','):
-        name, _, value = word.partition('=')
-        try:
-            values[names[name.strip()]] = float(value)
-        except (KeyError, ValueError):
-            raise SetupError(
-                f'--servo {text!r}: give {" or ".join(known)}, or {",".join(names)} as name=value'
-            ) from None
-    if 'stiffness' not in values:
-        raise SetupError(f'--servo {text!r} needs kp, in [N m/rad]')
-    return ServoParameters(**values)
 
 
 def parse_mount(text: str) -> tuple[int, Mount]:

@@ -17,7 +17,7 @@ import pytest
 from sim_envs import Broken, varied
 
 from quad_description import robot_urdf
-from quad_sim import SetupError, SimulationError, TargetError, Terrain
+from quad_sim import ServoModel, SetupError, SimulationError, TargetError, Terrain
 from quad_sim.env import (
     CommandRanges,
     ID,
@@ -145,7 +145,8 @@ def test_a_late_target_moves_the_robot_less_in_its_step() -> None:
     """Until it has arrived, the target before counts."""
     ways = []
     for delay in (0.0, 0.015):
-        env = WalkingEnv(randomization=replace(NO_RANDOMIZATION, delay=(delay, delay)))
+        late = replace(NO_RANDOMIZATION, delay=(delay, delay))
+        env = WalkingEnv(servo=ServoModel.FIRM, randomization=late)
         env.reset(seed=2)
         seen, *_ = env.step(np.full(12, 0.2, np.float32))
         ways.append(np.abs(part(seen, Observation.POSITIONS)).max())
@@ -287,8 +288,6 @@ def test_an_action_that_is_not_finite_or_complete_is_refused(action: np.ndarray)
         (lambda: Variation(damping=-0.1), 'damping'),
         (lambda: Terrain(roughness=0.2), 'roughness'),
         (lambda: Terrain(roughness=math.nan), 'roughness'),
-        (lambda: PhysicsBackend(Robot(robot_urdf()), delay=1.5), 'give 0 to 1'),
-        (lambda: PhysicsBackend(Robot(robot_urdf()), delay=math.nan), 'give 0 to 1'),
     ],
 )
 def test_what_makes_no_sense_is_refused(make: Callable[[], object], reason: str) -> None:

@@ -23,7 +23,7 @@ from quad_description import (
 from quad_description.rotations import from_rpy, rotate
 from quad_hardware.estimation import OdometrySettings
 from quad_hardware.estimation.odometry import LegOdometry
-from quad_sim import Terrain
+from quad_sim import ServoModel, Terrain
 from quad_sim.physics import Robot
 from quad_sim.plant.terrain import FLAT
 
@@ -63,8 +63,8 @@ def walk(
         The true way in the first heading, the estimate, the height, and the share of contacts of
         feet that were right.
     """
-    robot, rng = Robot(URDF, terrain=terrain), random.Random(1)
-    odometry = LegOdometry(OdometrySettings(), ROBOT.foot_radius)
+    robot, rng = Robot(URDF, ServoModel.FIRM, terrain), random.Random(1)
+    odometry = LegOdometry(OdometrySettings(delay=0.04), ROBOT.foot_radius)
     standing = [STAND[name] for name in NAMES]
     neutral = np.array(ROBOT.feet(standing))
     neutral[:, 0] = [0.025, 0.025, -0.125, -0.125]
@@ -129,7 +129,7 @@ def test_feet_are_where_physics_has_them() -> None:
 def test_physics_agrees_about_feet_in_the_air(legs: tuple[str, ...]) -> None:
     """A robot whose legs of one side are lifted, as in a pace, leans and stands on all feet."""
     held = {**STAND, **{f'{leg}_thigh_joint': STAND[f'{leg}_thigh_joint'] + 0.3 for leg in legs}}
-    robot = Robot(robot_urdf('lite'), seed=1)
+    robot = Robot(robot_urdf('lite'), ServoModel.FIRM, seed=1)
     for pose in (STAND, held):
         robot.set_targets(pose)
         robot.step(1.0)

@@ -31,7 +31,7 @@ def settled(robot: Robot) -> Robot:
 
 def test_a_standing_robot_stands() -> None:
     """After two seconds it is level, where it was, and the ground carries its weight."""
-    robot = Robot(URDF)
+    robot = Robot(URDF, ServoModel.FIRM)
     robot.step(2.0)
     assert robot.base_pose.tilt < math.radians(0.5)
     assert np.linalg.norm(robot.base_pose.position[:2]) < 2e-3
@@ -179,7 +179,7 @@ def test_time_adds_up_whatever_its_pieces() -> None:
 
 def test_set_points_go_straight_to_the_target() -> None:
     """Firm servos interpolate over 20 ms; a duration makes it longer; then they stay."""
-    robot = Robot(URDF)
+    robot = Robot(URDF, ServoModel.FIRM)
     robot.set_targets({'fl_thigh_joint': 1.2})
     seen = []
     for _ in range(12):
@@ -335,6 +335,7 @@ def test_a_description_that_is_no_quadruped_is_refused(urdf: str, message: str) 
         (lambda: ServoParameters(stiffness=-1), 'stiffness -1'),
         (lambda: ServoParameters(stiffness=0), 'never moves'),
         (lambda: ServoParameters(stiffness=1, damping=math.nan), 'damping nan'),
+        (lambda: ServoParameters(stiffness=1, delay=1.5), 'give 0 to 1'),
         (lambda: Terrain.slope(1.0), 'slope of 1.0'),
         (lambda: Terrain.slope(math.nan), 'slope of nan'),
         (lambda: Terrain(friction=0), 'friction 0'),
@@ -352,3 +353,27 @@ def test_options_without_sense_are_refused(make: object, message: str) -> None:
     """The message names the option and its value."""
     with pytest.raises(SetupError, match=message):
         make()  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(('step', 'torque'), [(0.028, 0.0), (-0.028, 0.0), (0.1, 0.14)])
+def test_a_servo_does_not_pull_within_its_free_width(step: float, torque: float) -> None:
+    """Dead band and half the backlash to either side; beyond it, by the rest of the error."""
+    robot = Robot(URDF, ServoParameters(stiffness=2.0, deadband=0.01, backlash=0.04))
+    robot.reset(drop=5.0)  # in the air nothing loads it
+    calf = robot.joint_names.index('fl_calf_joint')
+    robot.set_targets({'fl_calf_joint': STAND['fl_calf_joint'] + step})
+    robot.step(0.004)
+    assert robot.joint_torques[calf] == pytest.approx(torque, abs=0.005)
+
+
+def test_a_target_comes_with_the_next_refresh_after_its_delay() -> None:
+    """One that makes no sense is refused at once, and not when it comes."""
+    robot = Robot(URDF, ServoParameters(stiffness=5.0, delay=0.01, refresh=0.04))
+    came = []
+    for tick in range(10):
+        robot.set_targets({'fl_calf_joint': 0.1 * tick})
+        robot.step(0.01)
+        came.append(float(robot.joint_targets[robot.joint_names.index('fl_calf_joint')]))
+    assert [round(at, 3) for at in came[4:]] == [0.3, 0.3, 0.3, 0.3, 0.7, 0.7]
+    with pytest.raises(TargetError):
+        robot.set_targets({'tail_joint': 0.0})

@@ -199,7 +199,7 @@ def test_what_the_board_does_not_do_is_refused(frame: Frame, reason: Refusal) ->
 
 def test_a_standing_robots_state_is_that_of_the_physics() -> None:
     """Attitude, specific force, servo angles, loads and battery have their sizes and units."""
-    robot = VirtualRobot('--start', 'stand', '--noise', 'none')
+    robot = VirtualRobot('--start', 'stand', '--noise', 'none', '--servo', 'firm')
     state = last_state(robot)
     assert state.euler2 == pytest.approx((0, 0, 0), abs=0.5)
     assert state.acceleration == pytest.approx((0, 0, 9.81), abs=0.1)

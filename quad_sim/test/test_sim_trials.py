@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 import math
 from pathlib import Path
 import time
@@ -15,7 +16,7 @@ from sim_virtual import VirtualRobot
 
 from quad_description import robot_urdf
 from quad_hardware.protocol import Code, Frame, Kind
-from quad_sim import CommandTiming, ServedRobot, SimulationError, Terrain
+from quad_sim import CommandTiming, ServedRobot, ServoModel, SimulationError, Terrain
 from quad_sim.line.command_times import CommandTimes
 from quad_sim.physics import ImuBias, Meter, PhysicsBackend, Robot, Variation
 
@@ -40,10 +41,10 @@ PLACES = [(0.0, 0.0), (1.0, 0.5), (-1.5, 1.0), (2.0, -2.0), (100.0, 0.0)]
 def test_rough_ground_has_bumps_but_where_the_robot_begins() -> None:
     """They are as high as asked for at most, the same for a seed, and end somewhere."""
     plain, rough, again = (
-        heights(Robot(URDF, terrain=Terrain(roughness=roughness, seed=seed)), PLACES)
+        heights(Robot(URDF, ServoModel.FIRM, Terrain(roughness=roughness, seed=seed)), PLACES)
         for roughness, seed in ((0.0, 1), (0.02, 1), (0.02, 1))
     )
-    other = heights(Robot(URDF, terrain=Terrain(roughness=0.02, seed=2)), PLACES)
+    other = heights(Robot(URDF, ServoModel.FIRM, Terrain(roughness=0.02, seed=2)), PLACES)
     assert rough == again
     assert rough[0] == pytest.approx(plain[0], abs=1e-4)
     assert rough[-1] == pytest.approx(plain[-1], abs=1e-4)
@@ -71,7 +72,7 @@ def test_the_friction_of_bumps_varies_too() -> None:
 @pytest.mark.parametrize(('delay', 'late'), [(0.0, 0), (0.008, 0), (0.02, 1), (0.05, 2)])
 def test_targets_arrive_after_their_delay_and_in_their_order(delay: float, late: int) -> None:
     """Each of them, also when several are on the way at once."""
-    backend = PhysicsBackend(Robot(URDF), delay=delay)
+    backend = PhysicsBackend(Robot(URDF, replace(ServoModel.FIRM.parameters, delay=delay)))
     backend.reset()
     robot, stand = backend.robot, list(backend.robot.joint_positions)
     sent = [[q + 0.01 * (step + 1) for q in stand] for step in range(6)]

@@ -35,7 +35,7 @@ def settled(robot: Robot) -> tuple[object, ...]:
 
 def test_a_varied_robot_is_the_one_that_was_made_so() -> None:
     """Softer servos on smoother ground are what those arguments make."""
-    varied = Robot(robot_urdf())
+    varied = Robot(robot_urdf(), FIRM)
     varied.reset(variation=Variation(friction=0.3, stiffness=0.5, damping=2.0))
     softer = ServoParameters(
         stiffness=0.5 * FIRM.stiffness,

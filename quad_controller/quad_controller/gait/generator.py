@@ -75,6 +75,7 @@ class GaitGenerator:
     Attributes:
         velocity: Velocity that is walked at the moment.
         goal: Velocity that is approached.
+        limits: How fast the robot may go.
         clamped: Whether that is less than was requested.
         pose: Pose of the body over its feet at the moment.
         gait: The gait at the moment.
@@ -94,7 +95,7 @@ class GaitGenerator:
         self._robot = robot
         self._parameters = parameters
         self.others: Targets = tuple(others or [0.0] * len(robot.names))
-        self._limits = parameters.velocity_limits
+        self.limits = parameters.velocity_limits
         self._centre = robot.hip_centre
         self._neutral = parameters.stance(robot, self.others)
         self.gait = self.wanted_gait = Gait.TROT
@@ -122,7 +123,8 @@ class GaitGenerator:
     @property
     def standing(self) -> bool:
         """Whether all feet are at their places and the robot is at rest."""
-        return not self._stepper.walking and self.velocity.at_rest
+        late = self._compensation is not None and not self._compensation.standing
+        return not self._stepper.walking and self.velocity.at_rest and not late
 
     @property
     def stand_targets(self) -> Targets:
@@ -167,7 +169,7 @@ class GaitGenerator:
         heading = attitude[2] - self.pose.yaw if attitude is not None else None
         course = self._heading.step(self.velocity, heading, dt)
         # back to the course no faster than the gait and its limits allow, slower ahead if need be
-        feet = self._stepper.step(self._within_schedule(self._limits.bound(course)), dt)
+        feet = self._stepper.step(self._within_schedule(self.limits.bound(course)), dt)
         moved = self._leveller.step(attitude, self.pose, dt)
         sway = self._stepper.sway
         if sway:
@@ -186,10 +188,10 @@ class GaitGenerator:
                 self._stepper.schedule = self._parameters.schedule(self.gait)
                 self._stepper.lift = self._lifts[self.gait].height
             velocity = REST
-        self.goal = goal = self._within_schedule(self._limits.clamp(velocity))
+        self.goal = goal = self._within_schedule(self.limits.clamp(velocity))
         lost = math.hypot(velocity.x - goal.x, velocity.y - goal.y)
         self.clamped = lost > CLAMP_LINEAR or abs(velocity.yaw - goal.yaw) > CLAMP_YAW
-        self.velocity = self._limits.approach(self.velocity, goal, dt)
+        self.velocity = self.limits.approach(self.velocity, goal, dt)
 
     def _within_schedule(self, velocity: Velocity) -> Velocity:
         """Slow down to where the gait keeps its balance; no foot is faster over the body."""

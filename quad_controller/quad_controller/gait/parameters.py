@@ -49,7 +49,8 @@ class GaitParameters:
     heading_gain: float = setting(
         2.0, 0.0, 10.0, 'corrects the turning by the measured heading [1/s]; 0: off'
     )
-    servo: ServoModel | None = None  # what to compensate for; None for servos that are firm
+    # what to compensate for; None for servos that are firm
+    servo: ServoModel | None = field(default_factory=ServoModel)
     # how far the body may be moved over the feet
     body: BodyLimits = field(default_factory=BodyLimits)
 

@@ -58,6 +58,7 @@ from ..states.policy_motion import NO_POLICY
 from ..states.status import EventKind, Output, Status
 from . import messages
 from .control_loop import ControlLoop
+from .other_type import OtherTypeSubscription
 from .parameters import changed_gait, declare_parameters
 from .recorder import Recorder
 
@@ -68,6 +69,8 @@ REQUEST_QOS = 1  # only the newest velocity and pose count
 SWITCH_INTERVAL = 0.0005  # [s] how long one thread may keep another one from the interpreter
 ESTIMATE_WAIT = 1.0  # [s] for the first message, when a policy that needs it is loaded
 ESTIMATES = {'odom': Odometry, 'foot_contacts': FootContacts}
+TYPE_PERIOD = 1.0  # [s] between two looks for another type on cmd_vel
+STAMPED = 'geometry_msgs/msg/TwistStamped'  # what Nav2 and ros2_control publish
 GAIT_WORDS = {'', 'gait'}  # instead of a policy's path
 WARN_PERIOD = 2.0  # [s] between two warnings of the same kind
 
@@ -133,6 +136,7 @@ class ControllerNode(Node):
         self._state = self.create_publisher(String, '~/state', LATCHED)
         self._diagnostics = self.create_publisher(DiagnosticArray, 'diagnostics', 10)
         self._subscribe()
+        self._stamped: OtherTypeSubscription | None = None
         self._seen: set[str] = set()  # topics of estimates
         self._arrived = {topic: threading.Event() for topic in ESTIMATES}
         if policy is not None:
@@ -153,6 +157,7 @@ class ControllerNode(Node):
         self._gait = settings.gait
         self.add_on_set_parameters_callback(self._tune)
         self.create_timer(settings.diagnostics_period, self._diagnose)
+        self.create_timer(TYPE_PERIOD, self._serve_stamped)
         robot = settings.robot
         self.get_logger().info(
             f'{len(robot.names)} joints, {robot.mass:.2f} kg; waiting for joint_states'
@@ -168,6 +173,8 @@ class ControllerNode(Node):
 
     def end(self) -> None:
         """Stop sending; the servos hold their last targets."""
+        if self._stamped is not None:
+            self._stamped.close()
         self._loader.shutdown(cancel_futures=True)
         self._loop.stop()
         if (recorder := self._recorder) is not None:
@@ -246,6 +253,7 @@ class ControllerNode(Node):
         ):
             self.create_subscription(kind, topic, take, sensor, raw=True)
         self.create_subscription(BatteryState, 'battery_state', self._take_battery, sensor)
+        self.create_subscription(String, 'servo_problem', self._take_servo_problem, LATCHED)
         self.create_subscription(Twist, 'cmd_vel', self._take_twist, REQUEST_QOS)
         self.create_subscription(
             TwistStamped, 'cmd_vel_stamped', self._take_stamped_twist, REQUEST_QOS
@@ -295,6 +303,9 @@ class ControllerNode(Node):
     def _take_battery(self, message: BatteryState) -> None:
         self._loop.offer(battery=message.percentage)
 
+    def _take_servo_problem(self, message: String) -> None:
+        self._loop.offer(servo_problem=message.data)
+
     def _take_twist(self, message: Twist) -> None:
         velocity = Velocity(message.linear.x, message.linear.y, message.angular.z)
         with self._loop.lock:
@@ -304,6 +315,16 @@ class ControllerNode(Node):
     def _take_stamped_twist(self, message: TwistStamped) -> None:
         # its age counts from its arrival: clocks of two machines need not agree
         self._take_twist(message.twist)
+
+    def _serve_stamped(self) -> None:
+        """Subscribe to TwistStamped on cmd_vel, too, as soon as something publishes it."""
+        topic = self.resolve_topic_name('cmd_vel')
+        kinds = {info.topic_type for info in self.get_publishers_info_by_topic(topic)}
+        if self._stamped is None and STAMPED in kinds:
+            self._stamped = OtherTypeSubscription(
+                self, TwistStamped, topic, self._take_stamped_twist, REQUEST_QOS
+            )
+            self.get_logger().info(f'{topic} comes as TwistStamped, too')
 
     def _take_pose(self, message: Pose) -> None:
         with self._loop.lock:

@@ -128,7 +128,7 @@ def _gait(node: Node, read: ParameterReader) -> GaitParameters:
 
 def _servo(read: ParameterReader) -> ServoModel | None:
     enabled = read.flag(
-        'servo_compensation.enabled', default=False, meaning='set-points ahead of soft servos'
+        'servo_compensation.enabled', default=True, meaning='set-points ahead of soft servos'
     )
     values = _read(read, ServoModel, 'servo_compensation.')
     return ServoModel(**values) if enabled else None

@@ -18,14 +18,16 @@ from quad_hardware.backend import robot_at
 from quad_hardware.protocol import V2
 from quad_sim import (
     CommandTiming,
+    parse_servo,
     ServedRobot,
-    ServoModel,
     SimulationError,
     Terrain,
 )
 from quad_sim.physics import ImuBias, Meter, Metered, PhysicsBackend, Robot, Variation
 
 from ..exceptions import CheckError
+from ..gait.parameters import GaitParameters
+from ..gait.servo_compensation import ServoModel
 from ..policy.gains import ServoResponse
 
 MAX_PAUSE = 0.15  # [s] between two steps, which the controller is not to blame for
@@ -39,7 +41,8 @@ class Conditions:
 
     trunk_mass: float = 1.0  # factor of the mass of the trunk
     friction: float | None = None  # of the ground; None leaves it as it is
-    delay: float = 0.0  # from targets that are sent to servos that have them in [s]
+    # from targets that are sent to servos that have them in [s]; None leaves it as it is
+    delay: float | None = None
     gyro_bias: float = 0.0  # of each axis of the gyro in [rad/s]
     level_bias: float = 0.0  # of measured roll and pitch in [rad]
     push: float = 0.0  # change of the velocity at once, to any side, every two seconds, in [m/s]
@@ -90,22 +93,27 @@ class RobotChoice:
 
     preset: str = 'lite'  # of its description
     arm: bool = False  # it has its arm
-    servo: str = 'firm'  # model of its servos
+    servo: str = 'nominal'  # its servos, as fake_xgo takes them
 
     @property
     def urdf(self) -> str:
         """What it is made of."""
         return robot_urdf(self.preset, arm=self.arm)
 
+    def tuned(self, gait: GaitParameters) -> GaitParameters:
+        """Return a gait that knows how stiff the servos are."""
+        model = gait.servo or ServoModel()
+        return replace(gait, servo=replace(model, kp=parse_servo(self.servo).stiffness))
+
 
 def servo_response(servo: str) -> ServoResponse:
     """Return how the servos of a model follow their targets."""
-    parameters = ServoModel(servo).parameters
+    parameters = parse_servo(servo)
     return ServoResponse(
         parameters.stiffness,
         parameters.velocity_gain + parameters.damping,
         parameters.armature,
-        0.5 * parameters.interpolation,  # the mean of a ramp
+        parameters.delay + 0.5 * parameters.interpolation,  # the mean of a ramp
     )
 
 
@@ -120,12 +128,14 @@ class PhysicsArena:
         """
         urdf = choice.urdf
         ground = Terrain(roughness=conditions.roughness, seed=1)
-        self._robot = Robot(urdf, ServoModel(choice.servo), ground)
+        servo = parse_servo(choice.servo)
+        if conditions.delay is not None:
+            servo = replace(servo, delay=conditions.delay)
+        self._robot = Robot(urdf, servo, ground)
         self._variation = Variation(conditions.friction, conditions.trunk_mass)
         gyro, level = conditions.gyro_bias, conditions.level_bias
         self.backend: Backend = PhysicsBackend(
             self._robot,
-            delay=conditions.delay,
             bias=ImuBias((gyro, gyro, gyro), level, level) if gyro or level else None,
         )
         self._meter = Meter(self._robot, urdf)

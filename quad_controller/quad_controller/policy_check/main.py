@@ -46,8 +46,8 @@ from .findings import (
 if TYPE_CHECKING:
     from .arenas import PhysicsArena
 
-SERVOS = ('firm', 'vendor_rl')
-"""Servo models of the simulation; policies of the vendor's training expect ``vendor_rl``."""
+NOMINAL = 'nominal'
+"""Servos as they are known to be; policies of the vendor's training expect ``vendor_rl``."""
 
 MIN_DURATION, MAX_DURATION = 0.5, 600.0
 """Times of a walk in [s]."""
@@ -260,7 +260,12 @@ def _parser() -> argparse.ArgumentParser:
         action='store_true',
         help='accept a robot without some joints of the policy',
     )
-    parser.add_argument('--servo', choices=SERVOS, default=SERVOS[0], help='of the simulation')
+    parser.add_argument(
+        '--servo',
+        type=_servo,
+        default=NOMINAL,
+        help='of the simulation: nominal, firm, vendor_rl, or kp=4,...',
+    )
     ways = parser.add_argument_group('ways to try it, beside the gait but for the first')
     ways.add_argument(
         '--walk',
@@ -311,6 +316,19 @@ def _report_file(text: str) -> Path:
             return path
     except OSError as error:
         raise argparse.ArgumentTypeError(f'{text}: {error.strerror}') from error
+
+
+def _servo(text: str) -> str:
+    """Refuse servos that the simulation does not have; without it, none are needed."""
+    try:
+        from quad_sim import parse_servo, SetupError
+    except ImportError:
+        return text
+    try:
+        parse_servo(text)
+    except SetupError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+    return text
 
 
 def _number(what: str, low: float = -math.inf, high: float = math.inf) -> Callable[[str], float]:

@@ -34,6 +34,11 @@ class Candidate:
     robot: RobotChoice = field(default_factory=RobotChoice)  # which robot walks
     gait: GaitParameters = AS_TUNED  # tuning of the gait
 
+    @property
+    def tuned(self) -> GaitParameters:
+        """Its gait, which knows how stiff the servos of its robot are."""
+        return self.robot.tuned(self.gait)
+
     def load(self) -> LoadedPolicy | None:
         """Return its policy, checked; None for the gait.
 
@@ -43,7 +48,7 @@ class Candidate:
         if self.path is None:
             return None
         robot = quadruped(self.robot.urdf)
-        stand = GaitGenerator(robot, self.gait).stand_targets
+        stand = GaitGenerator(robot, self.tuned).stand_targets
         return load_policy(self.path, robot, stand, self.options, StateParameters().period)
 
 
@@ -73,7 +78,7 @@ class Trial:
         policy = None if loaded is None else loaded.runner
         try:
             arena = PhysicsArena(self.who.robot, self.conditions)
-            walker = CourseWalker(arena, quadruped(self.who.robot.urdf), policy, self.who.gait)
+            walker = CourseWalker(arena, quadruped(self.who.robot.urdf), policy, self.who.tuned)
             push = self.conditions.push
             return walker.walk(self.commands, self.duration, push=push, seed=self.seed)
         except SimulationError as error:
@@ -108,7 +113,7 @@ def run_chain(
         loaded = who.load()
         policy = None if loaded is None else loaded.runner
         with serial_arena(who.robot) as arena:
-            walker = CourseWalker(arena, quadruped(who.robot.urdf), policy, who.gait)
+            walker = CourseWalker(arena, quadruped(who.robot.urdf), policy, who.tuned)
             figures.append(walker.walk(commands, duration))
     return figures
 

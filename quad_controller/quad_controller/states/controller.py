@@ -106,6 +106,7 @@ class Controller:
         self._notices = Notices()
         self._unseen = UnseenJoints(states.hold_band)
         self._unreachable = 0
+        self._policy_velocity = REST  # that a policy follows now
         self._tolerated: frozenset[Fault] = frozenset()  # present when the way down was requested
 
     def set_mode(self, text: str) -> Answer:
@@ -274,7 +275,8 @@ class Controller:
         events += self._notices.step(self._conditions(), self._ended_conditions())
         if self._unseen.is_pending:  # targets of before would move it, those of one sample, too
             return Output(None, None, self._machine.title, self._health.complete, tuple(events))
-        situation, dt_motion = self._situation(), min(dt, MAX_STEP)
+        dt_motion = min(dt, MAX_STEP)
+        situation = self._situation(dt_motion)
         wanted = self._move(situation, dt_motion, last, events)
         shadow = self._policies.watch(situation, dt_motion, last)
         targets = self._limiter.step(wanted, dt)
@@ -411,14 +413,19 @@ class Controller:
         events += self._latch_fault(Fault.TARGET, reason, last)
         return last
 
-    def _situation(self) -> Situation:
+    def _situation(self, dt: float) -> Situation:
         """Collect what a motion may know; a way to another state goes through rest."""
         health, machine = self._health, self._machine
         state = machine.state if machine.state is machine.goal else State.STAND
+        velocity = self._commands.velocity(state)
+        if state is State.POLICY:  # the gait does so itself; a stop needs no slope
+            limits = self._generator.limits
+            velocity = limits.approach(self._policy_velocity, limits.clamp(velocity), dt)
+        self._policy_velocity = velocity if state is State.POLICY else REST
         return Situation(
             joints=None if health.held else health.joints,
             imu=health.attitude,
-            velocity=self._commands.velocity(state),
+            velocity=velocity,
             pose=self._commands.pose,
             linear_velocity=health.linear_velocity,
             foot_contacts=health.foot_contacts,

@@ -28,6 +28,7 @@ class Health:
         joints: The newest usable joint states, None before the first.
         imu: The newest usable attitude, None before the first.
         battery: The newest charge 0 to 1, None when nothing is known of it.
+        servo_problem: Why the servos may carry the robot no longer; empty while they may.
         joints_age: Time since the joint states in [s].
         imu_age: Time since the attitude in [s].
         refused: How many samples could not be used.
@@ -40,6 +41,7 @@ class Health:
         self.joints: JointSample | None = None
         self.imu: ImuSample | None = None
         self.battery: float | None = None
+        self.servo_problem = ''
         self.joints_age = self.imu_age = math.inf
         self._linear_velocity: Vector | None = None
         self._linear_velocity_age = math.inf
@@ -75,6 +77,8 @@ class Health:
             *self._take_linear_velocity(measurement.linear_velocity),
         ]
         self.refused += len(problems)
+        if measurement.servo_problem is not None:
+            self.servo_problem = measurement.servo_problem
         battery = measurement.battery
         if battery is not None and math.isfinite(battery):
             self.battery = battery
@@ -164,6 +168,8 @@ class Health:
             yield Fault.FALLEN, self._fall(self.imu)
         if self.battery is not None and (self._low_for or 0.0) > parameters.battery_time:
             yield Fault.BATTERY, f'{self.battery:.0%} left; charge it'
+        if self.servo_problem:
+            yield Fault.SERVO, self.servo_problem
 
     def unmeasured(self, policy: PolicyRunner | None) -> str:
         """Return what a policy would need and nobody measures; nothing for none."""

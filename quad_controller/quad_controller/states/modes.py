@@ -26,6 +26,7 @@ class Fault(Enum):
     IMU = 'attitude'
     FALLEN = 'fall'
     BATTERY = 'battery'
+    SERVO = 'servo'
     TARGET = 'target'
     PAUSE = 'pause'
 
@@ -35,6 +36,7 @@ REACTIONS: Mapping[Fault, Reaction] = {
     Fault.IMU: Reaction.STAND,
     Fault.FALLEN: Reaction.HOLD,  # legs in the air find no ground, and may be jammed
     Fault.BATTERY: Reaction.LIE_DOWN,
+    Fault.SERVO: Reaction.LIE_DOWN,
     Fault.TARGET: Reaction.HOLD,
     Fault.PAUSE: Reaction.LIE_DOWN,  # the hardware node may have begun it
 }

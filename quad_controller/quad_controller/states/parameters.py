@@ -7,6 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
+from quad_description import EMPTY_BATTERY, MAX_TILT
+
 from ..exceptions import ParameterError
 from ..settings import check_settings, setting, switch
 
@@ -20,11 +22,11 @@ class StateParameters:
     warn_age: float = setting(0.06, 0.01, 5.0, 'older joint states and attitudes are reported [s]')
     hold_age: float = setting(0.2, 0.02, 5.0, 'with older ones nothing moves on [s]')
     fault_age: float = setting(0.5, 0.05, 10.0, 'older ones are a fault [s]')
-    max_tilt: float = setting(0.9, 0.1, math.pi, 'more is a fall [rad]')
+    max_tilt: float = setting(MAX_TILT, 0.1, math.pi, 'more is a fall [rad]')
     max_turn_rate: float = setting(8.0, 1.0, 100.0, 'a faster body is falling [rad/s]')
     fall_time: float = setting(0.1, 0.0, 2.0, 'how long it must be so [s]')
     low_battery: float = setting(
-        0.1, 0.0, 0.9, 'charge 0 to 1 below which the robot lies down; 0: never'
+        EMPTY_BATTERY, 0.0, 0.9, 'charge 0 to 1 below which the robot lies down; 0: never'
     )
     battery_time: float = setting(3.0, 0.0, 60.0, 'how long it must be so [s]')
     require_imu: bool = switch(True, 'no leg moves without a known attitude')

@@ -14,8 +14,8 @@ import stat
 from serial.tools import list_ports
 
 from dds_network import NETWORK_VARIABLE, NetworkChoiceError, selected_reach
+from quad_description import LOW_BATTERY
 
-from ..estimation.filters import LOW_BATTERY
 from ..exceptions import LinkError, NoAnswerError
 from ..link import BATTERY, connect, latency_problem, latency_timer, read_value
 from ..link.open import PSEUDO_TERMINALS
@@ -191,6 +191,6 @@ def _contact(path: str) -> Iterator[Finding]:
 def _judge_battery(charge: int | None) -> Finding:
     if charge is None:
         return warning('battery', 'the robot does not report its charge', 'try once more')
-    if charge < LOW_BATTERY:
+    if charge < 100.0 * LOW_BATTERY:
         return warning('battery', f'at {charge} %', 'charge it: a weak robot falls')
     return good('battery', f'at {charge} %')

@@ -13,6 +13,8 @@ from quad_description import (
     ImuSample,
     JointSample,
     OdometryState,
+    Pose,
+    pose_positions,
     quadruped,
     raised_feet,
     RobotState,
@@ -24,7 +26,9 @@ from ..report import Report
 from .filters import AttitudeRate, FULL, GravityCheck, JointRate, MedianFilter
 from .imu_mounting import ImuMounting, UNCHECKED_DEVIATION
 from .odometry import LegOdometry, OdometrySettings
-from .plausibility import BoardWatch, Plausibility, SampleClock
+from .plausibility import BoardWatch, Plausibility, SampleClock, ServoWatch
+
+LYING_MARGIN = 0.002  # [m] above the height of a robot that lies
 
 
 class RateSource(Enum):
@@ -65,12 +69,18 @@ class Estimator:
             raise CommandError(f'robot_description: {error}') from error
         self._clock = SampleClock()
         self._boards = BoardWatch()
-        self._plausibility = Plausibility([servo.motor for servo in joints.servos])
+        motors = [servo.motor for servo in joints.servos]
+        self._plausibility, self._servos = Plausibility(motors), ServoWatch(motors)
         self._rate = AttitudeRate(settings.rate_cutoff)
         self._joint_rate = JointRate(settings.joint_cutoff)
         self._charge, self._voltage = MedianFilter(), MedianFilter()
         self._gravity = GravityCheck()
-        self._odometry = LegOdometry(settings.odometry, self._robot.foot_radius)
+        pose, radius = pose_positions(Pose.LIE), self._robot.foot_radius
+        legs = [pose.get(name) for name in joints.names[: joints.leg_count]]
+        # of another robot's belly nothing is known
+        folded = None if None in legs else self._robot.feet([q or 0.0 for q in legs])
+        lying = 0.0 if folded is None else LYING_MARGIN + radius - min(z for *_, z in folded)
+        self._odometry = LegOdometry(settings.odometry, radius, lying)
 
     def command(self, time: float, targets: Sequence[float]) -> None:
         """Note what was sent to the legs: it shows which feet stand and which swing.
@@ -110,6 +120,7 @@ class Estimator:
             imu_problem=problem,
             voltage=self._voltage.take(report.voltage),
             faults=report.faults,
+            servo_problem=self._servos.check(report),
             temperatures=report.temperatures or {},
         )
 

@@ -72,7 +72,6 @@ def _mean(vectors: Sequence[Vector]) -> Vector:
 
 CHARGE_REPORTS = 25  # that the median is taken of: half a second
 FULL = 100.0  # [%]
-LOW_BATTERY, EMPTY_BATTERY = 20.0, 10.0  # [%] below which it is to be charged, and useless
 
 
 class MedianFilter:

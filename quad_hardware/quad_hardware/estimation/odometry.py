@@ -17,13 +17,14 @@ from dataclasses import dataclass
 import math
 from operator import itemgetter
 
-from quad_description import ContactSource, FootPose, OdometryState
+from quad_description import ContactSource, FootPose, MAX_TILT, OdometryState
 from quad_description.rotations import (
     about_z,
     conjugate,
     multiply,
     Quaternion,
     rotate,
+    tilt_of,
     Vector,
     yaw_of,
 )
@@ -35,6 +36,11 @@ Flags = tuple[bool, ...]
 MAX_GAP = 0.2  # [s] more than that cannot be bridged: the body may have been carried
 KEPT_COMMANDS = 32
 GROUND_TIME = 1.0  # [s] in which every foot stands, whatever the gait
+MIN_DEVIATION = 0.01  # [m] of the position, however short the way was
+DRIFT = 0.07  # share of the way that is the standard deviation of the position
+GAP_SPEED = 0.3  # [m/s] at which a robot that is not seen may have gone on
+FALL_DEVIATION = 0.1  # [m] by which a body that falls or rolls may have gone
+YAW_DRIFT = 1.5e-4  # [rad/s] half a degree a minute; ours: no page says how the IMU drifts
 REST = (0.0, 0.0)
 _Z = itemgetter(2)
 
@@ -47,7 +53,8 @@ SCALES = (0.1, 10.0)
 class OdometrySettings:
     """How the legs are read."""
 
-    delay: float = 0.04  # by which the servos follow their commands [s]
+    # by which the servos follow their commands [s]: 0.02 until they have them, 0.04 of lag
+    delay: float = 0.06
     # height above the lowest foot up to which a foot is taken to stand [m]
     tolerance: float = 0.002
     margin: float = 0.02  # before and after a swing in which a foot does not count [s]
@@ -60,8 +67,15 @@ class OdometrySettings:
 class LegOdometry:
     """Adds up what the standing legs say."""
 
-    def __init__(self, settings: OdometrySettings, foot_radius: float) -> None:
-        self._settings = settings
+    def __init__(
+        self, settings: OdometrySettings, foot_radius: float, lying_height: float = 0.0
+    ) -> None:
+        """Begin at the origin.
+
+        Args:
+            lying_height: Of base_link above the feet [m], up to which the belly carries it.
+        """
+        self._settings, self._lying_height = settings, lying_height
         self._radius = foot_radius
         # replaced as a whole: commands come from another thread than measurements
         self._commands: tuple[tuple[float, Sequence[Vector]], ...] = ()
@@ -71,7 +85,10 @@ class LegOdometry:
         self._heading = 0.0  # [rad] of the last update
         self._keeps_heading = False
         self._place = self._held = self._smooth = REST  # the velocities in the body turned level
-        self._distance = 0.0
+        self._distance = self._gaps = 0.0  # way [m], variance by gaps [m²]
+        self._began_at: float | None = None
+        self._fallen = False
+        self._stepped_at = -math.inf  # when a foot was last in the air [s]
 
     def command(self, time: float, feet: Sequence[Vector]) -> None:
         """Note where the feet were sent.
@@ -101,20 +118,34 @@ class LegOdometry:
         self._heading = yaw - self._yaw0
         rotation = multiply(about_z(-self._yaw0), attitude)
         standing, source = self._standing(time, feet, rotation)
+        if self._began_at is None:
+            self._began_at = time
+        if not all(standing):
+            self._stepped_at = time
         turned = [
             FootPose(rotate(rotation, foot.position), multiply(rotation, foot.rotation))
             for foot in feet
         ]
-        self._integrate(time, turned, standing, self._heading)
+        height = self._height(turned, standing)
+        fallen = tilt_of(rotation) > MAX_TILT
+        if fallen and not self._fallen:
+            self._gaps += FALL_DEVIATION**2
+        self._fallen = fallen
+        if fallen or height <= self._lying_height:
+            self._held = self._smooth = REST  # the feet may move, and carry nothing
+        else:
+            self._integrate(time, turned, standing, self._heading)
         self._last = time, turned, standing
         return OdometryState(
             *self._place,
-            self._height(turned, standing),
+            height,
             rotation,
             *self._smooth,
             self._distance,
             standing,
             source,
+            MIN_DEVIATION**2 + (DRIFT * self._distance) ** 2 + self._gaps,
+            (YAW_DRIFT * (time - self._began_at)) ** 2,
         )
 
     def _standing(
@@ -149,6 +180,7 @@ class LegOdometry:
         elapsed = time - last_time
         if not 0.0 < elapsed <= MAX_GAP:
             self._held = self._smooth = REST
+            self._gaps += (GAP_SPEED * max(elapsed, 0.0)) ** 2
             return
         cosine, sine = math.cos(heading), math.sin(heading)
         pairs = zip(last_feet, feet, standing, stood, strict=True)
@@ -164,7 +196,9 @@ class LegOdometry:
             self._place[0] + cosine * ahead - sine * left,
             self._place[1] + sine * ahead + cosine * left,
         )
-        self._distance += math.hypot(ahead, left)
+        # a body over feet that stay comes back: it goes nowhere, and noise is no way
+        if time - self._stepped_at <= GROUND_TIME:
+            self._distance += math.hypot(ahead, left)
         share = low_pass_share(self._settings.cutoff, elapsed)
         (x, y), (held_x, held_y) = self._smooth, self._held
         self._smooth = x + share * (held_x - x), y + share * (held_y - y)

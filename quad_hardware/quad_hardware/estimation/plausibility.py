@@ -7,10 +7,13 @@ And the clock of the board: when a report was made, on ours, and whether the boa
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 import math
 
+from quad_description.rotations import conjugate, from_rpy, multiply, rotation_vector, Vector
+
 from ..joints.mapping import SERVO_REACH
+from ..protocol import Fault
 from ..report import DEVICE_TIME_WRAP, Report
 
 DRIFT = 1e-4  # share by which the robot's clock may be off
@@ -145,14 +148,22 @@ class Plausibility:
                 continue
             if abs(angle - last.positions.get(motor, angle)) > MAX_JUMP:
                 return f'motor {motor} jumped to {angle:.4g} deg'
-        for name, before, now in zip('rpy', last.attitude, state.attitude, strict=True):
-            if attitude and abs(math.remainder(now - before, 360.0)) > MAX_JUMP:
-                return f'attitude {name} jumped to {now:.4g} deg'
+        if attitude and (turned := _turned(last.attitude, state.attitude)) > MAX_JUMP:
+            return f'attitude jumped by {turned:.4g} deg'
         if last.device_time is not None and state.device_time is not None:
             passed = math.remainder(state.device_time - last.device_time, DEVICE_TIME_WRAP)
             if abs(passed - (state.arrival - last.arrival)) > MAX_LAG:
                 return f'the clock of the robot went on by {passed:.3f} s'
         return ''
+
+
+def _turned(before: Vector, now: Vector) -> float:
+    """Return the angle of the rotation between two attitudes [deg].
+
+    Roll and yaw alone say nothing about it: nose up or down, each may leap while the sum stays.
+    """
+    one, other = (from_rpy(*map(math.radians, attitude)) for attitude in (before, now))
+    return math.degrees(math.hypot(*rotation_vector(multiply(conjugate(one), other))))
 
 
 def _imu_problem(state: Report) -> str:
@@ -164,3 +175,52 @@ def _imu_problem(state: Report) -> str:
     if max(map(abs, state.attitude)) > 360.0:
         return f'imu: attitude {state.attitude} deg'
     return ''
+
+
+FAULT_TEXTS: Mapping[Fault, str] = {
+    Fault.LOW_BATTERY: 'low battery: charge it',
+    Fault.OVERLOAD: 'overload: free its legs, or let it lie down',
+    Fault.OVERHEATED: 'overheated: let it lie down and cool',
+    Fault.SERVO_SILENT: 'servo silent: look at the cable of the leg that hangs limp',
+    Fault.IMU: 'IMU: its attitude is not to be trusted, switch the robot off and on',
+}
+"""What a fault of protocol v2 is called, and what to do."""
+
+CONFIRMATIONS = 3  # reports in a row; one damaged frame in 256 passes its checksum
+MAX_TEMPERATURE = 70.0  # [°C] at which these servos switch themselves off, by their maker
+COOL_TEMPERATURE = 60.0  # [°C] below which they may carry the robot again
+_SERVO_FAULTS = Fault.OVERLOAD | Fault.OVERHEATED | Fault.SERVO_SILENT
+
+
+class ServoWatch:
+    """Finds servos that will not carry the robot any longer: silent, overloaded or too hot."""
+
+    def __init__(self, motors: Collection[int]) -> None:
+        """Begin without a report.
+
+        Args:
+            motors: Ids of those that a joint uses.
+        """
+        self._motors = motors
+        self._problem = self._next = ''
+        self._count = 0  # reports in a row that say the next
+
+    def check(self, state: Report) -> str:
+        """Add a report; return what is wrong, as soon as several reports in a row agree."""
+        said = self._read(state)
+        self._count = self._count + 1 if said == self._next else 1
+        self._next = said
+        if self._count >= CONFIRMATIONS:
+            self._problem = said
+        return self._problem
+
+    def _read(self, state: Report) -> str:
+        bits = Fault(state.faults & _SERVO_FAULTS)
+        texts = [FAULT_TEXTS[each] for each in Fault if each in bits]
+        most = COOL_TEMPERATURE if 'servo of motor' in self._problem else MAX_TEMPERATURE
+        felt = state.temperatures or {}
+        if hot := [motor for motor in self._motors if felt.get(motor, 0.0) > most]:
+            texts.append(
+                f'servo of motor {", ".join(map(str, hot))} above {most:g} degrees: let it cool'
+            )
+        return '; '.join(texts)

@@ -3,11 +3,10 @@
 """From joints of the URDF to servos and back, and what is let through to them."""
 
 from .command import CommandLimiter, LimiterSettings
-from .commander import CommandCounters, JointCommander, LossReaction, MAX_TILT
+from .commander import CommandCounters, JointCommander, LossReaction
 from .mapping import JointMap, JointServo, servo_of
 
 __all__ = [
-    'MAX_TILT',
     'CommandCounters',
     'CommandLimiter',
     'JointCommander',

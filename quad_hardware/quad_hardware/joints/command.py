@@ -51,7 +51,7 @@ class CommandLimiter:
     """
 
     def __init__(self, joints: JointMap, settings: LimiterSettings | None = None) -> None:
-        self._joints = joints
+        self.joints = joints  # may be exchanged for the same ones with other limits
         self._settings = settings or LimiterSettings()
         degree = math.pi / 180.0
         self._share = tuple(servo.gain / degree for servo in joints.servos)
@@ -105,12 +105,12 @@ class CommandLimiter:
         Raises:
             CommandError: A wrong length, or a number that is not finite.
         """
-        names = self._joints.names
-        if len(positions) not in {len(names), self._joints.leg_count}:
+        names = self.joints.names
+        if len(positions) not in {len(names), self.joints.leg_count}:
             raise CommandError(
                 f'{len(positions)} positions for {len(names)} joints; give one for each of '
                 f'{", ".join(names)}'
-                + (f', or the first {self._joints.leg_count}' if len(names) > 12 else '')
+                + (f', or the first {self.joints.leg_count}' if len(names) > 12 else '')
             )
         wrong = [name for name, p in zip(names, positions, strict=False) if not math.isfinite(p)]
         if wrong:
@@ -119,7 +119,7 @@ class CommandLimiter:
             )
 
     def _begin(self, measured: Sequence[float | None], now: float) -> None:
-        legs = zip(self._joints.names[: self._joints.leg_count], measured, strict=False)
+        legs = zip(self.joints.names[: self.joints.leg_count], measured, strict=False)
         lost = [name for name, place in legs if place is None]
         if lost:
             raise CommandError(
@@ -142,7 +142,7 @@ class CommandLimiter:
     def _approach(self, positions: Sequence[float], step: float) -> Command:
         clamped, slowed, outside, unseen = [], [], [], []
         for index, wanted in enumerate(positions):
-            servo, last = self._joints.servos[index], self._targets[index]
+            servo, last = self.joints.servos[index], self._targets[index]
             if math.isnan(last):
                 unseen.append(servo.joint)
                 last = min(max(wanted, servo.lower), servo.upper)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import Enum
 import math
 
-from quad_description import Pose, pose_positions, STREAM_TIMEOUT
+from quad_description import MAX_TILT, Pose, pose_positions, STREAM_TIMEOUT
 
 from ..exceptions import CommandError
 from .command import Command, CommandLimiter, LimiterSettings, MAX_PERIOD
@@ -19,7 +19,6 @@ START_BAND = 0.3  # [rad] between leg and target; a controller that is relaxed k
 MIN_STREAM = 0.5  # [s] a person who tries out a servo sends no stream
 SPEED = 1.0  # [rad/s] of the fastest joint on the way down
 MIN_DURATION = 1.0  # [s]
-MAX_TILT = 0.9  # [rad] beyond which legs find no ground
 
 
 class LossReaction(Enum):
@@ -184,6 +183,10 @@ class JointCommander(CommandLoss):
         self._send_angles, self._obstacle, self._warn = send, obstacle, warn
         self._last_targets: tuple[float, ...] = ()
         self._moved_by = ''  # what took the legs from where the commands of before left them
+
+    def limit_to(self, joints: JointMap) -> None:
+        """Take targets to the limits of these joints from now on; any thread may call it."""
+        self._limiter.joints = joints
 
     def lose(self) -> None:
         """Begin anew with the next command, for the robot was lost; any thread may call it."""

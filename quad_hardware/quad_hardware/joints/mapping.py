@@ -15,7 +15,7 @@ import math
 from quad_description import Joint
 
 from ..exceptions import CommandError
-from ..protocol import ANGLE_SPANS, LEG_MOTORS, Model, MOTOR_OF_JOINT, MOTOR_ORDER
+from ..protocol import ANGLE_SPANS, LEG_MOTORS, Model, MOTOR_OF_JOINT, MOTOR_ORDER, Span
 
 GRIPPER_MOTOR = 51
 SERVO_REACH = 200.0  # [deg] no servo turns farther, and the wire carries it
@@ -93,6 +93,12 @@ def _within_reach(servo: JointServo) -> JointServo:
     return replace(servo, lower=lower, upper=upper)
 
 
+def _within_span(servo: JointServo, span: Span) -> JointServo:
+    low, high = sorted((servo.position(span.low), servo.position(span.high)))
+    lower = min(max(servo.lower, low), high)
+    return replace(servo, lower=lower, upper=max(min(servo.upper, high), lower))
+
+
 class JointMap:
     """All joints of a robot, in the order of the URDF."""
 
@@ -136,6 +142,10 @@ class JointMap:
     def leg_count(self) -> int:
         """How many joints the legs have."""
         return len(LEG_MOTORS)
+
+    def within(self, spans: Mapping[int, Span]) -> JointMap:
+        """Return the joints with their limits within what their servos can be sent [deg]."""
+        return JointMap(_within_span(s, spans[s.motor]) for s in self.servos)
 
     def positions(self, angles: Mapping[int, float]) -> dict[str, float]:
         """Return positions [rad], [m] by joint, of those whose servo is reported."""

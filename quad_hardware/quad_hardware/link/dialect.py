@@ -16,7 +16,7 @@ from typing import Any
 
 from quad_description.rotations import Vector
 
-from ..protocol import ParserCounters, Protocol
+from ..protocol import ParserCounters, Protocol, Span
 from ..report import Report
 
 
@@ -83,6 +83,8 @@ class Dialect(ABC):
         """Begin a conversation."""
         self.protocol = protocol  # what the robot speaks
         self.can_release = True  # the torque of its servos can be switched off
+        # what each motor can be sent [deg], where that is less than servos turn
+        self.spans: Mapping[int, Span] = {}
         self._counters = DialectCounters()
         self._torque = b''  # bytes of a change that is still to be sent
 

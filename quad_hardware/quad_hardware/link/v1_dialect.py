@@ -121,7 +121,7 @@ class V1Dialect(Dialect):
             rate: Reports a second [Hz].
         """
         super().__init__(V1)
-        self._spans = ANGLE_SPANS[model]
+        self.spans = ANGLE_SPANS[model]
         self._period = 1.0 / rate
         self._cycle_at = now
         self._battery_at = now
@@ -150,9 +150,9 @@ class V1Dialect(Dialect):
         All legs go in one frame, so all of them must be there; the arm follows, where it changed
         or was last sent a while ago; a servo that is not reported goes slowly at first.
         """
-        self._legs = bytes(self._spans[motor].encode(angles[motor]) for motor in LEG_MOTORS)
+        self._legs = bytes(self.spans[motor].encode(angles[motor]) for motor in LEG_MOTORS)
         for motor in angles.keys() - set(LEG_MOTORS):
-            self._arm[motor] = bytes((self._spans[motor].encode(angles[motor]),))
+            self._arm[motor] = bytes((self.spans[motor].encode(angles[motor]),))
 
     def torque(self, *, on: bool) -> None:
         """Switch the torque of all servos, behind a pending command."""
@@ -207,7 +207,7 @@ class V1Dialect(Dialect):
             return {}
         sent = [(r, data) for r, data in scatter(frame.address, frame.payload) if data]
         motors = [(MOTOR_OF_REGISTER[r], data[0]) for r, data in sent if r in MOTOR_OF_REGISTER]
-        return {motor: self._spans[motor].decode(byte) for motor, byte in motors}
+        return {motor: self.spans[motor].decode(byte) for motor, byte in motors}
 
     def _expect(self, request: Frame, now: float) -> None:
         size = request.payload[:1]
@@ -271,14 +271,14 @@ class V1Dialect(Dialect):
                 return Frame(Kind.WRITE, Register.MOTOR_SPEED, bytes((speed,))).encode(V1)
             self._arm_sent[motor] = payload, now + ARM_REPEAT_PERIOD
             if motor in self._unseen:
-                self._unseen[motor].send(self._spans[motor].decode(payload[0]), now)
+                self._unseen[motor].send(self.spans[motor].decode(payload[0]), now)
             return Frame(Kind.WRITE, REGISTER_OF_MOTOR[motor], payload).encode(V1)
         return b''
 
     def _speed_of(self, motor: int, now: float) -> int:
         if motor not in BULK_READ_ORDER:
             if motor not in self._unseen:
-                self._unseen[motor] = UnseenServo(self._spans[motor], now)
+                self._unseen[motor] = UnseenServo(self.spans[motor], now)
             if not self._unseen[motor].arrived(now):
                 return MIN_SPEED
         return _BOARDS_OWN if self._speed == _BOARDS_OWN else FULL_SPEED
@@ -301,7 +301,7 @@ class V1Dialect(Dialect):
             wire_time=wire_time,
             attitude=vector(values['attitude']),
             acceleration=vector(values['acceleration']),
-            positions={motor: self._spans[motor].decode(byte) for motor, byte in pairs},
+            positions={motor: self.spans[motor].decode(byte) for motor, byte in pairs},
             velocities={},
             rates=vector(values['rate']),
             # each answer stands for many reports: one damaged answer must not

@@ -109,7 +109,7 @@ def _report(values: Mapping[str, tuple[float, ...]], now: float) -> Report:
     (voltage,), (device_time,) = values['battery_voltage'], values['device_time']
     by_motor = {
         name: dict(zip(MOTOR_ORDER, values[name], strict=True))
-        for name in ('position', 'velocity', 'temperature')
+        for name in ('position', 'velocity', 'temperature', 'load')
     }
     return Report(
         arrival=now,
@@ -123,4 +123,5 @@ def _report(values: Mapping[str, tuple[float, ...]], now: float) -> Report:
         device_time=device_time / 1000.0,
         faults=int(values['faults'][0]),
         temperatures=by_motor['temperature'],
+        loads=by_motor['load'],
     )

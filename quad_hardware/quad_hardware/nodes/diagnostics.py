@@ -9,13 +9,12 @@ import math
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from quad_description import RobotState
+from quad_description import EMPTY_BATTERY, LOW_BATTERY, RobotState
 
-from ..estimation.filters import EMPTY_BATTERY, LOW_BATTERY
+from ..estimation.plausibility import FAULT_TEXTS
 from ..joints import CommandCounters
 from ..link import latency_problem, LinkState, LinkStatus
 from ..protocol import Fault, ParserCounters
-from ..recording import FAULT_TEXTS
 from ..serial_robot import COMMANDS, LINK, ROBOT
 
 HOT_SERVO = 65.0  # [°C]
@@ -109,7 +108,7 @@ def robot_diagnostic(
     signs_checked = state.imu is not None and not state.imu.is_uncertain
     if not signs_checked:
         level, message = DiagnosticStatus.WARN, UNCHECKED
-    charge = None if state.battery is None else 100.0 * state.battery
+    charge = state.battery
     hot = [motor for motor, t in state.temperatures.items() if t > HOT_SERVO]
     if gravity_error is not None and gravity_error > GRAVITY_ERROR:
         level = DiagnosticStatus.WARN
@@ -123,8 +122,10 @@ def robot_diagnostic(
     if charge is not None and charge < LOW_BATTERY:
         empty = charge < EMPTY_BATTERY
         level = DiagnosticStatus.ERROR if empty else DiagnosticStatus.WARN
-        message = f'battery at {charge:.0f} %; charge it'
+        message = f'battery at {100.0 * charge:.0f} %; charge it'
     faults = Fault(state.faults & sum(Fault))
+    if state.servo_problem:
+        level, message = DiagnosticStatus.ERROR, state.servo_problem
     if state.imu_problem:
         level = DiagnosticStatus.ERROR
         message = f'{state.imu_problem}; lie down, then switch the robot off and on'
@@ -132,7 +133,7 @@ def robot_diagnostic(
         level = DiagnosticStatus.ERROR
         message = f'the robot reports {"; ".join(FAULT_TEXTS[f] for f in Fault if f in faults)}'
     values = {
-        'battery': '' if charge is None else f'{charge:.0f}',
+        'battery': '' if charge is None else f'{100.0 * charge:.0f}',
         'voltage': '' if state.voltage is None else f'{state.voltage:.2f}',
         'faults': state.faults,
         'imu_signs_checked': signs_checked,

@@ -38,6 +38,11 @@ from .robot_topics import log_link, RobotTopics, WARN_PERIOD
 COMMAND_QOS = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST, depth=1
 )
+_LIMP = {
+    True: 'the servos are without torque',
+    False: 'torque off was sent, and the servos still report load: keep clear, switch it off',
+    None: 'torque off was sent; this protocol reports no load that would confirm it',
+}
 SWITCH_INTERVAL = 0.0005  # [s] how long one thread may keep another one from the interpreter
 
 
@@ -131,7 +136,9 @@ class HardwareNode(Node):
         if not response.success:
             response.message = self._robot.status().detail
             return response
-        response.message = 'the servos hold' if on else 'the servos are without torque'
+        limp = None if on else self._robot.wait_until_limp()
+        response.success = limp is not False
+        response.message = 'the servos hold' if on else _LIMP[limp]
         self.get_logger().info(response.message)
         return response
 

@@ -109,7 +109,8 @@ def odometry(
         rotation, height = about_z(yaw_of(rotation)), 0.0
     known = _tilt(sample, deviations), _rate(sample, deviations)
     place = state.x, state.y, height
-    numbers = (*place, *rotation, *velocity, *rate, state.position_variance)
+    variances = state.position_variance, known[0] ** 2 + state.yaw_variance
+    numbers = (*place, *rotation, *velocity, *rate, *variances)
     return Template(_odometry, len(numbers), (frames.odom, child, known)), numbers
 
 
@@ -126,8 +127,9 @@ def _odometry(
     x, y, z = numbers[:3]
     message.pose.pose.position = Point(x=x, y=y, z=z)
     message.pose.pose.orientation = _quaternion(numbers[3:7])
-    place = numbers[13]
-    message.pose.covariance = _diagonal6((place, place, HEIGHT_VARIANCE, *[tilt**2] * 3))
+    place, yaw = numbers[13:]
+    level = tilt**2
+    message.pose.covariance = _diagonal6((place, place, HEIGHT_VARIANCE, level, level, yaw))
     message.twist.twist.linear = _vector(numbers[7:10])
     message.twist.twist.angular = _vector(numbers[10:13])
     turning = UNUSED if rate is None else rate**2

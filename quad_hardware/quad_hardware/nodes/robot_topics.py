@@ -11,9 +11,11 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import BatteryState, Imu, JointState
+from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
 from message_templates import FastPublisher
+from node_runner import LATCHED
 from quad_description import RobotState
 from quad_msgs.msg import FootContacts
 
@@ -40,7 +42,7 @@ def log_link(node: Node, state: LinkState, detail: str) -> None:
 
 
 class RobotTopics:
-    """Publishes joints, imu, odom, foot_contacts, /tf, battery_state and diagnostics."""
+    """Publishes joints, imu, odom, contacts, /tf, battery, servo problems and diagnostics."""
 
     def __init__(
         self,
@@ -70,9 +72,14 @@ class RobotTopics:
         self._battery = node.create_publisher(BatteryState, 'battery_state', SENSOR_DEPTH)
         self._tf = FastPublisher(node.create_publisher(TFMessage, '/tf', 100))
         self._diagnostics = node.create_publisher(DiagnosticArray, 'diagnostics', SENSOR_DEPTH)
+        self._servos = node.create_publisher(String, 'servo_problem', LATCHED)
+        self._servo_problem: str | None = None
 
     def publish(self, state: RobotState) -> None:
         """Publish a report, in the thread that has it."""
+        if state.servo_problem is not None and state.servo_problem != self._servo_problem:
+            self._servo_problem = state.servo_problem
+            self._servos.publish(String(data=state.servo_problem))
         # what a controller waits for comes first
         if (joints := state.joints) is not None:
             template, numbers = messages.joint_states(self._robot.names, joints)

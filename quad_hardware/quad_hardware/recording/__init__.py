@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What went over a serial line: kept in memory, written as a log, read again."""
 
-from .fault_watch import FAULT_TEXTS, FaultWatch, LossWatch
+from .fault_watch import FaultWatch, LossWatch
 from .serial_log import (
     Entry,
     Opened,
@@ -14,7 +14,6 @@ from .serial_log import (
 )
 
 __all__ = [
-    'FAULT_TEXTS',
     'Entry',
     'FaultWatch',
     'LossWatch',

@@ -4,27 +4,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 import math
 
-from quad_description import RobotState
+from quad_description import MAX_TILT, RobotState
 
 from ..estimation import BoardWatch
-from ..joints import MAX_TILT
+from ..estimation.plausibility import CONFIRMATIONS, FAULT_TEXTS
 from ..link import LinkState
 from ..protocol import Fault
 from ..report import Report
 
-FAULT_TEXTS: Mapping[Fault, str] = {
-    Fault.LOW_BATTERY: 'low battery: charge it',
-    Fault.OVERLOAD: 'overload: free its legs, or let it lie down',
-    Fault.OVERHEATED: 'overheated: let it lie down and cool',
-    Fault.SERVO_SILENT: 'servo silent: look at the cable of the leg that hangs limp',
-    Fault.IMU: 'IMU: its attitude is not to be trusted, switch the robot off and on',
-}
-"""What a fault of protocol v2 is called, and what to do."""
-
-CONFIRMATIONS = 3  # reports in a row; one damaged frame in 256 passes its checksum
 UPRIGHT = 0.8 * MAX_TILT  # [rad] below which a body that fell stands again
 _ALL_FAULTS = sum(Fault)
 _LOST = {LinkState.STALE, LinkState.REFUSED, LinkState.FAILED}

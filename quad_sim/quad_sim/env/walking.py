@@ -102,7 +102,7 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         self,
         *,
         preset: str = 'lite',
-        servo: ServoModel | ServoParameters = ServoModel.FIRM,
+        servo: ServoModel | ServoParameters = ServoModel.NOMINAL,
         randomization: Randomization = NO_RANDOMIZATION,
         commands: CommandRanges | None = None,
         weights: RewardWeights | None = None,

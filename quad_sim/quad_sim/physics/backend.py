@@ -4,18 +4,15 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from quad_description import Backend, ImuSample, JointSample, RobotState
 from quad_description.rotations import from_rpy, Quaternion, Vector
 
-from ..exceptions import SetupError
 from .robot import Robot
 
 PERIOD = 0.02  # [s]
-MAX_DELAY = 1.0  # [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,29 +45,20 @@ class PhysicsBackend(Backend):
         robot: Robot,
         period: float = PERIOD,
         *,
-        delay: float = 0.0,
         bias: ImuBias | None = None,
     ) -> None:
         """Observe a robot.
 
         Args:
-            delay: From targets that are sent to servos that have them in [s].
             bias: Of the IMU; None for none.
-
-        Raises:
-            SetupError: The delay is no time, or longer than a second.
         """
-        if not 0.0 <= delay <= MAX_DELAY:
-            raise SetupError(f'delay {delay} s: give 0 to {MAX_DELAY:g}')
         self.robot, self.period = robot, period
         self.names = robot.joint_names
-        self._delay, self._bias = delay, bias
-        self._begin()
+        self._bias = bias
 
     def reset(self) -> RobotState:
         """Stand on the ground again."""
         self.robot.reset()
-        self._begin()
         return self.observe()
 
     def step(self, targets: Sequence[float] | None) -> RobotState:
@@ -79,20 +67,9 @@ class PhysicsBackend(Backend):
         Raises:
             SimulationError: A target is not finite, or the physics blew up.
         """
-        sent_at = self._steps * self.period
-        self._steps += 1
-        if targets is not None and not self._delay:
+        if targets is not None:
             self.robot.set_targets(targets)
-        elif targets is not None:
-            self._on_the_way.append((sent_at + self._delay, targets))
-        passed = 0.0
-        while self._on_the_way and self._on_the_way[0][0] < sent_at + self.period:
-            due, late = self._on_the_way.popleft()
-            until = max(due - sent_at, passed)
-            self.robot.step(until - passed)
-            self.robot.set_targets(late)
-            passed = until
-        self.robot.step(self.period - passed)
+        self.robot.step(self.period)
         return self.observe()
 
     def observe(self) -> RobotState:
@@ -115,7 +92,3 @@ class PhysicsBackend(Backend):
 
     def close(self) -> None:
         """Do nothing: the robot is memory."""
-
-    def _begin(self) -> None:
-        self._steps = 0
-        self._on_the_way: deque[tuple[float, Sequence[float]]] = deque()

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Mapping
 import math
 from typing import Final
@@ -45,7 +46,7 @@ class Robot:
     def __init__(
         self,
         urdf: str,
-        servo: ServoModel | ServoParameters = ServoModel.FIRM,
+        servo: ServoModel | ServoParameters = ServoModel.NOMINAL,
         terrain: Terrain = FLAT,
         seed: int = 0,
         *,
@@ -78,7 +79,15 @@ class Robot:
         self._touch = [int(self._model.sensor(foot).adr[0]) for foot in FEET]
         self._inertial = InertialUnit(self._model, self._data)
         self._varied = VariedModel(self._model)
-        self._ramp = TargetRamp(joints, timestep, self._data.ctrl)
+        self._ramp = TargetRamp(joints, timestep, np.zeros(len(joints)))
+        self._delay = round(self._servo.delay / timestep)  # steps
+        self._refresh = max(round(self._servo.refresh / timestep), 1)  # steps
+        # what the error of a joint has to exceed before its servo pulls; a jaw has no play
+        hinges = [
+            int(self._model.joint(name).type[0]) == mujoco.mjtJoint.mjJNT_HINGE
+            for name in self.joint_names
+        ]
+        self._free = np.where(hinges, self._servo.free_width, 0.0)
         self._random = np.random.default_rng(seed)
         self.reset(pose=pose, seed=seed)
 
@@ -113,6 +122,8 @@ class Robot:
         self._random = np.random.default_rng(seed)
         self._steps, self._remainder = 0, 0.0
         self._push_until: int | None = None
+        # targets that servos do not have yet: with which step they come
+        self._coming: deque[tuple[int, Targets, float]] = deque()
         start = start_positions(self.joint_names, pose or {})
         self._data.qpos[self._qpos] = start
         self._ramp.jump(start)
@@ -133,7 +144,13 @@ class Robot:
         Raises:
             TargetError: A name is unknown, a value is not finite, or there are too many or few.
         """
-        self._ramp.approach(targets, self._servo.interpolation if duration is None else duration)
+        duration = self._servo.interpolation if duration is None else duration
+        due = -(-(self._steps + self._delay) // self._refresh) * self._refresh
+        if due == self._steps:
+            self._ramp.approach(targets, duration)
+            return
+        self._ramp.check(targets)
+        self._coming.append((due, targets, duration))
 
     def set_torque(
         self, on: bool, joints: Iterable[str] | None = None, *, hold: bool = True
@@ -213,7 +230,11 @@ class Robot:
         self._remainder -= count
         model, data, ramp, inertial = self._model, self._data, self._ramp, self._inertial
         for _ in range(count):
+            while self._coming and self._coming[0][0] <= self._steps:
+                _, targets, duration = self._coming.popleft()
+                ramp.approach(targets, duration)
             ramp.advance()
+            data.ctrl[:] = self._set_points()
             if self._push_until is not None and self._steps >= self._push_until:
                 data.xfrc_applied[self._base] = 0.0
                 self._push_until = None
@@ -313,6 +334,15 @@ class Robot:
         return disturb(truth, self._noise, self._random)
 
     # -- inside
+
+    def _set_points(self) -> Array:
+        """Return what the servos pull to: nowhere within their free width."""
+        values = self._ramp.values
+        if not self._servo.free_width:
+            return values
+        error = values - self._data.qpos[self._qpos]
+        pulled: Array = values - np.minimum(np.maximum(error, -self._free), self._free)
+        return pulled
 
     @property
     def _base(self) -> int:
