@@ -7,5 +7,5 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    package_data=['panda/*'],
+    package_data=['panda/*', 'scene/*.c'],
 )

@@ -33,6 +33,7 @@ from .names import ArmNames, names_of
 from .pose import combined, inverse, ORIGIN, Pose, rotation_of, turned_twists
 from .scene.allowed_collisions import AllowedCollisionMatrix
 from .scene.clearances import Clearances, Contact, LeastClearance, Proximity
+from .scene.compiled import compiled_scene, CompiledScene, CompiledSearch
 from .scene.objects import AttachedBody, CollisionObject
 from .scene.octomap import OCTOMAP_NAME, octomap_shapes
 from .scene.pairs import LinkPairs, sample_link_pairs, with_default_collisions
@@ -67,6 +68,8 @@ __all__ = [
     'Clearances',
     'CollisionObject',
     'CommandError',
+    'CompiledScene',
+    'CompiledSearch',
     'Cone',
     'Contact',
     'Cylinder',
@@ -94,6 +97,7 @@ __all__ = [
     'Sphere',
     'checked',
     'combined',
+    'compiled_scene',
     'example_files',
     'frozen',
     'inverse',

@@ -6,7 +6,8 @@ In the middle of a part of a path the pairs are measured that are not yet known 
 it. By the scene's distance rate bounds a distance also proves how far on either side of the middle
 nothing touches; the rest is two parts, measured again. Each pair must have :data:`MARGIN` left
 where it is measured. So nothing touches between two places that were measured either, and pairs
-that are far apart are measured a few times.
+that are far apart are measured a few times. Where there is a compiled core
+(:func:`arm_model.compiled_scene`) it does all that; what stands here is its reference.
 
 Where start or goal are nearer to contact than that, the pair may be as near on the way as it is
 there, and it is measured more densely; a contact of less than :data:`MIN_MARGIN` can then remain.
@@ -17,12 +18,21 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 import math
 
 import numpy as np
 
-from arm_model import Array, checked, Clearances, Contact, JointLimits, PlanningScene
+from arm_model import (
+    Array,
+    checked,
+    Clearances,
+    compiled_scene,
+    Contact,
+    JointLimits,
+    PlanningScene,
+)
 from arm_trajectory import farthest_beyond, Path
 
 from .exceptions import coded, PlanningCode, PlanningError
@@ -50,13 +60,12 @@ class ValidityCheck:
     """Checks states and paths in one scene; belongs to one thread."""
 
     def __init__(self, limits: JointLimits, scene: PlanningScene) -> None:
-        self._limits = limits
-        self._clearances = Clearances(scene)
+        self._limits, self.scene = limits, scene
+        self.compiled = compiled_scene(scene)
 
-    @property
-    def scene(self) -> PlanningScene:
-        """The scene that is measured."""
-        return self._clearances.scene
+    @cached_property
+    def _clearances(self) -> Clearances:
+        return Clearances(self.scene)
 
     def state(self, positions: Array) -> Violation | None:
         """Return why the arm may not be somewhere; None where it may."""
@@ -64,24 +73,29 @@ class ValidityCheck:
 
     def required(self, *ends: Array) -> Array:
         """Return the distance that each pair keeps on motions between some states in [m] (k)."""
-        least = [self._clearances.least(each, MARGIN).copy() for each in ends]
+        measured = self.compiled or self._clearances
+        least = [measured.least(each, MARGIN).copy() for each in ends]
         required: Array = np.clip(np.min(least, axis=0), 0.0, MARGIN) - LIMIT_TOLERANCE
         return required
 
-    def near(self, begin: Array, end: Array, required: Sequence[float]) -> Array | None:
+    def near(self, begin: Array, end: Array, required: Array) -> Array | None:
         """Return a place of a straight motion at which a pair is nearer than it may be, or None.
 
         Args:
             required: Distance that each pair keeps in [m] (k).
         """
         way = end - begin
-        motions = (self._clearances.distance_rate_bounds @ np.abs(way)).tolist()
-        every: Sequence[int] = range(len(required))
+        if self.compiled is not None:
+            share = self.compiled.edge(begin, end, required)
+            return None if share is None else begin + share * way
+        needed = required.tolist()
+        motions = (self.scene.distance_rate_bounds @ np.abs(way)).tolist()
+        every: Sequence[int] = range(len(needed))
         parts = deque([(0.5, 0.5, every)])  # their middle, half their length
         while parts:
             middle, half, pairs = parts.popleft()
             place = begin + middle * way
-            left = self._doubtful(place, pairs, required, motions, half)
+            left = self._doubtful(place, pairs, needed, motions, half)
             if left is None:
                 return place
             if left:  # what lies nearer to the middle is proved
@@ -100,7 +114,7 @@ class ValidityCheck:
         lower, upper = places.min(axis=0), places.max(axis=0)
         if (beyond := self._beyond(lower, upper)) is not None:
             return beyond
-        required = self.required(places[0], places[-1]).tolist()
+        required = self.required(places[0], places[-1])
         for begin, end in pairwise(places):
             place = self.near(begin, end, required)
             if place is not None:
@@ -148,12 +162,16 @@ class ValidityCheck:
     def _near_time(self, path: Path, control: Array) -> float | None:
         """Return a time at which a pair is nearer than it may be; None where none is."""
         times, turned = _cells(path, control)
-        rates, cells = self._clearances.distance_rate_bounds, np.arange(float(len(times)))
-        required = self.required(path.at(0.0).position, path.end.position).tolist()
+        rates, cells = self.scene.distance_rate_bounds, np.arange(float(len(times)))
+        required = self.required(path.at(0.0).position, path.end.position)
         along = turned @ rates.max(axis=0, initial=0.0)  # halves of a part move alike
+        if self.compiled is not None:
+            polynomials = path.starts, path.coefficients
+            return self.compiled.path(*polynomials, times, along, turned, FIRST_PART, required)
+        needed = required.tolist()
         ends = np.linspace(0.0, along[-1], max(math.ceil(along[-1] / FIRST_PART), 1) + 1)
         parts = np.stack((ends[:-1], ends[1:]), axis=1)
-        pairs: list[Sequence[int]] = [range(len(required))] * len(parts)
+        pairs: list[Sequence[int]] = [range(len(needed))] * len(parts)
         while len(parts):
             looks = np.insert(parts, 1, parts.mean(axis=1), axis=1)
             places = np.interp(looks, along, cells)
@@ -164,7 +182,7 @@ class ValidityCheck:
             rest: list[tuple[float, float]] = []
             doubtful: list[Sequence[int]] = []
             for when_there, row, here, moved, (first, middle, last) in rows:
-                left = self._doubtful(row, here, required, moved, 1.0)
+                left = self._doubtful(row, here, needed, moved, 1.0)
                 if left is None:
                     return float(when_there)
                 # no pair comes nearer by more than what lies between
@@ -206,6 +224,8 @@ class ValidityCheck:
         return next((Violation(words, each) for words, each in found if words), None)
 
     def _touching(self, positions: Array, time: float) -> Violation | None:
+        if self.compiled is not None and self.compiled.clear(positions, 0.0):
+            return None
         contacts = self._clearances.contacts(positions)
         if not contacts:
             return None
@@ -223,7 +243,7 @@ class ValidityCheck:
             return touching
         distances = self._clearances.least(positions, MARGIN)
         pair = int(distances.argmin())
-        first, second = self._clearances.pairs[pair]
+        first, second = self.scene.pairs[pair]
         reason = f'{first} passes {second} at {1e3 * distances[pair]:.2f} mm'
         return Violation(reason, positions, None, time)
 

@@ -61,6 +61,7 @@ DENSE = 1e-3  # motion of a joint from one look of the sampler to the next in [r
 SAMPLES = 2000  # places of a timed path that are compared
 
 RUNS, SHORTCUTS = 16, 6  # how often a long run searches a way, and how often it shortens each
+SAMPLES_OF_RUN = 100_000  # samples of such a search at most
 LONGEST = 30.0  # time for one problem of a long run in [s]
 
 RESOLUTION = 0.01
@@ -212,10 +213,11 @@ def best_length(model: RobotModel, asked: Problem) -> float | None:
         places = rrt_connect(
             asked.start,
             [asked.goal],
-            lambda: draw.uniform(model.limits.lower, model.limits.upper),
+            lambda count: draw.uniform(model.limits.lower, model.limits.upper, (count, len(model))),
             motions,
             expired,
             further=iter(()),
+            most=SAMPLES_OF_RUN,
         )
         if places is None:
             break

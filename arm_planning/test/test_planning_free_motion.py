@@ -190,11 +190,12 @@ def test_what_is_enclosed_is_given_up_in_time() -> None:
     ticks = iter(range(10_000_000))
     planner = Planner(model, clock=lambda: 0.001 * next(ticks))
     start, goal = ready('panda').copy(), ready('panda').copy()
-    start[0], goal[0] = -2.0, 2.0
+    start[[0, 1, 3]], goal[[0, 1, 3]] = (-2.0, 0.5, -1.0), (2.0, 0.5, -1.0)  # on either side
     scene = model.scene
     for number, angle in enumerate((0.0, np.pi)):  # a wall from the ground to beyond the reach
         at = (1.1 * np.cos(angle), 0.0, 1.0)
-        scene = with_box(scene, f'wall_{number}', (1.7, 0.02, 4.0), at)
+        scene = with_box(scene, f'wall_{number}', (1.9, 0.02, 4.0), at)
+    scene = with_box(scene, 'lintel', (1.0, 0.02, 2.0), (0.0, 0.0, 1.55))
     asked = replace(request(start, goal), timeout=0.1)
     with pytest.raises(PlanningError, match='no path was found in time') as caught:
         planner.plan(asked, scene)

@@ -99,7 +99,7 @@ def test_a_touch_in_passing_is_found(angle: float) -> None:
         touched = deepest_on(begin, end, scene) < -TOUCH
         near, far = (middle, far) if touched else (near, middle)
     check = ValidityCheck(model.limits, scene)
-    assert check.near(begin, end, check.required(begin, end).tolist()) is not None
+    assert check.near(begin, end, check.required(begin, end)) is not None
     assert not MotionCheck(check, [begin, end]).clear(begin, end)
     goal = TrajectoryGoal(model.joints, [GoalPoint(3.0, end.tolist())])
     path = build_path(goal, model.limits, RobotState.at_rest(begin), GoalRules()).path

@@ -30,6 +30,13 @@ MAX_SEARCHES = 3
 """Searches at most, of which the shortest path counts. Constraints make a search so slow
 that the first path counts."""
 
+CHEAP = 150
+"""Samples of the search that found a path, below which another one is worth its time."""
+
+RESTART = 1000
+"""Samples after which a search begins anew, twice as many each time: some trees grow into a dead
+end, and others find a way in a tenth of the time."""
+
 
 class FreeMotion:
     """Plans free motions of one arm in one scene; belongs to one thread."""
@@ -70,15 +77,32 @@ class FreeMotion:
         goals = sorted(goals, key=lambda goal: float(np.linalg.norm(goal - start)))
         direct = float(np.linalg.norm(goals[0] - start))
         searches = MAX_SEARCHES if self._constraints is None else 1
+        lower = np.where(self._limits.continuous, start - MAX_TURN, self._limits.lower)
+        upper = np.where(self._limits.continuous, start + MAX_TURN, self._limits.upper)
+        drawn, tried, most, more = 0, 0, RESTART, iter(further)
+
+        def sample(count: int) -> Array:
+            nonlocal drawn
+            drawn += count
+            states: Array = lower + (upper - lower) * self._draw.random((count, len(start)))
+            return states
+
         found: Path | None = None
-        shortest, tried, near, more = np.inf, 0, None, iter(further)
-        while not expired() and not (found is not None and tried >= searches):
-            tried += 1
-            sample = self._sampler(start)
-            places = rrt_connect(start, goals, sample, motions, expired, further=more)
+        shortest, near = np.inf, None
+        straight = (np.array((start, goal)) for goal in goals if motions.clear(start, goal))
+        while not expired():
+            places = next(straight, None)
             if places is None:
-                break
-            places = shortened(places, self._draw, motions, expired)
+                tried += 1
+                places = rrt_connect(
+                    start, goals, sample, motions, expired, further=more, most=most
+                )
+                if places is None and found is not None:
+                    break
+                if places is None:
+                    most *= 2
+                    continue
+                places = shortened(places, self._draw, motions, expired)
             length = float(lengths_along(places)[-1])
             if length < shortest:
                 path = timed_path(places, self._limits, motions)
@@ -88,6 +112,9 @@ class FreeMotion:
                 found, shortest = path, length
             if len(places) == 2 or length <= MAX_DETOUR_RATIO * direct:
                 break
+            if tried >= searches or drawn > CHEAP:
+                break
+            most = CHEAP
         if found is not None:
             return found
         hint = '' if near is None else f'; the last one was refused: {near.reason}'
@@ -95,8 +122,3 @@ class FreeMotion:
             PlanningCode.TIMED_OUT,
             f'no path was found in time{hint}; allow more time, or make room at start and goal',
         )
-
-    def _sampler(self, start: Array) -> Callable[[], Array]:
-        lower = np.where(self._limits.continuous, start - MAX_TURN, self._limits.lower)
-        upper = np.where(self._limits.continuous, start + MAX_TURN, self._limits.upper)
-        return lambda: self._draw.uniform(lower, upper)

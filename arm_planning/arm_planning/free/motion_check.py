@@ -19,7 +19,7 @@ from arm_model import Array
 from arm_trajectory import Path
 
 from ..constraints import ConstraintCheck
-from ..validity import ValidityCheck, Violation
+from ..validity import MARGIN, ValidityCheck, Violation
 
 PROBE = 0.25
 """Greatest motion of a shape against another between two looks of the broad phase in [m]."""
@@ -45,14 +45,16 @@ class MotionCheck:
             constraints: What holds everywhere; None for nothing.
         """
         self.constraints, self._check = constraints, check
-        self._required = check.required(*ends).tolist()
+        self.required, self.compiled = check.required(*ends), check.compiled
+        if self.compiled is not None:
+            return
         scene = check.scene
         self._kinematics = scene.kinematics
         self._model, self._data = scene.kinematics.native, scene.kinematics.native.createData()
         self._rates = scene.distance_rate_bounds
         results = scene.geometry.createData()
         for request in results.collisionRequests:
-            request.security_margin = min(self._required, default=0.0)
+            request.security_margin = float(self.required.min(initial=MARGIN))
         self._scene, self._results = scene, results  # the broad phase refers to them
         self._broad_phase = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(
             self._model, scene.geometry, results
@@ -64,13 +66,15 @@ class MotionCheck:
         Args:
             goal: Joint positions in [rad] (n), valid.
         """
-        return bool((self._check.required(goal) >= self._required).all())
+        return bool((self._check.required(goal) >= self.required).all())
 
     def free(self, positions: Array) -> bool:
         """Whether no pair touches, as far as the broad phase sees.
 
         It passes over pairs which are nearer than they may be while their boxes do not touch.
         """
+        if self.compiled is not None:
+            return self.compiled.clear(positions, float(self.required.min(initial=MARGIN)))
         expanded = self._kinematics.expanded(positions)
         return not pin.computeCollisions(
             self._model, self._data, self._broad_phase, expanded, True
@@ -83,13 +87,14 @@ class MotionCheck:
             begin: Joint positions in [rad] (n), known to be free.
         """
         way = end - begin
-        motion = float((self._rates @ np.abs(way)).max(initial=0.0))
-        places = begin + _coarse_first(math.ceil(motion / PROBE) + 1)[:, None] * way
-        if not all(map(self.free, places)):
-            return False
+        if self.compiled is None:
+            motion = float((self._rates @ np.abs(way)).max(initial=0.0))
+            places = begin + _coarse_first(math.ceil(motion / PROBE) + 1)[:, None] * way
+            if not all(map(self.free, places)):
+                return False
         if self.constraints is not None and not _heeded(self.constraints, begin, way):
             return False
-        return self._check.near(begin, end, self._required) is None
+        return self._check.near(begin, end, self.required) is None
 
     def waypoints(self, places: Array) -> Violation | None:
         """Return what is wrong with the straight lines between places; None for nothing.

@@ -7,25 +7,25 @@ with the balancing of the trees that OMPL has. Under constraints the trees grow 
 whose ends are led back to them: Berenson et al., "Manipulation planning on constraint manifolds"
 (CBiRRT), ICRA 2009. One is ours because the collision check decides over its speed, and that of
 the scene is quicker here than a library's that calls back for each state; the bench has the
-comparison. Straight motions between places on a path replace what lies between them.
+comparison. Without constraints the compiled one of arm_model takes its place where there is one. Straight motions between places on a path replace what lies between them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from itertools import count
+import math
 
 import numpy as np
 
-from arm_model import Array
+from arm_model import Array, CompiledSearch
 
 from .motion_check import MotionCheck
 
 MAX_EXTENSION = 1.2  # greatest length of an edge in [rad]
 FIRST_NODES = 256  # nodes that a tree has room for at first
 
-FURTHER_PERIOD = 25
-"""Edges between two looks for a further goal, each of which takes as long as several of them."""
+BLOCK = 25
+"""Samples between two looks at the time and for a further goal, which takes as long as several."""
 
 SAME = 1e-9  # distance of states that are one in [rad]
 MAX_TRIALS = 30  # shortcuts that are tried at most
@@ -36,12 +36,10 @@ MIN_GAIN = 0.05  # length that a shortcut saves at least in [rad]
 class _Tree:
     """States, and the state from which each was reached."""
 
-    def __init__(self, roots: Sequence[Array]) -> None:
+    def __init__(self, joints: int) -> None:
         self.count = 0
-        self._states: Array = np.zeros((max(FIRST_NODES, 2 * len(roots)), len(roots[0])))
+        self._states: Array = np.zeros((FIRST_NODES, joints))
         self._parents: list[int] = []
-        for root in roots:
-            self.add(root, -1)
 
     def add(self, state: Array, parent: int) -> int:
         """Add a state, and return its number."""
@@ -71,50 +69,72 @@ class _Tree:
         return found[::-1]
 
 
+class Search:
+    """Two trees, from the start and from goals; the reference of the compiled one."""
+
+    def __init__(self, start: Array, check: MotionCheck) -> None:
+        self._check, self._goals = check, _Tree(len(start))
+        self._start = self._growing = _Tree(len(start))
+        self._start.add(start, -1)
+        self._other = self._goals
+
+    def add_goal(self, goal: Array) -> None:
+        """Grow from a goal, too."""
+        self._goals.add(goal, -1)
+
+    def grow(self, targets: Array) -> Array | None:
+        """Grow towards samples (m, n); return the places of a path (k, n) where the trees met."""
+        for target in targets:
+            if self._growing.count > self._other.count:
+                self._growing, self._other = self._other, self._growing
+            reached = _extend(self._growing, target, self._check)
+            if reached is None:
+                continue
+            met = _connect(self._other, self._growing.state(reached).copy(), self._check)
+            if met is not None:
+                here, there = self._growing.branch(reached), self._other.branch(met)
+                if self._growing is self._goals:
+                    here, there = there, here
+                return np.array([*here, *there[-2::-1]])
+            self._growing, self._other = self._other, self._growing
+        return None
+
+
 def rrt_connect(
     start: Array,
     goals: Sequence[Array],
-    sample: Callable[[], Array],
+    sample: Callable[[int], Array],
     check: MotionCheck,
     expired: Callable[[], bool],
     *,
     further: Iterator[Array | None],
+    most: int,
 ) -> Array | None:
-    """Return the places of a path that looks free (m, n); None where the time is over.
+    """Return the places of a path that looks free (m, n); None where none was found.
 
     Args:
         goals: Joint positions in [rad] (n), free; one of them is reached.
+        sample: Draws a number of states (m, n).
         further: Goals that are looked for meanwhile: each is one, or a try that found none.
+        most: Samples after which the search ends.
     """
+    search: Search | CompiledSearch
+    if check.compiled is None or check.constraints is not None:
+        search = Search(start, check)
+    else:
+        search = CompiledSearch(check.compiled, start, check.required, MAX_EXTENSION)
     for goal in goals:
-        if check.clear(start, goal):
-            return np.array((start, goal))
-    from_start, from_goal = _Tree([start]), _Tree(goals)
-    growing, other = from_start, from_goal
-    for number in count():
+        search.add_goal(goal)
+    for _ in range(math.ceil(most / BLOCK)):
         if expired():
             break
-        if number % FURTHER_PERIOD == 0:
-            _add_goal(from_goal, next(further, None), check)
-        if growing.count > other.count:
-            growing, other = other, growing
-        reached = _extend(growing, sample(), check)
-        if reached is None:
-            continue
-        target = growing.state(reached).copy()
-        met = _connect(other, target, check)
-        if met is not None:
-            here, there = growing.branch(reached), other.branch(met)
-            if growing is from_goal:
-                here, there = there, here
-            return np.array([*here, *there[-2::-1]])
-        growing, other = other, growing
+        another = next(further, None)
+        if another is not None and check.admits(another):
+            search.add_goal(another)
+        places = search.grow(sample(BLOCK))
+        if places is not None:
+            return places
     return None
-
-
-def _add_goal(tree: _Tree, goal: Array | None, check: MotionCheck) -> None:
-    if goal is not None and check.admits(goal):
-        tree.add(goal, -1)
 
 
 def _extend(tree: _Tree, target: Array, check: MotionCheck) -> int | None:

@@ -12,16 +12,17 @@ from itertools import pairwise
 
 import numpy as np
 
-from arm_model import Array, JointLimits, RobotState
-from arm_trajectory import build_path, GoalError, GoalPoint, GoalRules, Path, TrajectoryGoal
+from arm_model import Array, JointLimits
+from arm_trajectory import Path
 
 from .motion_check import MotionCheck
 
 ROUNDING_ROOM = 1.02  # factor of the least times, so that rounding errors break no limit
-RULES = GoalRules()  # of the trajectories that are made here
 MAX_ITERATIONS = 30  # how often the times of the motions are improved
 STEP_UP = 1.01  # factor of a time that is improved, so that the search for it ends
-MIN_SEGMENT = 1e-3  # least time of a part of a path in [s]
+MIN_HALF = 1e-3  # least of half the time of a rounding in [s]
+MIN_PIECE = 1e-9  # least time of a straight motion between two corners in [s]
+POWERS = 6  # coefficients of each polynomial of a path
 MIN_DURATION = 0.01  # time for a motion between two places at least in [s]
 
 
@@ -56,28 +57,22 @@ def _rounded(places: Array, limits: JointLimits) -> Path | None:
     durations = _durations(places, limits)
     velocities = np.diff(places, axis=0) / durations[:, None]
     halves = _half_times(velocities, limits)
-    corners = halves[0] + np.concatenate(((0.0,), np.cumsum(durations)))
-    begins, ends = np.maximum(corners - halves, 0.0), corners + halves
+    straight = durations - halves[:-1] - halves[1:]
+    if (straight < 0.0).any():
+        return None
     still = np.zeros((1, places.shape[1]))
     before, after = np.concatenate((still, velocities)), np.concatenate((velocities, still))
-    times = np.stack((begins, ends), axis=1).ravel()
-    positions = np.stack(
-        (places - before * halves[:, None], places + after * halves[:, None]), axis=1
-    ).reshape(len(times), -1)
-    speeds = np.stack((before, after), axis=1).reshape(len(times), -1)
-    rest = [0.0] * places.shape[1]
-    apart = np.diff(times, prepend=-1.0) > MIN_SEGMENT  # corners that touch share a point
-    points = [
-        GoalPoint(time, position, speed, rest)
-        for time, position, speed in zip(
-            times[apart].tolist(), positions[apart].tolist(), speeds[apart].tolist(), strict=True
-        )
-    ]
-    goal, state = TrajectoryGoal(limits.names, points), RobotState.at_rest(places[0])
-    try:
-        return build_path(goal, limits, state, RULES).path
-    except GoalError:
-        return None
+    lasts, change = 2.0 * halves, after - before
+    # each corner, then the straight motion behind it; before the first there is none
+    pieces = np.zeros((2 * len(places) - 1, POWERS, places.shape[1]))
+    pieces[::2, 0], pieces[::2, 1] = places - before * halves[:, None], before
+    pieces[::2, 3] = change / lasts[:, None] ** 2
+    pieces[::2, 4] = -0.5 * change / lasts[:, None] ** 3
+    pieces[1::2, 0], pieces[1::2, 1] = (places + after * halves[:, None])[:-1], velocities
+    times = np.zeros(len(pieces))
+    times[::2], times[1::2] = lasts, straight
+    there = times > MIN_PIECE
+    return Path(times[there], pieces[there])
 
 
 def _durations(places: Array, limits: JointLimits) -> Array:
@@ -97,7 +92,7 @@ def _durations(places: Array, limits: JointLimits) -> Array:
 def _half_times(velocities: Array, limits: JointLimits) -> Array:
     """Return half the time of the rounding at begin, corners and end (m) in [s].
 
-    A rounding is the quintic that meets the straight motions with the acceleration 0 as long
+    A rounding is the quartic that meets the straight motions with the acceleration 0 as long
     before a corner as behind it. Its acceleration is 0.75 of the change of velocity over that
     time at most, its jerk 1.5 of it over the time squared.
     """
@@ -106,4 +101,4 @@ def _half_times(velocities: Array, limits: JointLimits) -> Array:
     by_acceleration = 0.75 * jumps / limits.acceleration
     by_jerk = np.sqrt(1.5 * jumps / limits.jerk)
     halves: Array = ROUNDING_ROOM * np.maximum(by_acceleration, by_jerk).max(axis=1)
-    return np.maximum(halves, MIN_SEGMENT)
+    return np.maximum(halves, MIN_HALF)

@@ -1,0 +1,352 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The compiled core of motion checks: motions.c, built by the C compiler of the machine.
+
+It is built at its first use, in half a second, and kept in ``$XDG_CACHE_HOME/arm_model/compiled``
+(``~/.cache/arm_model/compiled``), one file for each content of the source. Where there is no
+compiler, or it fails, one warning says so, and the same checks run in Python, several times
+slower. ``ARM_MODEL_COMPILED=0`` asks for that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+import contextlib
+import ctypes
+from functools import lru_cache
+import hashlib
+import logging
+import os
+from pathlib import Path
+import platform
+import shutil
+import subprocess
+import tempfile
+import weakref
+
+import coal
+import numpy as np
+from numpy.typing import NDArray
+import pinocchio as pin
+
+from ..arrays import Array, Native
+from .meshes import cache_folder
+from .planning_scene import PlanningScene
+
+SOURCE = Path(__file__).with_name('motions.c')
+FLAGS = (
+    '-O3',
+    '-march=native',
+    '-fno-math-errno',
+    '-ffinite-math-only',
+    '-fno-signed-zeros',
+    '-fno-trapping-math',
+    '-std=gnu11',
+    '-shared',
+    '-fPIC',
+)
+MUCH = 1e30  # what stands for infinity in [m]
+BUILD_TIME = 60.0  # time that the compiler is given in [s]
+
+KINDS = {
+    coal.Box: 0,
+    coal.Sphere: 1,
+    coal.Capsule: 2,
+    coal.Cylinder: 3,
+    coal.Cone: 4,
+    coal.Convex: 5,
+    coal.Halfspace: 6,
+}
+"""Numbers of the shapes in motions.c."""
+
+NO_POINTS = np.zeros((0, 3))
+Integers = NDArray[np.int32]
+
+
+class CompiledScene:
+    """Lower bounds of distances in a scene, each with its own proof; belongs to one thread."""
+
+    def __init__(self, library: Native, scene: PlanningScene) -> None:
+        """Hand the scene over; :func:`compiled_scene` is the way in."""
+        self.library = library
+        self._count = len(scene.kinematics.joints)
+        self._distances: Array = np.zeros(len(scene.pairs))
+        self._where = ctypes.c_double()
+        arguments = [*_joints(scene), *_shapes(scene)]
+        rates = np.ascontiguousarray(scene.distance_rate_bounds)
+        finite = np.minimum(rates, MUCH)  # infinity times no motion is no number
+        sizes = (*finite.shape[::-1], len(arguments[1]), len(arguments[6]), len(arguments[-2]))
+        joints, pairs, columns, shapes, points = sizes
+        self.handle: Native = library.world_new(
+            joints,
+            columns,
+            shapes,
+            pairs,
+            points,
+            *(_pointer(each) for each in arguments),
+            _pointer(finite),
+        )
+        if not self.handle:
+            raise MemoryError
+        weakref.finalize(self, library.world_free, self.handle)
+
+    def least(self, positions: Array, within: float) -> Array:
+        """Return distances of all pairs in [m]: exact ones below one of interest, else bounds."""
+        at, within = _row(positions), min(within, MUCH)
+        self.library.world_least(self.handle, _pointer(at), within, _pointer(self._distances))
+        return self._distances
+
+    def clear(self, positions: Array, required: float) -> bool:
+        """Whether all pairs have a distance in [m]."""
+        at = _row(positions)
+        return bool(self.library.world_state(self.handle, _pointer(at), required) < 0)
+
+    def edge(self, begin: Array, end: Array, required: Array) -> float | None:
+        """Return the share of a straight motion at which a pair is nearer than it may be, or None.
+
+        Args:
+            required: Distance that each pair keeps in [m] (k).
+        """
+        begin, end = _row(begin), _row(end)
+        return self._answer(
+            self.library.world_edge(
+                self.handle,
+                _pointer(begin),
+                _pointer(end),
+                _pointer(required),
+                ctypes.byref(self._where),
+            )
+        )
+
+    def path(
+        self,
+        starts: Array,
+        coefficients: Array,
+        times: Array,
+        along: Array,
+        turned: Array,
+        first_part: float,
+        required: Array,
+    ) -> float | None:
+        """Return a time of a path at which a pair is nearer than it may be, or None.
+
+        Args:
+            starts: When each polynomial begins in [s] (m).
+            coefficients: Of the powers 0 to 5 of the time since (m, 6, n).
+            times: Times that cut the path into cells in [s] (c).
+            along: Greatest motion of any shape until each of them in [m] (c).
+            turned: How far the joints turned until then in [rad] (c, n).
+            first_part: Motion within the parts that are looked at first in [m].
+            required: Distance that each pair keeps in [m] (k).
+        """
+        rows = [_row(each) for each in (starts, coefficients, times, along, turned)]
+        first, second, *others = map(_pointer, rows)
+        return self._answer(
+            self.library.world_path(
+                self.handle,
+                len(starts),
+                first,
+                second,
+                len(times),
+                *others,
+                first_part,
+                _pointer(required),
+                ctypes.byref(self._where),
+            )
+        )
+
+    def _answer(self, code: int) -> float | None:
+        if code < 0:
+            raise MemoryError
+        return None if code else self._where.value
+
+
+class CompiledSearch:
+    """Two trees of RRT-Connect, from the start and from goals; belongs to one thread."""
+
+    def __init__(
+        self, scene: CompiledScene, start: Array, required: Array, max_extension: float
+    ) -> None:
+        """Begin.
+
+        Args:
+            required: Distance that each pair keeps in [m] (k).
+            max_extension: Greatest length of an edge in [rad].
+        """
+        self._scene = scene  # which must not go before
+        self._library, self._count = scene.library, len(start)
+        start = _row(start)
+        self._handle = self._library.search_new(
+            scene.handle, _pointer(start), _pointer(required), max_extension
+        )
+        if not self._handle:
+            raise MemoryError
+        weakref.finalize(self, self._library.search_free, self._handle)
+
+    def add_goal(self, goal: Array) -> None:
+        """Grow from a goal, too."""
+        goal = _row(goal)
+        self._library.search_add_goal(self._handle, _pointer(goal))
+
+    def grow(self, targets: Array) -> Array | None:
+        """Grow towards samples (m, n); return the places of a path (k, n) where the trees met."""
+        rows = _row(targets)
+        count = self._library.search_grow(self._handle, _pointer(rows), len(rows))
+        if count < 0:
+            raise MemoryError
+        if not count:
+            return None
+        places = np.empty((count, self._count))
+        self._library.search_path(self._handle, _pointer(places))
+        return places
+
+
+def compiled_scene(scene: PlanningScene) -> CompiledScene | None:
+    """Return a scene for the compiled core; None without a core, or for octrees."""
+    loaded = library()
+    if loaded is None or scene.of_cells.any() or not scene.pairs:
+        return None
+    return CompiledScene(loaded, scene)
+
+
+@lru_cache(maxsize=1)
+def library() -> Native | None:
+    """Return the compiled core, which is built if need be; None where that is not possible."""
+    if os.environ.get('ARM_MODEL_COMPILED') == '0':
+        return None
+    try:
+        loaded = ctypes.CDLL(str(_built()))
+    except (OSError, ValueError, subprocess.SubprocessError) as error:
+        reason = getattr(error, 'stderr', None) or error
+        logging.getLogger(__name__).warning(
+            'motions are checked in Python, several times slower: the C core was not built: %s;'
+            ' install a C compiler (apt install gcc)',
+            str(reason).strip(),
+        )
+        return None
+    for name in ('world_new', 'search_new'):
+        getattr(loaded, name).restype = ctypes.c_void_p
+    pointer, number, real = ctypes.c_void_p, ctypes.c_int, ctypes.c_double
+    for name, arguments in {
+        'world_new': [number] * 5 + [pointer] * 15,
+        'world_free': [pointer],
+        'world_least': [pointer, pointer, real, pointer],
+        'world_state': [pointer, pointer, real],
+        'world_edge': [pointer] * 5,
+        'world_path': [pointer, number, pointer, pointer, number, *[pointer] * 3, real]
+        + [pointer] * 2,
+        'search_new': [pointer, pointer, pointer, real],
+        'search_free': [pointer],
+        'search_add_goal': [pointer, pointer],
+        'search_grow': [pointer, pointer, number],
+        'search_path': [pointer, pointer],
+    }.items():
+        getattr(loaded, name).argtypes = arguments
+    return loaded
+
+
+def _built() -> Path:
+    """Return the shared library, which is built where it is not in the cache.
+
+    Raises:
+        OSError, ValueError, SubprocessError: It cannot be built.
+    """
+    compiler = os.environ.get('CC') or shutil.which('cc') or shutil.which('gcc')
+    if not compiler:
+        raise OSError('there is no C compiler')
+    key = (SOURCE.read_bytes(), *map(str.encode, (compiler, *FLAGS, platform.machine())))
+    digest = hashlib.sha256(b'\0'.join(key)).hexdigest()
+    hulls = cache_folder()
+    folder = Path(tempfile.mkdtemp(prefix='arm_model-')) if hulls is None else hulls.parent
+    target = folder / 'compiled' / f'{digest}.so'
+    if not target.is_file():
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with _beside(target) as made:
+            command = [compiler, *FLAGS, '-o', str(made), str(SOURCE), '-lm']
+            subprocess.run(
+                command, check=True, capture_output=True, text=True, timeout=BUILD_TIME
+            )
+            made.replace(target)  # in one step: other processes build it, too
+    return target
+
+
+@contextlib.contextmanager
+def _beside(target: Path) -> Iterator[Path]:
+    made = target.with_suffix(f'.{os.getpid()}')
+    try:
+        yield made
+    finally:
+        made.unlink(missing_ok=True)
+
+
+def _joints(scene: PlanningScene) -> Sequence[Array | Integers]:
+    """Return factors and offsets of columns, parents, which slide, placements, and axes."""
+    kinematics, model = scene.kinematics, scene.kinematics.native
+    count = len(kinematics.joints)
+    offsets = kinematics.expanded(np.zeros(count))
+    factors = np.array([kinematics.expanded(row) - offsets for row in np.eye(count)]).T
+    screws = np.array([_screw(model, joint) for joint in range(1, model.njoints)])
+    slides = np.array([not row[3:].any() for row in screws], np.int32)
+    placements = [_numbers(each) for each in list(model.jointPlacements)[1:]]
+    return [
+        np.ascontiguousarray(factors),
+        np.array(offsets, float),
+        np.array(list(model.parents)[1:], np.int32) - 1,
+        slides,
+        np.array(placements),
+        np.ascontiguousarray(np.where(slides[:, None], screws[:, :3], screws[:, 3:])),
+    ]
+
+
+def _screw(model: Native, joint: int) -> Array:
+    """Return the linear and angular velocity that a unit of a joint's motion makes."""
+    data = model.joints[joint].createData()
+    model.joints[joint].calc(data, np.zeros(model.nq))
+    screw: Array = np.array(data.S).ravel()
+    return screw
+
+
+def _shapes(scene: PlanningScene) -> Sequence[Array | Integers]:
+    """Return kinds, movers, placements, sizes, swept, starts of corners, corners, and pairs."""
+    things = list(scene.geometry.geometryObjects)
+    kinds, sizes, swept, corners = [], [], [], []
+    for thing in things:
+        solid = thing.geometry
+        kinds.append(KINDS[type(solid)])
+        radius, half = getattr(solid, 'radius', 0.0), getattr(solid, 'halfLength', 0.0)
+        size = [radius, half, 0.0, 0.0]
+        if isinstance(solid, coal.Box):
+            size = [*solid.halfSide.tolist(), 0.0]
+        elif isinstance(solid, coal.Halfspace):
+            size = [*solid.n.tolist(), solid.d]
+        rounded = radius if isinstance(solid, coal.Sphere | coal.Capsule) else 0.0
+        sizes.append(size)
+        swept.append(rounded + solid.getSweptSphereRadius())
+        corners.append(solid.points() if isinstance(solid, coal.Convex) else NO_POINTS)
+    counts = [len(each) for each in corners]
+    pairs = [(pair.first, pair.second) for pair in scene.geometry.collisionPairs]
+    return [
+        np.array(kinds, np.int32),
+        np.array([thing.parentJoint - 1 for thing in things], np.int32),
+        np.array([_numbers(thing.placement) for thing in things]),
+        np.array(sizes),
+        np.array(swept),
+        np.concatenate(((0,), np.cumsum(counts))).astype(np.int32),
+        np.ascontiguousarray(np.concatenate(corners)),
+        np.array(pairs, np.int32),
+    ]
+
+
+def _numbers(placement: pin.SE3) -> Array:
+    """Return the rotation by rows, and the origin."""
+    numbers: Array = np.concatenate((placement.rotation.ravel(), placement.translation))
+    return numbers
+
+
+def _row(values: Array) -> Array:
+    """Return numbers as C reads them; hold them until it has."""
+    return np.ascontiguousarray(values, dtype=np.float64)
+
+
+def _pointer(array: Array | Integers) -> int:
+    return array.ctypes.data

@@ -1,0 +1,152 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The compiled core agrees with coal, and goes without a word where there is no compiler."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import logging
+from pathlib import Path
+
+from hypothesis import given, settings, strategies as st
+from model_robots import robot
+import numpy as np
+import pytest
+
+from arm_model import (
+    Box,
+    Capsule,
+    Clearances,
+    CollisionObject,
+    compiled_scene,
+    CompiledScene,
+    Cone,
+    Cylinder,
+    Mesh,
+    Plane,
+    PlanningScene,
+    Pose,
+    rotation_of,
+    Shape,
+    Sphere,
+)
+from arm_model.scene import compiled
+
+EXACT = 2e-5  # how far a distance may be below that of coal in [m]
+ROUNDING = 1e-6  # how far it may be above that in [m]
+PADDING = 0.02  # of a link in [m]
+
+lengths = st.floats(0.02, 0.5)
+corners = st.lists(st.tuples(lengths, lengths, lengths), min_size=8, max_size=20)
+solids = st.one_of(
+    st.builds(Box, lengths, lengths, lengths),
+    st.builds(Sphere, lengths),
+    st.builds(Cylinder, lengths, lengths),
+    st.builds(Capsule, lengths, lengths),
+    st.builds(Cone, lengths, lengths),
+    st.builds(Plane, st.tuples(lengths, lengths, lengths), st.floats(-1.5, -0.5)),
+    st.integers(0, 99).map(lambda seed: Mesh(np.random.default_rng(seed).random((20, 3)))),
+)
+numbers = st.floats(-1.0, 1.0)
+poses = st.builds(
+    lambda turn, place: Pose(rotation_of(turn / np.linalg.norm(turn)), np.array(place)),
+    st.tuples(numbers, numbers, numbers, st.just(1.0)),
+    st.tuples(numbers, numbers, numbers),
+)
+
+
+def scene_with(shape: Shape, pose: Pose, name: str = 'panda') -> PlanningScene:
+    """An arm beside an object, one of its links thicker than it is."""
+    model = robot(name)
+    scene = model.scene.with_object(CollisionObject('thing', shape, pose=pose))
+    link = next(iter(reversed(model.scene.link_shapes)))
+    return scene.with_contents(padding={link: PADDING})
+
+
+def core(scene: PlanningScene) -> CompiledScene:
+    """The compiled core of a scene; machines for tests have a compiler."""
+    found = compiled_scene(scene)
+    assert found is not None
+    return found
+
+
+@given(shape=solids, pose=poses, seed=st.integers(0, 10_000))
+@settings(max_examples=60, deadline=None)
+def test_distances_are_those_of_coal(shape: Shape, pose: Pose, seed: int) -> None:
+    """Never above, hardly below; what overlaps there has no distance here."""
+    scene = scene_with(shape, pose)
+    limits = robot('panda').limits
+    place = np.random.default_rng(seed).uniform(limits.lower, limits.upper)
+    results = Clearances(scene).measure(place, range(len(scene.pairs)))
+    expected = np.array([results[pair].min_distance for pair in range(len(scene.pairs))])
+    found, apart = core(scene).least(place, np.inf), expected > 0.0
+    assert (found <= np.maximum(expected, 0.0) + ROUNDING).all()
+    assert (found[apart] >= expected[apart] - EXACT).all()
+    for within in (0.001, 0.1, 1.0):
+        bounds = core(scene).least(place, within)
+        assert (bounds <= np.maximum(expected, 0.0) + ROUNDING).all()
+        assert core(scene).clear(place, within) == bool((found >= within).all())
+
+
+@pytest.mark.parametrize('name', ['panda', 'prbt', 'gp110'])
+def test_a_free_edge_is_free_between_its_ends(name: str) -> None:
+    """And what is not keeps less than it must, where the core says."""
+    model, draw = robot(name), np.random.default_rng(1)
+    scene = scene_with(Box(0.2, 0.5, 0.5), Pose(np.eye(3), np.array([0.6, 0.0, 0.4])), name)
+    checked, reference = core(scene), Clearances(scene)
+    required, answers = np.full(len(scene.pairs), 1e-3), []
+    while len(answers) < 60:
+        begin = draw.uniform(model.limits.lower, model.limits.upper)
+        if not checked.clear(begin, 1e-3):
+            continue
+        end = begin + draw.normal(size=len(begin)) * 0.3
+        share = checked.edge(begin, end, required)
+        if share is None:
+            for place in np.linspace(begin, end, 200):
+                assert reference.least(place, 0.0).min() >= 0.0
+        else:
+            place = begin + share * (end - begin)
+            assert reference.least(place, 1e-2).min() <= 1e-3 + ROUNDING
+        answers.append(share is None)
+    assert 0.1 < np.mean(answers) < 0.99
+
+
+@pytest.fixture
+def anew(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]:
+    """A process that has not built the core."""
+    monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path))
+    compiled.library.cache_clear()
+    yield
+    compiled.library.cache_clear()
+
+
+@pytest.mark.usefixtures('anew')
+@pytest.mark.parametrize(
+    ('setting', 'value', 'warned'),
+    [
+        ('CC', '/bin/false', 1),  # fails
+        ('CC', '/nowhere/cc', 1),
+        ('ARM_MODEL_COMPILED', '0', 0),
+    ],
+)
+def test_without_the_core_there_is_one_warning(
+    setting: str,
+    value: str,
+    warned: int,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """And none where it is not wanted."""
+    monkeypatch.setenv(setting, value)
+    with caplog.at_level(logging.WARNING):
+        assert compiled_scene(robot('panda').scene) is None
+        assert compiled_scene(robot('panda').scene) is None
+    assert len(caplog.records) == warned
+
+
+@pytest.mark.usefixtures('anew')
+def test_what_is_built_is_kept(tmp_path: Path) -> None:
+    """One file, and nothing beside it."""
+    assert compiled_scene(robot('panda').scene) is not None
+    (folder,) = (tmp_path / 'arm_model').iterdir()
+    assert [each.suffix for each in folder.iterdir()] == ['.so']
