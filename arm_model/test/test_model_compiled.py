@@ -8,7 +8,8 @@ from collections.abc import Iterator
 import logging
 from pathlib import Path
 
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from model_robots import robot
 import numpy as np
 import pytest

@@ -202,6 +202,34 @@ def test_bodies_that_lie_apart_have_a_hull_each(tmp_path: Path) -> None:
         assert ('ball' in found) is touches
 
 
+def test_a_body_of_several_materials_is_whole(tmp_path: Path) -> None:
+    """Each colour counts, as in the files that makers of arms publish."""
+    path, lines = tmp_path / 'cube.obj', two_cubes(0.5).splitlines()
+    firsts = [line for line in lines if line.startswith('f')]
+    colours = [f'newmtl {name}\nKd {shade} 0 0' for name, shade in (('dark', 0.1), ('bright', 1))]
+    path.with_suffix('.mtl').write_text('\n'.join(colours), encoding='utf-8')
+    parts = [
+        'mtllib cube.mtl',
+        'o cube',
+        *(line for line in lines if line.startswith('v')),
+        'usemtl dark',
+        *firsts[:7],
+        'usemtl bright',
+        *firsts[7:],
+    ]
+    path.write_text('\n'.join(parts), encoding='utf-8')
+    hulls = meshes.load_hulls(path)
+    path.write_text(two_cubes(0.5), encoding='utf-8')
+    whole = meshes.load_hulls(path)
+    assert [len(each.points) for each in hulls] == [len(each.points) for each in whole]
+    assert np.array_equal(
+        *(
+            np.sort(np.concatenate([each.points for each in found]), axis=0)
+            for found in (hulls, whole)
+        )
+    )
+
+
 def test_without_a_cache_hulls_are_made_all_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -166,8 +166,8 @@ class ValidityCheck:
         required = self.required(path.at(0.0).position, path.end.position)
         along = turned @ rates.max(axis=0, initial=0.0)  # halves of a part move alike
         if self.compiled is not None:
-            polynomials = path.starts, path.coefficients
-            return self.compiled.path(*polynomials, times, along, turned, FIRST_PART, required)
+            polynomials, bounds = (path.starts, path.coefficients), (times, along, turned)
+            return self.compiled.path(polynomials, bounds, FIRST_PART, required)
         needed = required.tolist()
         ends = np.linspace(0.0, along[-1], max(math.ceil(along[-1] / FIRST_PART), 1) + 1)
         parts = np.stack((ends[:-1], ends[1:]), axis=1)

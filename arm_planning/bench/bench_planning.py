@@ -204,6 +204,7 @@ def best_length(model: RobotModel, asked: Problem) -> float | None:
     deadline, check = time.monotonic() + LONGEST, ValidityCheck(model.limits, asked.scene)
     draw = np.random.default_rng(asked.seed)
     motions = MotionCheck(check, (asked.start, asked.goal))
+    lower, upper = model.limits.lower, model.limits.upper
     found = []
 
     def expired() -> bool:
@@ -213,7 +214,7 @@ def best_length(model: RobotModel, asked: Problem) -> float | None:
         places = rrt_connect(
             asked.start,
             [asked.goal],
-            lambda count: draw.uniform(model.limits.lower, model.limits.upper, (count, len(model))),
+            lambda count: draw.uniform(lower, upper, (count, len(model))),
             motions,
             expired,
             further=iter(()),

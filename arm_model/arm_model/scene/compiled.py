@@ -120,35 +120,33 @@ class CompiledScene:
 
     def path(
         self,
-        starts: Array,
-        coefficients: Array,
-        times: Array,
-        along: Array,
-        turned: Array,
+        polynomials: tuple[Array, Array],
+        cells: tuple[Array, Array, Array],
         first_part: float,
         required: Array,
     ) -> float | None:
         """Return a time of a path at which a pair is nearer than it may be, or None.
 
         Args:
-            starts: When each polynomial begins in [s] (m).
-            coefficients: Of the powers 0 to 5 of the time since (m, 6, n).
-            times: Times that cut the path into cells in [s] (c).
-            along: Greatest motion of any shape until each of them in [m] (c).
-            turned: How far the joints turned until then in [rad] (c, n).
+            polynomials: When each begins in [s] (m), and its coefficients of the powers 0 to 5 of
+                the time since then (m, 6, n).
+            cells: Times that cut the path in [s] (c), and until each of them the greatest motion
+                of any shape in [m] (c) and how far the joints turned in [rad] (c, n).
             first_part: Motion within the parts that are looked at first in [m].
             required: Distance that each pair keeps in [m] (k).
         """
-        rows = [_row(each) for each in (starts, coefficients, times, along, turned)]
-        first, second, *others = map(_pointer, rows)
+        starts, coefficients = map(_row, polynomials)
+        times, along, turned = map(_row, cells)
         return self._answer(
             self.library.world_path(
                 self.handle,
                 len(starts),
-                first,
-                second,
+                _pointer(starts),
+                _pointer(coefficients),
                 len(times),
-                *others,
+                _pointer(times),
+                _pointer(along),
+                _pointer(turned),
                 first_part,
                 _pointer(required),
                 ctypes.byref(self._where),
@@ -263,9 +261,7 @@ def _built() -> Path:
         target.parent.mkdir(parents=True, exist_ok=True)
         with _beside(target) as made:
             command = [compiler, *FLAGS, '-o', str(made), str(SOURCE), '-lm']
-            subprocess.run(
-                command, check=True, capture_output=True, text=True, timeout=BUILD_TIME
-            )
+            subprocess.run(command, check=True, capture_output=True, text=True, timeout=BUILD_TIME)
             made.replace(target)  # in one step: other processes build it, too
     return target
 

@@ -49,7 +49,7 @@ MIN_FULLNESS = 0.5
 FAR_OUT, MAX_HALVINGS = 0.005, 8
 """Triangles that stand out of a piece by this share of the body are halved, so many times."""
 
-FORMAT = 'v3'  # version of the files in the cache: part of their names
+FORMAT = 'v4'  # version of the files in the cache: part of their names
 
 
 class MeshError(ValueError):
@@ -160,12 +160,33 @@ def hulls_of_file(path: Path) -> Sequence[Hull]:
         raise MeshError('a mesh needs corners, and finite ones')
     faces = map(mesh.tri_indices, range(mesh.num_tris))
     triangles = np.array([[face[0], face[1], face[2]] for face in faces], dtype=int)
+    triangles = _of_parts(triangles, len(corners))
     if not len(triangles):
         return (Hull(frozen(convex(corners).points()), 1.0),)
     points, same = np.unique(corners, axis=0, return_inverse=True)
     triangles = same.reshape(-1)[triangles]
     bodies = _bodies(points, triangles)
     return tuple(hull for body in bodies for hull in _hulls_of_body(points, triangles[body]))
+
+
+def _of_parts(triangles: Places, corners: int) -> Places:
+    """Return triangles whose corners count through the whole mesh; none where that is not known.
+
+    coal numbers the corners of each material of a mesh from 0 on. The first triangle of a material
+    has the corners 0, 1 and 2, and others only such as were named before, or the next one.
+
+    Args:
+        corners: Number of corners of the mesh.
+    """
+    if len(np.unique(triangles)) == corners:
+        return triangles
+    (firsts,) = (triangles == np.arange(3)).all(axis=1).nonzero()
+    parts = np.split(triangles, firsts[firsts > 0])
+    counts = [int(part.max()) + 1 for part in parts]
+    if sum(counts) != corners:
+        return triangles[:0]
+    begins = np.cumsum([0, *counts[:-1]])
+    return np.concatenate([part + begin for part, begin in zip(parts, begins, strict=True)])
 
 
 def _hulls_of_body(points: Array, triangles: Places) -> Sequence[Hull]:

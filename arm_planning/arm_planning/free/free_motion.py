@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -77,32 +77,14 @@ class FreeMotion:
         goals = sorted(goals, key=lambda goal: float(np.linalg.norm(goal - start)))
         direct = float(np.linalg.norm(goals[0] - start))
         searches = MAX_SEARCHES if self._constraints is None else 1
-        lower = np.where(self._limits.continuous, start - MAX_TURN, self._limits.lower)
-        upper = np.where(self._limits.continuous, start + MAX_TURN, self._limits.upper)
-        drawn, tried, most, more = 0, 0, RESTART, iter(further)
-
-        def sample(count: int) -> Array:
-            nonlocal drawn
-            drawn += count
-            states: Array = lower + (upper - lower) * self._draw.random((count, len(start)))
-            return states
-
         found: Path | None = None
         shortest, near = np.inf, None
-        straight = (np.array((start, goal)) for goal in goals if motions.clear(start, goal))
-        while not expired():
-            places = next(straight, None)
+        ways = self._ways(start, goals, motions, expired, iter(further))
+        for tried, (places, drawn) in enumerate(ways, 1):
             if places is None:
-                tried += 1
-                places = rrt_connect(
-                    start, goals, sample, motions, expired, further=more, most=most
-                )
-                if places is None and found is not None:
+                if found is not None:
                     break
-                if places is None:
-                    most *= 2
-                    continue
-                places = shortened(places, self._draw, motions, expired)
+                continue
             length = float(lengths_along(places)[-1])
             if length < shortest:
                 path = timed_path(places, self._limits, motions)
@@ -110,11 +92,9 @@ class FreeMotion:
                     near = motions.waypoints(places)
                     continue
                 found, shortest = path, length
-            if len(places) == 2 or length <= MAX_DETOUR_RATIO * direct:
+            straight = len(places) == 2 or length <= MAX_DETOUR_RATIO * direct
+            if straight or tried >= searches or drawn > CHEAP:
                 break
-            if tried >= searches or drawn > CHEAP:
-                break
-            most = CHEAP
         if found is not None:
             return found
         hint = '' if near is None else f'; the last one was refused: {near.reason}'
@@ -122,3 +102,38 @@ class FreeMotion:
             PlanningCode.TIMED_OUT,
             f'no path was found in time{hint}; allow more time, or make room at start and goal',
         )
+
+    def _ways(
+        self,
+        start: Array,
+        goals: Sequence[Array],
+        motions: MotionCheck,
+        expired: Callable[[], bool],
+        further: Iterator[Array | None],
+    ) -> Iterator[tuple[Array | None, int]]:
+        """Yield ways that look free, straight ones first, and how many samples were drawn.
+
+        A way is None where a search came to its end.
+        """
+        lower = np.where(self._limits.continuous, start - MAX_TURN, self._limits.lower)
+        upper = np.where(self._limits.continuous, start + MAX_TURN, self._limits.upper)
+        drawn, most = 0, RESTART
+
+        def sample(count: int) -> Array:
+            nonlocal drawn
+            drawn += count
+            states: Array = lower + (upper - lower) * self._draw.random((count, len(start)))
+            return states
+
+        for goal in goals:
+            if motions.clear(start, goal):
+                yield np.array((start, goal)), drawn
+        while not expired():
+            places = rrt_connect(
+                start, goals, sample, motions, expired, further=further, most=most
+            )
+            if places is None:
+                most *= 2
+            else:
+                most, places = CHEAP, shortened(places, self._draw, motions, expired)
+            yield places, drawn

@@ -7,7 +7,8 @@ with the balancing of the trees that OMPL has. Under constraints the trees grow 
 whose ends are led back to them: Berenson et al., "Manipulation planning on constraint manifolds"
 (CBiRRT), ICRA 2009. One is ours because the collision check decides over its speed, and that of
 the scene is quicker here than a library's that calls back for each state; the bench has the
-comparison. Without constraints the compiled one of arm_model takes its place where there is one. Straight motions between places on a path replace what lies between them.
+comparison. Without constraints the compiled search of arm_model takes its place where there is
+one. Straight motions between places on a path replace what lies between them.
 """
 
 from __future__ import annotations
