@@ -23,7 +23,7 @@ import psutil
 from simulated_arm import SimulatedArm
 
 from arm_canopen import Event
-from arm_canopen.cia402.drive import Drive
+from arm_canopen.cia402.axis import Axis
 from arm_canopen.cia402.motion_group import MotionGroup
 from arm_canopen.config import load_bus
 from arm_canopen.master.network import Network
@@ -90,7 +90,7 @@ def run_alone(path: str, interface: str) -> dict[str, float]:
 
     with open_bus(interface) as can:
         network = Network(config, can.send, ignore)
-        drives = [Drive(node, network.scheduler) for node in network.nodes.values()]
+        drives = [Axis(node, network.scheduler) for node in network.nodes.values()]
         network.on_cycle = MotionGroup(drives, ignore).cycle
         thread = NetworkThread(can, network)
         thread.start()

@@ -30,8 +30,7 @@ from canopen_core import (
 from canopen_core.can import open_bus
 from canopen_core.standard import DriveState, OperationMode
 
-from .cia402.motion import AxisFeedback, MotionSource, Setpoint
-from .cia402.refusal import Refusal, RefusalCause
+from .cia402.motion import AxisFeedback, MotionSource, Refusal, RefusalCause, Setpoint
 from .config import load_bus
 from .config.model import BusConfig, NodeConfig
 

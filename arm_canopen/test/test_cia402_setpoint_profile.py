@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.cia402.setpoint_profile import ProfileLimits, SetpointProfile
+from arm_canopen.cia402.modes.setpoint_profile import ProfileLimits, SetpointProfile
 
 CYCLE = 0.01  # [s]
 LIMITS = ProfileLimits(1.0, 10.0, 10.0)

@@ -130,7 +130,7 @@ def test_a_drive_in_operation_is_seen_from_the_middle_of_a_log(watched: Watched)
     log.cycles(30, position=1500, target=1600)
     watched.play(log)
     (axis,) = watched.bus.axes['joint1']
-    status = axis.status(watched.bus.now)
+    status = axis.status()
     assert status.node.online
     assert status.node.nmt_state is NmtState.OPERATIONAL
     assert status.state is DriveState.OPERATION_ENABLED
@@ -150,7 +150,7 @@ def test_nothing_is_known_before_it_was_seen(watched: Watched) -> None:
     log.cycles(20, silent=True)
     watched.play(log)
     (axis,) = watched.bus.axes['joint1']
-    status = axis.status(watched.bus.now)
+    status = axis.status()
     assert not status.node.online
     assert status.state is DriveState.UNKNOWN
     assert math.isnan(status.position)
@@ -172,10 +172,10 @@ def test_a_fault_is_reported_as_the_master_does(watched: Watched) -> None:
     log.add(0x582, struct.pack('<BHBHxx', 0x4B, 0x603F, 0, 0x8611), 0.007)
     log.cycles(1, word=FAULT)
     watched.play(log)
-    assert '0x8611' in axis.status(watched.bus.now).error
+    assert '0x8611' in axis.status().error
     log.cycles(5)
     watched.play(log)
-    assert axis.status(watched.bus.now).error == ''
+    assert axis.status().error == ''
 
 
 def test_a_heartbeat_that_is_missing_is_missed_at_its_time(watched: Watched) -> None:
@@ -188,11 +188,11 @@ def test_a_heartbeat_that_is_missing_is_missed_at_its_time(watched: Watched) -> 
     (lost,) = [event for event in watched.events if event.kind is EventKind.HEARTBEAT_LOST]
     assert 'heartbeat lost' in lost.text
     (axis,) = watched.bus.axes['joint1']
-    assert not axis.status(watched.bus.now).node.online
+    assert not axis.status().node.online
     log.now = last + 6.0
     log.cycles(20, position=100)
     watched.play(log)
-    assert axis.status(watched.bus.now).position == 0.1
+    assert axis.status().position == 0.1
 
 
 def test_a_restart_of_the_device_ends_what_was_known(watched: Watched) -> None:
@@ -203,7 +203,7 @@ def test_a_restart_of_the_device_ends_what_was_known(watched: Watched) -> None:
     watched.play(log)
     (axis,) = watched.bus.axes['joint1']
     assert 'restarted' in watched.texts(Severity.ERROR)[0]
-    assert not axis.status(watched.bus.now).node.online
+    assert not axis.status().node.online
 
 
 def test_what_no_pdo_carries_is_taken_from_the_answers_of_the_drive(tmp_path: Path) -> None:
@@ -222,7 +222,7 @@ def test_what_no_pdo_carries_is_taken_from_the_answers_of_the_drive(tmp_path: Pa
     log.cycles(1, silent=True)
     watched.play(log)
     (axis,) = watched.bus.axes['joint1']
-    assert axis.status(watched.bus.now).position == 0.8
+    assert axis.status().position == 0.8
 
 
 def test_the_masters_own_frames_are_no_other_master(watched: Watched) -> None:

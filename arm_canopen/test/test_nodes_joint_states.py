@@ -21,7 +21,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from arm_canopen import CanopenError
-from arm_canopen.cia402.drive_view import DriveView
+from arm_canopen.cia402.state import AxisState
 from arm_canopen.nodes.joint_states import BusJointStates, DriveJointStates
 from arm_canopen.nodes.output_thread import OutputThread
 
@@ -56,7 +56,7 @@ class Scene:
         """Make them."""
         self.node = node
         self.axes = [Axis('shoulder', 0.1, 0.2, 0.3), Axis('elbow', 0.4, 0.5, 0.6)]
-        self.drive = DriveJointStates(node, cast('list[DriveView]', self.axes))
+        self.drive = DriveJointStates(node, cast('list[AxisState]', self.axes))
         self.output = OutputThread(node.get_logger())  # type: ignore[no-untyped-call]
         self.bus = BusJointStates(node, [self.drive], self.output)
         self.received: dict[str, JointState] = {}
@@ -142,7 +142,7 @@ def test_drives_that_the_urdf_lacks_are_named_once(
     """They keep their own topics; where it lacks all of them, that of the robot, too."""
     names = [(first, 'tool'), ('left', 'right')]
     drives = [
-        DriveJointStates(scene.node, cast('list[DriveView]', [Axis(axis, 0.7) for axis in axes]))
+        DriveJointStates(scene.node, cast('list[AxisState]', [Axis(axis, 0.7) for axis in axes]))
         for axes in names
     ]
     scene.bus = BusJointStates(scene.node, drives, scene.output)
@@ -159,7 +159,7 @@ def test_drives_that_the_urdf_lacks_are_named_once(
 def test_a_drive_that_is_not_fresh_is_left_out_after_a_while(scene: Scene) -> None:
     """What is not known is not invented; the drive comes back with its TPDOs."""
     other = Axis('wrist', 0.7)
-    drives = [scene.drive, DriveJointStates(scene.node, cast('list[DriveView]', [other]))]
+    drives = [scene.drive, DriveJointStates(scene.node, cast('list[AxisState]', [other]))]
     scene.bus = BusJointStates(scene.node, drives, scene.output)
     scene.bus.publish_robot('')
     scene.listen('/joint_states')

@@ -13,9 +13,8 @@ from canopen_core import CanopenError, DriveError
 from canopen_core.standard import DriveState
 
 from ..master.events import Event, EventKind, Report, Severity
-from .drive import Drive
-from .motion import AxisFeedback, MotionSource, Setpoint
-from .refusal import Refusal, RefusalCause
+from .axis import Axis
+from .motion import AxisFeedback, MotionSource, Refusal, RefusalCause, Setpoint
 
 HAND_OVER_MARGIN = 2.0  # cycles of profile velocity from the set-point that a stream may start
 SPEED_MARGIN = 1.5  # share of the greatest speed (0x607F) above which a step is a jump
@@ -32,8 +31,8 @@ class Attachment:
     """
 
     source: MotionSource
-    drives: list[Drive]
-    owned: list[Drive] = field(default_factory=list)
+    drives: list[Axis]
+    owned: list[Axis] = field(default_factory=list)
     streaming: set[str] = field(default_factory=set)
     failed: bool = False
 
@@ -46,7 +45,7 @@ class MotionGroup:
     itself.
     """
 
-    def __init__(self, drives: Sequence[Drive], report: Report) -> None:
+    def __init__(self, drives: Sequence[Axis], report: Report) -> None:
         self.drives = {drive.name: drive for drive in drives}  # the drives
         self._report = report
         self._attachments: list[Attachment] = []
@@ -120,9 +119,9 @@ class MotionGroup:
                 self._release(drive, Refusal(RefusalCause.SETPOINT_REFUSED, str(error)))
 
     def _stream(
-        self, attachment: Attachment, drive: Drive, setpoint: Setpoint, period: float
+        self, attachment: Attachment, drive: Axis, setpoint: Setpoint, period: float
     ) -> None:
-        position, before = setpoint.position, drive.control.setpoint
+        position, before = setpoint.position, drive.setpoint
         if drive.name not in attachment.streaming:
             margin = HAND_OVER_MARGIN * drive.view.parameters.profile.velocity * period
             if abs(position - before) > margin:
@@ -138,7 +137,7 @@ class MotionGroup:
             )
         drive.stream(setpoint)
 
-    def _release(self, drive: Drive, refusal: Refusal) -> None:
+    def _release(self, drive: Axis, refusal: Refusal) -> None:
         """Release a drive; a source that waits for it does not get it back."""
         for attachment in self._attachments:
             if drive in attachment.owned:
@@ -166,7 +165,7 @@ class MotionGroup:
         self._report(Event(EventKind.DRIVE, Severity.ERROR, '', text))
 
 
-def _feedback(drive: Drive) -> AxisFeedback:
+def _feedback(drive: Axis) -> AxisFeedback:
     """Return the state of a drive for its source; one for which that fails is stopped."""
     try:
         return drive.feedback()
@@ -179,7 +178,7 @@ def _feedback(drive: Drive) -> AxisFeedback:
         )
 
 
-def _greatest_speed(drive: Drive) -> float:
+def _greatest_speed(drive: Axis) -> float:
     """Return the speed in user units per second above which a stream is no motion any more."""
     parameters = drive.view.parameters
     if parameters.speed_limit is not None:

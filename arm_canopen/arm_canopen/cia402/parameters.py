@@ -15,8 +15,7 @@ from ..config.model.drive import DriveConfig
 from ..config.model.factor_group import ACCELERATION_ADDRESSES, FACTOR_ADDRESSES, FactorGroup
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Promise, Scheduler, Task
-from .setpoint_profile import ProfileLimits
-from .target_offset import OFFSET_OBJECTS
+from .modes import OFFSET_OBJECTS, ProfileLimits
 from .units import Units
 
 RETRY_PERIOD = 1.0  # [s] after which what a drive did not answer is read again

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The power drive system's state machine from the master's side (CiA 402-2, figure 4, table 28).
 
-Pure functions: which controlword leads from the state that the drive shows towards the one that is
-wanted. Bits of the operation mode are added elsewhere.
+One table: which command leads from the state that the drive shows towards the one that is wanted.
+Bits of the operation mode are added elsewhere.
 """
 
 from __future__ import annotations
@@ -41,54 +41,40 @@ TARGETS: tuple[DriveState, ...] = (
 )
 """States that a master can command; the others the drive enters by itself."""
 
-_UP: dict[DriveState, Command] = {
-    _S.SWITCH_ON_DISABLED: Command.SHUTDOWN,  # transition 2
-    _S.READY_TO_SWITCH_ON: Command.SWITCH_ON,  # 3
-    _S.SWITCHED_ON: Command.ENABLE_OPERATION,  # 4
-}
-"""The step upwards from each state."""
+_OFF, _STOP, _DOWN, _ON, _RUN = (
+    Command.DISABLE_VOLTAGE,
+    Command.QUICK_STOP,
+    Command.SHUTDOWN,
+    Command.SWITCH_ON,
+    Command.ENABLE_OPERATION,
+)
 
-_HOLD: dict[DriveState, Command] = {
-    _S.SWITCH_ON_DISABLED: Command.DISABLE_VOLTAGE,
-    _S.READY_TO_SWITCH_ON: Command.SHUTDOWN,
-    _S.SWITCHED_ON: Command.SWITCH_ON,
-    _S.OPERATION_ENABLED: Command.ENABLE_OPERATION,
-    _S.QUICK_STOP_ACTIVE: Command.QUICK_STOP,
+COMMANDS: dict[DriveState, tuple[Command, ...]] = {
+    # a column for each of TARGETS; transitions of figure 4 in brackets, none where it stays
+    _S.SWITCH_ON_DISABLED: (_OFF, _DOWN, _DOWN, _DOWN, _OFF),  # (2) upwards
+    _S.READY_TO_SWITCH_ON: (_OFF, _DOWN, _ON, _ON, _OFF),  # (7), (3)
+    _S.SWITCHED_ON: (_OFF, _DOWN, _ON, _RUN, _OFF),  # (10), (6), (4)
+    _S.OPERATION_ENABLED: (_OFF, _DOWN, _ON, _RUN, _STOP),  # (9), (8), (5), (11)
+    _S.QUICK_STOP_ACTIVE: (_OFF, _OFF, _OFF, _RUN, _STOP),  # (12), (16); other ways begin below
 }
-"""The command that keeps each state."""
+"""What leads from a state to each target by the shortest way.
 
-_RANK: dict[DriveState, int] = {
-    _S.SWITCH_ON_DISABLED: 0,
-    _S.READY_TO_SWITCH_ON: 1,
-    _S.SWITCHED_ON: 2,
-    _S.OPERATION_ENABLED: 3,
+From below Operation Enabled a quick stop is Switch On Disabled. States that are not here the drive
+leaves by itself, and a fault only by an explicit reset: they get DISABLE_VOLTAGE.
+"""
+
+_COMMANDS = {
+    (state, target): command
+    for state, row in COMMANDS.items()
+    for target, command in zip(TARGETS, row, strict=True)
 }
-
-_UNCONTROLLED = (_S.UNKNOWN, _S.NOT_READY_TO_SWITCH_ON, _S.FAULT_REACTION_ACTIVE, _S.FAULT)
 
 
 def next_command(state: DriveState, target: DriveState) -> Command:
-    """Return the command that leads from a state towards one of :data:`TARGETS`.
-
-    By the shortest way. In a fault, and where the drive goes on by itself, it is DISABLE_VOLTAGE:
-    a fault is never left as a side effect of wanting another state, only by an explicit reset.
-    """
+    """Return the command that leads from a state towards one of :data:`TARGETS`."""
     if target not in TARGETS:
         raise ValueError(f'{target.title} cannot be commanded; possible: {TARGETS}')
-    if state in _UNCONTROLLED:
-        return Command.DISABLE_VOLTAGE
-    if state is target:
-        return _HOLD[target]
-    if target is _S.QUICK_STOP_ACTIVE:
-        # only Operation Enabled leads there (11); from below, a quick stop is Switch On Disabled
-        return Command.QUICK_STOP if state is _S.OPERATION_ENABLED else Command.DISABLE_VOLTAGE
-    if state is _S.QUICK_STOP_ACTIVE:
-        # 16 back to Operation Enabled, else 12; the way to any other state begins at the bottom
-        enable = target is _S.OPERATION_ENABLED
-        return Command.ENABLE_OPERATION if enable else Command.DISABLE_VOLTAGE
-    if _RANK[state] < _RANK[target]:
-        return _UP[state]
-    return _HOLD[target]  # transitions 5 to 10 lead down directly
+    return _COMMANDS.get((state, target), Command.DISABLE_VOLTAGE)
 
 
 def fault_reset(state: DriveState, elapsed: float) -> int:

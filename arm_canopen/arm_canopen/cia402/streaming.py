@@ -4,15 +4,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Coroutine
 import math
+from typing import Any
 
 from canopen_core import DriveError
 
 from ..master.events import Severity
 from ..master.scheduler import Promise, Scheduler, Task
-from .drive import Drive
-from .sequences import DriveSequences
-from .stop_sequence import STOP_TIMEOUT
+from .axis import Axis
+from .stop import STOP_TIMEOUT
 
 
 class TargetStream:
@@ -24,9 +25,15 @@ class TargetStream:
     the drive or selects a mode is given while no targets come.
     """
 
-    def __init__(self, drive: Drive, scheduler: Scheduler, steps: DriveSequences) -> None:
-        self._drive = drive
-        self._steps = steps
+    def __init__(
+        self,
+        axis: Axis,
+        scheduler: Scheduler,
+        settle: Callable[[], Coroutine[Promise[Any], None, None]],
+    ) -> None:
+        """``settle`` waits until the drive has shown what it makes of the last command."""
+        self._axis = axis
+        self._settle = settle
         self._scheduler = scheduler
         self._came = -math.inf
         self._goes_on_until = 0.0
@@ -39,7 +46,7 @@ class TargetStream:
         self._came = self._scheduler.now
         if self._ended_by:
             raise DriveError(
-                f'{self._drive.name} takes no stream of targets: it was ended by {self._ended_by};'
+                f'{self._axis.name} takes no stream of targets: it was ended by {self._ended_by};'
                 ' stop the publisher, call ~/enable or the service of a mode, then stream anew'
             )
         self._begun = True
@@ -47,7 +54,7 @@ class TargetStream:
     def follow(self, delivery: Promise[None]) -> None:
         """A target was commanded: stop the drive when it refuses it, or no other one follows."""
         delivery.when_done(self._note_delivery)
-        self._goes_on_until = self._scheduler.now + self._drive.config.target_timeout
+        self._goes_on_until = self._scheduler.now + self._axis.config.target_timeout
         if self._watch is None or self._watch.done:
             self._watch = self._scheduler.background(self._watch_for_pause())
 
@@ -65,52 +72,51 @@ class TargetStream:
     def renew(self, by: str) -> None:
         """Admit a stream that begins from now on, but not one that comes already."""
         silence = self._scheduler.now - self._came
-        if silence <= self._drive.config.target_timeout:
+        if silence <= self._axis.config.target_timeout:
             self.end(by)
         else:
             self._ended_by, self._begun = '', False
 
     def _note_delivery(self, delivery: Promise[None]) -> None:
-        drive = self._drive
-        if delivery.error is None or self._ended_by or not drive.control.accepts_targets:
+        axis = self._axis
+        if delivery.error is None or self._ended_by or not axis.accepts_targets:
             return
         self.end('a target that the drive did not take')
-        drive.control.hold()
-        drive.warn(f'stopping: it has not taken a target of the stream ({delivery.error})')
+        axis.hold()
+        axis.warn(f'stopping: it has not taken a target of the stream ({delivery.error})')
 
     async def _watch_for_pause(self) -> None:
         while self._scheduler.now < self._goes_on_until:
             await self._scheduler.timer(self._goes_on_until - self._scheduler.now)
-        drive = self._drive
-        if not drive.control.accepts_targets:
+        axis = self._axis
+        if not axis.accepts_targets:
             return  # what has taken it away has reported it
-        paused = f'the stream of targets has paused for {drive.config.target_timeout * 1000:g} ms'
-        if drive.control.mode.setpoint is not None and not drive.control.mode.cyclic:
-            drive.warn(f'{paused}: it goes on to the last target, and rests there')
+        paused = f'the stream of targets has paused for {axis.config.target_timeout * 1000:g} ms'
+        if axis.mode.setpoint is not None and not axis.mode.cyclic:
+            axis.warn(f'{paused}: it goes on to the last target, and rests there')
             return
-        speed = drive.view.speed
-        drive.control.hold()
+        speed = axis.view.speed
+        axis.hold()
         self._scheduler.background(self._report_rest(paused, speed))
 
     async def _report_rest(self, paused: str, speed: float) -> None:
         """Report the stop when the axis stands, not when the halt begins."""
-        drive, steps = self._drive, self._steps
-        timeout = STOP_TIMEOUT + speed / drive.view.parameters.profile.deceleration
-        halted = drive.control.halt
+        axis = self._axis
+        timeout = STOP_TIMEOUT + speed / axis.view.parameters.profile.deceleration
 
         def ended() -> bool:
-            stands = drive.control.mode.braked and drive.view.stands
-            return stands or not drive.control.accepts_targets or not halted.held or halted.leaving
+            stands = axis.mode.braked and axis.view.stands
+            return stands or not axis.accepts_targets or not axis.halt.rests
 
-        await steps.settle()
+        await self._settle()
         try:
             await self._scheduler.until(ended, timeout)
         except TimeoutError:
-            drive.report(
+            axis.report(
                 Severity.ERROR,
                 f'{paused}: it was halted, but has not come to rest within {timeout:.1f} s and '
-                f'moves at {drive.view.velocity:g} per second',
+                f'moves at {axis.view.velocity:g} per second',
             )
             return
-        if halted.held and not halted.leaving and drive.control.accepts_targets:
-            drive.warn(f'{paused}: stopped; the next target goes on')
+        if axis.halt.rests and axis.accepts_targets:
+            axis.warn(f'{paused}: stopped; the next target goes on')

@@ -21,8 +21,7 @@ from canopen_core.standard import (
     sdo,
 )
 
-from ..cia402.drive_view import DriveView, FAULTY
-from ..cia402.status import axis_status, DriveStatus
+from ..cia402.state import AxisState, DriveStatus, FAULTY
 from ..config.model import BusConfig
 from ..master.events import EventKind, Report, Severity
 from ..master.network import Network
@@ -36,7 +35,7 @@ STEP = 0.02  # [s] in which time passes at most without a look for what is missi
 class ReplayedAxis:
     """An axis of a drive: its view, and what the recorded master commands to it."""
 
-    def __init__(self, view: DriveView) -> None:
+    def __init__(self, view: AxisState) -> None:
         """Bind to the view."""
         self.view = view  # its state
         # position last commanded in user units, NaN while no RPDO has carried one;
@@ -72,19 +71,15 @@ class ReplayedAxis:
             self.setpoint = self._target()
 
     def _target(self) -> float:
-        objects = self.view.objects
-        interpolated = objects.mode_display == OperationMode.INTERPOLATED_POSITION
-        target = objects.held_position(
-            OperationMode.INTERPOLATED_POSITION if interpolated else OperationMode.CYCLIC_POSITION,
-            self.view.parameters.offsets,
+        interpolated = self.view.mode == OperationMode.INTERPOLATED_POSITION
+        target = self.view.held_position(
+            OperationMode.INTERPOLATED_POSITION if interpolated else OperationMode.CYCLIC_POSITION
         )
         return math.nan if target is None else self.view.units.position.commanded(target)
 
-    def status(self, now: float) -> DriveStatus:
-        """Take a snapshot at a time of the log in [s]."""
-        return axis_status(
-            self.view, now, setpoint=self.setpoint, following_error=self.following_error
-        )
+    def status(self) -> DriveStatus:
+        """Return a snapshot at the time of the log."""
+        return self.view.status(self.setpoint, self.following_error)
 
 
 class BusReplay:
@@ -126,7 +121,7 @@ class BusReplay:
         if config.is_drive:
             warn = partial(node.report, EventKind.DRIVE, Severity.WARNING)
             self.axes[node.name] = [
-                ReplayedAxis(DriveView(node, self.network.scheduler, axis, warn))
+                ReplayedAxis(AxisState(node, self.network.scheduler, axis, warn))
                 for axis in config.axes
             ]
         for output in node.image.rpdos:
@@ -232,7 +227,7 @@ class BusReplay:
         node.objects.note_value(answer.index, answer.subindex, answer.data)
         for axis in self.axes.get(node.name, ()):
             view = axis.view
-            if answer.index == view.objects.at(Index.ERROR_CODE) and view.state in FAULTY:
+            if answer.index == view.at(Index.ERROR_CODE) and view.state in FAULTY:
                 view.error = error_code_text(int.from_bytes(answer.data[:2], 'little'))
 
 

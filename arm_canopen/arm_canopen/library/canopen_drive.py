@@ -10,9 +10,9 @@ from functools import partial
 from canopen_core import DriveError
 from canopen_core.standard import DriveState, OperationMode
 
-from ..cia402.drive_commands import DriveCommands, Sequence
-from ..cia402.position_modes import Move
-from ..cia402.status import drive_status, DriveStatus
+from ..cia402.commands import AxisCommands, Sequence
+from ..cia402.modes import Move
+from ..cia402.state import DriveStatus
 from ..master.runner import NetworkThread
 from .device import DeviceSdo
 
@@ -37,12 +37,12 @@ class CanopenDrive:
         sdo: Objects of its device.
     """
 
-    def __init__(self, commands: DriveCommands, thread: NetworkThread) -> None:
-        drive = commands.drive
-        self.name = drive.name
-        self.sdo = DeviceSdo(drive.node, thread)
+    def __init__(self, commands: AxisCommands, thread: NetworkThread) -> None:
+        axis = commands.axis
+        self.name = axis.name
+        self.sdo = DeviceSdo(axis.node, thread)
         self._commands = commands
-        self._drive = drive
+        self._axis = axis
         self._thread = thread
 
     def status(self) -> DriveStatus:
@@ -51,7 +51,7 @@ class CanopenDrive:
         Raises:
             BusError: The master has ended.
         """
-        return self._thread.call(lambda: drive_status(self._drive, self._thread.now())).result()
+        return self._thread.call(self._axis.status).result()
 
     @property
     def state(self) -> DriveState:
@@ -71,7 +71,7 @@ class CanopenDrive:
     @property
     def mode(self) -> OperationMode:
         """Mode of operation that is commanded."""
-        return self._thread.call(lambda: self._drive.control.mode.number).result()
+        return self._thread.call(lambda: self._axis.mode.number).result()
 
     def init(self) -> str:
         """Reset a fault, enable, home where bus.yml has a method; no mode is selected then."""
@@ -132,12 +132,12 @@ class CanopenDrive:
         """
         if self.mode not in POSITION_MODES:
             self.select_mode(OperationMode.PROFILE_POSITION)
-        control, commands = self._drive.control, self._commands
+        axis, commands = self._axis, self._commands
 
         def give() -> str:
-            if control.mode.number is OperationMode.PROFILE_POSITION:
+            if axis.mode.number is OperationMode.PROFILE_POSITION:
                 return commands.move(Move(position, relative=relative))
-            return commands.set_target(control.setpoint + position if relative else position)
+            return commands.set_target(axis.setpoint + position if relative else position)
 
         return self._thread.run_coroutine(partial(commands.arrive, give, timeout)).result()
 

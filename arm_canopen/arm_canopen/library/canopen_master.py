@@ -23,12 +23,12 @@ from canopen_core.can import Bus, BusLoad, Frame, open_bus
 from canopen_core.standard import CobId, Index, sdo
 from realtime_loop import raise_priority
 
-from ..cia402.drive import Drive
-from ..cia402.drive_commands import DriveCommands
+from ..cia402.axis import Axis
+from ..cia402.commands import AxisCommands
 from ..cia402.motion import MotionSource
 from ..cia402.motion_group import MotionGroup
 from ..cia402.state_machine import Command
-from ..cia402.stop_sequence import SHUTDOWN_MAX
+from ..cia402.stop import SHUTDOWN_MAX
 from ..config import load_bus
 from ..config.model import BusConfig
 from ..config.model.checks import check_bus
@@ -69,7 +69,7 @@ def log_event(event: Event) -> None:
 
 
 async def leave_device(
-    device: RemoteNode, axes: Sequence[DriveCommands], scheduler: Scheduler
+    device: RemoteNode, axes: Sequence[AxisCommands], scheduler: Scheduler
 ) -> None:
     """Stop the axes of a device, then let the master end without a reaction of the device.
 
@@ -83,9 +83,9 @@ async def leave_device(
     if not device.was_booted:
         return  # nothing was commanded to it
     await scheduler.gather(ends)
-    for axis in axes:
-        if not await axis.drive.stop.confirmed():  # by itself, or by another master
-            raise DriveError(f'{axis.drive.name} moves or is enabled again; cut its power')
+    for axis in (each.axis for each in axes):
+        if not await axis.stop.confirmed():  # by itself, or by another master
+            raise DriveError(f'{axis.name} moves or is enabled again; cut its power')
     await device.unwatch()
 
 
@@ -167,12 +167,12 @@ class CanopenMaster:
         self.thread.on_failure = self._booted.set  # who waits there sees the failure
         nodes, scheduler = self.network.nodes, self.network.scheduler
         drives = [
-            Drive(device, scheduler, axis)
+            Axis(device, scheduler, axis)
             for device in nodes.values()
             if device.config.is_drive
             for axis in device.config.axes
         ]
-        self.commands = {drive.name: DriveCommands(drive, scheduler) for drive in drives}
+        self.commands = {drive.name: AxisCommands(drive, scheduler) for drive in drives}
         self._group = MotionGroup(drives, self._report)
         self.network.on_cycle = self._group.cycle
         self.drives: Mapping[str, CanopenDrive] = MappingProxyType(
@@ -342,9 +342,9 @@ class CanopenMaster:
                 raise
             logger.error('%s', error)  # its traceback says nothing
 
-    def axes(self, device: RemoteNode) -> list[DriveCommands]:
+    def axes(self, device: RemoteNode) -> list[AxisCommands]:
         """Return the commands of the axes of a device."""
-        return [entry for entry in self.commands.values() if entry.drive.node is device]
+        return [entry for entry in self.commands.values() if entry.axis.node is device]
 
     def listen(self) -> str:
         """Listen for another master before the first frame; call it right before :meth:`start`.
@@ -432,11 +432,11 @@ class CanopenMaster:
         """
         if self.black_box is not None:
             self.black_box.fault('', f'{OWNER} has ended by a defect')
-        drives = [axis.drive for axis in self.commands.values()]
+        drives = [each.axis for each in self.commands.values()]
         powered = [each for each in drives if each.node.was_booted and not each.stop.disabled]
         refused: dict[str, BusError] = {}
         for drive in powered:
-            index = drive.objects.at(Index.CONTROLWORD)
+            index = drive.view.at(Index.CONTROLWORD)
             request = sdo.DownloadRequest(index, 0, QUICK_STOP)
             cob_id = CobId.SDO_REQUEST + drive.node.config.node_id
             if (refusal := self._insist(Frame(cob_id, request.encode()))) is not None:

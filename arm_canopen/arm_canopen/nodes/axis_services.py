@@ -15,8 +15,8 @@ from std_msgs.msg import Float64
 from arm_msgs.srv import Move as MoveService
 from canopen_core.standard import OperationMode
 
-from ..cia402.drive_commands import DriveCommands
-from ..cia402.position_modes import Move
+from ..cia402.commands import AxisCommands
+from ..cia402.modes import Move
 from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
 from .device_node import DeviceNode
@@ -43,7 +43,7 @@ class AxisServices:
     def __init__(
         self,
         node: DeviceNode,
-        commands: DriveCommands,
+        commands: AxisCommands,
         place: str,
         thread: NetworkThread,
     ) -> None:
@@ -138,11 +138,11 @@ class DriveServices:
     def __init__(
         self,
         node: DeviceNode,
-        axes: Sequence[DriveCommands],
+        axes: Sequence[AxisCommands],
         thread: NetworkThread,
         file: BusFile,
     ) -> None:
-        self.axes = [commands.drive for commands in axes]  # its axes
+        self.axes = [commands.axis for commands in axes]  # its axes
         # their joint states
         self.joint_states = DriveJointStates(node, [axis.view for axis in self.axes])
         places = ['~' if len(axes) == 1 else axis.name for axis in self.axes]

@@ -13,7 +13,7 @@ from rclpy.node import Node
 from canopen_core.can import BusCounters, ControllerState, LoadFigures
 from canopen_core.standard import DriveState
 
-from ..cia402.status import DriveStatus
+from ..cia402.state import DriveStatus
 from ..master.controller_watch import ControllerWatch
 from ..master.network import Network
 from ..master.runner import CycleFigures

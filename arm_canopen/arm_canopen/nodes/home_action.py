@@ -16,8 +16,8 @@ from rclpy.action.server import CancelResponse
 from arm_msgs.action import Home
 from node_runner.action_goals import serve_goals
 
-from ..cia402.drive_commands import DriveCommands
-from ..cia402.homing import HomingProgress
+from ..cia402.commands import AxisCommands
+from ..cia402.modes.homing import HomingProgress
 from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
 from .output_thread import OutputThread
@@ -49,7 +49,7 @@ class HomeAction:
     def __init__(
         self,
         node: DeviceNode,
-        commands: DriveCommands,
+        commands: AxisCommands,
         name: str,
         thread: NetworkThread,
         output: OutputThread,
@@ -110,8 +110,8 @@ class HomeAction:
             )
 
     def _position(self) -> float:
-        drive = self._commands.drive
-        return drive.view.position if drive.view.fresh else math.nan
+        view = self._commands.axis.view
+        return view.position if view.fresh else math.nan
 
     def _finish(self, goal: Any, homing: _Homing, future: Future[str]) -> None:  # noqa: ANN401
         error = future.exception()

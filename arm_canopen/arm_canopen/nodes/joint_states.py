@@ -17,7 +17,7 @@ from std_msgs.msg import String
 from canopen_core import CanopenError
 from node_runner import LATCHED
 
-from ..cia402.drive_view import DriveView
+from ..cia402.state import AxisState
 from ..joints.aggregator import JointAggregator, JointSample, JointSet
 from ..joints.robot_joints import movable_joints, RobotJoint
 from .output_thread import OutputThread
@@ -26,7 +26,7 @@ from .output_thread import OutputThread
 class DriveJointStates:
     """``~/joint_states`` of a drive, and of each of its channels where it has several."""
 
-    def __init__(self, node: Node, axes: Sequence[DriveView]) -> None:
+    def __init__(self, node: Node, axes: Sequence[AxisState]) -> None:
         self.axes = list(axes)  # the state of each axis
         self.listened = False  # somebody listens to one of the topics
         names = [axis.name for axis in axes]

@@ -11,7 +11,7 @@ from rclpy.node import Node
 
 from canopen_core import BootError
 
-from ..cia402.drive_commands import DriveCommands
+from ..cia402.commands import AxisCommands
 from ..master.lifecycle import Managed, MANAGER, Supervisor, Verb, Work
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
@@ -32,7 +32,7 @@ class ManagedBus:
         self,
         node: Node,
         devices: Mapping[str, DeviceNode],
-        axes: Callable[[RemoteNode], Sequence[DriveCommands]],
+        axes: Callable[[RemoteNode], Sequence[AxisCommands]],
         thread: NetworkThread,
         output: OutputThread,
     ) -> None:
@@ -55,7 +55,7 @@ class ManagedBus:
         self.manager.declare_parameter('container_name', '', text)
         LifecycleServices(self.manager, Managed(MANAGER, supervisor.work), thread, output)
 
-    def _work(self, device: RemoteNode, axes: Sequence[DriveCommands]) -> Work:
+    def _work(self, device: RemoteNode, axes: Sequence[AxisCommands]) -> Work:
         async def work(verb: Verb) -> None:
             if verb is Verb.ACTIVATE:
                 await self._booted(device)

@@ -18,7 +18,6 @@ from canopen_core.can import Bus
 from node_runner import notify_ready, raise_thread_priority
 
 from ..cia402.motion import MotionSource
-from ..cia402.status import drive_status
 from ..config.model import BusConfig
 from ..library.canopen_master import CanopenMaster
 from ..master.events import Event
@@ -171,7 +170,7 @@ class MasterProcess:
             can.name,
             self._network,
             {
-                name: [drive_status(axis, now) for axis in services.axes]
+                name: [axis.status() for axis in services.axes]
                 for name, services in self._drives.items()
             },
             now,

@@ -181,7 +181,7 @@ class ReplayProcess:
             MASTER,
             self._name,
             bus.network,
-            {name: [axis.status(now) for axis in axes] for name, axes in bus.axes.items()},
+            {name: [axis.status() for axis in axes] for name, axes in bus.axes.items()},
             now,
             counters=bus.counters,
             load=bus.load.figures(now),

@@ -14,8 +14,8 @@ from std_srvs.srv import Trigger
 
 from node_runner import create_deferred_service
 
-from ..cia402.drive_commands import DriveCommands
-from ..cia402.stop_all import stop_all, StopReport
+from ..cia402.commands import AxisCommands
+from ..cia402.stop import stop_all, StopReport
 from ..master.runner import NetworkThread
 from .output_thread import OutputThread
 
@@ -30,7 +30,7 @@ class StopService:
     def __init__(
         self,
         node: Node,
-        commands: Sequence[DriveCommands],
+        commands: Sequence[AxisCommands],
         thread: NetworkThread,
         output: OutputThread,
     ) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from arm_msgs.srv import ReadUnits
 
-from ..cia402.drive import Drive
+from ..cia402.axis import Axis
 from ..config.model.factor_group import FactorGroup
 from ..master.runner import NetworkThread
 
@@ -53,7 +53,7 @@ class UnitsService:
     """``~/read_units`` of one axis."""
 
     def __init__(
-        self, node: DeviceNode, drive: Drive, place: str, thread: NetworkThread, file: BusFile
+        self, node: DeviceNode, drive: Axis, place: str, thread: NetworkThread, file: BusFile
     ) -> None:
         self._node, self._drive = node, drive
         self._thread, self._file = thread, file

@@ -241,7 +241,7 @@ class VirtualNetwork:
         )
         self.network = self.master.network
         self.commands = self.master.commands
-        self.drives = {name: each.drive for name, each in self.commands.items()}
+        self.drives = {name: each.axis for name, each in self.commands.items()}
         self.network.on_feedback = lambda sync: self.feedback_times.append((self.now, sync))
 
     def connect(self, name: str, station: Station) -> None:

@@ -38,8 +38,8 @@ from arm_canopen import (
     OperationMode,
     Severity,
 )
-from arm_canopen.cia402.homing import HomingProgress
-from arm_canopen.cia402.position_modes import Move, QUEUE_MAX
+from arm_canopen.cia402.modes.homing import HomingProgress
+from arm_canopen.cia402.modes.profile_position import Move, QUEUE_MAX
 from arm_canopen.config import DriveConfig, NodeConfig
 from arm_canopen.config.model.drive import RecoveryPolicy
 from arm_canopen.master.scheduler import Promise
@@ -200,7 +200,7 @@ def test_home_is_a_command_of_its_own() -> None:
     assert 'homed by method 35' in answer
     assert phases == list(HomingProgress)
     assert net.drives[JOINT].view.state is DriveState.OPERATION_ENABLED
-    assert net.drives[JOINT].control.mode.number is OperationMode.NO_MODE
+    assert net.drives[JOINT].mode.number is OperationMode.NO_MODE
     net.run(0.1)
     assert net.drives[JOINT].view.position == pytest.approx(0.2, abs=1e-3)
 
@@ -250,7 +250,7 @@ def test_init_homes_by_the_method_of_bus_yml_whatever_was_tried_before() -> None
     net = with_modes(sdo_writes=(*MOTION_WRITES, sdo_write(0x6098, 0, 37)))
     commands = net.commands[JOINT]
     net.result(net.home(34))
-    net.result(commands.drive.node.objects.write_object(0x6098, 0, 35))
+    net.result(commands.axis.node.objects.write_object(0x6098, 0, 35))
     assert 'homed by method 35' in net.do(JOINT, 'home')
     assert 'homed by method 37' in net.do(JOINT, 'init')
     writes = [data[4] for data in net.frames(0x600 + NODE_ID) if data[:3] == b'\x2f\x98\x60']
@@ -278,7 +278,7 @@ def test_recovery_after_a_power_cut_is_by_policy(policy: RecoveryPolicy) -> None
     assert net.motor() == pytest.approx(rest, abs=1e-3)
     assert any('enabled again (recovery: auto)' in text for text in net.reported()) is again
     if again:
-        assert net.drives[JOINT].control.mode.number is OperationMode.CYCLIC_POSITION
+        assert net.drives[JOINT].mode.number is OperationMode.CYCLIC_POSITION
         assert 'select a mode' not in net.do(JOINT, 'recover')
     else:
         assert 'select a mode before the first target' in net.do(JOINT, 'recover')
@@ -415,7 +415,7 @@ def test_a_drive_that_is_not_enabled_without_a_mode_gets_that_of_bus_yml(
     net = deviating(*faults, quirks=quirks, position_mode=8, velocity_mode=3)
     answer = net.result(net.home(35)) if command == 'home' else net.do(JOINT, command)
     assert 'Operation enabled' in answer
-    assert net.drives[JOINT].objects.mode_display == OperationMode.CYCLIC_POSITION
+    assert net.drives[JOINT].view.mode == OperationMode.CYCLIC_POSITION
     assert net.motor() == pytest.approx(0.0, abs=1e-3)
     reported = [
         text for text in net.reported(Severity.WARNING) if '`quirks: no_mode_zero`' in text
@@ -468,7 +468,7 @@ def test_homing_does_not_leave_a_drive_without_mode_zero_in_mode_6(
     if selected is not None:
         net.select(JOINT, OperationMode(selected))
     assert 'homed by method 35' in net.do(JOINT, command)
-    assert net.drives[JOINT].objects.mode_display == (selected or 3)
+    assert net.drives[JOINT].view.mode == (selected or 3)
     net.target(0.2)
     net.run(0.3)
     assert net.motor() > 0.02
@@ -510,7 +510,7 @@ def test_a_halted_torque_is_not_let_go_to_switch_the_mode(mode: OperationMode) -
     net.do(JOINT, 'halt', preempt=True)
     with pytest.raises(DriveError, match=r'halted .bit 8.*disable it, select the mode'):
         net.select(JOINT, OperationMode.CYCLIC_POSITION)
-    assert net.drives[JOINT].control.halted
+    assert net.drives[JOINT].halt.held
     stood = net.motor()
     net.run(1.0)
     assert net.motor() == pytest.approx(stood, abs=2e-3)
@@ -598,7 +598,7 @@ def test_an_unknown_position_is_never_published() -> None:
             net.power_on(JOINT)
         for _ in range(300):
             net.run(PERIOD)
-            if not drive.objects.fresh(net.now):  # no TPDOs of it
+            if not drive.view.fresh:  # no TPDOs of it
                 reported.append(drive.feedback().position)
     assert reported == pytest.approx([0.5] * len(reported), abs=2 / SCALE)
     assert reported
@@ -764,7 +764,7 @@ def test_a_motion_source_that_takes_the_drive_replaces_a_motion() -> None:
     client = Client(OperationMode.CYCLIC_POSITION, ServoModel(lag=LAG))
     motion = client.move_to(0.3)
     drive = client.net.drives[JOINT]
-    client.net.run_until(lambda: drive.control.stream_refusal is None)
+    client.net.run_until(lambda: drive.stream_refusal is None)
     client.net.master.attach(Leader(speed=0.3))
     with pytest.raises(DriveError, match='got another target'):
         client.net.result(motion)

@@ -25,7 +25,7 @@ from arm_canopen import (
     RefusalCause,
     Severity,
 )
-from arm_canopen.cia402.position_modes import Move
+from arm_canopen.cia402.modes import Move
 from arm_canopen.cia402.units import Units
 from arm_canopen.config import DriveConfig, NodeConfig
 from canopen_core.can import Frame
@@ -66,8 +66,8 @@ STEPS: dict[str, Callable[[VirtualNetwork, str], tuple[object, str]]] = {
     'feedback': lambda net, name: (net.drives[name], 'feedback'),
     'stream': lambda net, name: (net.drives[name], 'stream'),
     'write': lambda net, name: (net.drives[name], 'write'),
-    'mode': lambda net, name: (net.drives[name].control.mode, 'step'),
-    'controlword': lambda net, name: (net.drives[name].objects.controlword, 'write'),
+    'mode': lambda net, name: (net.drives[name].mode, 'step'),
+    'controlword': lambda net, name: (net.drives[name].controlword_writer, 'write'),
     'RPDO 1': lambda net, name: (rpdo(net, name, 1), '_pack'),
     'RPDO 2': lambda net, name: (rpdo(net, name, 2), '_pack'),
     'RPDO 3': lambda net, name: (rpdo(net, name, 3), '_pack'),

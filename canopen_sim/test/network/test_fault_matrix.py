@@ -41,7 +41,7 @@ from arm_canopen import (
     Setpoint,
     Severity,
 )
-from arm_canopen.cia402.status import drive_status, DriveStatus
+from arm_canopen.cia402.state import DriveStatus
 from arm_canopen.config import Identity, SdoWrite
 from arm_canopen.nodes.diagnostics import drive_diagnostic
 from canopen_core.can import Frame
@@ -328,7 +328,7 @@ def test_fault_in_motion(fault: Fault, mode: OperationMode) -> None:
         )
         codes = [emcy.code for _, emcy in arm.net.network.nodes[name].emergencies.history]
         assert fault.emcy is None or fault.emcy in codes
-        refusal = arm.net.drives[name].control.refusal
+        refusal = arm.net.drives[name].refusal
         assert refusal is not None
         assert refusal.cause is fault.cause
         with pytest.raises(DriveError):
@@ -546,7 +546,7 @@ def test_a_drive_outside_its_limits_is_led_back_and_stopped(side: int, stop: str
 
     def stream(cycles: int, speed: float) -> None:
         for _ in range(cycles):
-            drive.stream(Setpoint(drive.control.setpoint + side * speed * CYCLE))
+            drive.stream(Setpoint(drive.setpoint + side * speed * CYCLE))
             arm.net.run(CYCLE)
 
     def enable() -> None:
@@ -602,9 +602,9 @@ def test_lost_pdos_in_motion(
     for name in names:
         drive = arm.net.drives[name]
         causes = {text for text in arm.net.reported(Severity.ERROR) if f'{name}: stopping' in text}
-        assert drive.control.accepts_targets is not silent
+        assert drive.accepts_targets is not silent
         assert bool(causes) is (silent or mode in STREAMED), arm.net.story()
-        assert drive.control.halted is bool(causes) or not drive.control.acts
+        assert drive.halt.held is bool(causes) or not drive.acts
         if silent:
             with pytest.raises(DriveError, match='TPDOs'):
                 arm.net.target(0.1, name)
@@ -624,7 +624,7 @@ def test_lost_pdos_in_motion(
             assert arm.state(name) is SWITCHED_OFF
             arm.net.do(name, 'enable')
         assert arm.state(name) is DriveState.OPERATION_ENABLED
-        assert arm.net.drives[name].control.accepts_targets
+        assert arm.net.drives[name].accepts_targets
     assert_accepts_targets(arm, mode)
 
 
@@ -790,7 +790,7 @@ def move_far(arm: Arm, mode: OperationMode) -> None:
 
 def status_of(arm: Arm) -> DriveStatus:
     """Return what diagnostics say of the faulty drive."""
-    return drive_status(arm.net.drives[FAULTY], arm.net.now)
+    return arm.net.drives[FAULTY].status()
 
 
 @pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)

@@ -27,9 +27,9 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen import DriveError, DriveState, OperationMode, Severity
-from arm_canopen.cia402.drive_view import VelocityEstimate, WINDOW
 from arm_canopen.cia402.halt import UNDER_HALT_TIME
-from arm_canopen.cia402.position_modes import Move
+from arm_canopen.cia402.modes import Move
+from arm_canopen.cia402.state import VelocityEstimate, WINDOW
 from arm_canopen.config import NodeConfig
 from arm_canopen.config.model.drive import RecoveryPolicy
 from canopen_core.can import Frame
@@ -128,10 +128,10 @@ def test_a_halt_right_after_a_target_holds(
     net.run(delay)
     assert 'halted' in net.do(JOINT, 'halt', preempt=True)
     assert_rests(net)
-    assert net.drives[JOINT].control.halted
+    assert net.drives[JOINT].halt.held
     net.target(-0.2)
     go(net, 4.0 if mode is not OperationMode.PROFILE_VELOCITY else 0.5)
-    assert not net.drives[JOINT].control.halted
+    assert not net.drives[JOINT].halt.held
     if mode is not OperationMode.PROFILE_VELOCITY:
         assert net.motor() == pytest.approx(-0.2, abs=2e-3)
 
@@ -210,7 +210,7 @@ def test_a_target_that_is_not_taken_does_not_end_the_halt() -> None:
     net.run(0.2)
     assert abs(net.motor() - begin) < BRAKING_MAX / 5
     assert_rests(net, 4.0)
-    assert net.drives[JOINT].control.halted
+    assert net.drives[JOINT].halt.held
     assert any('stays halted' in text for text in net.reported(Severity.WARNING))
 
 
@@ -247,7 +247,7 @@ def test_relative_moves_count_from_what_the_drive_has_or_gets() -> None:
         assert f'to {destination},' in commands.move(Move(0.1, relative=True))
     go(net, 3.0)
     assert net.motor() == pytest.approx(1.8, abs=2e-3)
-    assert net.drives[JOINT].control.setpoint == pytest.approx(1.8)
+    assert net.drives[JOINT].setpoint == pytest.approx(1.8)
     commands.move(Move(0.1, relative=True))
     commands.move(Move(0.5))
     assert 'to 0.4,' in commands.move(Move(-0.1, relative=True))
@@ -346,7 +346,7 @@ def test_homing_that_is_cancelled_leaves_the_axis_at_rest(cycles: int) -> None:
     net.run(0.5)
     assert abs(net.motor() - begin) < BRAKING_MAX
     assert_rests(net)
-    net.run_until(lambda: net.drives[JOINT].control.accepts_targets)
+    net.run_until(lambda: net.drives[JOINT].accepts_targets)
     net.target(begin)
     go(net, 2.0)
     assert net.drives[JOINT].view.position == pytest.approx(begin, abs=2e-3)
@@ -364,7 +364,7 @@ def test_a_switch_that_is_cancelled_stays_halted() -> None:
     assert not running.done
     assert 'halted' in net.do(JOINT, 'halt', preempt=True)
     assert_rests(net)
-    assert net.drives[JOINT].control.mode.number is OperationMode.PROFILE_POSITION
+    assert net.drives[JOINT].mode.number is OperationMode.PROFILE_POSITION
 
 
 @pytest.mark.parametrize('verb', ['halt', 'quick_stop', 'disable'])
@@ -382,7 +382,7 @@ def test_a_stop_at_any_moment_of_init_is_answered_truly(verb: str) -> None:
             millisecond,
             answer,
         )
-        assert reported == (verb == 'halt' and drive.control.halted), (millisecond, answer)
+        assert reported == (verb == 'halt' and drive.halt.held), (millisecond, answer)
 
 
 @pytest.mark.parametrize('cycles', range(16))
@@ -538,11 +538,11 @@ def test_a_halt_ends_with_the_new_target_or_with_an_error(
         if reported:
             assert net.motor() == pytest.approx(target, abs=ACCURACY)
             assert beyond < ACCURACY
-            assert not net.drives[JOINT].control.halted
+            assert not net.drives[JOINT].halt.held
         else:
             assert kind is Kind.WORD_AFTER_HALT or (queued and kind in REFUSE_WHEN_FULL)
             assert beyond < BRAKING
-            assert net.drives[JOINT].control.halted
+            assert net.drives[JOINT].halt.held
             assert abs(net.drives[JOINT].view.velocity) < ACCURACY
             assert any('stays halted' in text for text in net.reported(Severity.WARNING))
         net.target(OLD)
@@ -644,7 +644,7 @@ def test_halt_and_switch_wait_for_the_standstill(
     fastest = 0.0
     while not promise.done:
         net.run(PERIOD / 2)
-        if net.drives[JOINT].objects.mode_display == other:
+        if net.drives[JOINT].view.mode == other:
             fastest = max(fastest, abs(net.speed()))
     assert fastest <= STANDING
     promise.result()

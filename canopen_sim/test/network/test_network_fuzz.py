@@ -85,7 +85,7 @@ def test_anything_on_the_bus() -> None:
     for name, drive in network.drives.items():
         assert drive.view.fresh
         assert drive.view.state is not DriveState.OPERATION_ENABLED
-        assert not drive.control.accepts_targets
+        assert not drive.accepts_targets
         network.do(name, 'recover')  # what the noise has left behind faults no drive for good
         network.do(name, 'disable')
     network.network.send_nmt(NmtCommand.RESET_NODE, ALL_NODES)

@@ -75,7 +75,7 @@ class Loaded:
     @property
     def mode(self) -> OperationMode:
         """Mode of operation that the drive displays."""
-        return OperationMode(self.net.drives[JOINT].objects.mode_display)
+        return OperationMode(self.net.drives[JOINT].view.mode)
 
     def enable(self, mode: OperationMode) -> None:
         """Enable the drive and select a mode."""
@@ -203,9 +203,7 @@ def test_a_drive_that_keeps_its_mode_does_not_jump_when_it_is_enabled() -> None:
     loaded.net.droop(0)
     loaded.net.keep_mode(8)
     drive = loaded.net.simulated()
-    loaded.net.drives[JOINT].control.select(
-        loaded.net.drives[JOINT].control.modes[OperationMode.NO_MODE]
-    )
+    loaded.net.drives[JOINT].select(loaded.net.drives[JOINT].modes[OperationMode.NO_MODE])
     drive.count_from(drive.position - 1234, loaded.net.now)
     loaded.net.run(0.1)
     rest = loaded.position
@@ -491,7 +489,7 @@ def test_a_drive_that_holds_goes_on_holding(mode: OperationMode) -> None:
     drive = net.drives['a']
     assert net.network.nodes['a'].taken_over
     assert drive.view.state is DriveState.OPERATION_ENABLED
-    assert drive.control.accepts_targets
+    assert drive.accepts_targets
     assert max(abs(position - at_rest) for position in seen) <= 1
     assert all(word & 0x0F == 0x0F for word in net.controlwords('a', since=begin))
     assert any('taken over enabled' in text for text in net.reported())
@@ -522,7 +520,7 @@ def test_a_drive_that_is_not_enabled_is_not_enabled() -> None:
     net.start()
     net.run(1.0)
     assert net.drives['a'].view.state is not DriveState.OPERATION_ENABLED
-    assert net.drives['a'].control.goal is None
+    assert net.drives['a'].goal is None
 
 
 def test_what_was_taken_over_is_led_anew_after_a_stop() -> None:

@@ -33,7 +33,7 @@ from arm_canopen import (
     SdoTimeoutError,
     Severity,
 )
-from arm_canopen.cia402.position_modes import Move
+from arm_canopen.cia402.modes import Move
 from arm_canopen.config import BootWrite, DEFAULT_DRIVE, load_bus, NodeConfig
 from arm_canopen.master.scheduler import Promise
 from canopen_core.eds import load_eds
@@ -147,8 +147,8 @@ def test_the_mode_that_a_drive_stays_in_is_held_at_enable() -> None:
     leave_behind(net, VELOCITY, 3_000)
     before = net.motor()
     net.do(JOINT, 'enable')
-    assert net.drives[JOINT].control.mode.number is OperationMode.NO_MODE
-    assert net.drives[JOINT].objects.mode_display == OperationMode.PROFILE_VELOCITY
+    assert net.drives[JOINT].mode.number is OperationMode.NO_MODE
+    assert net.drives[JOINT].view.mode == OperationMode.PROFILE_VELOCITY
     net.run(1.0)
     assert net.motor() == pytest.approx(before, abs=1e-3)
 
@@ -162,7 +162,7 @@ def test_a_refused_holding_value_keeps_the_mode() -> None:
     with pytest.raises(DriveError, match='0x60FF'):
         net.select(JOINT, OperationMode.PROFILE_VELOCITY)
     net.run(0.5)
-    assert net.drives[JOINT].objects.mode_display == OperationMode.PROFILE_POSITION
+    assert net.drives[JOINT].view.mode == OperationMode.PROFILE_POSITION
     assert net.motor() == pytest.approx(before, abs=1e-3)
     net.result(give(net, 0.2))
     net.run(2.0)
@@ -200,7 +200,7 @@ def test_a_target_that_is_refused_at_the_end_of_a_halt_leaves_it_halted() -> Non
     with pytest.raises(DriveError, match='present device state'):
         net.result(give(net, -0.3))
     net.run(1.0)
-    assert net.drives[JOINT].control.halted
+    assert net.drives[JOINT].halt.held
     assert abs(net.drives[JOINT].view.rate) < 0.01
     accept(net)
     net.result(give(net, -0.3))
@@ -219,8 +219,8 @@ def test_moves_of_which_the_first_is_refused_leave_a_halted_axis_halted_at_once(
     net.run(0.5)
     assert isinstance(first.error, DriveError)
     assert second.done
-    assert net.drives[JOINT].control.halted
-    assert not net.drives[JOINT].control.halt.leaving
+    assert net.drives[JOINT].halt.held
+    assert not net.drives[JOINT].halt.leaving
 
 
 @pytest.mark.parametrize('mode', [OperationMode.PROFILE_POSITION, OperationMode.PROFILE_VELOCITY])
@@ -384,7 +384,7 @@ def test_a_target_after_a_stream_is_not_stopped_by_what_was_under_way() -> None:
     under_way.reject(SdoAbortError('0x60FF refused', 0x08000022))
     assert 'target' in net.result(answered)
     net.run(1.0)
-    assert not net.drives[JOINT].control.halted
+    assert not net.drives[JOINT].halt.held
     assert net.drives[JOINT].view.rate == pytest.approx(0.3, abs=0.02)
 
 
@@ -510,8 +510,8 @@ class Client:
 
     def _leave_behind(self) -> None:
         drive = self.net.drives[JOINT]
-        acting = TARGETS.get(OperationMode(drive.objects.mode_display))
-        idle = [index for index in TARGETS.values() if index != acting or not drive.control.acts]
+        acting = TARGETS.get(OperationMode(drive.view.mode))
+        idle = [index for index in TARGETS.values() if index != acting or not drive.acts]
         leave_behind(self.net, self._random.choice(idle), self._random.randint(-3_000, 3_000))
 
     def _disturb(self) -> None:

@@ -101,7 +101,7 @@ def test_a_fault_while_a_drive_cannot_be_seen_is_known_when_it_can(mode: Operati
     led.net.simulated().raise_fault(0x2310, led.net.now)
     led.net.run(1.0)
     drive = led.net.drives[JOINT]
-    assert not drive.control.accepts_targets
+    assert not drive.accepts_targets
     assert not drive.view.fresh
     assert drive.view.age > 1.5
     rest = led.net.motor()
@@ -256,7 +256,7 @@ def test_the_following_error_of_the_drive_counts(duration: float, *, stops: bool
     net.wire.alters = show
     net.run(3.0)
     assert (net.simulated().state is DriveState.SWITCH_ON_DISABLED) is stops
-    refusal = net.drives[JOINT].control.refusal
+    refusal = net.drives[JOINT].refusal
     assert (refusal is not None and refusal.cause is RefusalCause.NOT_ENABLED) is stops
     assert len(net.reported(Severity.ERROR)) == stops
 
@@ -351,7 +351,7 @@ def test_a_drive_whose_tpdos_stop_to_come_on_change_is_not_fresh(mode: Operation
     assert led.source.losses[JOINT].cause is RefusalCause.SILENT
     led.lose()
     led.net.run(3.0)
-    assert led.net.drives[JOINT].control.accepts_targets
+    assert led.net.drives[JOINT].accepts_targets
     assert not [text for text in led.net.reported(Severity.WARNING) if 'goes unnoticed' in text]
 
 

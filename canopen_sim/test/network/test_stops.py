@@ -20,10 +20,7 @@ from moving_drive import MovingDrive, NODE_ID, RAMP, STANDING
 import pytest
 
 from arm_canopen import DriveError, DriveState, EventKind, OperationMode, Severity
-from arm_canopen.cia402.drive_objects import DriveObjects
-from arm_canopen.cia402.status import drive_status
-from arm_canopen.cia402.stop_all import stop_all, StopReport
-from arm_canopen.cia402.stop_sequence import SHUTDOWN_MAX
+from arm_canopen.cia402.stop import SHUTDOWN_MAX, stop_all, StopReport
 from arm_canopen.config.model.drive import RecoveryPolicy
 from arm_canopen.library.canopen_master import leave_device
 from arm_canopen.master.remote_node import BootPhase
@@ -147,10 +144,10 @@ def owner_of(failing: MovingDrive, place: str) -> tuple[object, str]:
     drive = failing.net.drives[JOINT]
     rpdo = failing.net.network.nodes[JOINT].image.rpdos[-1]
     return {
-        'mode': (drive.control.mode, 'step'),
+        'mode': (drive.mode, 'step'),
         'write': (drive, 'write'),
         'read': (drive, 'read'),
-        'controlword': (drive.objects.controlword, 'write'),
+        'controlword': (drive.controlword_writer, 'write'),
         'RPDO': (rpdo, '_pack'),
     }[place]
 
@@ -218,8 +215,8 @@ def test_an_axis_is_stopped_whose_rpdo_is_kept_back_with_another_axis(
 ) -> None:
     """It would go on with the last controlword that it got; enabling it frees no RPDO."""
     failing = MovingDrive(6)
-    other = DriveObjects(failing.net.network.nodes[JOINT])
-    other.mute_controlword()
+    rpdo, other = failing.net.network.nodes[JOINT].image.rpdos[-1], object()
+    rpdo.kept_back_by.add(other)
     failing.run(RAMP + 1.0)
     assert failing.states[-1] is DriveState.SWITCH_ON_DISABLED
     assert failing.fastest < STANDING
@@ -227,8 +224,8 @@ def test_an_axis_is_stopped_whose_rpdo_is_kept_back_with_another_axis(
     assert len(failing.errors) == 1
     with pytest.raises(DriveError, match='did not reach Operation enabled'):
         failing.net.do(JOINT, 'enable')
-    assert other.controlword_muted, 'the RPDO carries what the other axis must not get'
-    other.unmute_controlword()
+    assert rpdo.kept_back_by == {other}, 'the RPDO carries what the other axis must not get'
+    rpdo.kept_back_by.discard(other)
     failing.net.do(JOINT, 'enable')
 
 
@@ -283,7 +280,7 @@ def test_a_shutdown_begins_by_rpdo_and_says_when_the_drive_keeps_its_power(
     failing.run(10.0)
     with pytest.raises(DriveError, match='joint1 is not disabled; cut its power'):
         failing.net.do(JOINT, 'shutdown', preempt=True)
-    failing.net.drives[JOINT].objects.mute_controlword()
+    failing.net.drives[JOINT].mute_controlword()
     lose(failing, 0x600 + NODE_ID)
     failing.net.do(JOINT, 'shutdown', preempt=True)
     assert failing.device.state is DriveState.SWITCH_ON_DISABLED
@@ -373,7 +370,7 @@ def test_a_failure_while_it_is_enabled_stays_named_until_the_next_enabling(
     failing.net.do(JOINT, 'shutdown', preempt=True)
     enabling = failing.net.begin(JOINT, 'enable')
     drive = failing.net.drives[JOINT]
-    failing.net.run_until(lambda: bool(drive.control._controlword & 0x8))
+    failing.net.run_until(lambda: bool(drive._controlword & 0x8))
     failing.net.run(PERIOD * (cycles - 1))
     drive.fail(ZeroDivisionError('injected'))
     failing.run(RAMP + 1.0)
@@ -392,7 +389,7 @@ def test_nothing_enables_a_drive_while_it_is_stopped(monkeypatch: pytest.MonkeyP
     for verb in ('init', 'enable', 'recover', 'home'):
         with pytest.raises(DriveError, match='being stopped'):
             failing.net.do(JOINT, verb)
-    status = drive_status(failing.net.drives[JOINT], failing.net.now)
+    status = failing.net.drives[JOINT].status()
     assert drive_diagnostic('bus', status).level == DiagnosticStatus.ERROR
     assert 'injected' in status.summary
     failing.net.do(JOINT, 'disable', preempt=True)
@@ -400,7 +397,7 @@ def test_nothing_enables_a_drive_while_it_is_stopped(monkeypatch: pytest.MonkeyP
     assert abs(failing.net.speed()) < STANDING
     failing.net.do(JOINT, 'enable')
     assert failing.net.drives[JOINT].view.state is DriveState.OPERATION_ENABLED
-    assert not drive_status(failing.net.drives[JOINT], failing.net.now).failure
+    assert not failing.net.drives[JOINT].status().failure
 
 
 def test_what_goes_wrong_after_it_was_enabled_again_is_named_again(
@@ -635,7 +632,7 @@ def test_a_drive_without_heartbeat_is_given_back_by_policy(
     drive = moving.net.drives[JOINT]
     assert drive.failure == ''
     moving.net.run(1.0)
-    assert drive.control.accepts_targets is (policy is RecoveryPolicy.AUTO)
+    assert drive.accepts_targets is (policy is RecoveryPolicy.AUTO)
     assert abs(moving.net.speed()) < STANDING
 
 

@@ -24,7 +24,6 @@ from arm_canopen import (
     RefusalCause,
     Severity,
 )
-from arm_canopen.cia402.status import drive_status
 from arm_canopen.config.model.drive import RecoveryPolicy
 from arm_canopen.master.scheduler import Promise
 
@@ -134,7 +133,7 @@ def test_a_new_stream_is_followed_after_an_explicit_command(mode: OperationMode)
     assert client.refusals == []
     assert client.motor == pytest.approx(client.value, abs=0.6)
     assert client.net.drives[JOINT].view.velocity > 0.3
-    assert not client.net.drives[JOINT].control.halted
+    assert not client.net.drives[JOINT].halt.held
 
 
 @pytest.mark.parametrize('pause', [0.0, *PAUSES])
@@ -186,10 +185,10 @@ def test_a_stream_is_followed_evenly_and_its_error_is_that_of_one_cycle() -> Non
     client.publish(1.0)
     drive, speeds, errors = client.net.drives[JOINT], [], []
     for _ in range(50):
-        before = drive.control.setpoint
+        before = drive.setpoint
         client.publish(PERIOD)
-        speeds.append((drive.control.setpoint - before) / PERIOD)
-        errors.append(drive_status(drive, client.net.now).following_error)
+        speeds.append((drive.setpoint - before) / PERIOD)
+        errors.append(drive.status().following_error)
     assert speeds == pytest.approx([STEP / PERIOD] * 50, rel=0.02)
     assert all(STEP <= error < 1.5 * STEP for error in errors)  # and the lag of the servo
 

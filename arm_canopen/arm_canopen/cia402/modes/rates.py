@@ -12,9 +12,10 @@ from collections.abc import Callable
 
 from canopen_core.standard import OperationMode
 
-from ..master.process_image import IN_THE_IMAGE, Writer
-from ..master.scheduler import completed, Promise
-from .modes import Actual, fitting, Mode, NO_BITS
+from ...master.process_image import IN_THE_IMAGE, Writer
+from ...master.scheduler import completed, Promise
+from ..units import Scale
+from .mode import Actual, Mode, NO_BITS
 
 VL_RAMP = 0x70
 """Bits 4 to 6 of the velocity mode: ramp enabled, not locked, reference used (CiA 402-2, 16.3)."""
@@ -25,16 +26,11 @@ class DriveRamped(Mode):
 
     bits = NO_BITS
 
-    def __init__(self, target: Writer, to_device: Callable[[float], int]) -> None:
-        """``to_device`` converts a target to device units."""
+    def __init__(self, target: Writer, scale: Scale) -> None:
+        self.by_sdo = target.by_sdo
         self._target = target
-        self._to_device = to_device
+        self._scale = scale
         self._delivery = completed()
-
-    @property
-    def by_sdo(self) -> bool:
-        """Whether no RPDO carries the target."""
-        return self._target.by_sdo
 
     @property
     def taken(self) -> bool:
@@ -43,7 +39,7 @@ class DriveRamped(Mode):
 
     def set_target(self, target: float) -> Promise[None]:
         """Command a value."""
-        return self._deliver(fitting(self._target, self._to_device(target)))
+        return self._deliver(self._scale.to_device(target, self._target.limits))
 
     def brake(self) -> None:
         """Command standstill; the drive makes the ramp."""
@@ -93,17 +89,10 @@ class MasterRamped(Mode):
 
     cyclic = True
 
-    def __init__(
-        self,
-        target: Writer,
-        to_device: Callable[[float], int],
-        commanded: Callable[[float], float],
-        slope: Callable[[], float],
-    ) -> None:
-        """``commanded`` undoes ``to_device``; ``slope`` is in user units per second, at most."""
+    def __init__(self, target: Writer, scale: Scale, slope: Callable[[], float]) -> None:
+        """``slope`` is in user units per second, at most."""
         self._target = target
-        self._to_device = to_device
-        self._commanded = commanded
+        self._scale = scale
         self._slope = slope
         self._value = 0.0
         self._goal = 0.0
@@ -111,7 +100,7 @@ class MasterRamped(Mode):
     def set_target(self, target: float) -> Promise[None]:
         """Ramp to a value."""
         # refuse now what could not be sent on arrival
-        fitting(self._target, self._to_device(target))
+        self._scale.to_device(target, self._target.limits)
         self._goal = target
         return IN_THE_IMAGE
 
@@ -123,7 +112,7 @@ class MasterRamped(Mode):
         """Advance the ramp."""
         change = self._slope() * period
         self._value += max(-change, min(change, self._goal - self._value))
-        self._target.write(self._to_device(self._value))
+        self._target.write(self._scale.to_device(self._value))
         return NO_BITS
 
 
@@ -140,7 +129,7 @@ class CyclicVelocity(MasterRamped):
 
     def preload(self, actual: Actual) -> Promise[None]:
         """Begin at the actual velocity, and brake from it."""
-        self._value, self._goal = self._commanded(actual.velocity_dev), 0.0
+        self._value, self._goal = self._scale.commanded(actual.velocity_dev), 0.0
         return self._target.deliver(actual.velocity_dev)
 
 
@@ -157,5 +146,5 @@ class CyclicTorque(MasterRamped):
 
     def preload(self, actual: Actual) -> Promise[None]:
         """Keep the torque that the drive has, so that it drops no load."""
-        self._value = self._goal = self._commanded(actual.torque)
+        self._value = self._goal = self._scale.commanded(actual.torque)
         return self._target.deliver(actual.torque)

@@ -13,10 +13,10 @@ import math
 from canopen_core import DriveError
 from canopen_core.standard import Controlword, OperationMode, Statusword
 
-from ..master.process_image import Writer
-from ..master.scheduler import completed, Promise
-from .modes import Actual, fitting, Mode, TARGET_REACHED
-from .units import Units
+from ...master.process_image import Writer
+from ...master.scheduler import completed, Promise
+from ..units import Units
+from .mode import Actual, Mode, TARGET_REACHED
 
 ACKNOWLEDGE = int(Statusword.SET_POINT_ACKNOWLEDGE)
 NEW_SET_POINT = int(Controlword.NEW_SET_POINT)
@@ -108,23 +108,14 @@ class ProfilePosition(Mode):
         self._full_since: float | None = None
         self._imposed: Waiting | None = None
         self._cycles_left = 0
-        self._setpoint: float | None = None
+        self.setpoint: float | None = None  # of the last move that was handed over
+        self.by_sdo = target.by_sdo
         self._reference: float | None = None
         self._taken = False
         self._acknowledges: bool | None = None  # None until the drive has shown it
         self._offered: Waiting | None = None
         self._delivery = completed()
         self.handshake = Handshake.IDLE
-
-    @property
-    def by_sdo(self) -> bool:
-        """Whether no RPDO carries 0x607A."""
-        return self._target.by_sdo
-
-    @property
-    def setpoint(self) -> float | None:
-        """Target of the last move that was handed over, in user units."""
-        return self._setpoint
 
     @property
     def taken(self) -> bool:
@@ -150,7 +141,7 @@ class ProfilePosition(Mode):
         """Write the actual position as the target, without announcing it."""
         self._forget()
         self._bits = CHANGE_IMMEDIATELY
-        self._setpoint = self._reference = self._units.position.commanded(actual.position_inc)
+        self.setpoint = self._reference = self._units.position.commanded(actual.position_inc)
         return self._target.deliver(actual.position_inc)
 
     def brake(self) -> None:
@@ -188,8 +179,8 @@ class ProfilePosition(Mode):
             DriveError: The value does not fit 0x607A, too many moves wait, or it is relative and
                 there is nothing to count from.
         """
-        to_device = self._units.distance.to_device if move.relative else None
-        value = fitting(self._target, (to_device or self._units.position.to_device)(move.target))
+        scale = self._units.distance if move.relative else self._units.position
+        value = scale.to_device(move.target, self._target.limits)
         waiting = Waiting(value, move, self.destination(move))
         if move.immediate and not move.relative:
             waiting = replace(waiting, delivery=self._replaced())
@@ -289,7 +280,7 @@ class ProfilePosition(Mode):
 
     def _offer(self, now: float, *, acknowledged: bool) -> None:
         if self._offered is not None:
-            self._setpoint = self._offered.destination
+            self.setpoint = self._offered.destination
         self._offered_at = now
         self._cycles_left = EDGE_CYCLES
         self._taken |= self._acknowledges is False

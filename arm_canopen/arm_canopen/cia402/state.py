@@ -7,22 +7,27 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 import math
 
 from canopen_core import CodecError, DriveError, SdoError
 from canopen_core.standard import (
+    AXIS_OFFSET,
     drive_state,
     DriveState,
     error_code_text,
     Index,
     mode_title,
+    OperationMode,
+    Statusword,
     statusword_text,
 )
 
 from ..config.model.drive import DriveConfig
+from ..master.process_image import ReceivedTpdo
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler
-from .drive_objects import DriveObjects
+from ..master.status import node_status, NodeStatus
 from .modes import Actual
 from .parameters import DriveParameters, ParameterCache
 from .units import clamp, INT16_MAX, INT32_MAX, Units
@@ -36,10 +41,35 @@ LOOK_AGE_MAX = 0.5  # [s] of such a reading
 REST_SHARE = 0.002  # share of the profile velocity below which an axis counts as standing
 REST_TIME = 0.004  # [s] within which one that counts as standing could stop
 NOISE_DEV = 2  # units of 0x606C, and increments within the window, that noise of sensors may be
-
-
 WINDOW = 0.1  # [s] of positions that the estimate looks back on
 FLICKER_INC = 1  # [inc] by which an encoder at rest may change
+WARNINGS = int(Statusword.WARNING | Statusword.INTERNAL_LIMIT)
+
+
+@dataclass(frozen=True, slots=True)
+class DriveStatus:
+    """How a drive was at one moment, for other threads and for people."""
+
+    name: str  # name of the axis
+    node: NodeStatus  # the device below it
+    state: DriveState  # state of the power drive system
+    mode: str  # mode of operation in words
+    statusword: str  # 0x6041 in words
+    warning: bool  # the statusword shows a warning or an internal limit
+    error: str  # 0x603F in words, empty when none is known
+    failure: str  # why the master stopped it, until it is enabled again; else empty
+    fresh: bool  # state, position and velocity are young enough to act on
+    age: float  # age of the oldest of them in [s]; infinite while they are unknown
+    position: float  # actual position in user units
+    velocity: float  # actual velocity in user units per second
+    setpoint: float  # position last commanded in user units
+    following_error: float  # set-point that was sent before the position was measured, minus that
+    summary: str  # all of it in a sentence
+
+    @property
+    def faulted(self) -> bool:
+        """Whether the drive is in a fault or on the way to it."""
+        return self.state in FAULTY
 
 
 class VelocityEstimate:
@@ -93,22 +123,26 @@ class VelocityEstimate:
         return (last - first) / (end - begin)
 
 
-class DriveView:
-    """What the master knows of an axis; everybody who needs its state reads it here.
+class AxisState:
+    """What the master knows of an axis; everything that needs its state reads it here.
+
+    :meth:`observe` makes it once a cycle. Positions, velocities and efforts are in user units; a
+    name with ``_inc`` or ``_dev`` is in device units.
 
     Attributes:
         node: The device.
         config: Settings of the axis.
         name: Its name: that of the device, of its channel for one with several axes.
         units: Its units.
-        objects: Its objects in the process image.
-        state: State shown in the last cycle.
-        statusword: 0x6041 as it was then.
-        fresh: Its TPDOs showed its state in the last cycle, young enough to act on.
-        observed: Actual position as it was then, in user units; NaN before the first.
-        observed_inc: The same in [inc].
-        error: 0x603F in words when it was faulted last, else empty.
         cache: Reads its parameters.
+        state: State of the power drive system.
+        statusword: 0x6041.
+        mode: Mode of operation that the drive displays (0x6061); 0 while unknown.
+        fresh: The TPDOs with all of this are young enough to act on.
+        position: Actual position; the last one of a lost drive, NaN before the first.
+        position_inc: The same (0x6064).
+        velocity_dev: 0x606C; None where no PDO carries it, or it is unknown.
+        error: 0x603F in words when it was faulted last, else empty.
     """
 
     def __init__(
@@ -118,24 +152,44 @@ class DriveView:
         config: DriveConfig,
         warn: Callable[[str], None],
     ) -> None:
+        """Bind each object to its PDO; what the drive has but no PDO carries is read by SDO."""
         self.node = node
         self.config = config
         self.name = config.name or node.name
         self.units = Units(config)
-        self.objects = DriveObjects(node, config.channel)
+        self.cache = ParameterCache(node, config, self.units, scheduler, warn)
         self.state = DriveState.UNKNOWN
-        self.statusword = 0
+        self.statusword = self.mode = 0
         self.fresh = False
+        self.position = self.position_inc = math.nan
+        self.velocity_dev: float | None = None
         self.error = ''
-        self.observed = self.observed_inc = math.nan
+        self._scheduler = scheduler
         self._looked: tuple[int, float] | None = None  # statusword and position, by SDO
         self._looked_at = -math.inf
-        self._scheduler = scheduler
-        self.cache = ParameterCache(node, config, self.units, scheduler, warn)
-        self._estimate = VelocityEstimate(
-            node.config.poll_period if self.objects.position_is_polled else 0.0,
-            on_change=self.objects.position_comes_on_change,
+        objects, image = node.objects, node.image
+        self._statusword = objects.reader(self.at(Index.STATUSWORD))
+        self._mode = objects.reader(self.at(Index.MODE_OF_OPERATION_DISPLAY))
+        self._position = objects.reader(self.at(Index.POSITION_ACTUAL))
+        self._velocity = image.reader(self.at(Index.VELOCITY_ACTUAL))
+        self._torque = image.reader(self.at(Index.TORQUE_ACTUAL))
+        # several objects come in one TPDO, which is looked at once; a mode that is read by SDO
+        # does not count: the cycle needs no SDO
+        mode_in_pdo = image.reader(self.at(Index.MODE_OF_OPERATION_DISPLAY))
+        readers = [self._statusword, self._position, self._velocity, self._torque, mode_in_pdo]
+        self._sources = list(
+            dict.fromkeys(reader.source for reader in readers if reader is not None)
         )
+        polled = image.reader(self.at(Index.POSITION_ACTUAL)) is None
+        source = self._position.source
+        self._estimate = VelocityEstimate(
+            node.config.poll_period if polled else 0.0,
+            on_change=isinstance(source, ReceivedTpdo) and not source.synchronous,
+        )
+
+    def at(self, index: int) -> int:
+        """Return the index of an object of the profile for this axis."""
+        return index + AXIS_OFFSET * self.config.channel
 
     @property
     def parameters(self) -> DriveParameters:
@@ -157,37 +211,32 @@ class DriveView:
     @property
     def age(self) -> float:
         """Age of the oldest value of its state in [s]; infinite while there is none."""
-        if self.state is DriveState.UNKNOWN:
-            return math.inf
-        return self._scheduler.now - self.objects.timestamp
+        return math.inf if self.state is DriveState.UNKNOWN else self.silence
+
+    @property
+    def silence(self) -> float:
+        """Time since the oldest of its TPDOs came in [s]."""
+        return self._scheduler.now - min(source.timestamp for source in self._sources)
 
     @property
     def position_age(self) -> float:
         """Age of 0x6064 in [s]."""
-        return self._scheduler.now - self.objects.position_timestamp
-
-    @property
-    def position(self) -> float:
-        """Actual position in user units: the last one of a lost drive, NaN before the first."""
-        position_inc = None if self._looks else self.objects.position
-        if position_inc is None:
-            return self.observed
-        return self.units.position.from_device(position_inc)
+        return self._scheduler.now - self._position.source.timestamp
 
     @property
     def velocity(self) -> float:
-        """Actual velocity in user units per second; from the positions where no PDO has it."""
-        reported = None if self._looks else self.objects.velocity
+        """Actual velocity; from the positions where no PDO has it."""
+        reported = self.velocity_dev
         return self.rate if reported is None else self.units.velocity.from_device(reported)
 
     @property
     def rate(self) -> float:
-        """Rate of the actual position in user units per second, a few cycles late."""
+        """Rate of the actual position, a few cycles late."""
         return self.units.distance.from_device(self._estimate.rate)
 
     @property
     def speed(self) -> float:
-        """Greatest speed that anything shows, in user units per second."""
+        """Greatest speed that anything shows."""
         return max(abs(self.velocity), abs(self.rate))
 
     @property
@@ -200,8 +249,7 @@ class DriveView:
         rest = self.rest_speed
         if not self.speed_known or abs(self.rate) > rest:
             return False
-        reported = 0.0 if self._looks else self.objects.velocity or 0.0
-        return abs(reported) <= NOISE_DEV or abs(self.velocity) <= rest
+        return abs(self.velocity_dev or 0.0) <= NOISE_DEV or abs(self.velocity) <= rest
 
     @property
     def speed_known(self) -> bool:
@@ -210,7 +258,7 @@ class DriveView:
 
     @property
     def rest_speed(self) -> float:
-        """Rate of the position up to which the axis counts as standing, in user units per second.
+        """Rate of the position up to which the axis counts as standing.
 
         By its own limits, and not below what its encoder resolves.
         """
@@ -220,14 +268,38 @@ class DriveView:
         return max(slow, noise)
 
     @property
+    def torque_dev(self) -> float:
+        """0x6077; 0 when no PDO carries it."""
+        return (self._torque.value or 0) if self._torque is not None else 0
+
+    @property
     def effort(self) -> float:
-        """Actual torque in user units."""
-        return self.units.effort.from_device(self.objects.torque)
+        """Actual torque."""
+        return self.units.effort.from_device(self.torque_dev)
 
     @property
     def ready(self) -> bool:
         """Whether its state and its parameters are known."""
         return self.fresh and self.cache.known and self.state is not DriveState.UNKNOWN
+
+    def statusword_came(self, since: float) -> bool:
+        """Return whether 0x6041 has come since a time in [s]; one that comes on change has."""
+        source = self._statusword.source
+        return source.timestamp > since or source.stale_after == math.inf
+
+    def held_position(self, mode: OperationMode) -> int | None:
+        """Position that a cyclic mode commands by RPDO in [inc], None when none carries it."""
+        interpolated = mode is OperationMode.INTERPOLATED_POSITION
+        place = (Index.INTERPOLATION_DATA, 1) if interpolated else (Index.TARGET_POSITION, 0)
+        value = self.node.image.commanded(self.at(place[0]), place[1])
+        if value is None:
+            return None
+        return int(value) + (0 if interpolated else self.offset(Index.POSITION_OFFSET))
+
+    def offset(self, index: Index) -> int:
+        """Return what the drive adds to a target: as the RPDOs carry it, else as it was read."""
+        value = self.node.image.commanded(self.at(index))
+        return self.parameters.offsets.get(index, 0) if value is None else int(value)
 
     def error_of_emcy(self) -> str:
         """Return the error of an EMCY that came just now; empty for none, until 0x603F is read."""
@@ -246,7 +318,7 @@ class DriveView:
         if self.state is not DriveState.UNKNOWN:
             parts = [statusword_text(self.statusword)]
             if node.operational:
-                parts.append(f'mode {mode_title(self.objects.mode_display)}')
+                parts.append(f'mode {mode_title(self.mode)}')
             if not self.seen:
                 parts.append(f'no TPDOs for {self.age:.1f} s')
         if halted:
@@ -263,7 +335,7 @@ class DriveView:
 
     async def read_error_code(self) -> None:
         """Read 0x603F, so that the answer can name the error."""
-        index = self.objects.at(Index.ERROR_CODE)
+        index = self.at(Index.ERROR_CODE)
         if self.state not in FAULTY or (index, 0) not in self.node.config.dictionary:
             return
         try:
@@ -274,26 +346,39 @@ class DriveView:
 
     def observe(self) -> None:
         """Read state and position from the process image, or from the last look by SDO."""
-        objects, now = self.objects, self._scheduler.now
-        shown = objects.observe() if self.node.operational else None
-        self.fresh = shown is not None and objects.fresh(now)
+        now, shown = self._scheduler.now, None
+        self.fresh = False
+        if self.node.operational:
+            word, position = self._statusword.value, self._position.value
+            mode = self._mode.value
+            if word is not None and position is not None and mode is not None:
+                shown, self.mode = (int(word), position), int(mode)
+                self.fresh = True
+                for source in self._sources:  # in every cycle: half of what any() costs
+                    if source.stale(now):
+                        self.fresh = False
+                        break
         if self.fresh and shown is not None:
-            self._estimate.note(now, shown[1], objects.position_timestamp)
+            self._estimate.note(now, shown[1], self._position.source.timestamp)
         elif self._looks:
             shown = self._looked
         else:
             self._estimate.clear()
         if shown is None:
-            self.state, self.statusword = DriveState.UNKNOWN, 0
+            self.state, self.statusword, self.mode = DriveState.UNKNOWN, 0, 0
+            self.velocity_dev = None
             return
-        word, self.observed_inc = shown
-        self.observed = self.units.position.from_device(self.observed_inc)
+        word, self.position_inc = shown
+        looked = shown is self._looked
+        self.velocity_dev = None if looked or self._velocity is None else self._velocity.value
+        self.position = self.units.position.from_device(self.position_inc)
         if word != self.statusword or self.state is DriveState.UNKNOWN:
             self.state, self.statusword = drive_state(word), word
 
     def lose_sight(self) -> None:
         """Forget the state; the position stays the last one."""
-        self.state, self.statusword, self.fresh = DriveState.UNKNOWN, 0, False
+        self.state, self.statusword, self.mode = DriveState.UNKNOWN, 0, 0
+        self.fresh, self.velocity_dev = False, None
         self._looked = None
         self._estimate.clear()
 
@@ -304,8 +389,8 @@ class DriveView:
         """
         objects, begin = self.node.objects, self._scheduler.now
         try:
-            word = await objects.read_object(self.objects.at(Index.STATUSWORD))
-            position_inc = await objects.read_object(self.objects.at(Index.POSITION_ACTUAL))
+            word = await objects.read_object(self.at(Index.STATUSWORD))
+            position_inc = await objects.read_object(self.at(Index.POSITION_ACTUAL))
         except (SdoError, CodecError):
             return DriveState.UNKNOWN
         if not (isinstance(word, int) and isinstance(position_inc, int)):
@@ -339,23 +424,45 @@ class DriveView:
         Raises:
             DriveError: The position is not known.
         """
-        objects = self.objects
-        velocity, reported = self.rate, objects.velocity
+        position_inc = self._position.value
+        if position_inc is None:
+            raise DriveError(f'{self.name}: its position (0x6064) is not known yet')
+        velocity, reported = self.rate, self.velocity_dev
         velocity_dev = self.units.velocity.raw(velocity)
         if reported is not None:
             shown = self.units.velocity.from_device(reported)
             share = 0.0 if shown * velocity <= 0.0 else min(1.0, velocity / shown)
             velocity, velocity_dev = share * shown, share * reported
         return Actual(
-            clamp(self.position_inc(), INT32_MAX),
+            clamp(position_inc, INT32_MAX),
             velocity,
             clamp(velocity_dev, INT32_MAX),
-            clamp(objects.torque, INT16_MAX),
+            clamp(self.torque_dev, INT16_MAX),
         )
 
-    def position_inc(self) -> float:
-        """Return 0x6064 in [inc]; an unknown position is no position 0."""
-        position_inc = self.objects.position
-        if position_inc is None:
-            raise DriveError(f'{self.name}: its position (0x6064) is not known yet')
-        return position_inc
+    def status(
+        self,
+        setpoint: float,
+        following_error: float,
+        *,
+        failure: str = '',
+        summary: str = '',
+    ) -> DriveStatus:
+        """Return a snapshot, with what is commanded to the axis."""
+        return DriveStatus(
+            name=self.name,
+            node=node_status(self.node, self._scheduler.now),
+            state=self.state,
+            mode=mode_title(self.mode),
+            statusword=statusword_text(self.statusword),
+            warning=bool(self.statusword & WARNINGS),
+            error=self.error,
+            failure=failure,
+            fresh=self.fresh,
+            age=self.age,
+            position=self.position,
+            velocity=self.velocity,
+            setpoint=setpoint,
+            following_error=following_error,
+            summary=summary or self.describe(),
+        )

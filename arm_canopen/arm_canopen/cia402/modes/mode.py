@@ -4,23 +4,30 @@
 
 A mode writes its target object and returns its bits of the controlword. Every mode is
 preloaded with the actual value before the drive is enabled or the mode switched, so that nothing
-moves before a command. The modes that move are in ``position_modes.py`` and
-``rate_modes.py``.
+moves before a command.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import NamedTuple
 
 from canopen_core import DriveError
-from canopen_core.standard import Controlword, OperationMode, Statusword
+from canopen_core.standard import Index, OperationMode, Statusword
 
-from ..master.process_image import Writer
-from ..master.scheduler import completed, Promise
+from ...master.process_image import Writer
+from ...master.scheduler import completed, Promise
 
 TARGET_REACHED = int(Statusword.TARGET_REACHED)
 NO_BITS = 0  # bits are plain numbers in the cycle, where operators of IntFlag cost too much
+
+OFFSET_OBJECTS: dict[OperationMode, Index] = {
+    OperationMode.CYCLIC_POSITION: Index.POSITION_OFFSET,
+    OperationMode.CYCLIC_VELOCITY: Index.VELOCITY_OFFSET,
+    OperationMode.CYCLIC_TORQUE: Index.TORQUE_OFFSET,
+}
+"""What a drive adds to the target of a cyclic mode (CiA 402-2, clauses 13 to 15)."""
 
 
 class Actual(NamedTuple):
@@ -34,15 +41,34 @@ class Actual(NamedTuple):
     torque: int = 0  # 0x6077 in device units, 0 when it is unknown
 
 
-def fitting(target: Writer, value: int) -> int:
-    """Return a target in device units, if its object can hold it."""
-    low, high = target.limits
-    if not low <= value <= high:
-        raise DriveError(
-            f'the target is {value} device units, but its object holds {low:g} to {high:g} only; '
-            'are the scale factors in bus.yml right, and the type of the object in the EDS?'
-        )
-    return value
+class OffsetTarget:
+    """A target object that is written less its offset, so that the drive does what is commanded.
+
+    The offset counts as it is when a target is preloaded: one that is written while the drive is
+    enabled moves the axis by itself, as whoever writes it intends.
+    """
+
+    def __init__(self, target: Writer, offset: Callable[[], int]) -> None:
+        """``offset`` returns what the offset object holds in device units."""
+        self.by_sdo = target.by_sdo
+        self._target = target
+        self._read = offset
+        self._offset = 0
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Smallest and largest sum of target and offset."""
+        low, high = self._target.limits
+        return low + self._offset, high + self._offset
+
+    def write(self, value: float) -> None:
+        """Command a value in device units."""
+        self._target.write(value - self._offset)
+
+    def deliver(self, value: float) -> Promise[None]:
+        """Command the value that holds the drive, with the offset that it has now."""
+        self._offset = self._read()
+        return self._target.deliver(value - self._offset)
 
 
 class Mode(ABC):
@@ -52,16 +78,15 @@ class Mode(ABC):
         number: Its value in 0x6060.
         halts_by_bit: Bit 8 of the controlword stops it; else the master brakes its set-points.
         cyclic: Its target acts on the drive in each cycle.
+        by_sdo: Its target goes by SDO, because no RPDO carries it.
+        setpoint: Position commanded last in user units, None in a mode that commands none.
     """
 
     number: OperationMode
     halts_by_bit = True
     cyclic = False
-
-    @property
-    def by_sdo(self) -> bool:
-        """Whether its target goes by SDO, because no RPDO carries it."""
-        return False
+    by_sdo = False
+    setpoint: float | None = None
 
     @abstractmethod
     def preload(self, actual: Actual) -> Promise[None]:
@@ -90,14 +115,6 @@ class Mode(ABC):
     def step(self, now: float, period: float, statusword: int) -> int:
         """Advance a cycle in which the drive accepts targets; return the bits of this mode."""
 
-    def withdraw(self, delivery: Promise[None], error: DriveError) -> bool:
-        """Withdraw a target that the drive does not have yet, and reject its promise.
-
-        Returns:
-            Whether that was possible; else it is on its way.
-        """
-        return False
-
     def brake(self) -> None:  # noqa: B027  # most modes leave it to the drive
         """Come to rest by own means, for a halt, a switch or the end of a stream."""
 
@@ -114,27 +131,6 @@ class Mode(ABC):
     def taken(self) -> bool:
         """Whether the drive has a target that was commanded after the last brake."""
         return True
-
-    @property
-    def offered(self) -> bool:
-        """Whether a target is shown to the drive that it has not acknowledged yet."""
-        return False
-
-    def offer_again(self) -> None:  # noqa: B027  # most modes have nothing to acknowledge
-        """Withdraw a target that is not acknowledged, and present it anew."""
-
-    def goes_on_unanswered(self) -> bool:
-        """Conclude from an acknowledge that does not come, though nothing was in its way.
-
-        Returns:
-            Whether the target counts as taken all the same.
-        """
-        return False
-
-    @property
-    def setpoint(self) -> float | None:
-        """Position last commanded in user units, None in a mode that commands none."""
-        return None
 
 
 class NoMode(Mode):
@@ -153,25 +149,3 @@ class NoMode(Mode):
     def step(self, now: float, period: float, statusword: int) -> int:
         """Command nothing."""
         return NO_BITS
-
-
-class Homing(Mode):
-    """Mode 6: bit 4 starts the method of 0x6098."""
-
-    number = OperationMode.HOMING
-
-    def __init__(self) -> None:
-        self.started = False  # whether bit 4 is set
-
-    def preload(self, actual: Actual) -> Promise[None]:
-        """Preload nothing: without bit 4 nothing moves."""
-        self.started = False
-        return completed()
-
-    def set_target(self, target: float) -> Promise[None]:
-        """Refuse every target."""
-        raise DriveError('the drive is homing and takes no target')
-
-    def step(self, now: float, period: float, statusword: int) -> int:
-        """Keep bit 4 while homing runs."""
-        return Controlword.HOMING_START if self.started else NO_BITS

@@ -1,0 +1,780 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""One axis of a CiA 402 drive in the SYNC cycle: what is commanded to it, and what stops it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import auto, Enum
+import math
+
+from canopen_core import CanopenError, SdoError
+from canopen_core.standard import DriveState, Index, mode_title, OperationMode, Statusword
+
+from ..config.model.drive import DriveConfig
+from ..master.events import EventKind, Severity
+from ..master.process_image import SentRpdo
+from ..master.remote_node import RemoteNode
+from ..master.scheduler import Promise, Scheduler, Task
+from .following_watch import Following, FollowingWatch, MARGIN_TIME
+from .halt import Halt
+from .modes import (
+    build_modes,
+    CyclicPosition,
+    FeedForward,
+    InterpolatedPosition,
+    Mode,
+    NEW_SET_POINT,
+    NO_BITS,
+)
+from .motion import AxisFeedback, Refusal, RefusalCause, Setpoint
+from .quirks import quirks_of
+from .state import AxisState, DriveStatus, FAULTY, LOOK_PERIOD, POWERED
+from .state_machine import Command, fault_reset, next_command
+from .stop import BrakingWatch, StopSequence
+from .units import check_setpoint, check_target
+
+FOLLOWS_COMMAND = int(Statusword.FOLLOWS_COMMAND)
+FOLLOWING_ERROR = int(Statusword.FOLLOWING_ERROR)
+ENABLE_OPERATION = int(Command.ENABLE_OPERATION)
+POSITION_AGE_MAX = 0.25  # [s] of a position at which an axis may be held
+UNSEEN_STOP_TIME = 1.0  # [s] in which a motion source may lead a silent drive to rest on its path
+NOT_TAKEN = (
+    'it has not taken its new target (bit 12); disable and enable it to make it forget the moves '
+    'that it holds'
+)
+
+
+class Phase(Enum):
+    """How much of an axis is known since its device came; a loss begins it anew."""
+
+    OFFLINE = auto()  # its device is not operational
+    UNSEEN = auto()  # no controlword leaves before its TPDOs show its state
+    FOUND = auto()  # it is commanded
+    READY = auto()  # its parameters are known, too
+
+
+class Axis:
+    """An axis of a drive, and the sole writer of its controlword, mode and target.
+
+    ``read`` and ``write`` run in each cycle. Commands (``commands.py``) set :attr:`goal`, mode and
+    targets from coroutines in the same thread; the controlword follows by the table in
+    ``state_machine.py``. What the drive does by itself:
+
+    ======================  ====================  =================================================
+    it shows                commanded was         then
+    ======================  ====================  =================================================
+    its first state         nothing               enabled: taken over, or led to rest
+    a fault                 anything              goal Switch On Disabled, report, halt ended
+    Quick Stop Active       Operation Enabled     goal Quick Stop Active, report
+    another state           Operation Enabled     goal Switch On Disabled, report
+    no TPDOs                Operation Enabled     halt; the stop looks by SDO
+    no motion               set-points            halt, or no power where it is pulled away
+    no rest                 halt, or no power     :class:`.StopSequence`: quick stop, then no power
+    no life sign            anything              goal none, mode none, :class:`.StopSequence`
+    ======================  ====================  =================================================
+
+    Attributes:
+        node: The device.
+        config: Settings of the axis.
+        name: Its name: that of the device, of its channel for one with several axes.
+        view: Its state.
+        phase: How much of it is known.
+        goal: State that the cycle leads to, None before the first command.
+        modes: The modes that this bus.yml makes possible.
+        mode: The mode that is commanded.
+        halt: What keeps it halted.
+        stop: Takes it out of operation; while that runs, nothing else leads it.
+        failure: Why the master stopped it, until it is enabled again; else empty.
+        resetting: Send fault resets while the drive is faulted.
+        following_error: Set-point that was sent before the last position was measured, minus that
+            position, in user units.
+        period: Length of the last cycle in [s].
+        motions: How many motions were begun: by targets, moves and motion sources.
+        interrupted: Mode in which it was enabled when its device was lost, None otherwise.
+        feed_forward: The offsets of a motion source.
+        released: Called with the cause when a motion source loses the drive.
+        on_ready: Called when state and parameters are known after each boot.
+    """
+
+    def __init__(
+        self, node: RemoteNode, scheduler: Scheduler, config: DriveConfig | None = None
+    ) -> None:
+        """Bind the axis to its device; the first one unless ``config`` is another."""
+        self.node = node
+        self.config = config or node.config.drive
+        self.view = AxisState(node, scheduler, self.config, self.warn)
+        self.name, at = self.view.name, self.view.at
+        self.released: Callable[[Refusal], None] = lambda refusal: None
+        self.on_ready: Callable[[], None] = lambda: None
+        self.phase = Phase.OFFLINE
+        self.goal: DriveState | None = None
+        self.modes = build_modes(self.view, self.warn)
+        self.mode = self.modes[OperationMode.NO_MODE]
+        self.halt = Halt()
+        self.stop = StopSequence(self, scheduler)
+        self.failure = ''
+        self.resetting = False
+        self.motions = 0
+        self.following_error = self.period = 0.0
+        self.interrupted: OperationMode | None = None
+        image = node.image
+        self.feed_forward = FeedForward(
+            image.writer(at(Index.VELOCITY_OFFSET)),
+            image.writer(at(Index.TORQUE_OFFSET)),
+            self.view.units,
+        )
+        self._scheduler = scheduler
+        self.controlword_writer = node.objects.writer(at(Index.CONTROLWORD))
+        self.mode_writer = node.objects.writer(at(Index.MODE_OF_OPERATION))
+        self._controlling = [
+            output
+            for output in image.rpdos
+            if any(mapped.index == at(Index.CONTROLWORD) for mapped in output.config.mapping)
+        ]
+        self._no_mode_zero = quirks_of(self.config.quirks).no_mode_zero
+        # a mode is shown to the drive a cycle after the target that holds it there has left
+        self._mode_led = self._mode_shown = self.mode
+        self._controlword = 0
+        self._state = DriveState.UNKNOWN  # that the last cycle has seen
+        self._reset_began: float | None = None
+        self._braking = BrakingWatch()
+        self._following = FollowingWatch()
+        self._followed = False  # bit 12 in a cyclic mode, in the last cycle
+        self._led = self._streamed = False  # by a motion source, in the last cycle and in this
+        self._unseen_since: float | None = None
+        self._polling: Task[None] | None = None
+        node.on_lost.append(self._on_lost)
+        node.on_failed.append(self.fail)
+        node.lead_to_rest.append(self.lead_to_rest)
+
+    # What it is, and what it accepts.
+
+    def describe(self) -> str:
+        """Describe the drive in a sentence."""
+        return self.view.describe(halted=self.halt.held, failure=self.failure)
+
+    def status(self) -> DriveStatus:
+        """Return a snapshot for other threads."""
+        return self.view.status(
+            self.setpoint, self.following_error, failure=self.failure, summary=self.describe()
+        )
+
+    def report(self, severity: Severity, text: str) -> None:
+        """Report something about this drive to the owner of the network."""
+        about = text if self.name == self.node.name else f'{self.name}: {text}'
+        self.node.report(EventKind.DRIVE, severity, about)
+
+    def warn(self, text: str) -> None:
+        """Report what goes wrong with this drive."""
+        self.report(Severity.WARNING, text)
+
+    def feedback(self) -> AxisFeedback:
+        """Return the state for motion sources."""
+        view, refusal = self.view, self.stream_refusal
+        return AxisFeedback(
+            name=self.name,
+            online=self.node.online,
+            state=view.state,
+            mode=view.mode,
+            position=view.position,
+            velocity=view.velocity,
+            setpoint=self.setpoint,
+            followable=refusal is None or self._is_led_to_rest(),
+            refusal=refusal,
+            age=view.age,
+            speed_limit=view.parameters.speed_limit or math.inf,
+        )
+
+    @property
+    def setpoint(self) -> float:
+        """Position last commanded, the actual one where none is."""
+        commanded = self.mode.setpoint
+        if commanded is None or self.view.state is not DriveState.OPERATION_ENABLED:
+            return self.view.position
+        return commanded
+
+    @property
+    def stays_enabled(self) -> bool:
+        """Whether it is enabled, and no command is on its way that changes that."""
+        return self.view.state is DriveState.OPERATION_ENABLED and self._enables
+
+    @property
+    def _enables(self) -> bool:
+        """Whether the last controlword commands Operation Enabled."""
+        return self._controlword & ENABLE_OPERATION == ENABLE_OPERATION
+
+    @property
+    def acts(self) -> bool:
+        """Whether the target of the selected mode acts on the drive, by its last state.
+
+        It may be too old to accept targets (:attr:`refusal`), but a drive that cannot be seen is
+        braked in its mode, too.
+        """
+        return (
+            self.goal is DriveState.OPERATION_ENABLED
+            and self.view.state is DriveState.OPERATION_ENABLED
+            and self.view.mode == self.mode.number
+        )
+
+    @property
+    def shows_mode(self) -> bool:
+        """Whether the drive displays the selected mode, and has been sent what holds it there."""
+        return self._mode_shown is self.mode and self.view.mode == self.mode.number
+
+    @property
+    def accepts_targets(self) -> bool:
+        """Whether a target of the selected mode would be executed; :attr:`refusal` says why not."""
+        return (
+            self.acts
+            and self.view.fresh
+            and self.node.operational
+            and self._mode_shown is self.mode
+        )
+
+    @property
+    def refusal(self) -> Refusal | None:
+        """Why it accepts no targets of the selected mode now; None when it does."""
+        if self.accepts_targets:
+            return None
+        view, node = self.view, self.node
+        if not node.online:
+            return Refusal(RefusalCause.OFFLINE, node.loss or node.phase_text)
+        if node.left_operational:
+            return Refusal(RefusalCause.NOT_OPERATIONAL)
+        if view.state is DriveState.UNKNOWN:
+            return Refusal(RefusalCause.STATE_UNKNOWN)
+        if not view.fresh:
+            return Refusal(RefusalCause.SILENT, f'the last is {view.age:.1f} s old')
+        if view.state in FAULTY:
+            return Refusal(RefusalCause.FAULT, view.error)
+        if not self.goal is view.state is DriveState.OPERATION_ENABLED:
+            return Refusal(RefusalCause.NOT_ENABLED, view.state.title)
+        return Refusal(RefusalCause.MODE_CHANGE, mode_title(view.mode))
+
+    @property
+    def stream_refusal(self) -> Refusal | None:
+        """Why it accepts no stream of positions now; None when it does."""
+        refusal, mode = self.refusal, self.mode
+        if refusal is not None:
+            return refusal
+        if not isinstance(mode, CyclicPosition):
+            return Refusal(RefusalCause.OTHER_MODE, mode_title(mode.number))
+        if mode.goes_to_single_target:
+            return Refusal(RefusalCause.SINGLE_TARGET)
+        if self.halt.held and not mode.braked:
+            return Refusal(RefusalCause.HALTED)
+        return None
+
+    @property
+    def holding_mode(self) -> Mode | None:
+        """Mode whose target acts on the drive: it is powered and displays that mode."""
+        return self.shown_mode if self.view.state is DriveState.OPERATION_ENABLED else None
+
+    @property
+    def shown_mode(self) -> Mode | None:
+        """Mode that the drive displays; None where it is none of :attr:`modes`."""
+        shown = self.view.mode
+        return next((mode for mode in self.modes.values() if mode.number == shown), None)
+
+    # The cycle.
+
+    def read(self) -> None:
+        """Read the state from the process image, and stop the drive where that demands it."""
+        if self.phase is Phase.OFFLINE and self.node.operational:
+            self._begin()
+        view, before = self.view, self._state
+        view.observe()
+        self._state = view.state
+        if view.state is DriveState.UNKNOWN:
+            return
+        self.following_error = self.setpoint - view.position
+        if before is DriveState.UNKNOWN and self.node.taken_over and self.goal is None:
+            self._take_over()
+        elif self.phase in (Phase.OFFLINE, Phase.UNSEEN) and view.fresh:
+            self._found()
+        if view.state is not before:
+            self._state_changed(before)
+        self._watch_sight()
+        self._watch_braking()
+        self._watch_following()
+        if self.phase is Phase.FOUND and view.ready:
+            self.phase = Phase.READY
+            self.on_ready()
+
+    def write(self, now: float, period: float) -> None:
+        """Write controlword, mode and target for this cycle."""
+        self.period = period
+        if not self._streamed:
+            self.feed_forward.end()
+        self._led, self._streamed = self._streamed, False
+        command, bits = Command.DISABLE_VOLTAGE, NO_BITS
+        view, unseen = self.view, self.phase in (Phase.OFFLINE, Phase.UNSEEN)
+        known = view.state is not DriveState.UNKNOWN
+        if known and (view.fresh or (self.node.operational and not unseen)):
+            command, bits = self._step(self._command(), now, period)
+        elif self.node.taken_over:
+            return  # its RPDOs go on to carry what another master had commanded
+        elif unseen:
+            self.mute_controlword()  # it may move, and would coast
+        leads = self._enables and not (unseen or self.stop.running)
+        if leads and self.controlword_muted:
+            raise CanopenError('the RPDO with its controlword is kept back, with another axis')
+        self._send(command, bits)
+
+    def _step(self, command: Command, now: float, period: float) -> tuple[Command, int]:
+        """Advance the mode by a cycle, and let targets leave before what makes them act.
+
+        Returns:
+            The command of this cycle, and the bits of mode and halt in its controlword.
+        """
+        command, edge = self._lead_targets(command)
+        if command is Command.ENABLE_OPERATION and self.acts:
+            return command, self._step_mode(now, period)
+        return command, self._hold_without_target(edge=edge)
+
+    def _step_mode(self, now: float, period: float) -> int:
+        """Advance the mode by a cycle, and the halt; return their bits of the controlword."""
+        mode, halt = self.mode, self.halt
+        bits = mode.step(now, period, self.view.statusword)
+        if not halt.held:
+            return bits
+        before = halt.bits(mode)  # at its end bit 8 goes a cycle after the new target
+        if not halt.advance(now, period, mode):
+            mode.brake()
+            self.warn(f'stays halted: {NOT_TAKEN}')
+            return halt.bits(mode)
+        held = halt.bits(mode)
+        if held and mode.cyclic:
+            mode.preload(self.view.actual())  # from there it goes on
+        # ends with the edge where no acknowledge comes before
+        return bits | (held if bits & NEW_SET_POINT else before)
+
+    def _lead_targets(self, command: Command) -> tuple[Command, bool]:
+        """Send targets a cycle before the mode and the command that make them act.
+
+        RPDOs carry objects in any distribution, so that of one cycle a drive may see the edge
+        before the target. The flag: this command, or the mode, makes targets act that have left.
+        """
+        enabling = command is Command.ENABLE_OPERATION and not self._enables
+        if self._mode_led is not self.mode:
+            self._mode_led = self.mode
+            return (Command.SWITCH_ON if enabling else command), False
+        switching = self._mode_shown is not self.mode
+        self._mode_shown = self.mode
+        return command, switching or enabling
+
+    def _hold_without_target(self, *, edge: bool) -> int:
+        """Preload what may act on the drive later, and keep up a halt while modes change.
+
+        With ``edge`` the drive is enabled, or its mode switched, by what leaves in this cycle:
+        targets stay as they left in the one before.
+        """
+        held = self.holding_mode
+        keeps_target = held is not None and (held is self.mode or held.cyclic)
+        if not edge and not keeps_target:
+            # every target in an RPDO, also of modes that are not selected: a drive may stay in the
+            # mode that it had; of two modes with one target object the selected one writes last
+            actual = self.view.actual()
+            for mode in (*self.modes.values(), self.mode):
+                if not mode.by_sdo:
+                    mode.preload(actual)
+        if held is None or self.goal is not DriveState.OPERATION_ENABLED:
+            return NO_BITS
+        return self.halt.bits(held)
+
+    def _command(self) -> Command:
+        state = self.view.state
+        if self.resetting and state is DriveState.FAULT:
+            if self._reset_began is None:
+                self._reset_began = self._scheduler.now
+            return Command(fault_reset(state, self._scheduler.now - self._reset_began))
+        self._reset_began = None
+        goal = self.goal if self.stop.goal is None else self.stop.goal
+        return Command.DISABLE_VOLTAGE if goal is None else next_command(state, goal)
+
+    def _send(self, command: Command, bits: int = NO_BITS) -> None:
+        """Write controlword and mode."""
+        self._controlword = int(command) | bits
+        self.controlword_writer.write(self._controlword)
+        number = int(self._mode_shown.number)
+        if number or not self._no_mode_zero:
+            self.mode_writer.write(number)
+        elif self.view.mode and not self.mode_writer.by_sdo:
+            self.mode_writer.write(self.view.mode)  # keeps the mode that it has
+
+    # Its controlword by SDO: the RPDOs that carry it are kept back then.
+
+    @property
+    def controlword_muted(self) -> bool:
+        """Whether an RPDO with the controlword of this axis is kept back, for whichever axis."""
+        for output in self._controlling:  # noqa: SIM110  # in every cycle: half of what any() costs
+            if output.kept_back_by:
+                return True
+        return False
+
+    @property
+    def mutes_controlword(self) -> bool:
+        """Whether it is kept back for this axis."""
+        return any(self in output.kept_back_by for output in self._controlling)
+
+    def mute_controlword(self) -> None:
+        """Keep every RPDO back that carries the controlword of this axis."""
+        for output in self._controlling:
+            output.kept_back_by.add(self)
+
+    def unmute_controlword(self) -> None:
+        """Send them again, as far as no other axis keeps them back."""
+        for output in self._controlling:
+            output.kept_back_by.discard(self)
+
+    def can_send(self, controlword: int) -> bool:
+        """Set the controlword, and return whether the RPDOs that carry it can be sent with it."""
+        try:
+            self.controlword_writer.write(controlword)
+            for output in self._controlling:
+                output.frame()
+        except Exception:  # noqa: BLE001  # whatever made the cycle fail may last
+            return False
+        return True
+
+    # What is commanded in a mode.
+
+    def select(self, mode: Mode) -> None:
+        """Command another mode, preloaded with where the drive is, or where it is held.
+
+        A target that goes by SDO is in the drive before (``commands.py``).
+        A halt goes on: until the drive shows the new mode, it may still have a target of the old.
+        """
+        known = self.view.state is not DriveState.UNKNOWN  # else its first position preloads it
+        if known and self.holding_mode is not mode and not mode.by_sdo:
+            self.preload(mode)
+        self.mode = mode
+
+    def preload(self, mode: Mode) -> Promise[None]:
+        """Set the target of a mode to where the drive is, or where it is held.
+
+        Returns:
+            Done when the drive has it.
+        """
+        held, actual = self.holding_mode, self.view.actual()
+        if isinstance(held, CyclicPosition):
+            # under load the drive is not quite where it is held, and would sag to where it is
+            position_inc = self.view.units.position.to_device(held.setpoint)
+            actual = actual._replace(position_inc=position_inc, velocity=held.velocity)
+        return mode.preload(actual)
+
+    def select_back(self, mode: Mode) -> None:
+        """Command the mode of before after a switch that failed; the drive is halted in it."""
+        if not self.node.online or self.mode is mode:
+            return
+        if self.view.state is DriveState.OPERATION_ENABLED:
+            self.hold()
+        self.select(mode)
+
+    def hold(self) -> None:
+        """Brake, and stay halted until a new target is taken."""
+        self.mode.brake()
+        self.halt.hold()
+
+    def check_target(self, target: float) -> None:
+        """Refuse a target beyond the limits that the drive has in the selected mode."""
+        view = self.view
+        check_target(
+            self.name, self.mode, view.parameters, view.units, target, position=view.position
+        )
+
+    def stream(self, setpoint: Setpoint) -> None:
+        """Follow a motion source in this cycle.
+
+        Raises:
+            DriveError: A value is not finite, does not fit its object or is beyond a limit.
+        """
+        mode = self.mode
+        if not isinstance(mode, CyclicPosition):
+            return
+        check_setpoint(self.name, mode, self.view.parameters, setpoint)
+        if mode.number is OperationMode.CYCLIC_POSITION:
+            self.feed_forward.follow(setpoint)
+        mode.stream(setpoint.position)
+        self.halt.release()
+        self.motions += not self._led
+        self._streamed = True
+
+    # What takes it out of operation.
+
+    def fail(self, error: Exception, output: SentRpdo | None = None) -> None:
+        """Stop and disable the drive, because its cycle failed; never raises.
+
+        The other drives go on. An error that the drive itself could not have caused is a defect;
+        ``output`` is an RPDO of its device that cannot be sent.
+        """
+        text = str(error)
+        if not isinstance(error, CanopenError):
+            text = f'a defect in the CANopen master: {type(error).__name__}: {error}'
+        self._take_out(Refusal(RefusalCause.CYCLE_FAILED, text), text)
+        try:
+            self._send(self._command())
+            self.feed_forward.end()
+        except Exception:  # noqa: BLE001  # its cause may hinder this, too
+            self.stop.use_sdo()
+        if output in self._controlling:
+            self.stop.use_sdo()
+
+    def leave_operation(self) -> None:
+        """Lead it to Switch On Disabled, by the stop sequence where it may still move."""
+        self.goal = DriveState.SWITCH_ON_DISABLED
+        if self.view.state in POWERED and not self.view.stands:
+            self.stop.begin()
+
+    async def lead_to_rest(self, reason: str, severity: Severity = Severity.ERROR) -> bool:
+        """Bring it to rest and take its power away; return whether that was seen.
+
+        What TPDOs do not show is read by SDO; one that does not answer is left as it is.
+        """
+        await self.stop.ended()  # that the loss of its device has begun
+        state = self.view.state if self.view.fresh else await self.view.look()
+        if state in (*POWERED, DriveState.FAULT_REACTION_ACTIVE):
+            self._note_interruption()
+            self._take_out(Refusal(RefusalCause.OFFLINE, reason), reason, severity)
+            await self.stop.ended()
+            seen = self.stop.disabled and self.stop.rests
+        else:
+            seen = state is not DriveState.UNKNOWN
+        if not self.node.operational:
+            self.view.lose_sight()
+        return seen
+
+    def _take_out(self, refusal: Refusal, text: str, severity: Severity = Severity.ERROR) -> None:
+        """Stop and disable it; only the first cause is reported until it is enabled again."""
+        if self.goal is not None:
+            self.goal = DriveState.SWITCH_ON_DISABLED
+        first, self.failure = not self.failure, self.failure or text
+        if first or self.view.state in POWERED:
+            self.stop.begin(quiet=not first)
+        if not first:
+            return
+        self.released(refusal)
+        self.report(severity, f'stopping: {text}')
+
+    # Events: its device comes, it is seen, its state changes, its device is lost.
+
+    def _begin(self) -> None:
+        """Read the parameters of a device that has come into operation."""
+        self.phase = Phase.UNSEEN
+        self.view.cache.begin()
+        if self.config is self.node.config.drive:  # one axis polls for all
+            poll = self.node.objects.poll(self.node.config.poll_period)
+            self._polling = self._scheduler.background(poll)
+
+    def _found(self) -> None:
+        """Command it from now on; one that is enabled without a command of ours is stopped."""
+        self.phase = Phase.FOUND
+        if self.stop.running:
+            return
+        self.unmute_controlword()
+        if self.view.state in POWERED and self.goal is None:
+            self.warn(f'was found enabled, and is led to rest: {self.describe()}')
+            self.leave_operation()
+
+    def _take_over(self) -> None:
+        """Go on where another master has left the drive: enabled, it holds where it is held."""
+        held, view = self.holding_mode, self.view
+        if held is not None:
+            actual, target = view.actual(), view.held_position(held.number)
+            if isinstance(held, CyclicPosition) and target is not None:
+                actual = actual._replace(position_inc=target)
+            held.preload(actual)
+            self.mode = self._mode_shown = self._mode_led = held
+            self.goal = DriveState.OPERATION_ENABLED
+            title = mode_title(held.number)
+            self.report(Severity.INFO, f'taken over enabled, in mode {title}; it holds')
+            return
+        self._mode_shown = self._mode_led = self.mode
+        self.warn(f'is not enabled by the new master: {self.describe()}')
+        if view.state in POWERED:
+            self.leave_operation()
+
+    def _state_changed(self, before: DriveState) -> None:
+        view, left = self.view, before is DriveState.OPERATION_ENABLED
+        if left:
+            self.halt.release()
+        if view.state in FAULTY and before not in FAULTY:
+            self.goal = DriveState.SWITCH_ON_DISABLED
+            view.error = view.error_of_emcy()
+            self.released(Refusal(RefusalCause.FAULT, view.error))
+            self._scheduler.background(self._report_fault())
+        elif left and self.goal is DriveState.OPERATION_ENABLED:
+            self._left_by_itself()
+        elif left:
+            self.released(Refusal(RefusalCause.NOT_ENABLED, view.state.title))
+
+    def _left_by_itself(self) -> None:
+        """Keep it from starting again when the cause goes away, with power while it brakes."""
+        goal, cause = DriveState.SWITCH_ON_DISABLED, 'is the voltage or the safe torque off gone?'
+        if self.view.state is DriveState.QUICK_STOP_ACTIVE:
+            goal = DriveState.QUICK_STOP_ACTIVE
+            cause = 'is it at a limit switch, is its quick stop input on, or was a heartbeat late?'
+        self.goal = goal
+        self.released(Refusal(RefusalCause.NOT_ENABLED, 'it left Operation enabled by itself'))
+        self.report(
+            Severity.ERROR,
+            f'left Operation enabled by itself: {self.describe()}; {cause} Enable it again when '
+            'it is safe',
+        )
+
+    async def _report_fault(self) -> None:
+        await self.view.read_error_code()
+        self.report(Severity.ERROR, f'FAULT: {self.describe()}; recover it')
+
+    def _note_interruption(self) -> None:
+        """Keep the mode that it is enabled in, for the time after its device is lost."""
+        if self.goal is self.view.state is DriveState.OPERATION_ENABLED:
+            self.interrupted = self.mode.number
+
+    def _on_lost(self, reason: str) -> None:
+        """Command nothing any more, and select no mode."""
+        view, node = self.view, self.node
+        view.cache.forget(reason)
+        if self._polling is not None:
+            self._polling.cancel(SdoError(reason))
+        by_itself = node.left_by_itself
+        powered = view.state in POWERED
+        if not node.left_operational:
+            self._note_interruption()
+        elif not by_itself:
+            self.interrupted = None
+        self.feed_forward.end()
+        self.phase = Phase.OFFLINE
+        self.resetting = self._followed = False
+        self._unseen_since = None
+        self._following.clear()
+        self.goal = None
+        self.halt.release()
+        self.mode = self._mode_shown = self._mode_led = self.modes[OperationMode.NO_MODE]
+        view.error = self.failure = ''
+        view.lose_sight()
+        self._state = DriveState.UNKNOWN
+        left = node.left_operational
+        cause = RefusalCause.NOT_OPERATIONAL if left else RefusalCause.OFFLINE
+        self.released(Refusal(cause, reason))
+        if powered and by_itself:  # it may receive what it does not answer
+            self.stop.begin(quiet=True)
+        elif powered and node.online:
+            self._scheduler.background(self._brake_without_pdos(reason))
+
+    async def _brake_without_pdos(self, reason: str) -> None:
+        """Stop an axis that goes on without its master, as a command took its device from PDOs."""
+        self.failure = failure = f'{reason}, and it is not seen to stand'
+        self.warn(f'stopping by SDO: {reason}')
+        await self.stop.run()
+        if self.stop.disabled and self.stop.rests and self.failure == failure:
+            self.failure = ''
+
+    # What is watched in each cycle: that it is seen, brakes when it shall, and follows.
+
+    def _watch_sight(self) -> None:
+        """Bring a drive to rest that acts on targets and has stopped to send its state."""
+        view = self.view
+        if view.fresh or not self.acts:
+            self._unseen_since = None
+            return
+        if self._unseen_since is None:
+            self._unseen_since = self._scheduler.now
+        if self._is_led_to_rest() or self.halt.rests:
+            return
+        self.hold()
+        self._scheduler.background(self._look_for_motion())
+        self.released(Refusal(RefusalCause.SILENT, f'the last is {view.age:.1f} s old'))
+        self.report(
+            Severity.ERROR,
+            f'stopping: no TPDOs for {view.age:.1f} s; it stays halted until the first target '
+            'after they have come again',
+        )
+
+    async def _look_for_motion(self) -> None:
+        """See by SDO whether a drive slows down whose TPDOs do not come."""
+        while not self.view.fresh and self.acts:
+            await self.view.look()
+            await self._scheduler.timer(LOOK_PERIOD)
+
+    def _is_led_to_rest(self) -> bool:
+        """Whether a motion source may still lead a silent drive, to stop it on its path."""
+        since = self._unseen_since
+        return self._led and since is not None and self._scheduler.now - since < UNSEEN_STOP_TIME
+
+    def _watch_braking(self) -> None:
+        """Stop an axis by stronger means that a halt, or being disabled, does not slow down."""
+        view, halted = self.view, self.halt.rests
+        goal, enabled = self.goal, DriveState.OPERATION_ENABLED
+        commanded = halted or not (goal is enabled or goal is None)
+        if not commanded or view.state is not enabled or self.stop.running:
+            self._braking.clear()
+            return
+        if not self._braking.fails(
+            self._scheduler.now, view, view.parameters.profile.deceleration
+        ):
+            return
+        text = (
+            f'moves on at {view.rate:.3g} per second, although it was '
+            f'{"halted" if halted else "disabled"}: quick stop, and no power if that does not '
+            'slow it down either'
+        )
+        if halted:
+            self.goal = DriveState.QUICK_STOP_ACTIVE
+        self.stop.begin(disables=not halted)
+        self.released(Refusal(RefusalCause.NOT_ENABLED, 'its halt did not slow it down'))
+        self.report(Severity.ERROR, text)
+
+    def _watch_following(self) -> None:
+        """Stop a drive that is left behind by the set-points of a cyclic mode."""
+        mode = self.mode
+        if not (mode.cyclic and self.accepts_targets):
+            self._followed = False
+            if mode.cyclic and self.acts:
+                self._following.lose_sight()
+            else:
+                self._following.clear()
+            return
+        follows = bool(self.view.statusword & FOLLOWS_COMMAND)
+        lost, self._followed = self._followed and not follows, follows
+        if lost:
+            rests = isinstance(mode, InterpolatedPosition) and not mode.velocity
+            if not rests:  # in mode 7 bit 12 may go where nothing moves
+                self.released(Refusal(RefusalCause.NOT_FOLLOWING, 'bit 12'))
+                self.warn(f'does not follow its set-points any more (bit 12): {self.describe()}')
+        if isinstance(mode, CyclicPosition):
+            self._watch_position(mode)
+
+    def _watch_position(self, mode: CyclicPosition) -> None:
+        view, setpoint = self.view, mode.setpoint
+        position = view.units.position.commanded(view.position_inc)
+        shown = mode.number is OperationMode.CYCLIC_POSITION and bool(
+            view.statusword & FOLLOWING_ERROR
+        )
+        parameters = view.parameters
+        margin = MARGIN_TIME * parameters.profile.velocity
+        window = parameters.following_window or margin
+        following = self._following.judge(
+            self._scheduler.now,
+            setpoint,
+            position,
+            margin=min(margin, window),
+            window=window,
+            error=shown,
+        )
+        if following is Following.FOLLOWS:
+            return
+        self._following.clear()
+        where = f'commanded to {setpoint:g}, it is at {position:g}'
+        refusal = Refusal(RefusalCause.NOT_FOLLOWING, where)
+        text = f'it does not follow its set-points ({where})'
+        if following is Following.LASTING_ERROR or view.position_age > POSITION_AGE_MAX:
+            self._take_out(refusal, f'{text}. Can it hold its load, and is the axis free?')
+            return
+        self.hold()
+        mode.preload(view.actual())  # so that it does not jump when set-points reach it again
+        self.released(refusal)
+        self.report(
+            Severity.ERROR, f'stopping: {text}. Do its RPDOs arrive, and is the axis free?'
+        )
