@@ -224,7 +224,7 @@ class Axis:
 
     @property
     def accepts_targets(self) -> bool:
-        """Whether a target of the selected mode would be executed; :attr:`refusal` says why not."""
+        """Whether a target of the selected mode would be executed; else see :attr:`refusal`."""
         return (
             self.acts
             and self.view.fresh

@@ -190,10 +190,11 @@ class AxisCommands:
             TAKEN_TIMEOUT + axis.node.config.sdo_timeout,
             'its target',
         )
-        if delivery.error is not None:
-            raise self.refused(f'has not taken its target ({delivery.error})')
         if halt.state is HaltState.UNANSWERED:
             raise DriveError(f'{axis.name} stays halted: {NOT_TAKEN}')
+        error = delivery.error
+        if error is not None and not (stopped() and isinstance(error, DriveError)):
+            raise self.refused(f'has not taken its target ({error})')
         if stopped():
             raise self.refused('was stopped before it had taken the target')
 

@@ -235,6 +235,36 @@ def test_a_drive_without_acknowledge_is_reported_once() -> None:
     assert len([text for text in net.reported(Severity.WARNING) if 'bit 12' in text]) == 1
 
 
+def test_a_drive_that_sees_no_set_point_has_not_taken_its_target() -> None:
+    """It does not count as one without acknowledge, as it does not move; the next target goes."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    commands = net.commands[JOINT]
+    SetPoints(net, Kind.NEVER)
+    with pytest.raises(DriveError, match=r'has not taken its target .*bit 12'):
+        net.result(commands.deliver(lambda: commands.set_target(0.5)))
+    assert_rests(net)
+    SetPoints(net, Kind.NEVER_ACKNOWLEDGES)
+    for target in (0.0, 0.3):  # the first is where it stands
+        net.result(commands.deliver(partial(commands.set_target, target)))
+    go(net, 2.5)
+    assert net.motor() == pytest.approx(0.3, abs=2e-3)
+
+
+def test_a_drive_that_acknowledges_no_more_is_judged_by_its_motion() -> None:
+    """A target that moves it is answered as taken, and one that does not as refused."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    commands = net.commands[JOINT]
+    for kind, target in ((Kind.ALWAYS, 0.1), (Kind.NEVER_ACKNOWLEDGES, 0.5)):
+        SetPoints(net, kind)
+        net.result(commands.deliver(partial(commands.set_target, target)))
+        go(net, 2.0)
+        assert net.motor() == pytest.approx(target, abs=2e-3)
+    SetPoints(net, Kind.NEVER)
+    with pytest.raises(DriveError, match=r'has not taken its target .*bit 12'):
+        net.result(commands.deliver(partial(commands.set_target, 0.1)))
+    assert_rests(net)
+
+
 def test_relative_moves_count_from_what_the_drive_has_or_gets() -> None:
     """An immediate one that waits is not lost by the next, and the answers are where they end."""
     net = running_in(OperationMode.PROFILE_POSITION)

@@ -65,7 +65,7 @@ def _profile_modes(view: AxisState, warn: Callable[[str], None]) -> Iterator[Mod
     if position := target(OperationMode.PROFILE_POSITION, OperationMode.CYCLIC_POSITION):
         place, command = view.at(Index.TARGET_POSITION), view.at(Index.CONTROLWORD)
         leads = not node.image.is_applied_first(place, 0, command=command)
-        yield ProfilePosition(units, position, warn, target_leads=leads)
+        yield ProfilePosition(view, position, warn, target_leads=leads)
     if vl_target := writer(OperationMode.VELOCITY):
         yield Velocity(vl_target, units.velocity)
     if velocity := target(OperationMode.PROFILE_VELOCITY, OperationMode.CYCLIC_VELOCITY):

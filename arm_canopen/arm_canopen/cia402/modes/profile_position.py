@@ -9,14 +9,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import Enum
 import math
+from typing import TYPE_CHECKING
 
 from canopen_core import DriveError
 from canopen_core.standard import Controlword, OperationMode, Statusword
 
 from ...master.process_image import Writer
 from ...master.scheduler import completed, Promise
-from ..units import Units
 from .mode import Actual, Mode, TARGET_REACHED
+
+if TYPE_CHECKING:
+    from ..state import AxisState
 
 ACKNOWLEDGE = int(Statusword.SET_POINT_ACKNOWLEDGE)
 NEW_SET_POINT = int(Controlword.NEW_SET_POINT)
@@ -24,6 +27,8 @@ CHANGE_IMMEDIATELY = int(Controlword.CHANGE_IMMEDIATELY)
 ACKNOWLEDGE_TIMEOUT = 1.0  # [s] a drive acknowledges a set-point within a few cycles
 QUEUE_MAX = 16  # moves that may wait for the drive
 EDGE_CYCLES = 3  # of SYNC in which a drive sees bit 4 change
+NEAR_INC = 10  # [inc] from its destination at which an axis has no way to go
+STOPPED = 'it was stopped before the drive had it'
 FULL_AFTER = 0.1  # [s] after which bit 12 is no late answer any more, but a full buffer
 
 
@@ -68,8 +73,13 @@ class Waiting:
     value: int  # what is written to 0x607A
     move: Move  # the move
     destination: float  # where it ends in user units
-    # done when the drive has the value
+    # done when the drive has it
     delivery: Promise[None] = field(default_factory=Promise, compare=False)
+
+    def note_sent(self, sent: Promise[None]) -> None:
+        """Reject the delivery where the drive has refused the value."""
+        if sent.error is not None:
+            self.delivery.reject(sent.error)
 
 
 class ProfilePosition(Mode):
@@ -78,16 +88,17 @@ class ProfilePosition(Mode):
     Of immediate moves the newest counts: it replaces those that still wait for the handshake.
     Others queue, and none of them is lost; relative ones too, for each counts from the one before.
 
-    A drive that has never raised bit 12 when its time was up does not do so at all, which is
-    reported once. From then on a set-point counts as taken when it was offered, and a move that
-    waits for the one before follows bit 10 (target reached).
+    The delivery of a move is done when the drive has acknowledged it. A drive that acts on a
+    set-point, but has never raised bit 12, does not do so at all, which is reported once. From
+    then on a set-point counts as taken when it was offered, and a move that waits for the one
+    before follows bit 10 (target reached).
     """
 
     number = OperationMode.PROFILE_POSITION
 
     def __init__(
         self,
-        units: Units,
+        view: AxisState,
         target: Writer,
         warn: Callable[[str], None],
         *,
@@ -99,7 +110,8 @@ class ProfilePosition(Mode):
         cycle.
         """
         self._target_leads = target_leads
-        self._units = units
+        self._view = view
+        self._units = view.units
         self._target = target
         self._warn = warn
         self._queue: deque[Waiting] = deque()
@@ -114,6 +126,7 @@ class ProfilePosition(Mode):
         self._taken = False
         self._acknowledges: bool | None = None  # None until the drive has shown it
         self._offered: Waiting | None = None
+        self._acts = False  # bit 10 has gone since the set-point was offered
         self._delivery = completed()
         self.handshake = Handshake.IDLE
 
@@ -194,6 +207,8 @@ class ProfilePosition(Mode):
     def withdraw(self, delivery: Promise[None], error: DriveError) -> bool:
         """Forget a move that has not been offered, and those behind it, which count from it."""
         delivery.reject(error)  # where its value is on its way, it is not offered any more
+        if self.offered and self._offered is not None and self._offered.delivery is delivery:
+            self._withdraw()
         deliveries = [waiting.delivery for waiting in self._queue]
         if delivery in deliveries:
             place = deliveries.index(delivery)
@@ -206,6 +221,7 @@ class ProfilePosition(Mode):
         """Advance the handshake."""
         acknowledged = bool(statusword & ACKNOWLEDGE)
         if self.handshake is Handshake.OFFERED:
+            self._acts |= not statusword & TARGET_REACHED
             self._watch_acknowledge(now, acknowledged=acknowledged)
         elif self.handshake is Handshake.WRITTEN:
             self._watch_delivery(now, acknowledged=acknowledged)
@@ -230,8 +246,10 @@ class ProfilePosition(Mode):
         return self._acknowledges is not False or not waits
 
     def _forget(self) -> None:
-        self._drop_waiting('it was stopped before the drive had it')
-        self._imposed = None
+        self._drop_waiting(STOPPED)
+        if self._offered is not None:
+            self._offered.delivery.reject(DriveError(STOPPED))
+        self._offered = self._imposed = None
         self._taken = False
         if self.handshake in (Handshake.OFFERED, Handshake.FORCED):
             self.handshake = Handshake.WITHDRAWN
@@ -245,7 +263,7 @@ class ProfilePosition(Mode):
             return
         self._offered = waiting = self._queue.popleft()
         self._delivery = self._target.deliver(waiting.value)
-        waiting.delivery.follow(self._delivery)
+        self._delivery.when_done(waiting.note_sent)
         self._bits = waiting.move.bits
         self._reference = waiting.destination
         if self._target_leads or not self._delivery.done:
@@ -283,7 +301,9 @@ class ProfilePosition(Mode):
             self.setpoint = self._offered.destination
         self._offered_at = now
         self._cycles_left = EDGE_CYCLES
-        self._taken |= self._acknowledges is False
+        self._acts = False
+        if self._acknowledges is False:
+            self._take()
         self.handshake = Handshake.FORCED if acknowledged else Handshake.OFFERED
 
     def _show_edge(self, now: float) -> None:
@@ -320,19 +340,18 @@ class ProfilePosition(Mode):
         """See whether a full drive has taken an immediate move; else it is handed over later."""
         imposed = self._imposed
         if not acknowledged:
-            self._taken, self._imposed = True, None
+            self._imposed = None
+            self._take()
             self._hand_over(now, acknowledged=False)
         elif now - self._offered_at > timeout:
             self.handshake = Handshake.RELEASED
-            if imposed is not None and not self._queue:
-                self._queue.append(imposed)
+            self._offer_later(imposed)
 
     def offer_again(self) -> None:
         """Clear bit 4 until the drive has seen that, and offer the newest target."""
         if self.handshake is not Handshake.OFFERED:
             return
-        if self._offered is not None and not self._is_replaced:
-            self._queue.appendleft(self._offered)
+        self._offer_later(self._offered)
         self._withdraw()
 
     def goes_on_unanswered(self) -> bool:
@@ -350,7 +369,8 @@ class ProfilePosition(Mode):
 
     def _watch_acknowledge(self, now: float, *, acknowledged: bool) -> None:
         if acknowledged:
-            self._taken = self._acknowledges = True
+            self._acknowledges = True
+            self._take()
             self.handshake = Handshake.RELEASED
         elif self._acknowledges is False:
             self._cycles_left -= 1
@@ -358,6 +378,21 @@ class ProfilePosition(Mode):
                 self._withdraw()
         elif now - self._offered_at > ACKNOWLEDGE_TIMEOUT:
             self._not_acknowledged()
+
+    def _take(self) -> None:
+        """The drive has the set-point that was offered."""
+        self._taken = True
+        if self._offered is not None:
+            self._offered.delivery.resolve(None)
+
+    def _offer_later(self, waiting: Waiting | None) -> None:
+        """Offer a set-point once more, unless the next one replaces it."""
+        if waiting is None:
+            return
+        if self._is_replaced:
+            waiting.delivery.follow(self._queue[0].delivery)
+        else:
+            self._queue.appendleft(waiting)
 
     def _withdraw(self) -> None:
         self.handshake = Handshake.WITHDRAWN
@@ -368,10 +403,9 @@ class ProfilePosition(Mode):
         self._acknowledges = False
         offered = self._offered
         if offered is not None and offered.move.immediate and not offered.move.relative:
-            if not self._is_replaced:
-                self._queue.appendleft(offered)
+            self._offer_later(offered)
         else:
-            self._taken = True
+            self._take()
         self._withdraw()
         self._warn(
             f'set-points are not acknowledged (bit 12 did not come within {ACKNOWLEDGE_TIMEOUT:g} '
@@ -380,12 +414,20 @@ class ProfilePosition(Mode):
         )
 
     def _not_acknowledged(self) -> None:
-        if self._acknowledges is None:
+        """Conclude from an acknowledge that has not come in time, and from what the axis does."""
+        offered, view = self._offered, self._view
+        there = offered is None or (
+            abs(self._units.position.raw(offered.destination) - view.position_inc) <= NEAR_INC
+        )
+        acts = self._acts or there or not view.stands
+        if self._acknowledges is None and acts:
             self._never_acknowledged()
             return
-        self.handshake = Handshake.RELEASED
         self._reference = None
-        self._warn(
-            f'the set-point was not acknowledged within {ACKNOWLEDGE_TIMEOUT:g} s (bit 12); it '
-            'may not have been taken'
-        )
+        self._withdraw()
+        text = f'the set-point was not acknowledged within {ACKNOWLEDGE_TIMEOUT:g} s (bit 12)'
+        self._warn(f'{text}; it may not have been taken')
+        if acts:
+            self._take()
+        elif offered is not None:
+            offered.delivery.reject(DriveError(text))
