@@ -274,8 +274,7 @@ class Axis:
     @property
     def shown_mode(self) -> Mode | None:
         """Mode that the drive displays; None where it is none of :attr:`modes`."""
-        shown = self.view.mode
-        return next((mode for mode in self.modes.values() if mode.number == shown), None)
+        return self.modes.get(self.view.mode)
 
     # The cycle.
 

@@ -433,7 +433,9 @@ class AxisCommands:
         axis = self.axis
         parameters = axis.view.parameters
         offered = ', '.join(
-            mode.title for mode in axis.modes if mode and parameters.supports(mode)
+            mode.number.title
+            for mode in axis.modes.values()
+            if mode.number and parameters.supports(mode.number)
         )
         if not parameters.supports(number):
             why = f'the drive does not have it (0x6502 is 0x{parameters.supported_modes:X})'
@@ -556,7 +558,7 @@ class AxisCommands:
             axis.config.velocity_mode,
             axis.config.effort_mode,
         ):
-            mode = next((mode for mode in axis.modes.values() if mode.number == number), None)
+            mode = None if number is None else axis.modes.get(number)
             if mode is not None and mode.number and axis.view.parameters.supports(mode.number):
                 return mode
         return None

@@ -29,22 +29,24 @@ DEFAULT_PROFILE = ProfileLimits(DEFAULT_VELOCITY, DEFAULT_ACCELERATION, DEFAULT_
 NO_WINDOW = (0, 0xFFFF_FFFF)  # values of 0x6065 with which nothing is monitored
 DEFAULT_TORQUE_SLOPE_DEV = 1000.0  # [device units/s]: from 0 to the rated torque in a second
 
-REFRESHED = frozenset(
-    {
-        Index.HOMING_METHOD,
-        Index.SOFTWARE_POSITION_LIMIT,
-        Index.MAX_PROFILE_VELOCITY,
-        Index.FOLLOWING_ERROR_WINDOW,
-        Index.MAX_TORQUE,
-        Index.PROFILE_VELOCITY,
-        Index.PROFILE_ACCELERATION,
-        Index.PROFILE_DECELERATION,
-        Index.QUICK_STOP_DECELERATION,
-        Index.TORQUE_SLOPE,
-        *OFFSET_OBJECTS.values(),
-    }
+ADDRESSES: tuple[tuple[int, int], ...] = (
+    (Index.SUPPORTED_MODES, 0),
+    (Index.HOMING_METHOD, 0),
+    (Index.SOFTWARE_POSITION_LIMIT, 1),
+    (Index.SOFTWARE_POSITION_LIMIT, 2),
+    (Index.MAX_PROFILE_VELOCITY, 0),
+    (Index.FOLLOWING_ERROR_WINDOW, 0),
+    (Index.MAX_TORQUE, 0),
+    (Index.PROFILE_VELOCITY, 0),
+    (Index.PROFILE_ACCELERATION, 0),
+    (Index.PROFILE_DECELERATION, 0),
+    (Index.QUICK_STOP_DECELERATION, 0),
+    (Index.TORQUE_SLOPE, 0),
+    *((index, 0) for index in OFFSET_OBJECTS.values()),
 )
-"""Objects of the first axis that are read again when this master has written one of them."""
+"""Objects of the first axis that are read."""
+REFRESHED = frozenset(index for index, _ in ADDRESSES) - {Index.SUPPORTED_MODES}
+"""Those that are read again when this master has written one of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,81 +169,63 @@ class ParameterCache:
             )
 
     async def _read_all(self) -> DriveParameters:
-        """Read them, as far as the EDS has them."""
+        """Read them, as far as the EDS has them; what the drive lacks follows from its others."""
         self._units_from = self._units_from or await self._read_units()
-        units = self._units
-        slope = await self._read(Index.TORQUE_SLOPE)
-        effort = await self._read(Index.MAX_TORQUE)
-        window = await self._read(Index.FOLLOWING_ERROR_WINDOW)
-        speed = await self._read(Index.MAX_PROFILE_VELOCITY)
-        speed_limit = abs(units.velocity.commanded(speed)) if speed else None
-        position_limits = await self._position_limits()
-        profile = await self._profile(speed_limit, position_limits)
-        quick_stop = await self._read(Index.QUICK_STOP_DECELERATION)
+        held, units = await self._read_each(ADDRESSES), self._units
+
+        def value(index: int, subindex: int = 0) -> int:
+            return held[index, subindex] or 0
+
+        def acceleration(index: int, default: float) -> float:
+            return abs(units.acceleration.from_device(value(index))) if value(index) else default
+
+        speed_limit = position_limits = effort_limit = following_window = None
+        velocity = DEFAULT_VELOCITY
+        lower, upper = (held[Index.SOFTWARE_POSITION_LIMIT, subindex] for subindex in (1, 2))
+        if lower is not None and upper is not None and lower < upper:
+            # as targets go, which they are limits of
+            low, high = sorted((units.position.commanded(lower), units.position.commanded(upper)))
+            position_limits, velocity = (low, high), (high - low) / RANGE_TIME
+        if speed := value(Index.MAX_PROFILE_VELOCITY):
+            speed_limit = abs(units.velocity.commanded(speed))
+            velocity = SPEED_SHARE * speed_limit
+        if speed := value(Index.PROFILE_VELOCITY):
+            velocity = abs(units.velocity.commanded(speed))
+        if effort := value(Index.MAX_TORQUE):
+            effort_limit = abs(units.effort.commanded(effort))
+        window = held[Index.FOLLOWING_ERROR_WINDOW, 0]
+        if window is not None and window not in NO_WINDOW:
+            following_window = abs(window / units.position.to_dev)
+        accelerates = acceleration(Index.PROFILE_ACCELERATION, velocity / RAMP_TIME)
+        profile = ProfileLimits(
+            velocity=min(velocity, speed_limit or velocity),
+            acceleration=accelerates,
+            deceleration=acceleration(Index.PROFILE_DECELERATION, accelerates),
+            speed_limit=speed_limit or 0.0,
+        )
+        place = Index.PROFILE_VELOCITY + self._offset
+        in_rpdo = self._node.image.mapped_output(place) is not None
+        slope = value(Index.TORQUE_SLOPE) or DEFAULT_TORQUE_SLOPE_DEV
         return DriveParameters(
-            supported_modes=await self._read(Index.SUPPORTED_MODES),
-            homing_method=await self._read(Index.HOMING_METHOD) or 0,
+            supported_modes=held[Index.SUPPORTED_MODES, 0],
+            homing_method=value(Index.HOMING_METHOD),
             position_limits=position_limits,
             speed_limit=speed_limit,
-            effort_limit=abs(units.effort.commanded(effort)) if effort else None,
-            following_window=self._following_window(window),
+            effort_limit=effort_limit,
+            following_window=following_window,
             profile=profile,
-            quick_stop_deceleration=self._acceleration(quick_stop, profile.deceleration),
-            torque_slope=abs(units.effort.commanded(slope or DEFAULT_TORQUE_SLOPE_DEV)),
-            profile_velocity_inc=await self._profile_velocity(),
-            offsets={index: await self._read(index) or 0 for index in OFFSET_OBJECTS.values()},
+            quick_stop_deceleration=acceleration(
+                Index.QUICK_STOP_DECELERATION, profile.deceleration
+            ),
+            torque_slope=abs(units.effort.commanded(slope)),
+            profile_velocity_inc=None if in_rpdo else held[Index.PROFILE_VELOCITY, 0],
+            offsets={index: value(index) for index in OFFSET_OBJECTS.values()},
             units=self._units_from,
         )
 
     async def _factor_group(self, addresses: Sequence[tuple[int, int]]) -> FactorGroup:
-        held = {address: await self._read(*address) for address in addresses}
+        held = await self._read_each(addresses)
         return FactorGroup.read(lambda index, subindex: held.get((index, subindex)))
-
-    async def _profile_velocity(self) -> int | None:
-        if self._node.image.mapped_output(Index.PROFILE_VELOCITY + self._offset) is not None:
-            return None
-        return await self._read(Index.PROFILE_VELOCITY)
-
-    async def _position_limits(self) -> tuple[float, float] | None:
-        lower = await self._read(Index.SOFTWARE_POSITION_LIMIT, 1)
-        upper = await self._read(Index.SOFTWARE_POSITION_LIMIT, 2)
-        if lower is None or upper is None or lower >= upper:
-            return None
-        convert = self._units.position.commanded  # as targets go, which they are limits of
-        ends = sorted((convert(lower), convert(upper)))
-        return ends[0], ends[1]
-
-    def _following_window(self, window: int | None) -> float | None:
-        if window is None or window in NO_WINDOW:
-            return None
-        return abs(window / self._units.position.to_dev)
-
-    async def _profile(
-        self, speed_limit: float | None, position_limits: tuple[float, float] | None
-    ) -> ProfileLimits:
-        """Read the limits of a profile; what the drive does not say follows from its others."""
-        velocity_dev = await self._read(Index.PROFILE_VELOCITY)
-        acceleration = await self._read(Index.PROFILE_ACCELERATION)
-        deceleration = await self._read(Index.PROFILE_DECELERATION)
-        if velocity_dev:
-            velocity = abs(self._units.velocity.commanded(velocity_dev))
-        elif speed_limit is not None:
-            velocity = SPEED_SHARE * speed_limit
-        elif position_limits is not None:
-            velocity = (position_limits[1] - position_limits[0]) / RANGE_TIME
-        else:
-            velocity = DEFAULT_VELOCITY
-        default = velocity / RAMP_TIME
-        return ProfileLimits(
-            velocity=min(velocity, speed_limit or velocity),
-            acceleration=self._acceleration(acceleration, default),
-            deceleration=self._acceleration(deceleration or acceleration, default),
-            speed_limit=speed_limit or 0.0,
-        )
-
-    def _acceleration(self, value: int | None, default: float) -> float:
-        """Convert an acceleration to user units; a drive without it has the default."""
-        return abs(self._units.acceleration.from_device(value)) if value else default
 
     async def _read_units(self) -> str:
         """Use the units of the factor group (CiA 402-2, clause 8); report where they are from."""
@@ -271,6 +255,12 @@ class ParameterCache:
             config = replace(config, scale_acc_to_dev=scale, scale_acc_from_dev=1.0 / scale)
         self._units.use(config)
         return source
+
+    async def _read_each(
+        self, addresses: Sequence[tuple[int, int]]
+    ) -> dict[tuple[int, int], int | None]:
+        """Read objects of the profile; None for those that the drive lacks."""
+        return {address: await self._read(*address) for address in addresses}
 
     async def _read(self, index: int, subindex: int = 0) -> int | None:
         profile_index = index + self._offset

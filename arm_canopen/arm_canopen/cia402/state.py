@@ -346,7 +346,8 @@ class AxisState:
 
     def observe(self) -> None:
         """Read state and position from the process image, or from the last look by SDO."""
-        now, shown = self._scheduler.now, None
+        now = self._scheduler.now
+        shown = position = None
         self.fresh = False
         if self.node.operational:
             word, position = self._statusword.value, self._position.value
@@ -367,6 +368,9 @@ class AxisState:
         if shown is None:
             self.state, self.statusword, self.mode = DriveState.UNKNOWN, 0, 0
             self.velocity_dev = None
+            if position is not None:  # it may come before the statusword
+                self.position_inc = position
+                self.position = self.units.position.from_device(position)
             return
         word, self.position_inc = shown
         looked = shown is self._looked

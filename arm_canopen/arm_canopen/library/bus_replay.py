@@ -41,7 +41,7 @@ class ReplayedAxis:
         # position last commanded in user units, NaN while no RPDO has carried one;
         # following_error: set-point that was sent before the position was measured, minus that
         self.setpoint = self.following_error = math.nan
-        self._commanded = False
+        self._commanded = self._faulted = False
 
     def note_command(self) -> None:
         """Store the target of an RPDO."""
@@ -52,20 +52,20 @@ class ReplayedAxis:
         self.view.lose_sight()
         self.view.error = ''
         self.setpoint = self.following_error = math.nan
-        self._commanded = False
+        self._commanded = self._faulted = False
 
     def observe(self, report: Callable[[Severity, str], None]) -> None:
         """Read state and position of this cycle; report a new fault."""
         view = self.view
-        before = view.state
         view.observe()
+        before, self._faulted = self._faulted, view.state in FAULTY
         if view.state is DriveState.UNKNOWN:
             return
         self.following_error = self.setpoint - view.position
-        if view.state in FAULTY and before not in FAULTY:
+        if self._faulted and not before:
             view.error = view.error_of_emcy()
             report(Severity.ERROR, f'FAULT: {view.describe()}')
-        elif view.state not in FAULTY:
+        elif not self._faulted:
             view.error = ''
         if self._commanded:
             self.setpoint = self._target()
@@ -79,6 +79,7 @@ class ReplayedAxis:
 
     def status(self) -> DriveStatus:
         """Return a snapshot at the time of the log."""
+        self.view.observe()  # what no TPDO carries comes between cycles
         return self.view.status(self.setpoint, self.following_error)
 
 

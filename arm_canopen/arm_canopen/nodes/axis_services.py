@@ -132,25 +132,12 @@ class AxisServices:
         return self._thread.call(run)
 
 
-class DriveServices:
-    """Services and topics of a drive with one axis or several."""
-
-    def __init__(
-        self,
-        node: DeviceNode,
-        axes: Sequence[AxisCommands],
-        thread: NetworkThread,
-        file: BusFile,
-    ) -> None:
-        self.axes = [commands.axis for commands in axes]  # its axes
-        # their joint states
-        self.joint_states = DriveJointStates(node, [axis.view for axis in self.axes])
-        places = ['~' if len(axes) == 1 else axis.name for axis in self.axes]
-        self._services = [
-            AxisServices(node, commands, place, thread)
-            for commands, place in zip(axes, places, strict=True)
-        ]
-        self._units = [
-            UnitsService(node, axis, place, thread, file)
-            for axis, place in zip(self.axes, places, strict=True)
-        ]
+def offer_drive(
+    node: DeviceNode, axes: Sequence[AxisCommands], thread: NetworkThread, file: BusFile
+) -> DriveJointStates:
+    """Offer services and topics of a drive with one axis or several; return its joint states."""
+    for commands in axes:
+        place = '~' if len(axes) == 1 else commands.axis.name
+        AxisServices(node, commands, place, thread)
+        UnitsService(node, commands.axis, place, thread, file)
+    return DriveJointStates(node, [commands.axis.view for commands in axes])

@@ -21,7 +21,7 @@ from ..cia402.motion import MotionSource
 from ..config.model import BusConfig
 from ..library.canopen_master import CanopenMaster
 from ..master.events import Event
-from .axis_services import DriveServices
+from .axis_services import offer_drive
 from .device_node import DeviceNode
 from .device_topics import log_bus_event
 from .diagnostics import bus_diagnostics, DiagnosticsPublisher
@@ -72,12 +72,15 @@ class MasterProcess:
         for own in self._devices.values():
             ObjectServices(own, self._thread)
         file = BusFile.at(config.file)
-        self._drives = {
-            name: DriveServices(each, self._master.axes(each.device), self._thread, file)
+        self._axes = {
+            name: self._master.axes(each.device)
             for name, each in self._devices.items()
             if each.device.config.is_drive
         }
-        drives = [drive.joint_states for drive in self._drives.values()]
+        drives = [
+            offer_drive(self._devices[name], axes, self._thread, file)
+            for name, axes in self._axes.items()
+        ]
         self._joint_states = BusJointStates(node, drives, self._output)
         self._network.on_feedback = self._joint_states.feedback
         services = MasterServices(node, self._thread, self._output)
@@ -169,10 +172,7 @@ class MasterProcess:
             self._node.get_name(),
             can.name,
             self._network,
-            {
-                name: [axis.status() for axis in services.axes]
-                for name, services in self._drives.items()
-            },
+            {name: [each.axis.status() for each in axes] for name, axes in self._axes.items()},
             now,
             counters=can.counters,
             load=self._master.load.figures(now),

@@ -38,8 +38,8 @@ __all__ = [
 ]
 
 
-def build_modes(view: AxisState, warn: Callable[[str], None]) -> dict[OperationMode, Mode]:
-    """Return the modes of a drive by number."""
+def build_modes(view: AxisState, warn: Callable[[str], None]) -> dict[int, Mode]:
+    """Return the modes of a drive by their number in 0x6060."""
     modes = [NoMode(), Homing(), *_profile_modes(view, warn), *_cyclic_modes(view)]
     return {mode.number: mode for mode in modes}
 

@@ -30,7 +30,8 @@ class CyclicPosition(Mode):
         self._limits = limits
         self._profile = SetpointProfile(0.0)
         self._streamed: tuple[float, int] | None = None  # position, the same in [inc]
-        self._stands = False  # at a set-point that was written
+        self._position_inc = 0  # that was written last
+        self._stands = False  # the set-point is that one
 
     @property
     def setpoint(self) -> float:  # type: ignore[override]  # never none, and never written
@@ -92,15 +93,13 @@ class CyclicPosition(Mode):
         """Write the streamed set-point, or the profile's; a stream that ends is braked."""
         profile = self._profile
         if self._streamed is not None:
-            position, position_inc = self._streamed
+            position, self._position_inc = self._streamed
             profile.follow(position, period)
             self._streamed, self._stands = None, False
-        elif self._stands and profile.at_rest:
-            return self.bits
-        else:
-            position_inc = self._scale.to_device(profile.step(period, self._limits()))
+        elif not (self._stands and profile.at_rest):
+            self._position_inc = self._scale.to_device(profile.step(period, self._limits()))
             self._stands = profile.at_rest
-        self._target.write(position_inc)
+        self._target.write(self._position_inc)
         return self.bits
 
 
