@@ -26,7 +26,7 @@ IN_ENVIRONMENT = bash -c '. "$(CURDIR)/env.sh" && exec "$$@"' environment
 # some containers set PYTHONDONTWRITEBYTECODE: every worker and process would compile all that it imports
 PYTEST = $(IN_ENVIRONMENT) env -u PYTHONDONTWRITEBYTECODE python -m pytest -n auto --dist loadgroup
 
-.PHONY: help demo demo-arm demo-plan demo-quad test check build lint docs bench findings train chaos soak setup pins clean distclean
+.PHONY: help demo demo-arm demo-plan demo-quad test check build lint docs pictures bench findings train chaos soak setup pins clean distclean
 .DEFAULT_GOAL := help
 
 help:
@@ -39,6 +39,7 @@ help:
 	@echo 'make build      build every package; then: source env.sh'
 	@echo 'make lint       ruff, its formatter, mypy, who imports whom, dead code, spelling, containers, manual'
 	@echo 'make docs       build the manual as a site in build/site, to be read without a network'
+	@echo 'make pictures   take the pictures of the README anew (Chromium)'
 	@echo 'make bench      print the figures'
 	@echo 'make findings   see whether the surprises of other software are as we found them (installs each anew; minutes)'
 	@echo 'make train      train a policy that walks, check it and compare it (MINUTES=30, SEED=1)'
@@ -81,6 +82,10 @@ lint: system
 
 docs: system
 	@$(WORKSPACE) docs
+
+pictures: system
+	@$(BUILD) --dev
+	@$(IN_ENVIRONMENT) python tests/pictures.py
 
 bench: system
 	@$(BUILD) --dev

@@ -19,6 +19,7 @@ runpy.run_path(str(SHARED))['setup_package'](
     programs=[
         'foxglove_bridge = robot_viewer.nodes.foxglove_bridge:main',
         'robot_state_publisher = robot_viewer.nodes.robot_state_publisher:main',
+        'state = robot_viewer.nodes.state:main',
         'web_viewer = robot_viewer.nodes.web_viewer:main',
     ],
     package_data=['page/overlay.html'],

@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 import importlib.util
 import io
 from pathlib import Path
+import re
 import shlex
 import shutil
 import signal
@@ -34,15 +35,16 @@ OPTIONS = [
 ]
 POLITE = ('nice', '-n', '10')
 """It draws without a graphics card; the robots that it shows come first."""
-SIZE = {'width': 760, 'height': 520}  # [px] a software renderer draws it
+SIZE = {'width': 820, 'height': 560}  # [px] a software renderer draws it
 PAGE_TIMEOUT = 60_000  # [ms] on a busy machine
 TEXT_TIMEOUT = 5_000  # [ms] of a page that may hang
 PAGE_URL = r'the robot is seen at (http://localhost:\d+)$'
 """What a bring-up or demo prints of its page."""
 PICTURES = Path(__file__).parents[1] / 'build' / 'screenshots'
 """Where pictures of the tests are kept, to be looked at."""
-PANEL = 330  # [px] width of the controls at the right
-TOP = 170  # [px] height of STOP and of messages
+PANEL = 410  # [px] width of the controls at the right
+TOP = 80  # [px] height of STOP and state
+BELOW = 100  # [px] height of views and messages
 
 
 _started: list[Browser] = []
@@ -135,7 +137,9 @@ def open_page(browser: Browser, url: str, **options: object) -> Page:
     page = browser.new_page(**({'viewport': SIZE} | options))  # type: ignore[arg-type]
     page.set_default_timeout(PAGE_TIMEOUT)
     page.goto(url)
-    page.get_by_role('tab', name='Joints').wait_for()
+    # viser's own warning of a software renderer covers the scene
+    page.add_style_tag(content='.mantine-Notifications-root { display: none }')
+    page.locator('#rv-robot b').filter(has_text=re.compile('.')).wait_for(state='attached')
     return page
 
 
@@ -161,8 +165,18 @@ def colors_of_scene(png: bytes) -> int:
 
     image = Image.open(io.BytesIO(png)).convert('HSV')
     width, height = image.size
-    scene = image.crop((0, 150, width - PANEL, height))  # without STOP and the panel
+    scene = image.crop((0, TOP, width - PANEL, height - BELOW))  # without STOP and the panel
     return sum(scene.getchannel('S').histogram()[64:])
+
+
+def state_is(page: Page, word: str) -> None:
+    """Wait until the state of the robot on a page is a word, or begins with it."""
+    page.locator('#rv-state b').filter(has_text=re.compile(f'^{word}')).wait_for()
+
+
+def act(page: Page, action: str) -> None:
+    """Press the action of the state."""
+    page.locator('#rv-do').filter(has_text=action).click()
 
 
 def hold(page: Page, button: str) -> None:
@@ -229,7 +243,7 @@ def _leftmost(page: Page, channel: int) -> tuple[int, int] | None:
     from PIL import Image
 
     image = Image.open(io.BytesIO(page.screenshot())).convert('RGB')
-    scene = np.asarray(image, dtype=int)[TOP:, : image.width - PANEL]
+    scene = np.asarray(image, dtype=int)[TOP:-BELOW, : image.width - PANEL]
     others = np.delete(scene, channel, axis=2).max(axis=2)
     rows, columns = np.nonzero(scene[:, :, channel] > others + 60)
     if not len(columns):

@@ -3,32 +3,35 @@
 # SPDX-License-Identifier: Apache-2.0
 """Takes the pictures of the README: the pages of both demos in a real browser.
 
-Run: ``python tests/pictures.py`` in the sourced workspace; writes ``docs/arm.png`` and
-``docs/quadruped.png``. Needs Chromium.
+Run: ``make pictures``; writes ``docs/arm.png``, ``docs/quadruped.png`` and ``docs/phone.png``. Needs
+Chromium.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 import re
+from typing import TYPE_CHECKING
 
 import browser as chromium
 from isolation import reserve
 from processes import executable, RunningProcess
 
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
 DOCS = Path(__file__).parents[1] / 'docs'
-SIZE = {'width': 1200, 'height': 640}  # [px]
+DESK, PHONE = {'width': 1200, 'height': 640}, {'width': 390, 'height': 844}  # [px]
 STARTING = 90.0  # [s]
 MOVING = 25.0  # [s] the plots reach back that far then
 
 
-def take(demo: tuple[str, ...], tab: str, path: Path) -> None:
-    """Take the picture of a demo, while its robot moves.
+def take(demo: tuple[str, ...], views: dict[str, tuple[str, dict[str, int]]]) -> None:
+    """Take pictures of a demo, while its robot moves.
 
     Args:
         demo: Package, program and arguments.
-        tab: Of the page.
-        path: File to write.
+        views: Group of the page and size, by the name of the picture.
     """
     package, program, *arguments = demo
     with (
@@ -41,18 +44,26 @@ def take(demo: tuple[str, ...], tab: str, path: Path) -> None:
         line = running.wait_for(r'seen at http://localhost:\d+', STARTING)
         found = re.search(r'http://localhost:\d+', line)
         assert found is not None
-        page = chromium.open_page(browser, found[0], viewport=SIZE)
-        page.get_by_role('tab', name=tab).click(timeout=1e3 * STARTING)
-        page.locator('.mantine-Notification-closeButton').first.click()  # of the software renderer
-        page.wait_for_timeout(1e3 * MOVING)
-        page.screenshot(path=path)
+        for name, (group, size) in views.items():
+            take_one(browser, found[0], group, size, DOCS / f'{name}.png')
         running.stop()
+
+
+def take_one(browser: Browser, url: str, group: str, size: dict[str, int], path: Path) -> None:
+    """Take one picture."""
+    phone = size is PHONE
+    page = chromium.open_page(browser, url, viewport=size, has_touch=phone, is_mobile=phone)
+    page.get_by_role('tab', name=group, exact=True).click(timeout=1e3 * STARTING)
+    page.wait_for_timeout(1e3 * MOVING)
+    page.screenshot(path=path, timeout=chromium.PAGE_TIMEOUT)
+    page.close()
 
 
 def main() -> None:
     """Entry point."""
-    take(('arm_bringup', 'motion_demo', 'panda'), 'Plots', DOCS / 'arm.png')
-    take(('quad_bringup', 'demo'), 'Walk', DOCS / 'quadruped.png')
+    arm = {'arm': ('See', DESK), 'phone': ('Drive', PHONE)}
+    take(('arm_bringup', 'motion_demo', 'panda'), arm)
+    take(('quad_bringup', 'demo'), {'quadruped': ('Drive', DESK)})
 
 
 if __name__ == '__main__':

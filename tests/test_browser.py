@@ -35,8 +35,10 @@ from arm_msgs.srv import InjectFault
 from robot_viewer.page.jog_panel import BASE
 from robot_viewer.page.motion_plan import DRAGGED
 from robot_viewer.page.overlay import StopAnswer
+from robot_viewer.page.plan_panel import HOLD_EXECUTE
 from robot_viewer.page.robot_page import Actions, RobotPage
-from robot_viewer.page.target_panel import UNLOCK
+from robot_viewer.page.target_panel import HOLD_TARGET
+from robot_viewer.robot_state import ALLOW
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page
@@ -53,14 +55,13 @@ REST = 0.6  # [s] of joint states without motion
 MOVES = 0.01  # [rad/s]
 NEAR = 0.01  # [rad] of a target
 UNDER_WAY = 0.05  # [rad] from its start: STOP names joints that move, and a motion starts softly
-JOG, TARGETS, DRIVES, PLAN = 'Jog', 'Targets', 'Drives', 'Plan'
-TURN, TURN_BACK = '+ about z', '− about z'
+TURN, TURN_BACK = 'Turn Z +', 'Turn Z −'
 WRIST = 'panda_joint7'
 """Turns the tool, which points downwards, about the z axis."""
 READY_TIP = (0.307, 0.0, 0.59)
 """Where the tip is in the state 'ready' of the SRDF, in [m]."""
 JOINT1 = 1
-"""Place of the joint's slider; the speed is above it."""
+"""Place of the joint's slider in the tab of the target; the speed is above it."""
 
 
 @dataclass
@@ -91,17 +92,19 @@ class Seen:
         self.wrist = self.position(WRIST)
         self.ready = self.states[-1][1].position
 
-    def show(self, tab: str) -> Page:
-        """Show a tab of the page."""
-        self.page.get_by_role('tab', name=tab).click()
+    def show(self, group: str, tab: str = '') -> Page:
+        """Show a group of the page, and a tab in it, in which motion is allowed."""
+        self.page.get_by_role('tab', name=group, exact=True).click()
+        if tab:
+            self.page.get_by_role('tab', name=tab, exact=True).click()
+        self.allow(self.page)
         return self.page
 
-    def unlock(self) -> None:
-        """Let the sliders send again, where there was a STOP before."""
-        button = self.page.get_by_role('button', name=UNLOCK)
-        if button.is_visible():
-            button.click()
-            button.wait_for(state='hidden')  # the sliders below it move up
+    def allow(self, page: Page) -> None:
+        """Allow motion where there was a STOP before."""
+        if page.locator('#rv-do').inner_text() == ALLOW:
+            chromium.act(page, ALLOW)
+        page.locator('body:not(.rv-stopped)').wait_for()
 
     def box(self, slider: int) -> Locator:
         """Return the number box beside a slider of the open tab."""
@@ -116,11 +119,26 @@ class Seen:
 
     def jog(self, page: Page) -> None:
         """Turn the tool about the base's axis; back, as at its limit the joint would not move."""
-        page.get_by_role('tab', name=JOG).click()
+        self.allow(page)
+        if page.locator('#rv-take').is_visible():
+            page.locator('#rv-take').click()
+            page.locator('body:not(.rv-other)').wait_for()
+        page.get_by_role('tab', name='Drive', exact=True).click()
         page.get_by_role('tab', name='Tool', exact=True).click()
-        chromium.choose(page, 'Along the axes of', BASE)
+        chromium.choose(page, 'Along axes of', BASE)
         chromium.hold(page, TURN if self.position(WRIST) > self.wrist else TURN_BACK)
         self.wait(self.moves, 'a jog')
+
+    def move_to(self, target: float, name: str = '') -> None:
+        """Move the first joint to a target, by its number box and the button that is held."""
+        page = self.show('Drive', 'Target')
+        self.type_into(JOINT1, f'{target}')
+        page.keyboard.press('Enter')
+        chromium.hold(page, HOLD_TARGET)
+        self.wait_until_at(target)
+        page.mouse.up()
+        if name:
+            chromium.picture(page, name)
 
     def position(self, joint: str = 'panda_joint1') -> float:
         """Return where a joint is in [rad]."""
@@ -216,16 +234,17 @@ def add_box(seen: Seen, place: tuple[float, float, float]) -> None:
 
 def test_a_dragged_goal_and_a_box(seen: Seen) -> None:
     """Both by the mouse in the scene: the tip goes elsewhere, and the box is where it is left."""
-    page = seen.show(PLAN)
+    page = seen.show('Plan')
     chromium.choose(page, 'Goal', DRAGGED)
     chromium.drag_arrow(page, 'green', 40)
-    press(page, 'Plan')
+    press(page, 'Plan motion')
     page.get_by_text('the motion takes').wait_for()
     chromium.picture(page, 'plan-dragged')
-    press(page, 'Execute')
-    page.get_by_text('executed').wait_for()
+    chromium.hold(page, HOLD_EXECUTE)
+    page.get_by_text('executed').first.wait_for()
+    page.mouse.up()
     seen.wait(lambda: seen.way() > 0.05, 'another place')
-    press(page, 'Add a box')
+    press(page, 'Add box')
     page.get_by_text('box1 is added').wait_for()
     chromium.picture(page, 'box')
     chromium.drag_arrow(page, 'red', 30)
@@ -236,146 +255,144 @@ def test_a_dragged_goal_and_a_box(seen: Seen) -> None:
         GetPlanningScene, '/get_planning_scene', request
     ).scene.world.collision_objects
     assert box.pose != Pose(position=Point(x=0.6, z=0.1)), 'moved or turned'
-    press(page, 'Remove it')
+    page.get_by_role('button', name='Remove', exact=False).click()
     page.get_by_text('box1 is removed').wait_for()
 
 
 def test_stop_ends_what_was_planned(seen: Seen) -> None:
     """On its way; what was planned cannot be executed any more."""
-    seen.show(TARGETS)
-    seen.unlock()
-    seen.type_into(JOINT1, '1')
-    seen.page.keyboard.press('Enter')
-    seen.wait_until_at(1.0)
-    page = seen.show(PLAN)
+    seen.move_to(1.0)
+    page = seen.show('Plan')
     chromium.choose(page, 'Goal', 'ready')
-    chromium.drag(page, 0, 0.0)  # slowly: it is on its way for long
-    press(page, 'Plan')
+    press(page, 'Plan motion')
     page.get_by_text('the motion takes').wait_for()
-    press(page, 'Execute')
+    chromium.hold(page, HOLD_EXECUTE)
     seen.wait(seen.moves, 'a motion')
-    page.locator('#robot-stop').click()
+    page.keyboard.press('Space')
     seen.wait_for_rest()
-    page.get_by_text(re.compile('PREEMPTED|CONTROL_FAILED')).wait_for()
-    assert page.get_by_role('button', name='Execute', exact=True).is_disabled()
+    page.mouse.up()
+    page.get_by_text(re.compile('PREEMPTED|CONTROL_FAILED')).first.wait_for()
+    page.locator('.rv-hold.rv-off').filter(has_text=HOLD_EXECUTE).wait_for()
     chromium.picture(page, 'plan-stopped')
-    chromium.drag(page, 0, 0.5)
     assert seen.way() > 0.05
 
 
 def test_a_goal_is_planned_shown_and_executed(seen: Seen) -> None:
     """A state of the SRDF: blocked by a box first, in the words of move_group, then free."""
-    page = seen.show(PLAN)
+    page = seen.show('Plan')
     add_box(seen, READY_TIP)
     chromium.choose(page, 'Goal', 'ready')
-    press(page, 'Plan')
+    press(page, 'Plan motion')
     # where STOP ended the motion before is as near as chance has it
     page.get_by_text(re.compile('(GOAL|START_STATE)_IN_COLLISION: .*pillar')).wait_for()
     chromium.picture(page, 'plan-blocked')
-    assert page.get_by_role('button', name='Execute', exact=True).is_disabled()
+    page.locator('.rv-hold.rv-off').filter(has_text=HOLD_EXECUTE).wait_for()
     chromium.choose(page, 'Object', 'pillar')
-    press(page, 'Remove it')
+    page.get_by_role('button', name='Remove', exact=False).click()
     page.get_by_text('pillar is removed').wait_for()
-    press(page, 'Plan')
+    press(page, 'Plan motion')
     page.get_by_text('the motion takes').wait_for()
     chromium.picture(page, 'plan')
     assert not seen.moves()
-    press(page, 'Execute')
-    page.get_by_text('executed').wait_for()
+    chromium.hold(page, HOLD_EXECUTE)
+    seen.wait(lambda: seen.way() > 0.02 and seen.moves(), 'a motion')
+    page.mouse.up()
+    page.get_by_text('PREEMPTED').first.wait_for()
+    seen.wait_for_rest()
+    assert seen.way() > 0.01, 'it was let go on its way'
+    press(page, 'Plan motion')
+    page.get_by_text('the motion takes').wait_for()
+    chromium.hold(page, HOLD_EXECUTE)
+    page.get_by_text('executed').first.wait_for()
+    page.mouse.up()
     seen.wait(lambda: seen.way() < 0.01, 'the goal')
 
 
-def test_a_slider_moves_a_joint_that_is_seen_on_all_pages(seen: Seen) -> None:
-    """The robot is drawn; its joint states follow the slider; another page shows the same."""
-    page, other = seen.show(TARGETS), chromium.open_page(seen.browser, seen.url)
-    seen.unlock()
-    other.get_by_role('tab', name=TARGETS).click()
+def test_a_target_moves_the_arm_while_its_button_is_held(seen: Seen) -> None:
+    """Its slider moves no joint; another page sees who drives, and only its STOP works."""
+    page, other = seen.show('Drive', 'Target'), chromium.open_page(seen.browser, seen.url)
     before = chromium.picture(page, 'arm')
     assert chromium.colors_of_scene(before) > 100
     start = seen.position()
     chromium.drag(page, JOINT1, 0.65 if start < 0.0 else 0.35)
     wanted = chromium.slider_value(page, JOINT1)
     assert abs(wanted - start) > 0.3
-    seen.wait_until_at(wanted)
-    page.get_by_text('target: reached').wait_for()
-    seen.wait(lambda: abs(chromium.slider_value(other, JOINT1) - wanted) < 0.02, 'the other page')
-    assert chromium.picture(page, 'arm-moved') != before
-    other.close()
-
-
-def test_stop_of_any_page_ends_a_jog(seen: Seen) -> None:
-    """Also while the button is still held: only a new press moves the arm again."""
-    page, other = seen.page, chromium.open_page(seen.browser, seen.url)
-    seen.jog(page)
-    other.locator('#robot-stop').click()
-    words_of_stop(other, '^(stopped|stand): ').wait_for()
     seen.wait_for_rest()
-    other.close()
-    page.mouse.up()
-    seen.wait_for_rest()
-    seen.jog(page)
-    page.mouse.up()
-    seen.wait_for_rest()
-
-
-def test_the_space_bar_ends_a_trajectory(seen: Seen) -> None:
-    """The arm stands on the way, and the page says so; the key presses no button."""
-    page = seen.show(TARGETS)
-    seen.unlock()
-    share = 0.1 if seen.position() > 0.0 else 0.9
-    chromium.drag(page, JOINT1, share)
-    wanted, start = chromium.slider_value(page, JOINT1), seen.position()
+    assert abs(seen.position() - start) < 0.001, 'a slider moves the target only'
+    assert chromium.picture(page, 'target') != before
+    chromium.hold(page, HOLD_TARGET)
     seen.wait(lambda: abs(seen.position() - start) > UNDER_WAY, 'a motion')
+    other.locator('#rv-who').filter(has_text='another page').wait_for()
+    other.locator('body.rv-other').wait_for()
+    count = seen.position()
+    page.mouse.up()
+    seen.wait_for_rest()
+    assert abs(seen.position() - wanted) > 0.1, f'let go at {count}'
+    chromium.hold(other, '1 +')
+    seen.wait_for_rest()
+    other.mouse.up()
+    chromium.hold(page, HOLD_TARGET)
+    seen.wait(seen.moves, 'a motion')
+    other.locator('#robot-stop').click()
+    seen.wait_for_rest()
+    assert abs(seen.position() - wanted) > 0.05, 'the STOP of another page'
+    page.mouse.up()
+    for each in (page, other):
+        chromium.state_is(each, 'STOPPED')
+    other.locator('#rv-take').click()
+    chromium.act(other, ALLOW)
+    page.locator('#rv-who').filter(has_text='another page').wait_for()
+    other.close()
+    page.locator('#rv-who').filter(has_text='nobody').wait_for()
+
+
+def test_after_stop_nothing_moves_until_it_is_allowed(seen: Seen) -> None:
+    """By the space bar, which presses no button; to allow motion moves nothing itself."""
+    page = seen.page
+    seen.jog(page)
     page.keyboard.press('Space')
+    words_of_stop(page, '^stopped$').wait_for()
+    chromium.state_is(page, 'STOPPED')
+    page.get_by_text('Stopped: panda_joint7; the others stand').wait_for()
     seen.wait_for_rest()
-    assert abs(seen.position() - wanted) > 0.2
-    words_of_stop(page, 'stopped: panda_joint1').wait_for()
+    page.mouse.up()
     chromium.picture(page, 'stopped')
-    page.get_by_role('button', name=UNLOCK).wait_for()
-    chromium.drag(page, JOINT1, share)  # as if one were dragged on, or late
+    stood = seen.position(WRIST)
+    for _ in range(2):
+        page.mouse.down()  # the pointer is on the button
+        seen.wait_for_rest()
+        page.mouse.up()
+    chromium.act(page, ALLOW)
+    chromium.state_is(page, 'READY')
     seen.wait_for_rest()
-    assert abs(seen.position() - wanted) > 0.2
-    seen.unlock()
-    chromium.drag(page, JOINT1, share)
-    seen.wait(seen.moves, 'a motion again')
-    page.get_by_text('target: reached').wait_for()
+    assert abs(seen.position(WRIST) - stood) < 0.001
+    seen.jog(page)
+    page.mouse.up()
+    seen.wait_for_rest()
 
 
 def test_a_number_counts_when_it_is_complete(seen: Seen) -> None:
-    """Its first digit is no target; the space bar is STOP also while it is being typed."""
-    page = seen.show(TARGETS)
-    seen.unlock()
-    seen.wait_for_rest()
-    start = seen.position()
-    wanted = 2.5 if start < 0.5 else -2.5
-    seen.type_into(JOINT1, f'{wanted}')
-    seen.wait_for_rest()
-    assert abs(seen.position() - start) < MOVES, 'half a number was sent'
-    page.keyboard.press('Enter')
-    seen.wait(lambda: abs(seen.position() - start) > UNDER_WAY, 'a motion')
-    page.keyboard.press('Space')
-    words_of_stop(page, 'stopped: panda_joint1').wait_for()
-    seen.wait_for_rest()
-    assert abs(seen.position() - wanted) > 0.2
-    before = dict(zip(seen.states[-1][1].name, seen.states[-1][1].position, strict=True))
-    seen.unlock()
-    for text, end in (('0', 'Enter'), ('0,5', 'Tab')):  # the second is longer than what is shown
+    """By Enter, or when its box is left; what is no number goes back to what was shown."""
+    page = seen.show('Drive', 'Target')
+    seen.move_to(0.0)
+    for text, end in (('2.5', ''), ('0,5', 'Tab')):  # longer than what is shown
         seen.type_into(JOINT1, text)
-        page.keyboard.press(end)
-        seen.wait_until_at(float(text.replace(',', '.')))
+        page.keyboard.press(end or 'Enter')
+        assert chromium.slider_value(page, JOINT1) == pytest.approx(float(text.replace(',', '.')))
     seen.type_into(JOINT1, '1e0')
     page.keyboard.press('Enter')
     assert seen.box(JOINT1).input_value() == '0.5', 'no number'
-    seen.wait_for_rest()
-    assert abs(seen.position() - 0.5) < NEAR
+    before = dict(zip(seen.states[-1][1].name, seen.states[-1][1].position, strict=True))
+    chromium.hold(page, HOLD_TARGET)
+    seen.wait_until_at(0.5)
+    page.mouse.up()
     others = set(before) - {'panda_joint1'}
     assert max(abs(seen.position(joint) - before[joint]) for joint in others) < 0.002
 
 
 def test_a_single_joint_and_the_tool_along_its_own_axes(seen: Seen) -> None:
     """The other joints stand; the tool goes where it points, which is down."""
-    page = seen.show(JOG)
-    page.get_by_role('tab', name='Single joints').click()
+    page = seen.show('Drive', 'Joints')
     before, start = seen.states[-1][1], seen.position(WRIST)
     chromium.hold(page, '7 −' if seen.position(WRIST) > seen.wrist else '7 +')
     seen.wait(lambda: abs(seen.position(WRIST) - start) > UNDER_WAY, 'a jog')
@@ -385,8 +402,8 @@ def test_a_single_joint_and_the_tool_along_its_own_axes(seen: Seen) -> None:
         assert name == WRIST or abs(seen.position(name) - position) < MOVES, name
     chromium.picture(page, 'jog-joints')
     page.get_by_role('tab', name='Tool', exact=True).click()
-    chromium.choose(page, 'Along the axes of', 'panda_link7')
-    chromium.hold(page, '− z')
+    chromium.choose(page, 'Along axes of', 'panda_link7')
+    chromium.hold(page, 'Z −')
     seen.wait(seen.moves, 'a jog')
     page.mouse.up()
     seen.wait_for_rest()
@@ -419,71 +436,81 @@ def test_a_page_that_is_killed_moves_nothing(seen: Seen) -> None:
     seen.wait_for_rest()
 
 
-def test_stop_is_in_reach_on_a_phone(seen: Seen) -> None:
-    """In front of everything, on a screen of that size, by touch, with the panel open."""
-    options = {'viewport': {'width': 390, 'height': 780}, 'has_touch': True, 'is_mobile': True}
-    context = seen.browser.new_context(**options)  # type: ignore[arg-type]
-    page = context.new_page()
-    page.set_default_timeout(chromium.PAGE_TIMEOUT)
-    page.goto(seen.url)
-    stop = page.locator('#robot-stop')
-    stop.wait_for()
-    box = stop.bounding_box()
+def test_a_finger_on_a_phone(seen: Seen) -> None:
+    """A swipe moves no joint; a slip does not let go; letting go stops; STOP is below."""
+    options = {'viewport': {'width': 390, 'height': 844}, 'has_touch': True, 'is_mobile': True}
+    page = chromium.open_page(seen.browser, seen.url, **options)
+    seen.allow(page)
+    button = page.get_by_role('button', name='7 +', exact=True)
+    button.scroll_into_view_if_needed()
+    box = button.bounding_box()
     assert box is not None
-    assert min(box['width'], box['height']) > 48  # [px] what a thumb hits
-    page.touchscreen.tap(box['x'] + box['width'] / 2, box['y'] + box['height'] / 2)
-    words_of_stop(page, '^(stand|not enabled): ').wait_for()
-    page.get_by_role('tab', name='Joints').wait_for()
-    jog = page.get_by_role('tab', name=JOG)
-    jog.tap()
-    page.get_by_role('button', name=TURN, exact=True).wait_for()
-    middle = 'document.elementFromPoint(195, 170).tagName'
-    assert page.evaluate(middle) == 'CANVAS', 'the panel hides the robot'
-    tab = jog.bounding_box()
-    assert tab is not None
-    assert tab['y'] > 200
-    assert box['y'] > 640, 'a thumb holds the phone below'
+    x, y = box['x'] + box['width'] / 2, box['y'] + box['height'] / 2
+    touch = page.context.new_cdp_session(page)
+
+    def finger(kind: str, dy: float = 0.0) -> None:
+        points = [] if kind == 'touchEnd' else [{'x': x, 'y': y + dy}]
+        touch.send('Input.dispatchTouchEvent', {'type': kind, 'touchPoints': points})
+
+    stood = seen.position(WRIST)
+    finger('touchStart')
+    for step in range(1, 6):
+        finger('touchMove', -20.0 * step)
+    finger('touchEnd')
+    seen.wait_for_rest()
+    assert abs(seen.position(WRIST) - stood) < 0.002, 'a swipe moves no joint'
+    button.scroll_into_view_if_needed()
+    box = button.bounding_box()
+    assert box is not None
+    y = box['y'] + box['height'] / 2
+    finger('touchStart')
+    seen.wait(seen.moves, 'a jog')
+    finger('touchMove', 40.0)
+    page.get_by_text('7 + is held on a page').wait_for()
+    slipped = seen.position(WRIST)
+    seen.wait(lambda: abs(seen.position(WRIST) - slipped) > UNDER_WAY, 'on and on')
+    finger('touchEnd')
+    seen.wait_for_rest()
     chromium.picture(page, 'phone')
-    context.close()
+    stop = page.locator('#robot-stop')
+    stop.tap()
+    chromium.state_is(page, 'STOPPED')
+    words_of_stop(page, '^stopped$').wait_for()
+    chromium.picture(page, 'phone-stopped')
+    page.context.close()
 
 
-def test_a_fault_is_shown_with_its_reason(seen: Seen) -> None:
-    """The one of the drive, and its state, EMCY and statusword in words."""
-    page = seen.show(DRIVES)
+def test_a_fault_has_two_presses_to_motion(seen: Seen) -> None:
+    """Seen wherever one is, with its reason; Recover, and a button is held."""
+    page = seen.show('Drive', 'Joints')
     request = InjectFault.Request(device='panda_joint3', fault='over_current')
     answer = seen.client.call(InjectFault, '/fake_slaves/fault', request)
     assert answer.success, answer.message
-    page.get_by_text(re.compile('panda_joint3: drive: .*over.?current', re.IGNORECASE)).wait_for()
-    page.locator('input:visible').first.click()  # the only one of this tab
-    page.get_by_role('option', name='/panda_joint3', exact=True).click()
-    page.get_by_role('cell', name='Fault', exact=True).wait_for()
+    chromium.state_is(page, 'FAULT')
+    page.locator('#rv-state').filter(has_text=re.compile('panda_joint3.*over current')).wait_for()
+    for group in ('Plan', 'See', 'Diagnose', 'Drive'):
+        page.get_by_role('tab', name=group, exact=True).click()
+        assert page.locator('#rv-do').inner_text() == 'Recover panda_joint3'
+    chromium.hold(page, '3 +')
+    seen.wait_for_rest()
+    page.mouse.up()
     chromium.picture(page, 'fault')
-
-
-def test_a_robot_that_does_not_answer_has_not_stopped(seen: Seen) -> None:
-    """Its process hangs: the page says what to do; with a dropdown open, by the space bar."""
-    page = seen.show(DRIVES)
-    page.locator('input:visible').first.click()
-    robot = [
-        child
-        for child in psutil.Process(seen.bringup.pid).children(recursive=True)
-        if any(word.endswith('/motion_node') for word in child.cmdline())
-    ]
-    assert robot
-    for process in robot:
-        process.suspend()
-    try:
-        page.keyboard.press('Space')
-        page.get_by_text('no answer from the robot: use the emergency stop').wait_for()
-        chromium.picture(page, 'no-answer')
-    finally:
-        for process in robot:
-            process.resume()
-    words_of_stop(page, 'stand|not enabled|NOT confirmed').wait_for()
+    chromium.act(page, 'Recover panda_joint3')
+    chromium.state_is(page, 'READY')
+    start = seen.position(WRIST)
+    chromium.hold(page, '7 −' if start > seen.wrist else '7 +')
+    seen.wait(lambda: abs(seen.position(WRIST) - start) > UNDER_WAY, 'a jog')
+    page.mouse.up()
+    seen.wait_for_rest()
+    page = seen.show('Diagnose')
+    page.get_by_label('Drive', exact=True).click()
+    page.get_by_role('option', name='/panda_joint3', exact=True).click()
+    page.get_by_role('cell', name='Operation enabled', exact=True).wait_for()
+    chromium.picture(page, 'diagnose')
 
 
 def test_a_robot_that_stops_late(seen: Seen) -> None:
-    """The warning gives way to its words, however often STOP was pressed until then."""
+    """The warning gives way to its answer, however often STOP was pressed until then."""
     answers, stands = list[Future[StopAnswer]](), threading.Event()
     answer = StopAnswer(stands=True, text='stopped: legs')
 
@@ -498,10 +525,10 @@ def test_a_robot_that_stops_late(seen: Seen) -> None:
     ) as served:
         page = seen.browser.new_page()
         page.goto(served.url)
-        words_of_stop(page, 'space bar').wait_for()
+        words_of_stop(page, 'Space').wait_for()
         for _ in range(9):  # more than a browser sends at once
             page.keyboard.press('Space')
-        words_of_stop(page, 'no answer from the robot: use the emergency stop').wait_for()
+        words_of_stop(page, 'NOT confirmed: use the emergency stop').wait_for()
         count = len(answers)
         page.keyboard.press('Space')
         seen.wait(lambda: len(answers) > count, 'a STOP behind those that are not answered')
@@ -509,5 +536,42 @@ def test_a_robot_that_stops_late(seen: Seen) -> None:
         for each in answers:
             if not each.done():
                 each.set_result(answer)
-        words_of_stop(page, '^stopped: legs$').wait_for()
+        words_of_stop(page, '^stopped$').wait_for()
         page.close()
+
+
+def test_a_robot_that_does_not_answer_has_not_stopped(seen: Seen) -> None:
+    """Its process hangs, is killed, and the page's own end: the page says what to do."""
+    page = seen.show('Diagnose')
+    page.get_by_label('Drive', exact=True).click()  # with a dropdown open
+    (robot,) = processes_of(seen, '/motion_node')
+    robot.suspend()
+    try:
+        page.keyboard.press('Space')
+        words_of_stop(page, 'NOT confirmed: use the emergency stop').wait_for()
+        chromium.state_is(page, 'NO CONTACT WITH THE ROBOT')
+        chromium.picture(page, 'no-answer')
+    finally:
+        robot.resume()
+    words_of_stop(page, 'stopped|NOT confirmed').wait_for()
+    page.keyboard.press('Escape')
+    robot.kill()
+    chromium.state_is(page, 'NO CONTACT WITH THE ROBOT')
+    assert page.evaluate("document.body.classList.contains('rv-still')")
+    (viewer,) = chromium.viewers_below(seen.bringup)
+    viewer.suspend()
+    try:
+        chromium.state_is(page, 'NO CONTACT$')
+        words_of_stop(page, 'does NOT reach the robot').wait_for()
+        chromium.picture(page, 'no-contact')
+    finally:
+        viewer.resume()
+
+
+def processes_of(seen: Seen, program: str) -> list[psutil.Process]:
+    """Return the processes of the arm that run a program."""
+    return [
+        child
+        for child in psutil.Process(seen.bringup.pid).children(recursive=True)
+        if any(word.endswith(program) for word in child.cmdline())
+    ]

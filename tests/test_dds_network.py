@@ -170,21 +170,20 @@ def test_a_page_of_the_other_side_jogs_stops_with_the_link_and_heals(isolation: 
         ):
             url = viewer.wait_for(r'http://localhost:\d+$').rpartition(' ')[2]
             page = chromium.open_page(browser, url)
-            page.get_by_role('tab', name='Jog').click(force=True)
-            silence = page.get_by_text('nothing from the robot for')
+            page.get_by_role('tab', name='Tool', exact=True).click(force=True)
             # there and back again, far from the limits of the joint
             for turn, fault in (
-                ('+ about z', Condition(cut=True)),
-                ('− about z', Condition(delay=0.15)),
+                ('Turn Z +', Condition(cut=True)),
+                ('Turn Z −', Condition(delay=0.15)),
             ):
                 chromium.hold(page, turn)
                 watch.wait_until_last('^moving')
                 link.condition = fault
                 watch.wait_until_last('^still')
                 if fault.cut:
-                    silence.wait_for()
+                    chromium.state_is(page, 'NO CONTACT WITH THE ROBOT')
                 link.condition = Condition()
                 watch.wait_until_last('^moving')
-                silence.wait_for(state='hidden')
+                chromium.state_is(page, 'MOVING')
                 page.mouse.up()
                 watch.wait_until_last('^still')

@@ -36,7 +36,7 @@ PER_TURN = 36_000  # [inc] of the joints, in truth
 STARTING = 60.0  # [s]
 REACTION = 20.0  # [s] on a busy machine
 REST = 0.5  # [s] without a motion
-TAB, PREPARE = 'First motion', 'Enable and prepare'
+TITLE, PREPARE = 'First motion', 'Enable and prepare'
 ARM = """
 <robot name="arm">
   <link name="base"/>
@@ -116,10 +116,18 @@ def write_bus(folder: Path, per_turn: float) -> Path:
     return path
 
 
+def open_first_motion(page: Page) -> None:
+    """Open its folder, which is folded in the beginning."""
+    page.get_by_role('tab', name='Diagnose', exact=True).click(force=True)
+    if not page.get_by_label('Distance [deg]').is_visible():
+        page.get_by_text(TITLE, exact=True).click(force=True)
+    page.get_by_label('Distance [deg]').wait_for()
+
+
 def prepare(page: Page, distance: str) -> None:
     """Have a motion prepared, of another distance than the one before; nothing moves yet."""
     # forced: a busy machine draws too seldom for playwright to find out that something stands
-    page.get_by_role('tab', name=TAB).click(force=True)
+    open_first_motion(page)
     page.get_by_label('Distance [deg]').fill(distance)
     page.get_by_label('Speed [deg/s]').fill('2')
     page.keyboard.press('Tab')  # the number counts when it is left
@@ -178,7 +186,7 @@ def test_a_wrong_sign_and_scale_are_found_on_the_page(
         assert abs(joint.angle) < 4.0, '20 deg of the wrong scale are 5'
 
         page = chromium.open_page(browser, url)
-        page.get_by_role('tab', name=TAB).click(force=True)
+        open_first_motion(page)
         page.get_by_text('at rest').wait_for()
         page.get_by_role('button', name='That is enough').click(force=True)
         page.get_by_text('ended by you before the target').wait_for()

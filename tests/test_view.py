@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from contextlib import closing, suppress
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
 import socket
 from typing import TYPE_CHECKING
 from urllib.request import urlopen
@@ -49,19 +50,50 @@ def memory_of_dds(robot: RunningProcess) -> list[str]:
     return [path for path in maps if path.startswith(SHARED)]
 
 
-def see_feet(url: str) -> None:
-    """Look at what the page of a quadruped says of its feet, where there is a browser."""
+@contextmanager
+def suspended(robot: RunningProcess, program: str) -> Iterator[None]:
+    """Stop a program of a robot in the block, as an unplugged cable does."""
+    (found,) = [
+        child
+        for child in psutil.Process(robot.pid).children(recursive=True)
+        if any(word.endswith(program) for word in child.cmdline())
+    ]
+    found.suspend()
+    try:
+        yield
+    finally:
+        found.resume()
+
+
+def see_feet(url: str, dog: RunningProcess) -> None:
+    """Walk, look at the feet, and clear a fault on the page, where there is a browser."""
     if chromium.lacking():
         return
     with chromium.browser() as browser:
         page = chromium.open_page(browser, url)
-        page.get_by_role('tab', name='Walk').click()
-        page.get_by_role('button', name='stand', exact=True).click()
-        page.get_by_role('tab', name='Body').click()
+        names = page.locator('[role=tab]').all_inner_texts()
+        assert names == ['Drive', 'Body', 'See', 'Diagnose']
+        page.get_by_role('button', name='Stand', exact=True).click()
+        chromium.state_is(page, 'STANDING')
+        page.locator('.rv-hold.rv-off').filter(has_text='Forward').wait_for()
+        page.get_by_role('button', name='Walk', exact=True).click()
+        chromium.state_is(page, 'READY')
+        chromium.hold(page, 'Forward')
+        chromium.state_is(page, 'WALKING')
+        chromium.picture(page, 'walking')
+        page.mouse.up()
+        chromium.state_is(page, 'READY')
+        page.get_by_role('tab', name='Body', exact=True).click()
         page.get_by_text('feet on the ground: bl, br, fl, fr').wait_for()
         page.get_by_text('estimated by where they were sent; nothing senses it').wait_for()
         page.get_by_text('inside the support').wait_for()
         chromium.picture(page, 'feet')
+        with suspended(dog, '/hardware_node'):
+            chromium.state_is(page, 'NO CONTACT WITH THE ROBOT')
+        chromium.state_is(page, 'FAULT')
+        chromium.picture(page, 'quadruped-fault')
+        chromium.act(page, 'Clear fault')
+        chromium.state_is(page, 'STANDING|LYING|RELAXED|READY')
 
 
 def test_each_robot_has_a_page_and_goes_on_without_it(isolation: Isolation) -> None:
@@ -79,7 +111,7 @@ def test_each_robot_has_a_page_and_goes_on_without_it(isolation: Isolation) -> N
         left.wait_for('all is ready', STARTING)
         dog.wait_for('all is ready', STARTING)
         assert not [path for robot in (left, dog) for path in memory_of_dds(robot)]
-        see_feet(urls[1])
+        see_feet(urls[1], dog)
         (viewer,) = viewers_below(left)
         seen = sum(line.endswith(urls[0]) for line in left.lines)
         viewer.kill()

@@ -27,7 +27,7 @@ from robot_viewer.nodes.first_motion import (
     SETTLE_TIME,
 )
 from robot_viewer.page.first_motion import MotionRequest, RELEASED_AFTER, Saw
-from robot_viewer.page.robot_page import Status
+from robot_viewer.robot_state import Status
 
 PERIOD = 1.0 / 30.0  # [s]
 JOINTS = [joint.name for joint in read_urdf(ARM).movable() if joint.mimic is None][:2]

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import closing
 from functools import partial
+import math
 import time
 from typing import Any
 
@@ -127,6 +128,8 @@ class Planner(ViewerRig):
         panel = self.panel
         actor = panel._scene if hasattr(panel._scene, action) else panel._plan
         panel._order(partial(getattr(actor, action), *arguments, **options))
+        if action == 'execute':  # its button is held until the test lets it go
+            panel._order(lambda: setattr(self.viewer._planning, '_held_at', math.inf))
 
     def plan(self) -> None:
         """Have a motion to the state 'up' planned."""
@@ -248,6 +251,7 @@ def test_stop_cancels_and_forgets(planner: Planner) -> None:
     planner.do('execute')
     planner.viewer.stop()  # in the same turn
     planner.spin_until(lambda: len(planner.execute.canceled) == 2, 'a cancel')
+    planner.spin_until(lambda: not planner.viewer._planning.busy, 'its end')
     planner.plan()
     planner.viewer.stop()
     planner.do('execute')  # it came late
@@ -258,8 +262,20 @@ def test_stop_cancels_and_forgets(planner: Planner) -> None:
     planner.viewer.stop()
     planner.spin_until(lambda: bool(planner.move.canceled), 'a cancel')
     planner.spin_until(lambda: not planner.viewer._orders, 'the end')
-    assert planner.panel._execute.disabled
+    assert planner.panel._hold in planner.viewer.page.live.off
     assert len(planner.execute.goals) == 2
+
+
+@pytest.mark.parametrize('how', ['let go', 'lost'])
+def test_an_execution_goes_on_as_long_as_its_button_is_held(planner: Planner, how: str) -> None:
+    """It is canceled when that is let go, or when its heartbeats do not come any more."""
+    planner.plan()
+    planner.do('execute')
+    planner.spin_until(lambda: bool(planner.execute.goals), 'an execution')
+    planner.spin_times(20)
+    assert not planner.execute.canceled
+    planner.do('let_go' if how == 'let go' else 'go_on')
+    planner.spin_until(lambda: bool(planner.execute.canceled), 'a cancel')
 
 
 def test_a_goal_is_dragged(planner: Planner) -> None:

@@ -25,15 +25,30 @@ def test_what_was_held_up_counts_once(count: int, delay: float) -> None:
     assert sum(deadman.beat(1, 'hold', arrival) for arrival in arrivals) == 1
 
 
-@given(st.lists(st.tuples(st.sampled_from([1, 2, 3]), st.floats(0.0, 1.0)), max_size=60))
-def test_one_page_at_a_time(beats: list[tuple[int, float]]) -> None:
-    """Another one counts when the first has been silent for long enough."""
+@given(st.lists(st.tuples(st.integers(1, 3), st.floats(0.0, 1.0), st.booleans()), max_size=60))
+def test_one_page_at_a_time(steps: list[tuple[int, float, bool]]) -> None:
+    """The first that holds has control; another takes it, while nothing is held."""
     deadman, now, holder, last = Deadman(), 10.0, 0, -1.0
-    for page, gap in beats:
+    for page, gap, takes in steps:
         now += gap
-        if deadman.beat(page, 'hold', now):
-            assert page == holder or now - last >= RELEASED_AFTER
-            holder, last = page, now
+        if takes:
+            holder = page if now - last >= RELEASED_AFTER else holder
+            assert deadman.take(page, now) is (holder == page)
+        elif deadman.beat(page, 'hold', now):
+            assert page == (holder or page)
+            holder = page
+        if not takes and page == holder:
+            last = now
+        assert deadman.holder == (holder or None)
+
+
+def test_a_page_that_is_closed_has_no_control() -> None:
+    """Another one has it with its first heartbeat."""
+    deadman = Deadman()
+    assert deadman.beat(1, 'hold', 10.0)
+    assert not deadman.beat(2, 'hold', 20.0)
+    deadman.leave(1)
+    assert deadman.beat(2, 'hold', 20.1)
 
 
 @given(
@@ -56,6 +71,7 @@ def test_after_a_stop_a_button_has_to_be_pressed_anew(
     assert deadman.release(1, 'hold', now)
     assert not deadman.release(2, 'hold', now)
     assert deadman.beat(1, 'hold', now + RELEASED_AFTER)
+    assert not deadman.beat(2, 'hold', now + RELEASED_AFTER)
 
 
 def test_a_button_that_nobody_held_counts_after_a_stop_at_once() -> None:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import closing
 import gzip
@@ -21,6 +21,7 @@ from robot_viewer.loopback import binding_problem
 from robot_viewer.page import overlay
 from robot_viewer.page.gate import COOKIE, Gate
 from robot_viewer.page.jog_panel import Twist
+from robot_viewer.page.live import Live, LIVE_PATH
 from robot_viewer.page.overlay import Overlay, STOP_HEADER, StopAnswer
 from robot_viewer.page.robot_page import RobotPage, Velocity
 
@@ -44,7 +45,10 @@ class Nothing:
             future.set_result(self.answer)
         return future
 
-    def call(self, service: str) -> None:
+    def act(self, action: str) -> None:
+        """Nothing."""
+
+    def call(self, what: str, services: Sequence[str]) -> None:
         """Nothing."""
 
     def jog(self, twist: Twist, frame: str) -> None:
@@ -53,7 +57,7 @@ class Nothing:
     def jog_joint(self, joint: str, share: float) -> None:
         """Nothing."""
 
-    def grip(self, gripper: str, *, opens: bool) -> None:
+    def grip(self, gripper: str, position: float) -> None:
         """Nothing."""
 
     def walk(self, velocity: Velocity) -> None:
@@ -65,7 +69,10 @@ class Nothing:
     def publish_joints(self, positions: Mapping[str, float]) -> None:
         """Nothing."""
 
-    def aim(self, controller: str, targets: Mapping[str, float], share: float) -> None:
+    def aim(self, targets: Mapping[str, float], share: float) -> None:
+        """Nothing."""
+
+    def let_go(self) -> None:
         """Nothing."""
 
 
@@ -228,18 +235,19 @@ def test_a_name_that_was_pointed_to_this_host_opens_nothing(page: RobotPage) -> 
     assert 'for this host only' in text
 
 
+@pytest.mark.parametrize('path', ['', LIVE_PATH])
 @pytest.mark.parametrize('origin', ['http://evil.example', 'http://localhost:1', 'null'])
-def test_another_page_gets_no_connection(page: RobotPage, origin: str) -> None:
+def test_another_page_gets_no_connection(page: RobotPage, origin: str, path: str) -> None:
     """Any page of a browser of this host may try, with the cookies of ours."""
     cookie, port = cookie_of(page), urlsplit(page.url).port
     address = f'127.0.0.1:{port}'
 
     def try_it(from_page: str) -> None:
         connect(
-            f'ws://{address}',
+            f'ws://{address}{path}',
             origin=Origin(from_page),
             additional_headers=cookie,
-            subprotocols=[Subprotocol('viser-v1.1.1')],
+            subprotocols=None if path else [Subprotocol('viser-v1.1.1')],
         ).close()
 
     with pytest.raises(InvalidStatus, match='403'):
@@ -251,6 +259,6 @@ def test_a_server_that_is_not_guarded_is_none() -> None:
     """A version of viser that serves otherwise must not open the page to everybody."""
     with (
         pytest.raises(RuntimeError, match='asks nobody'),
-        Gate('127.0.0.1', Overlay(Nothing().stop)).before(),
+        Gate('127.0.0.1', Overlay(Nothing().stop, Live(lambda *_: None))).before(),
     ):
         pass

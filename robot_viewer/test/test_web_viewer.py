@@ -9,13 +9,14 @@ from concurrent.futures import Future
 from contextlib import closing, contextmanager
 from functools import partial
 from importlib import import_module
+import math
 import socket
 import sys
 import threading
 from typing import Any
 
 from canopen_interfaces.srv import CONmtID
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import TwistStamped
 from isolation import Isolation
 import pytest
@@ -34,10 +35,13 @@ from viser import GuiEvent
 
 from node_runner import LATCHED, ParameterError
 from robot_viewer.nodes import controllers as controllers_module
-from robot_viewer.nodes import listening, web_viewer
+from robot_viewer.nodes import listening, watch, web_viewer
+from robot_viewer.nodes.controllers import Controller
 from robot_viewer.nodes.web_viewer import WebViewer
 from robot_viewer.page.overlay import StopAnswer
 from robot_viewer.page.robot_page import RobotPage
+from robot_viewer.page.target_panel import TargetPanel
+from robot_viewer.robot_state import ALLOW
 
 pytestmark = pytest.mark.scenario
 
@@ -83,6 +87,16 @@ class Robot(ViewerRig):
         self.node.create_service(CONmtID, '~/set_nmt', lambda _, response: response)
         return self.node.create_service(Trigger, 'stop', self._answer('stop'))
 
+    def answers(self) -> list[str]:
+        """Listen to what the page reports of the robot."""
+        found: list[str] = []
+
+        def take(message: DiagnosticArray) -> None:
+            found.extend(s.message for s in message.status if s.name == 'web_viewer: robot')
+
+        self.node.create_subscription(DiagnosticArray, 'diagnostics', take, 10)
+        return found
+
     def called_until_enable(self) -> list[str]:
         """Return what the page has called, in order of names, when it has enabled both drives.
 
@@ -90,7 +104,7 @@ class Robot(ViewerRig):
         """
         enables = {'joint1/enable', 'joint2/enable'}
         for service in enables:
-            self.viewer.call(f'/{service}')
+            self.viewer.call('Enable', [f'/{service}'])
         self.spin_until(lambda: enables <= set(self.calls), 'enable')
         called = sorted(each for each in self.calls if each not in enables)
         self.calls.clear()
@@ -150,7 +164,9 @@ def test_stop_halts_every_drive(robot: Robot) -> None:
     answer = robot.viewer.stop()
     assert robot.called_until_enable() == ['joint1/halt', 'joint2/halt']
     assert robot.answer_to(answer) == StopAnswer(stands=True, text='done. done')
-    robot.viewer.call('/nobody/enable')  # after good answers one that fails, which is a warning
+    robot.viewer.call(
+        'Enable', ['/nobody/enable']
+    )  # after good answers one that fails, which is a warning
     assert not robot.called_until_enable()
 
 
@@ -172,7 +188,7 @@ def test_stop_is_answered_by_the_robot_alone(robot: Robot, said: list[str]) -> N
     hung.create_service(CONmtID, '~/set_nmt', lambda _, response: response)  # as a master has it
     hung.create_service(Trigger, 'stop', lambda _, response: response)
     robot.spin_until(lambda: '/stop' in robot.viewer._stops, 'the service')
-    client = robot.viewer._trigger_clients['/stop']
+    client = robot.viewer._triggers.client('/stop')
     robot.spin_until(client.service_is_ready, 'a connection')
     answer = robot.viewer.stop()
     robot.spin_until(lambda: said[-1:] == ['STOP: no answer from the robot yet'], 'the request')
@@ -205,7 +221,7 @@ def test_stop_calls_one_service_that_stops_all(
         assert robot.answer_to(answer) == StopAnswer(stands=True, text='done')
         assert robot.called_until_enable() == ['stop']
     robot.node.destroy_service(service)
-    client = robot.viewer._trigger_clients['/stop']
+    client = robot.viewer._triggers.client('/stop')
     robot.spin_until(lambda: not client.service_is_ready(), 'its end')
     robot.viewer.stop()
     assert robot.called_until_enable() == ['joint1/halt', 'joint2/halt']
@@ -266,7 +282,7 @@ def test_a_stop_of_somebody_else_leaves_no_drive_moving(
         robot.spin_until(lambda: '/stop' in robot.viewer._stops, 'the service')
         robot.spin_until(lambda: robot.node.count_services('/stop') == 1, 'its server')
         robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
-        client = robot.viewer._trigger_clients['/stop']
+        client = robot.viewer._triggers.client('/stop')
         robot.spin_until(lambda: client.service_is_ready() or not is_asked, 'a connection')
         assert stopped() == halts
         assert named() == is_asked
@@ -289,7 +305,7 @@ def test_a_stop_of_somebody_else_is_no_answer_of_the_robot(
     monkeypatch.setattr(web_viewer, 'of_robot', lambda *_: [])
     with conveyor(isolation, Trigger, success=True) as asked:
         robot.spin_until(lambda: '/stop' in robot.viewer._stops, 'the service')
-        client = robot.viewer._trigger_clients['/stop']
+        client = robot.viewer._triggers.client('/stop')
         robot.spin_until(client.service_is_ready, 'a connection')
         answer = robot.viewer.stop()
         robot.spin_until(lambda: bool(asked), 'the request')
@@ -308,7 +324,7 @@ def test_who_does_not_look_takes_no_messages(
     robot.spin_until(lambda: listeners() == [2, 1, 1], 'subscriptions')
     monkeypatch.setattr(listening, 'LINGER', 0.1)
     opened.append(False)
-    robot.spin_until(lambda: listeners() == [1, 0, 0], 'their end')
+    robot.spin_until(lambda: listeners() == [1, 0, 1], 'their end')
     robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
     robot.viewer.stop()
     robot.spin_until(lambda: len(robot.calls) == 2, 'halts')
@@ -357,7 +373,7 @@ def test_a_gripper_is_opened_closed_and_stopped(robot: Robot, said: list[str]) -
 
     def begin(handle: Any) -> None:
         goals.append(handle)
-        if len(goals) < 3:  # the third one goes on
+        if len(goals) < 4:  # the fourth one goes on
             handle.execute()
 
     def execute(handle: Any) -> Any:
@@ -386,22 +402,19 @@ def test_a_gripper_is_opened_closed_and_stopped(robot: Robot, said: list[str]) -
 
     def found() -> bool:
         states.publish(state)
-        jogged = robot.viewer.page._jogged
-        return jogged is not None and jogged[1].grippers == ('/hand',)
+        return robot.viewer.page._offered.grippers == (('/hand', 'b'),)
 
     robot.spin_until(found, 'the gripper')
-    jogged = robot.viewer.page._jogged
-    assert jogged is not None
-    assert jogged[1].joints == ('a',)
+    assert robot.viewer.page._offered.joints == ('a',)
     client = robot.viewer._grippers._found['/hand'].client
     robot.spin_until(client.server_is_ready, 'its action')
-    for opens, end, word in ((True, 2.0, 'open'), (False, -2.0, 'close')):
-        robot.viewer.grip('/hand', opens=opens)
+    for end, word in ((2.0, 'open'), (-2.0, 'close'), (0.5, 'to 0.5000')):
+        robot.viewer.grip('/hand', end)
         done = partial(said.__contains__, f'/hand: {word}: done, at 2.0000')
         robot.spin_until(done, 'the end')
         assert goals[-1].request.command.position == end
-    robot.viewer.grip('/hand', opens=True)
-    robot.spin_until(lambda: len(goals) == 3, 'a goal')
+    robot.viewer.grip('/hand', 2.0)
+    robot.spin_until(lambda: len(goals) == 4, 'a goal')
     robot.viewer.stop()
     robot.spin_until(lambda: bool(canceled), 'its end')
 
@@ -428,9 +441,7 @@ def test_the_page_keeps_what_the_robot_warns_of(robot: Robot) -> None:
     assert '<b>/robot</b>' in page._log.html
     assert 'a note' not in page._log.html
     page.say('target: reached')
-    robot.spin_until(
-        lambda: page._log_html is not None and 'target: reached' in page._log_html.content, 'it'
-    )
+    robot.spin_until(lambda: 'target: reached' in page._log_html.content, 'it')
 
 
 def test_sliders_publish_where_nobody_else_does(robot: Robot) -> None:
@@ -454,31 +465,87 @@ def test_a_robot_that_is_out_of_reach_is_said_to_be(
     """A link that is cut looks like an arm that stands still; the words go when it comes back."""
     states = robot.node.create_publisher(JointState, 'joint_states', 10)
     robot.description.publish(String(data=ARM))
-    silence = robot.viewer.page._silence
+    answers = robot.answers()
 
     def received() -> bool:
         states.publish(JointState(name=['a'], position=[0.5]))
-        return robot.viewer._received_at is not None and not silence.content
+        return bool(answers) and answers[-1].startswith('READY: ')
+
+    def gone() -> bool:
+        return answers[-1].startswith('NO CONTACT WITH THE ROBOT: Nothing for ')
 
     robot.spin_until(received, 'joint states')
-    robot.spin_until(lambda: 'nothing from the robot for' in silence.content, 'the words')
+    robot.spin_until(gone, 'the words')
+    assert not robot.viewer.page.live.movable
     robot.spin_until(received, 'their end')
     robot.node.destroy_publisher(states)  # as a link that was cut for long looks
     robot.spin_until(lambda: not robot.node.count_publishers('joint_states'), 'its end')
     opened.append(False)
     monkeypatch.setattr(listening, 'LINGER', 0.1)
     robot.spin_until(lambda: robot.node.count_subscribers('joint_states') == 1, 'a closed page')
-    robot.viewer.page.show_silence(None)
     opened.append(True)
-    robot.spin_until(lambda: 'nothing from the robot for' in silence.content, 'the words again')
+    robot.spin_until(gone, 'the words again')
     assert not robot.node.count_publishers('joint_states'), 'no sliders for a robot that was there'
 
 
-def test_a_slider_moves_its_joint_alone(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The others stay at their references, also outside of their sliders, or go on as they were.
+def test_after_stop_the_page_moves_nothing_until_that_is_allowed(robot: Robot) -> None:
+    """It is allowed by the action of the state, which moves nothing; an older action does not."""
+    robot.description.publish(String(data=ARM))
+    robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
+    answers, page = robot.answers(), robot.viewer.page
+    robot.spin_until(lambda: bool(answers) and answers[-1].startswith('READY: '), 'the robot')
+    page._stop()
+    assert page.live.stopped
+    robot.spin_until(lambda: answers[-1].startswith('STOPPED: Done'), 'the answer')
+    robot.viewer.act('Recover joint1')
+    robot.spin_times(5)
+    assert page.live.stopped
+    robot.viewer.act(ALLOW)
+    robot.spin_until(lambda: answers[-1].startswith('READY: '), 'an end')
+    assert not page.live.stopped
+    robot.success = False
+    page._stop()
+    robot.spin_until(lambda: answers[-1].startswith('STOP NOT CONFIRMED: '), 'no confirmation')
 
-    A stop forgets all; what follows is a new request, which an empty trajectory says.
-    """
+
+def test_the_action_calls_one_group_of_services_after_the_other(robot: Robot) -> None:
+    """Enabling is init and the mode; a refusal ends it, and is the answer."""
+    statuses = robot.node.create_publisher(DiagnosticArray, 'diagnostics', 10)
+    for verb in ('init', 'cyclic_position_mode'):
+        robot.node.create_service(Trigger, f'joint1/{verb}', robot._answer(verb))
+    off = DiagnosticStatus(name='joint1: drive', level=b'\x00', message='off')
+    off.values.append(KeyValue(key='state', value='Switch on disabled'))
+    robot.description.publish(String(data=ARM))
+    answers = robot.answers()
+
+    def offered() -> bool:
+        statuses.publish(DiagnosticArray(status=[off]))
+        state = robot.viewer._judge._state
+        return state.action == 'Enable joint1' and all(state.calls)
+
+    for success, called in ((False, ['init']), (True, ['init', 'cyclic_position_mode'])):
+        robot.success = success
+        robot.spin_until(offered, 'the action')
+        robot.spin_until(
+            lambda: answers[-1:] == ['NOT ENABLED: 1 of 1 drives have no torque.'], 'the state'
+        )
+        robot.spin_until(
+            lambda: robot.viewer._triggers.client('/joint1/init').service_is_ready(), 'init'
+        )
+        robot.spin_until(
+            lambda: robot.viewer._triggers.client(
+                '/joint1/cyclic_position_mode'
+            ).service_is_ready(),
+            'the mode',
+        )
+        robot.viewer.act('Enable joint1')
+        robot.spin_until(lambda called=called: robot.calls == called, 'calls')
+        robot.spin_until(lambda: not robot.viewer._judge._acting, 'the end')
+        robot.calls.clear()
+
+
+def targets_of(robot: Robot) -> tuple[list[Any], Controller, TargetPanel]:
+    """Show a controller of two joints; return what it is sent, it, and its panel."""
     sent: list[Any] = []
     kind = import_module('trajectory_msgs.msg').JointTrajectory  # no dependency of the package
     state = state_message()
@@ -496,11 +563,26 @@ def test_a_slider_moves_its_joint_alone(robot: Robot, monkeypatch: pytest.Monkey
             and bool(found.joints)
             and robot.node.count_publishers('arm_controller/joint_trajectory') > 0
             and found.commands.get_subscription_count() > 0
-            and '/arm_controller' in robot.viewer.page._targets
+            and robot.viewer.page._jog is not None
+            and robot.viewer.page._jog.target is not None
         )
 
     robot.spin_until(known, 'the controller')
-    sliders = robot.viewer.page._targets['/arm_controller']._sliders
+    panel = robot.viewer.page._jog
+    assert panel is not None
+    assert panel.target is not None
+    return sent, controllers.found['/arm_controller'], panel.target
+
+
+def test_a_target_moves_its_joint_alone(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The others stay at their references, also outside of their sliders, or go on as they were.
+
+    A stop forgets all; what follows is a new request, which an empty trajectory says.
+    """
+    monkeypatch.setattr(controllers_module, 'RELEASED_AFTER', math.inf)
+    sent, controller, target = targets_of(robot)
+    controllers = robot.viewer._controllers
+    sliders = target._sliders
 
     def slide(joint: str, position: float) -> None:
         """Move a slider as a browser does."""
@@ -511,33 +593,62 @@ def test_a_slider_moves_its_joint_alone(robot: Robot, monkeypatch: pytest.Monkey
 
     slide('a', 0.9)
     slide('a', 1.0)
+    robot.spin_times(20)
+    assert not sent, 'a slider moves the target only'
+    target._move()
+    target._move()
     robot.spin_until(lambda: bool(sent), 'a trajectory')
     (point,) = sent[0].points
     assert list(sent[0].joint_names) == ['a', 'b']
     assert list(point.positions) == [1.0, -9.004]
     assert list(point.velocities) == list(point.accelerations) == [0.0, 0.0]
     assert point.time_from_start.sec + point.time_from_start.nanosec * 1e-9 > 4.5  # 15/8 of 2.5
-    assert controllers.found['/arm_controller'].busy
+    assert controller.busy
     slide('b', -1.0)
+    target._move()
     robot.spin_until(lambda: len(sent) == 2, 'another trajectory')
     assert list(sent[1].points[0].positions) == [1.0, -1.0]
     slide('a', 99.0)  # a number may be typed
+    target._move()
     robot.spin_until(lambda: len(sent) == 3, 'another trajectory')
     assert list(sent[2].points[0].positions) == [2.0, -1.0]
     slide('a', 0.0)
+    target._move()
     robot.viewer.stop()
     robot.spin_times(20)
     assert len(sent) == 3
-    assert not controllers.found['/arm_controller'].busy
+    assert not controller.busy
     assert controllers.history.of('a')[-1].target == 0.504
     monkeypatch.setattr(controllers_module, 'SETTLING_TIMEOUT', 0.1)
     monkeypatch.setattr(controllers_module, 'motion_time', lambda *_: 0.1)
     for count in (5, 7):  # after a stop, and after a target that was not reached
-        robot.viewer.aim('/arm_controller', {'a': 1.0}, 1.0)
+        robot.viewer.aim({'a': 1.0}, 1.0)
         robot.spin_until(lambda count=count: len(sent) == count, 'an empty trajectory and another')
         assert not sent[-2].points
         assert list(sent[-1].points[0].positions) == [1.0, -9.004]
-        robot.spin_until(lambda: not controllers.found['/arm_controller'].busy, 'the end')
+        robot.spin_until(lambda: not controller.busy, 'the end')
+        robot.viewer.let_go()
+
+
+@pytest.mark.parametrize('way', ['let go', 'lost'])
+def test_a_motion_to_a_target_ends_when_its_button_is_let_go(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch, way: str
+) -> None:
+    """An empty trajectory stops the arm on its path; also where heartbeats come no more."""
+    monkeypatch.setattr(controllers_module, 'motion_time', lambda *_: 60.0)
+    monkeypatch.setattr(controllers_module, 'RELEASED_AFTER', math.inf)
+    sent, controller, _ = targets_of(robot)
+    robot.viewer.aim({'a': 1.0}, 1.0)
+    robot.spin_until(lambda: bool(sent), 'a trajectory')
+    robot.spin_times(20)
+    assert len(sent) == 1
+    if way == 'let go':
+        robot.viewer.let_go()
+    else:
+        monkeypatch.setattr(controllers_module, 'RELEASED_AFTER', 0.1)
+    robot.spin_until(lambda: len(sent) == 2, 'its end')
+    assert not sent[-1].points
+    assert not controller.busy
 
 
 def test_nothing_that_the_robot_sends_ends_the_page(
@@ -549,16 +660,13 @@ def test_nothing_that_the_robot_sends_ends_the_page(
 
     def shown() -> bool:
         statuses.publish(DiagnosticArray(status=[odd]))
-        html = robot.viewer.page._statuses
-        return html is not None and 'a level of nobody' in html.content
+        return 'a level of nobody' in robot.viewer.page._statuses.content
 
     robot.spin_until(shown, 'the status')
-    monkeypatch.setattr(web_viewer, 'STATUS_AGE', 0.1)
+    monkeypatch.setattr(watch, 'STATUS_AGE', 0.1)
     page = robot.viewer.page
     gone = 'unknown for 0 s; before: a level of nobody'
-    robot.spin_until(
-        lambda: gone in ((page._statuses and page._statuses.content) or ''), 'its age'
-    )
+    robot.spin_until(lambda: gone in page._statuses.content, 'its age')
     for wrong in ('<robot', BAD_ORIGIN):
         robot.description.publish(String(data=wrong))
         robot.spin_until(lambda: bool(said), 'a sentence')

@@ -54,7 +54,11 @@ class Page(Protocol):
 
 
 class Body:
-    """Attitude, battery, feet and pose; in the thread of the node, but for :meth:`send`."""
+    """Attitude, battery, feet and pose; in the thread of the node, but for :meth:`send`.
+
+    Attributes:
+        battery: Its charge in words; empty where nothing measures it.
+    """
 
     def __init__(
         self, node: Node, page: Page, listening: Listening, positions: Mapping[str, float]
@@ -65,7 +69,7 @@ class Body:
         self._feet: tuple[str, ...] = ()
         self._panel: BodyPanel | None = None
         self._attitude: Quaternion | None = None
-        self._battery = ''
+        self.battery = ''
         self._masses: tuple[PointMass, ...] = ()
         self._radius = 0.0
         self._contacts: Contacts | None = None
@@ -148,7 +152,7 @@ class Body:
             feet = ''
             if self._contacts is not None and self._support is not None:
                 feet = self._contacts.html(self._support)
-            self._panel.show(horizon_html(self._attitude, self._battery) + feet)
+            self._panel.show(horizon_html(self._attitude, self.battery) + feet)
 
     def _take_imu(self, message: Imu) -> None:
         turn = message.orientation
@@ -161,4 +165,4 @@ class Body:
         self._contacts, self._contacts_at = Contacts(feet, message.source), time.monotonic()
 
     def _take_battery(self, message: BatteryState) -> None:
-        self._battery = battery_text(message.percentage, message.voltage)
+        self.battery = battery_text(message.percentage, message.voltage)

@@ -17,6 +17,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import qos_profile_sensor_data, QoSProfile
 
 from ..page.aim import History, motion_time
+from ..page.deadman import RELEASED_AFTER
 from ..robots import of_robot
 from .listening import Listening
 
@@ -49,6 +50,8 @@ class Controller:
         targets: Where the joints are on their way to; empty when they are not.
         ends: Steady time at which they are there in [s].
         sent: Steady time of the last trajectory in [s].
+        aimed: Targets whose button is held, and their share of the greatest velocity.
+        held_at: Steady time at which it was seen to be held in [s].
         lets_go: The robot was stopped, or did not follow, and nothing was sent since.
     """
 
@@ -60,6 +63,8 @@ class Controller:
     targets: Mapping[str, float] = field(default_factory=dict)
     ends: float = -math.inf
     sent: float = -math.inf
+    aimed: tuple[Mapping[str, float], float] | None = None
+    held_at: float = -math.inf
     lets_go: bool = False
 
     @property
@@ -139,26 +144,39 @@ class Controllers:
         controller.positions, controller.references = positions, targets
         self.history.add(targets, positions, time.monotonic())
 
-    def aim(self, name: str, targets: Mapping[str, float], share: float) -> None:
-        """Send targets and move no other joint; of several of a joint the last one counts.
+    def aim(self, targets: Mapping[str, float], share: float) -> None:
+        """Send joints to targets, and no other joint, as long as this is called again.
 
         Args:
-            name: The controller.
             targets: By joint in [rad] or [m].
             share: Of the greatest velocity, above 0 to 1.
         """
-        controller = self.found[name]
-        earlier = controller.wanted[0] if controller.wanted else {}
-        controller.wanted = ({**earlier, **targets}, share)
+        for controller in self.found.values():
+            own = {name: at for name, at in targets.items() if name in controller.joints}
+            if own:
+                controller.held_at = time.monotonic()
+                if (own, share) != controller.aimed:
+                    controller.wanted = controller.aimed = (own, share)
+
+    def let_go(self) -> None:
+        """Stop what is on its way to a target: its button was let go."""
+        for controller in self.found.values():
+            if controller.busy and not controller.arrived:
+                controller.commands.publish(_empty())
+                self._conclude(controller, 'target: let go, it stops', failed=False)
+            controller.wanted = controller.aimed = None
 
     def stop(self) -> None:
         """Send nothing that was not sent yet, and wait for nothing: the robot was stopped."""
         for controller in self.found.values():
-            controller.wanted, controller.targets, controller.lets_go = None, {}, True
+            controller.wanted = controller.aimed = None
+            controller.targets, controller.lets_go = {}, True
 
     def advance(self, velocities: Mapping[str, float]) -> None:
         """Send what is wanted, and report what was reached."""
         now = time.monotonic()
+        if any(each.aimed and now - each.held_at > RELEASED_AFTER for each in self.found.values()):
+            self.let_go()
         for controller in self.found.values():
             if controller.wanted is not None and controller.lets_go:
                 if now - controller.sent > SILENCE:

@@ -51,7 +51,7 @@ from ..page.first_motion import (
     Saw,
 )
 from ..page.first_motion_panel import FirstMotionActions, FirstMotionPanel
-from ..page.robot_page import Status
+from ..robot_state import Status
 
 READ_UNITS = 'read_units'
 READ_UNITS_TYPE = 'arm_msgs/srv/ReadUnits'
@@ -139,6 +139,7 @@ class FirstMotion:
             for joint in tree.movable()
             if joint.mimic is None
         }
+        self._drives, self._panel = {}, None  # the page has removed it
 
     def look(self, services: Mapping[str, Sequence[str]], drives: Collection[str]) -> None:
         """Find the drives that say how they count."""

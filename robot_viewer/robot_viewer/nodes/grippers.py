@@ -39,9 +39,9 @@ class Grippers:
         self._ends: Mapping[str, tuple[float, float]] = {}
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Full names of their controllers."""
-        return tuple(self._found)
+    def named(self) -> tuple[tuple[str, str], ...]:
+        """Full names of their controllers, each with its joint."""
+        return tuple((name, each.joint) for name, each in self._found.items())
 
     @property
     def joints(self) -> frozenset[str]:
@@ -73,15 +73,17 @@ class Grippers:
                 client = ActionClient(self._node, kind, action)
                 self._found[name] = _Gripper(client, controller.joints[0])
 
-    def grip(self, name: str, *, opens: bool) -> None:
-        """Open or close one: to the greatest or the least position of its joint."""
+    def grip(self, name: str, position: float) -> None:
+        """Move one to a position of its joint in [m] or [rad]."""
         gripper = self._found.get(name)
-        what = f'{name}: {"open" if opens else "close"}'
+        ends = (0.0, 0.0) if gripper is None else self._ends[gripper.joint]
+        words = {ends[0]: 'close', ends[1]: 'open'}
+        what = f'{name}: {words.get(position, f"to {position:.4f}")}'
         if gripper is None or not gripper.client.server_is_ready():
             self._report(f'{what}: its action is not there', True)
             return
         goal = import_module('control_msgs.action').GripperCommand.Goal()
-        goal.command.position = self._ends[gripper.joint][opens]
+        goal.command.position = position
         self._calls[name] = ActionCall(gripper.client, goal, partial(self._done, what))
 
     def stop(self) -> None:

@@ -25,6 +25,11 @@ class Listening:
         self._made: list[Subscription] = []
         self._last_look: float | None = None
 
+    @property
+    def active(self) -> bool:
+        """Whether it is subscribed."""
+        return bool(self._made)
+
     def add(
         self,
         kind: Any,  # noqa: ANN401  # message types have no type

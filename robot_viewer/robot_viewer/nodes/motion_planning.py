@@ -21,6 +21,7 @@ from urdf_reader import DescriptionError, KinematicTree, Transform
 from node_runner import LATCHED
 
 from ..link_poses import link_pose, moved
+from ..page.deadman import RELEASED_AFTER
 from ..page.motion_plan import (
     DRAGGED,
     NO_GOAL,
@@ -102,6 +103,7 @@ class MotionPlanning:
         self._motion: PlannedMotion | None = None
         self._shown_since: float | None = None
         self._execution: ActionCall | None = None
+        self._held_at = 0.0  # when the button of the execution was seen to be held
         self._executed_goal: tuple[str, dict[str, float]] = (NO_GOAL, {})
         self._scene = SceneEditor(node)
 
@@ -178,6 +180,25 @@ class MotionPlanning:
         if self._execution is not None:
             self._execution.cancel()
         self._drop()
+
+    def go_on(self) -> None:
+        """Go on with the execution: its button is held."""
+        self._held_at = time.monotonic()
+
+    def let_go(self) -> None:
+        """Cancel the execution: its button was let go."""
+        if self._execution is not None:
+            self._execution.cancel()
+
+    @property
+    def busy(self) -> bool:
+        """Whether a plan is executed."""
+        return self._execution is not None
+
+    def advance(self) -> None:
+        """Cancel the execution when nothing holds its button any more."""
+        if self.busy and time.monotonic() - self._held_at > RELEASED_AFTER:
+            self.let_go()
 
     def draw(self) -> None:
         """Show the next picture of a plan, if it is being shown."""
@@ -294,6 +315,10 @@ class MotionPlanning:
             return
         self._trajectory = result.planned_trajectory
         self._motion = motion = planned_motion(self._trajectory)
+        if motion.duration == 0.0:
+            self._trajectory = None
+            self._say('it is there already', failed=False)
+            return
         self._shown_since = time.monotonic()
         self._panel.show_line(tip_line(self._tree, self._group.tip, self._positions, motion))
         self._panel.allow(execute=True)
@@ -317,7 +342,7 @@ class MotionPlanning:
             return
         goal = import_module('moveit_msgs.action').ExecuteTrajectory.Goal()
         goal.trajectory = self._trajectory
-        self._trajectory, self._shown_since = None, None
+        self._trajectory, self._shown_since, self._held_at = None, None, time.monotonic()
         self._executed_goal = self._goal, self._joints
         self._panel.allow(execute=False)
         if self._motion is not None:

@@ -8,7 +8,6 @@ from collections import deque
 from collections.abc import Callable, Collection, Mapping, Sequence
 import concurrent.futures
 from contextlib import suppress
-from dataclasses import replace
 from functools import partial
 from importlib import import_module
 import threading
@@ -26,7 +25,6 @@ from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
 from rclpy.task import Future
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
-from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 from urdf_reader import KinematicTree, read_urdf, Transform
 
@@ -40,18 +38,21 @@ from node_runner import (
 )
 
 from ..loopback import binding_problem
-from ..page.jog_panel import Twist
+from ..page.jog_panel import Offered, Twist
 from ..page.overlay import StopAnswer
-from ..page.robot_page import RobotPage, STALE, Status, Velocity
+from ..page.robot_page import RobotPage, Velocity
 from ..page.robot_scene import greatest_velocities
 from ..robots import of_robot, SET_MODE_TYPE, stops_robot
 from .body import Body
 from .controllers import Controllers
 from .first_motion import FirstMotion
 from .grippers import Grippers
+from .judge import Judge
 from .listening import Listening
 from .motion_planning import MotionPlanning
 from .serving import Border, serve
+from .trigger_calls import TriggerCalls
+from .watch import Watch
 
 NAME = 'web_viewer'
 PORT = 8080
@@ -59,8 +60,11 @@ DRAW_PERIOD = 1.0 / 30.0
 """Time between two pictures, and between two looks at what was done on the page, in [s]."""
 LIST_PERIOD = 0.2
 """Time between two looks at numbers in [s]."""
-STATUS_AGE = 5.0
-"""After which a status that does not come again is unknown in [s]."""
+LIMIT_AGE = 1.0
+"""Time in [s] for which a limit that the servo names is shown."""
+SERVO_STATUS_TYPE = 'moveit_msgs/msg/ServoStatus'
+SIMULATIONS = ('arm_msgs/srv/InjectFault', 'quad_msgs/srv/InjectFault')
+"""Types of services that only a simulation offers."""
 GRAPH_PERIOD = 1.0
 """Time between two looks at what the robot offers in [s]."""
 DRIVE_SERVICES = (
@@ -77,7 +81,6 @@ DRIVE_SERVICES = (
     'cyclic_position_mode',
 )
 """Services of a drive that the page offers; a node with halt and quick_stop is one."""
-WALKING_MODES = ('stand', 'walk', 'turn', 'lie', 'relax', 'get_up')
 WARN = 30
 """Level of warnings in rcl_interfaces/Log."""
 ROSOUT = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -115,18 +118,17 @@ class WebViewer(Node):
                 ' 127.0.0.1, or 0.0.0.0 for all of them'
             )
         self._orders: deque[Callable[[], object]] = deque()
-        self._trigger_clients: dict[str, Client] = {}
+        self._triggers = TriggerCalls(self, self._report)
         self._drives: dict[str, list[str]] = {}
         self._stops: set[str] = set()
         self._own_stops: set[str] = set()  # of them those that a robot was seen to offer
         self._positions: dict[str, float] = {}
         self._drawn: dict[str, float] = {}
-        self._received_at: float | None = None
-        self._listens_since = 0.0
+        self._watch = Watch()
         self._own = False  # the page publishes joint states, as nobody else ever did
         self._robot_publishes = False
-        self._statuses: dict[str, Status] = {}
-        self._status_times: dict[str, float] = {}  # when each of them came
+        self._limit = ('', 0.0)  # in words of the servo, and when
+        self._servo_listens = False
         self._set_mode: Client | None = None
         self._root = ''
         self._velocities: Mapping[str, float] = {}
@@ -142,18 +144,19 @@ class WebViewer(Node):
         self._walks: Publisher | None = None
         self._joint_states: Publisher | None = None
         self.page = RobotPage(host, port, self)
+        self._judge = Judge(self, self.page, self._watch, self._triggers)
         self.border = Border(self, lambda text: self.page.say(text, failed=True))
         self._body = Body(self, self.page, self._listening, self._positions)
         self._first_motion = FirstMotion(
-            self, self.page, self._positions, self._statuses, self._order
+            self, self.page, self._positions, self._watch.statuses, self._order
         )
         self._planning = MotionPlanning(self, self.page, self._positions, self._order)
         self.create_subscription(String, 'robot_description', self._describe, LATCHED)
         sensor = qos_profile_sensor_data
         self._listening.add(JointState, 'joint_states', self._take_joints, sensor)
         self._listening.add(TFMessage, '/tf', self._take_transforms, sensor)
-        self._listening.add(DiagnosticArray, 'diagnostics', self._take_statuses, 10)
         self._listening.add(Log, '/rosout', self._take_log, ROSOUT)
+        self.create_subscription(DiagnosticArray, 'diagnostics', self._watch.take_statuses, 10)
         self.create_timer(DRAW_PERIOD, self._serve_page)
         self.create_timer(LIST_PERIOD, self._list)
         self.create_timer(GRAPH_PERIOD, self._look_around)
@@ -166,7 +169,8 @@ class WebViewer(Node):
             self._show(read_urdf(message.data))
 
     def _show(self, tree: KinematicTree) -> None:
-        self._root, self._drawn = tree.root, {}
+        self._root, self._judge.robot, self._drawn = tree.root, tree.name, {}
+        self._watch.forget()
         self._velocities = greatest_velocities(tree)
         self._independent = [joint.name for joint in tree.joints if joint.independent]
         self._grippers.describe(tree)
@@ -179,7 +183,7 @@ class WebViewer(Node):
 
     def _take_joints(self, message: JointState) -> None:
         if not self._own:
-            self._received_at = time.monotonic()
+            self._watch.take_joints(message)
         positions = dict(zip(message.name, message.position, strict=False))
         self._first_motion.take(positions)
         self._positions.update(positions)
@@ -192,21 +196,9 @@ class WebViewer(Node):
                     (place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w)
                 )
 
-    def _take_statuses(self, message: DiagnosticArray) -> None:
-        for status in message.status:
-            level = min(status.level[0], STALE)  # others than those of diagnostic_msgs: unknown
-            values = {each.key: each.value for each in status.values}
-            self._statuses[status.name] = Status(status.name, level, status.message, values)
-            self._status_times[status.name] = time.monotonic()
-
-    def _aged(self, status: Status, now: float) -> Status:
-        """Return a status as it is known now; the last one of a node that has ended is old."""
-        age = now - self._status_times[status.name]
-        if age < STATUS_AGE:
-            return status
-        return replace(
-            status, level=STALE, message=f'unknown for {age:.0f} s; before: {status.message}'
-        )
+    def _take_servo(self, message: Any) -> None:  # noqa: ANN401  # moveit_msgs may not be there
+        if message.code > 0:
+            self._limit = message.message, time.monotonic()
 
     def _take_log(self, message: Log) -> None:
         """Keep the warnings and errors of other nodes of the robot."""
@@ -223,11 +215,15 @@ class WebViewer(Node):
             self._orders.popleft()()
         self._controllers.advance(self._velocities)
         self._first_motion.advance()
+        self._planning.advance()
         watched = self.page.watched
         looked_at = watched or self._controllers.busy or self._first_motion.busy
-        if self._listening.update(time.monotonic(), looked_at=looked_at):
-            self._received_at, self._listens_since = None, time.monotonic()  # what is known is old
-            self._statuses.clear()
+        was, begins = (
+            self._listening.active,
+            self._listening.update(time.monotonic(), looked_at=looked_at),
+        )
+        if begins or was != self._listening.active:
+            self._watch.listen(begins=begins)  # what is known is old
         if watched:
             self._draw()
 
@@ -243,21 +239,29 @@ class WebViewer(Node):
             self.page.show_base(self._base)
 
     def _list(self) -> None:
+        self._judge_robot()
         if not self.page.watched:
             return
-        now, received_at = time.monotonic(), self._received_at
-        age = None if received_at is None else now - received_at
+        now = time.monotonic()
         self.page.list_log()
-        self.page.list_joints(self._positions, 0.0 if self._own else age)
-        silent = now - self._listens_since if age is None else age
-        self.page.show_silence(silent if self._robot_publishes else None)
-        if self._statuses:
-            self.page.show_statuses([self._aged(each, now) for each in self._statuses.values()])
-        for name, controller in self._controllers.found.items():
-            self.page.follow(name, busy=controller.busy, positions=controller.positions)
+        for legs in self._watch.legs:
+            self.page.show_mode(legs.values.get('state', ''))
+        self.page.show_statuses(self._watch.aged(now))
+        self.page.follow(self._positions)
         self._body.list()
         self._first_motion.list()
-        self.page.plot(self._controllers.history, time.monotonic())
+        self.page.plot(self._controllers.history, now)
+
+    def _judge_robot(self) -> None:
+        limit, at = self._limit
+        self._judge.judge(
+            self._positions,
+            publishes=self._robot_publishes,
+            limit=limit if time.monotonic() - at < LIMIT_AGE else '',
+            battery=self._body.battery,
+            executes=self._planning.busy,
+            controllers=self._controllers.found,
+        )
 
     # -- what the robot offers
 
@@ -265,17 +269,25 @@ class WebViewer(Node):
         services = dict(self.get_service_names_and_types())
         around = self.border.around
         with around('drives are not offered'):
-            self._find_drives({name for name, kinds in services.items() if TRIGGER in kinds})
+            triggers = {name for name, kinds in services.items() if TRIGGER in kinds}
+            self._judge.services = frozenset(triggers)
+            self._find_drives(triggers)
+        self._judge.simulated = any(
+            kind in SIMULATIONS for kinds in services.values() for kind in kinds
+        )
         with around('the first motion is not offered'):
             self._first_motion.look(services, self._drives)
         with around('targets are not offered'):
-            self._find_controllers()
+            self._controllers.look(self.resolve_topic_name('robot_description'))
         with around('grippers are not offered'):
             self._grippers.look(services, self._controllers.found)
         with around('single joints are not jogged'):
             self._find_joint_jogging()
         with around('jogging is not offered'):
             self._find_jogging()
+        with around('limits are not shown'):
+            self._find_servo()
+        self.page.offer_drive(self._offered())
         with around('walking is not offered'):
             self._find_walking(services)
         with around('planning is not offered'):
@@ -306,24 +318,32 @@ class WebViewer(Node):
         with self.border.around('who offers STOP is not known'):
             self._doubtful_stops(self._stops - self._own_stops)
         for service in (*self._stops, *(f'{drive}/halt' for drive in self._drives)):
-            self._client(service)  # it takes time to find its server, which a STOP has not
+            self._triggers.client(service)  # it needs time to find its server; a STOP has none
         self.page.offer_drives(self._drives)
-
-    def _find_controllers(self) -> None:
-        self._controllers.look(self.resolve_topic_name('robot_description'))
-        for name, controller in self._controllers.found.items():
-            if controller.joints:
-                self.page.offer_targets(name, controller.joints)
 
     def _find_jogging(self) -> None:
         topic = 'servo_node/delta_twist_cmds'
         if self._jogs is None and self.count_subscribers(topic):
             self._jogs = self.create_publisher(TwistStamped, topic, QoSProfile(depth=1))
-        if self._jogs is not None:
-            others = self._grippers.joints
-            joints = [] if self._joint_jogs is None else self._independent
-            arm = [joint for joint in joints if joint not in others]
-            self.page.offer_jog(arm, self._grippers.names)
+
+    def _find_servo(self) -> None:
+        topic = self.resolve_topic_name('servo_node/status')
+        ends = () if self._servo_listens else self.get_publishers_info_by_topic(topic)
+        if any(end.topic_type == SERVO_STATUS_TYPE for end in ends):
+            self._servo_listens = True
+            kind = import_module('moveit_msgs.msg').ServoStatus
+            self._listening.add(kind, topic, self._take_servo, qos_profile_sensor_data)
+
+    def _offered(self) -> Offered:
+        grippers = dict(self._grippers.named)
+        held = set(grippers.values())
+        targets = {joint for each in self._controllers.found.values() for joint in each.joints}
+        return Offered(
+            tuple(j for j in self._independent if self._joint_jogs and j not in held),
+            self._jogs is not None,
+            tuple(grippers.items()),
+            tuple(joint for joint in self._independent if joint in targets - held),
+        )
 
     def _find_joint_jogging(self) -> None:
         topic = 'servo_node/delta_joint_cmds'
@@ -337,7 +357,9 @@ class WebViewer(Node):
             kind = import_module('quad_msgs.srv').SetMode
             self._set_mode = self.create_client(kind, 'set_mode')
             self._walks = self.create_publisher(TwistMessage, 'cmd_vel', QoSProfile(depth=1))
-            self.page.offer_walk(WALKING_MODES)
+        if self._set_mode is not None:
+            policy = any(each.values.get('policy') for each in self._watch.legs)
+            self.page.offer_walk(policy=policy)
 
     # -- what people do on the page, in its threads
 
@@ -347,9 +369,13 @@ class WebViewer(Node):
         self._order(partial(self._stop, answer))
         return answer
 
-    def call(self, service: str) -> None:
-        """Call a Trigger service."""
-        self._order(partial(self._call, service))
+    def act(self, action: str) -> None:
+        """Do the action that is wanted now, if it is still this one."""
+        self._order(partial(self._judge.act, action))
+
+    def call(self, what: str, services: Sequence[str]) -> None:
+        """Call Trigger services at the same time; what they are for, in words."""
+        self._order(partial(self._triggers.call_all, what, services))
 
     def jog(self, twist: Twist, frame: str = '') -> None:
         """Publish a jog once, at once; the robot's time-out ends it."""
@@ -371,9 +397,9 @@ class WebViewer(Node):
         message.header.stamp = self.get_clock().now().to_msg()
         self._joint_jogs.publish(message)
 
-    def grip(self, gripper: str, *, opens: bool) -> None:
-        """Open or close a gripper."""
-        self._order(partial(self._grippers.grip, gripper, opens=opens))
+    def grip(self, gripper: str, position: float) -> None:
+        """Move a gripper."""
+        self._order(partial(self._grippers.grip, gripper, position))
 
     def walk(self, velocity: Velocity) -> None:
         """Publish a velocity once, at once; the robot's time-out ends it."""
@@ -391,16 +417,21 @@ class WebViewer(Node):
         """Publish joint states, where no other node does."""
         self._order(partial(self._publish_joints, positions))
 
-    def aim(self, controller: str, targets: Mapping[str, float], share: float) -> None:
-        """Send joints to targets."""
-        self._order(partial(self._controllers.aim, controller, targets, share))
+    def aim(self, targets: Mapping[str, float], share: float) -> None:
+        """Move joints to targets as long as this comes."""
+        self._order(partial(self._controllers.aim, targets, share))
+
+    def let_go(self) -> None:
+        """Stop a motion to targets."""
+        self._order(self._controllers.let_go)
 
     def _order(self, order: Callable[[], object]) -> None:
         self._orders.append(order)
 
     def _stop(self, answer: concurrent.futures.Future[StopAnswer]) -> None:
         self.page.say('STOP: no answer from the robot yet', failed=None)
-        calls = {service: self._call(service) for service in sorted(self._stops)}
+        self._judge.stop(answer, self._order)
+        calls = {service: self._triggers.call(service) for service in sorted(self._stops)}
         called = {service for service, call in calls.items() if call is not None}
         for part in (self._controllers, self._grippers, self._first_motion, self._planning):
             with self.border.around('STOP'):
@@ -412,7 +443,7 @@ class WebViewer(Node):
             doubtful = {service: [] for service in called}
         for drive in self._drives:
             if _stop_beside(drive) not in called - doubtful.keys():
-                calls[f'{drive}/halt'] = self._call(f'{drive}/halt')
+                calls[f'{drive}/halt'] = self._triggers.call(f'{drive}/halt')
         for service, others in doubtful.items():
             who = ', '.join(others) or 'a node that the graph does not show'
             text = f'offered by {who}, which leads neither drives nor legs: each drive is halted'
@@ -448,21 +479,6 @@ class WebViewer(Node):
         return {
             name: nodes for name, nodes in others.items() if nodes or name not in self._own_stops
         }
-
-    def _client(self, service: str) -> Client:
-        if service not in self._trigger_clients:
-            self._trigger_clients[service] = self.create_client(Trigger, service)
-        return self._trigger_clients[service]
-
-    def _call(self, service: str) -> Future | None:
-        """Call a Trigger service; return its answer to come, None where it is not there."""
-        client = self._client(service)
-        if not client.service_is_ready():
-            self._report(service, 'is not there', failed=True)
-            return None
-        future = client.call_async(Trigger.Request())
-        future.add_done_callback(partial(self._answered, service))
-        return future
 
     def _request_mode(self, mode: str) -> None:
         if self._set_mode is not None:

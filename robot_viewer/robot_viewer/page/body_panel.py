@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+import math
 from typing import TypeAlias
 
 import numpy as np
@@ -20,13 +21,12 @@ from viser import (
 
 from .sliders import value_of
 from .standing import Contacts, Support
-from .style import NEUTRAL, WANTED
-from .target_panel import UNLOCK
+from .style import NEUTRAL
 
-RANGES: Mapping[str, float] = {'Roll [rad]': 0.35, 'Pitch [rad]': 0.3, 'Height [m]': 0.03}
+RANGES: Mapping[str, float] = {'Roll [deg]': 20.0, 'Pitch [deg]': 17.0, 'Height [mm]': 30.0}
 """Of the sliders to either side; the controller has limits of its own."""
-DOWN_COLOR, UP_COLOR, LINE_COLOR = (47, 158, 68), (134, 142, 150), (25, 113, 194)
-MASS_COLOR, OUTSIDE_COLOR = (245, 159, 0), (224, 49, 49)
+DOWN_COLOR, UP_COLOR, LINE_COLOR = (35, 112, 50), (134, 142, 150), (24, 100, 171)
+MASS_COLOR, OUTSIDE_COLOR = (24, 100, 171), (255, 212, 59)
 """Of the place below the centre of mass: over the support, or outside."""
 FOOT_RADIUS = 0.012
 """Of the mark of a foot in [m]."""
@@ -42,14 +42,12 @@ Pose: TypeAlias = tuple[float, float, float]
 class BodyPanel:
     """Sliders of the body's pose, a horizon, and marks at the feet."""
 
-    def __init__(self, server: ViserServer, path: str) -> None:
-        self._server, self._path = server, path
+    def __init__(self, server: ViserServer, path: str, allowed: Callable[[], bool]) -> None:
+        self._server, self._path, self._allowed = server, path, allowed
         gui = server.gui
         self._folder = gui.add_folder(None)
         with self._folder:
             self._html: GuiHtmlHandle = gui.add_html('')
-            self._unlock = gui.add_button(UNLOCK, color=WANTED, visible=False)
-        self._unlock.on_click(lambda _: self._set_locked(locked=False))
         self._sliders: list[GuiSliderHandle[float]] = []
         self._feet: dict[str, IcosphereHandle] = {}
         self._mass: IcosphereHandle | None = None
@@ -61,12 +59,12 @@ class BodyPanel:
             return
 
         def moved(event: GuiEvent[GuiSliderHandle[float]]) -> None:
-            if event.client_id is not None and not self._unlock.visible:
+            if event.client_id is not None and self._allowed():
                 roll, pitch, height = map(value_of, self._sliders)
-                send((roll, pitch, height))
+                send((math.radians(roll), math.radians(pitch), height / 1000.0))
 
         def level() -> None:
-            if self._unlock.visible:
+            if not self._allowed():
                 return
             for slider in self._sliders:
                 slider.value = 0.0  # type: ignore[misc]  # it has a setter
@@ -78,7 +76,7 @@ class BodyPanel:
                 slider = gui.add_slider(label, -most, most, most / 100.0, 0.0)
                 slider.on_update(moved)
                 self._sliders.append(slider)
-            gui.add_button('Level', color=NEUTRAL).on_click(lambda _: level())
+            gui.add_button('Level the body', color=NEUTRAL).on_click(lambda _: level())
 
     def remove(self) -> None:
         """Remove all of it from the page."""
@@ -86,11 +84,6 @@ class BodyPanel:
         for node in (*self._feet.values(), self._mass, self._line):
             if node is not None:
                 node.remove()
-
-    def lock(self) -> None:
-        """Send nothing until somebody unlocks the sliders: one may be dragged, or be late."""
-        if self._sliders:
-            self._set_locked(locked=True)
 
     def show(self, html: str) -> None:
         """Show attitude and battery."""
@@ -139,9 +132,6 @@ class BodyPanel:
     def _mark(self, name: str, radius: float) -> IcosphereHandle:
         path = f'{self._path}/{name}'
         return self._server.scene.add_icosphere(path, radius, UP_COLOR, opacity=0.8)
-
-    def _set_locked(self, *, locked: bool) -> None:
-        self._unlock.visible = locked
 
 
 def _paint(mark: IcosphereHandle, color: tuple[int, int, int]) -> None:

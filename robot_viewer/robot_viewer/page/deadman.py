@@ -13,7 +13,7 @@ HEARTBEAT = 1.0 / 30.0
 LEAST_GAP = 0.4 * HEARTBEAT
 """Heartbeats that are nearer to each other in [s] were held up: they may be of a button let go."""
 RELEASED_AFTER = 0.3
-"""Silence in [s] after which another page may hold a button."""
+"""Silence in [s] after which a button counts as let go."""
 
 _Press: TypeAlias = tuple[Hashable, Hashable]  # a page and its button
 
@@ -25,11 +25,16 @@ class Deadman:
     else: a page that is gone sends none, and the robot's own time-out stops the motion. Of what a
     slow connection has held up and delivers at once, one counts. After a stop a button that was
     held has to be let go, however its heartbeats pause; one that was taken off the page is over.
+
+    One page has control: the first that holds a button, until it is closed or another takes it.
+
+    Attributes:
+        holder: The page that has control; None for none.
     """
 
     def __init__(self) -> None:
         """Begin with no button held."""
-        self._holder: Hashable = None
+        self.holder: Hashable = None
         self._last = -math.inf
         self._pressed: set[_Press] = set()  # what was not let go
         self._barred: set[_Press] = set()  # what has to be, after a stop
@@ -39,24 +44,45 @@ class Deadman:
         """Ignore heartbeats of a button that is held now, until it is released."""
         self._barred |= self._pressed
 
+    def held(self, now: float) -> bool:
+        """Whether a button is held."""
+        return now - self._last < RELEASED_AFTER
+
+    def take(self, page: Hashable, now: float) -> bool:
+        """Give control to a page, unless a button is held; return whether it has it."""
+        if not self.held(now):
+            self.holder = page
+        return self.holder == page
+
+    def leave(self, page: Hashable) -> None:
+        """Forget a page that was closed."""
+        for presses in (self._pressed, self._barred):
+            presses.difference_update([press for press in presses if press[0] == page])
+        self._released = {press: at for press, at in self._released.items() if press[0] != page}
+        if self.holder == page:
+            self.holder = None
+
     def release(self, page: Hashable, button: Hashable, now: float) -> bool:
         """Record that a page has released; return whether it was the one that held."""
         press = page, button
         self._pressed.discard(press)
         self._barred.discard(press)
         self._released[press] = now
-        return page == self._holder
+        if page == self.holder:
+            self._last = -math.inf
+        return page == self.holder
 
     def beat(self, page: Hashable, button: Hashable, now: float) -> bool:
         """Process a heartbeat; return whether it counts."""
         press = page, button
         if now - self._released.get(press, -math.inf) < LEAST_GAP:
-            return False  # of the button that was let go; threads may have changed their order
+            return False  # of the button that was let go; a slow connection brings it later
         self._pressed.add(press)
         if press in self._barred:
             return False
-        gap = now - self._last
-        if page != self._holder and gap < RELEASED_AFTER:
+        if self.holder is None:
+            self.holder = page
+        if page != self.holder:
             return False
-        self._holder, self._last = page, now
+        gap, self._last = now - self._last, now
         return gap >= LEAST_GAP

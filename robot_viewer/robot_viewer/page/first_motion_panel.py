@@ -4,17 +4,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
-from html import escape
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from viser import GuiButtonHandle, GuiDropdownHandle, GuiHtmlHandle, GuiNumberHandle, ViserServer
+from viser import GuiDropdownHandle, GuiHtmlHandle, GuiNumberHandle, ViserServer
 
 from first_motion import Cause, FASTEST, FURTHEST, JointKind, Judgement, MotionGuard
 
 from .first_motion import MotionRequest, Saw
-from .style import CAUTION, NEUTRAL, WANTED
+from .live import Hold, Live
+from .style import BAD, CAUTION, GOOD, line, NEUTRAL, PLAIN, WANTED
 
 DISTANCE = 1.0
 """In the unit of people, degrees or millimetres."""
@@ -23,10 +22,6 @@ SPEEDS = {JointKind.TURNS: 0.5, JointKind.SLIDES: 1.0}
 HOLD = 'Hold to move'
 PRESS_ANEW = 'let go of the button, and press it anew'
 CHOOSE = 'choose'
-GOOD, BAD, PLAIN = '#2f9e44', '#e03131', '#868e96'
-
-Hold = Callable[[str, Callable[[], None], Callable[[], None]], GuiButtonHandle]
-"""Adds a button that acts as long as it is held, and rests when it is let go."""
 
 
 class FirstMotionActions(Protocol):
@@ -65,11 +60,10 @@ class FirstMotionPanel:
         server: ViserServer,
         joints: Mapping[str, JointKind],
         actions: FirstMotionActions,
-        hold: Hold,
+        live: Live,
     ) -> None:
-        self._joints, self._actions = joints, actions
-        self._add_hold = partial(hold, HOLD, actions.beat, actions.release)
-        self._hold: GuiButtonHandle | None = None  # while a motion is prepared
+        self._joints, self._actions, self._live = joints, actions, live
+        self._hold: int | None = None  # while a motion is prepared
         self._kind = next(iter(joints.values()))
         self._causes: Mapping[str, Cause] = {}
         gui = server.gui
@@ -80,7 +74,7 @@ class FirstMotionPanel:
             self._speed: GuiNumberHandle[float] = gui.add_number('Speed', SPEEDS[self._kind])
             self._prepare = gui.add_button('Enable and prepare', color=WANTED)
             self._state: GuiHtmlHandle = gui.add_html('')
-            self._place_of_hold = gui.add_html('')
+            self._place_of_hold: GuiHtmlHandle = gui.add_html('')
             self._enough = gui.add_button('That is enough', color=NEUTRAL)
             self._saw: GuiDropdownHandle[str] = gui.add_dropdown(
                 'What you saw', tuple(each.value for each in Saw)
@@ -107,6 +101,7 @@ class FirstMotionPanel:
 
     def remove(self) -> None:
         """Remove it from the page."""
+        self._drop_hold()
         self._folder.remove()
 
     # -- what is shown
@@ -114,19 +109,19 @@ class FirstMotionPanel:
     def begin(self, text: str, *, failed: bool) -> None:
         """Show that nothing is prepared, and why."""
         self._prepare.disabled = False
-        self._state.content = _line(text, BAD if failed else PLAIN) if text else ''
+        self._state.content = line(text, BAD if failed else PLAIN) if text else ''
         self._show(moves=False, asks=False, concluded=False)
 
     def show_waiting(self, text: str, *, failed: bool) -> None:
         """Show what is waited for; nothing can be prepared meanwhile."""
         self._prepare.disabled = True
-        self._state.content = _line(text, BAD if failed else PLAIN)
+        self._state.content = line(text, BAD if failed else PLAIN)
         self._show(moves=False, asks=False, concluded=False)
 
     def show_ready(self, announced: Sequence[str]) -> None:
         """Show what will happen, and offer the button."""
         self._prepare.disabled = False
-        self._state.content = ''.join(_line(text, PLAIN) for text in announced)
+        self._state.content = ''.join(line(text, PLAIN) for text in announced)
         self._note.content = ''
         self._show(moves=True, asks=False, concluded=False)
 
@@ -137,14 +132,14 @@ class FirstMotionPanel:
         state, color = ('moving', GOOD) if guard.moving else ('at rest', PLAIN)
         if press_anew:
             state, color = PRESS_ANEW, BAD
-        self._note.content = _line(f'{state}: {way}', color)
+        self._note.content = line(f'{state}: {way}', color)
 
     def ask(self, ended: str, reported: float) -> None:
         """Ask what was seen of a motion that has ended."""
         kind = self._kind
-        self._state.content = _line(
+        self._state.content = line(
             f'{ended}; the drive reported {kind.shown(reported)}', PLAIN
-        ) + _line('What did the real joint do?', PLAIN)
+        ) + line('What did the real joint do?', PLAIN)
         self._far.value = round(abs(reported) / kind.size, 3)  # type: ignore[misc]
         self._note.content = ''
         self._show(moves=False, asks=True, concluded=False)
@@ -153,8 +148,8 @@ class FirstMotionPanel:
         """Show what is concluded."""
         causes = [f'{each.text} (factor {each.factor:.4g})' for each in judgement.causes]
         texts = [judgement.remedy] if judgement.remedy else causes
-        self._verdict.content = _line(judgement.verdict.value, GOOD if right else BAD) + ''.join(
-            _line(text, PLAIN) for text in texts
+        self._verdict.content = line(judgement.verdict.value, GOOD if right else BAD) + ''.join(
+            line(text, PLAIN) for text in texts
         )
         self._causes = dict(zip(causes, judgement.causes, strict=True))
         self._cause.options = (CHOOSE, *causes)
@@ -167,23 +162,21 @@ class FirstMotionPanel:
         self._lines.content = f'```yaml\n{lines}\n```'
         self._lines.visible = True
         self._write.visible = writable
-        self._note.content = ''.join(_line(text, PLAIN) for text in notes)
+        self._note.content = ''.join(line(text, PLAIN) for text in notes)
 
     def show_written(self, text: str, *, failed: bool) -> None:
         """Show what became of the file."""
         self._write.visible = False
-        self._note.content = _line(text, BAD if failed else GOOD)
+        self._note.content = line(text, BAD if failed else GOOD)
 
     def _show(self, *, moves: bool, asks: bool, concluded: bool) -> None:
-        # one that is only hidden gets no pointerup, so it sends heartbeats without end; those of
-        # one that is gone reach nothing, whatever a page was about to do
-        if self._hold is not None:
-            self._hold.remove()
-            self._hold = None
+        self._drop_hold()  # what is pressed for a motion moves nothing in the next one
         if moves:
-            with self._folder:
-                self._hold = self._add_hold()
-            self._hold.order = self._place_of_hold.order
+            actions = self._actions
+            self._hold, html = self._live.button(
+                Hold(HOLD, actions.beat, actions.release, always=True)
+            )
+            self._place_of_hold.content = f'<div class="rv-one">{html}</div>'
         self._enough.visible = moves
         for question in (self._saw, self._far, self._conclude):
             question.visible = asks
@@ -191,6 +184,11 @@ class FirstMotionPanel:
         self._cause.visible = self._lines.visible = self._write.visible = False
         if not moves and not asks:
             self._note.content = ''
+
+    def _drop_hold(self) -> None:
+        if self._hold is not None:
+            self._live.remove(self._hold)
+            self._hold, self._place_of_hold.content = None, ''
 
     # -- what people do
 
@@ -219,10 +217,3 @@ class FirstMotionPanel:
         cause = self._causes.get(self._cause.value)
         if cause is not None:
             self._actions.choose(cause)
-
-
-def _line(text: str, color: str) -> str:
-    return (
-        f'<div style="margin:0.3em 1em"><span style="color:{color}">&#9679;</span> '
-        f'{escape(text)}</div>'
-    )

@@ -9,7 +9,7 @@ connect to a loopback port. So each request is looked at before viser sees it.
 from __future__ import annotations
 
 from asyncio import CancelledError
-from collections.abc import Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 import hmac
@@ -24,10 +24,12 @@ from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 import websockets.asyncio.server as websocket_server
+from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from ..loopback import is_loopback
+from .live import LIVE_PATH
 from .overlay import ANSWER_TIMEOUT, Overlay, text_response
 
 COOKIE = 'robot_viewer_token_{}'
@@ -96,11 +98,11 @@ class Gate:
         """
         serve = websocket_server.serve
 
-        def guarded(*args: Any, **options: Any) -> Any:  # noqa: ANN401  # as they are
+        def guarded(serve_viser: Any, *args: Any, **options: Any) -> Any:  # noqa: ANN401
             self._serving = True
             options['process_request'] = partial(self._process, options.get('process_request'))
             options['open_timeout'] = 2.0 * ANSWER_TIMEOUT  # or it would end before the answer
-            return serve(*args, **options)
+            return serve(partial(self._connected, serve_viser), *args, **options)
 
         websocket_server.serve = guarded  # type: ignore[assignment, misc]
         try:
@@ -109,6 +111,17 @@ class Gate:
             websocket_server.serve = serve  # type: ignore[misc]
         if not self._serving:
             raise RuntimeError('the server of the page asks nobody who may open it')
+
+    async def _connected(
+        self,
+        serve_viser: Callable[[ServerConnection], Awaitable[None]],
+        connection: ServerConnection,
+    ) -> None:
+        request = connection.request
+        if request is not None and request.path.partition('?')[0] == LIVE_PATH:
+            await self._overlay.live.serve(connection)
+        else:
+            await serve_viser(connection)
 
     async def _process(
         self,

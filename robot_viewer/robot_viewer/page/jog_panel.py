@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Jogging as long as a button is held: the tool along axes, single joints; and grippers."""
+"""What drives an arm: its joints, the tool along axes, a target, and grippers."""
 
 from __future__ import annotations
 
@@ -11,40 +11,38 @@ from html import escape
 from typing import Protocol, TypeAlias
 
 from urdf_reader import Joint, JointKind, KinematicTree
-from viser import GuiDropdownHandle, GuiFolderHandle, GuiHtmlHandle, ViserServer
+from viser import GuiDropdownHandle, GuiFolderHandle, GuiHtmlHandle, GuiTabGroupHandle, ViserServer
 
-from .robot_scene import travel
-from .sliders import add_speed
-from .style import JOINT_ROWS, NEUTRAL, THREE_COLUMNS
+from .live import Hold, Live
+from .robot_scene import RobotScene, travel
+from .sliders import Share, value_of
+from .style import NEUTRAL, pad, sentence, THREE_COLUMNS
+from .target_panel import TargetPanel
 
 Twist: TypeAlias = tuple[float, float, float, float, float, float]
-Held: TypeAlias = Callable[[str, Callable[[], None], Callable[[], None]], object]
-"""Adds a button with its label, what it does while it is held, and when it is let go."""
 
 TWISTS: Mapping[str, Twist] = {
-    '+ x': (1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    '+ y': (0.0, 1.0, 0.0, 0.0, 0.0, 0.0),
-    '+ z': (0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
-    '− x': (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    '− y': (0.0, -1.0, 0.0, 0.0, 0.0, 0.0),
-    '− z': (0.0, 0.0, -1.0, 0.0, 0.0, 0.0),
-    '+ about x': (0.0, 0.0, 0.0, 1.0, 0.0, 0.0),
-    '+ about y': (0.0, 0.0, 0.0, 0.0, 1.0, 0.0),
-    '+ about z': (0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
-    '− about x': (0.0, 0.0, 0.0, -1.0, 0.0, 0.0),
-    '− about y': (0.0, 0.0, 0.0, 0.0, -1.0, 0.0),
-    '− about z': (0.0, 0.0, 0.0, 0.0, 0.0, -1.0),
+    'X +': (1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    'Y +': (0.0, 1.0, 0.0, 0.0, 0.0, 0.0),
+    'Z +': (0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
+    'X −': (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    'Y −': (0.0, -1.0, 0.0, 0.0, 0.0, 0.0),
+    'Z −': (0.0, 0.0, -1.0, 0.0, 0.0, 0.0),
+    'Turn X +': (0.0, 0.0, 0.0, 1.0, 0.0, 0.0),
+    'Turn Y +': (0.0, 0.0, 0.0, 0.0, 1.0, 0.0),
+    'Turn Z +': (0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
+    'Turn X −': (0.0, 0.0, 0.0, -1.0, 0.0, 0.0),
+    'Turn Y −': (0.0, 0.0, 0.0, 0.0, -1.0, 0.0),
+    'Turn Z −': (0.0, 0.0, 0.0, 0.0, 0.0, -1.0),
 }
 """Shares of the speed of jogging, along and about axes."""
 REST: Twist = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 BASE = 'base'
 """The frame that a command has which names none."""
-NEAR_END = 0.05
-"""Share of its range at either end where a joint is marked."""
 
 
 class JogActions(Protocol):
-    """What is jogged; any thread may call it, and none of it waits."""
+    """What moves an arm; any thread may call it, and none of it waits."""
 
     def jog(self, twist: Twist, frame: str) -> None:
         """Command a share of the speed of jogging once, -1 to 1, along the axes of a frame."""
@@ -52,84 +50,146 @@ class JogActions(Protocol):
     def jog_joint(self, joint: str, share: float) -> None:
         """Command a share of the speed of a joint once, -1 to 1."""
 
-    def grip(self, gripper: str, *, opens: bool) -> None:
-        """Open or close a gripper."""
+    def grip(self, gripper: str, position: float) -> None:
+        """Move a gripper to a position of its joint in [m] or [rad]."""
+
+    def aim(self, targets: Mapping[str, float], share: float) -> None:
+        """Move joints to targets as long as this comes, at a share of their greatest velocity."""
+
+    def let_go(self) -> None:
+        """Stop a motion to targets."""
 
 
 @dataclass(frozen=True, slots=True)
-class Jogged:
-    """What a panel jogs.
+class Offered:
+    """What can be driven.
 
     Attributes:
-        joints: Single joints, from the base on.
-        grippers: Names of the controllers of grippers.
-        actions: What is done.
+        joints: Single joints that are jogged, from the base on.
+        tool: The tool is jogged.
+        grippers: Their joints by the names of their controllers.
+        targets: Joints that a controller brings to a target.
     """
 
-    joints: tuple[str, ...]
-    grippers: tuple[str, ...]
-    actions: JogActions
+    joints: tuple[str, ...] = ()
+    tool: bool = False
+    grippers: tuple[tuple[str, str], ...] = ()
+    targets: tuple[str, ...] = ()
 
 
 class JogPanel:
-    """The tool, the joints and the grippers, a tab each."""
+    """The joints, the tool, the target and the grippers, a tab each."""
 
     def __init__(
-        self, server: ViserServer, tree: KinematicTree, jogged: Jogged, held: Held
+        self,
+        server: ViserServer,
+        robot: RobotScene,
+        tree: KinematicTree,
+        offered: Offered,
+        ways: tuple[JogActions, Live, Share],
     ) -> None:
-        self._gui, self._held, self._actions = server.gui, held, jogged.actions
-        self._cells: dict[str, tuple[Joint, GuiHtmlHandle]] = {}
-        movable = {joint.name: joint for joint in tree.movable()}
+        actions, live, self._speed = ways
+        self._gui, self._actions, self._live = server.gui, actions, live
+        self._numbers: list[int] = []
+        self._joints = {joint.name: joint for joint in tree.movable()}
+        self.target: TargetPanel | None = None
         self._folder: GuiFolderHandle = self._gui.add_folder(None)
         with self._folder:
-            self._speed = add_speed(self._gui)
-            tabs = self._gui.add_tab_group()
+            tabs: GuiTabGroupHandle = self._gui.add_tab_group()
+            with tabs.add_tab('Joints'):
+                self._rows: GuiHtmlHandle = self._gui.add_html(self._joint_rows(offered.joints))
+                if not offered.joints:
+                    self._gui.add_html(sentence('No servo_node jogs these joints.'))
             with tabs.add_tab('Tool'):
-                self._add_twists(tool_frames(tree, jogged.joints))
-            if jogged.joints:
-                with tabs.add_tab('Single joints'):
-                    self._gui.add_html(JOINT_ROWS)
-                    for number, name in enumerate(jogged.joints, 1):
-                        self._add_joint(number, movable[name])
-            if jogged.grippers:
-                with tabs.add_tab('Gripper'):
-                    for gripper in jogged.grippers:
-                        self._add_gripper(gripper)
+                if offered.tool:
+                    self._add_twists(tool_frames(tree, offered.joints))
+                else:
+                    self._gui.add_html(sentence('No servo_node jogs this tool.'))
+            with tabs.add_tab('Target'):
+                if offered.targets:
+                    joints = [self._joints[name] for name in offered.targets]
+                    self.target = TargetPanel(
+                        server, robot, tree, joints, (actions, self._speed, self._hold)
+                    )
+                else:
+                    self._gui.add_html(sentence('No trajectory controller moves these joints.'))
+            with tabs.add_tab('Gripper'):
+                for gripper, joint in offered.grippers:
+                    self._add_gripper(gripper, self._joints[joint])
+                if not offered.grippers:
+                    self._gui.add_html(sentence('This robot has no gripper.'))
 
     def remove(self) -> None:
         """Remove all of it from the page."""
+        for number in self._numbers:
+            self._live.remove(number)
+        if self.target is not None:
+            self.target.remove()
         self._folder.remove()
 
-    def show(self, positions: Mapping[str, float]) -> None:
-        """Show where the joints are."""
-        for name, (joint, html) in self._cells.items():
-            content = _cell(joint, positions.get(name))
-            if html.content != content:
-                html.content = content
+    def _hold(self, hold: Hold) -> str:
+        number, html = self._live.button(hold)
+        self._numbers.append(number)
+        return html
+
+    def _joint_rows(self, jogged: Sequence[str]) -> str:
+        free = [joint for joint in self._joints.values() if joint.mimic is None]
+        rows = []
+        for joint in free:
+            name = escape(joint.name)
+            cell = (
+                f'<div class="rv-cell" data-joint="{name}"><b>{name}</b>'
+                '<span>unknown</span><i></i></div>'
+            )
+            buttons = ['<span></span>'] * 2
+            if joint.name in jogged:
+                number = jogged.index(joint.name) + 1
+                buttons = [
+                    self._hold(
+                        Hold(
+                            f'{number} {sign}',
+                            partial(self._jog_joint, joint.name, way),
+                            partial(self._actions.jog_joint, joint.name, 0.0),
+                        )
+                    )
+                    for sign, way in (('−', -1.0), ('+', 1.0))
+                ]
+            rows += [cell, *buttons]
+        return pad(rows, 'rv-rows')
 
     def _add_twists(self, frames: Sequence[str]) -> None:
-        self._gui.add_html(THREE_COLUMNS)
-        axes = self._gui.add_dropdown('Along the axes of', (BASE, *frames))
-        for title, twist in TWISTS.items():
-            self._held(title, partial(self._jog, axes, twist), partial(self._jog, axes, REST))
+        axes = self._gui.add_dropdown('Along axes of', (BASE, *frames))
+        buttons = [
+            self._hold(
+                Hold(title, partial(self._jog, axes, twist), partial(self._jog, axes, REST))
+            )
+            for title, twist in TWISTS.items()
+        ]
+        self._gui.add_html(pad(buttons))
 
-    def _add_joint(self, number: int, joint: Joint) -> None:
-        self._cells[joint.name] = joint, self._gui.add_html(_cell(joint, None))
-        for sign, way in (('−', -1.0), ('+', 1.0)):
-            self._held(
-                f'{number} {sign}',
-                partial(self._jog_joint, joint.name, way),
-                partial(self._actions.jog_joint, joint.name, 0.0),
+    def _add_gripper(self, gripper: str, joint: Joint) -> None:
+        low, high = travel(joint)
+        slides = joint.kind is JointKind.PRISMATIC
+        size, unit = (1000.0, 'mm') if slides else (1.0, 'rad')
+        with self._gui.add_folder(gripper.rpartition('/')[2]):
+            self._gui.add_html(THREE_COLUMNS)
+            width = self._gui.add_slider(
+                f'Width [{unit}]', size * low, size * high, size * (high - low) / 100.0, size * low
             )
 
-    def _add_gripper(self, gripper: str) -> None:
-        self._gui.add_html(f'<div class="rv-cell"><b>{escape(gripper)}</b></div>')
-        for label, opens in (('Open gripper', True), ('Close gripper', False)):
-            button = self._gui.add_button(label, color=NEUTRAL)
-            button.on_click(partial(self._grip, gripper, opens))
+            def move(position: Callable[[], float]) -> Callable[[object], None]:
+                return lambda _: self._grip(gripper, position())
 
-    def _grip(self, gripper: str, opens: bool, _: object) -> None:
-        self._actions.grip(gripper, opens=opens)
+            for label, position in (
+                ('Open gripper', lambda: high),
+                ('Close gripper', lambda: low),
+                ('Move to width', lambda: value_of(width) / size),
+            ):
+                self._gui.add_button(label, color=NEUTRAL).on_click(move(position))
+
+    def _grip(self, gripper: str, position: float) -> None:
+        if not self._live.stopped:
+            self._actions.grip(gripper, position)
 
     def _jog(self, axes: GuiDropdownHandle[str], twist: Twist) -> None:
         x, y, z, a, b, c = (self._speed() * part for part in twist)
@@ -152,15 +212,16 @@ def tool_frames(tree: KinematicTree, joints: Sequence[str]) -> list[str]:
     return frames
 
 
-def _cell(joint: Joint, position: float | None) -> str:
-    low, high = travel(joint)
-    name = escape(joint.name)
-    if position is None:
-        return f'<div class="rv-cell"><b>{name}</b><span>unknown</span></div>'
-    share = min(max((position - low) / (high - low), 0.0), 1.0)
-    near = ' near' if min(share, 1.0 - share) < NEAR_END else ''
-    unit = 'm' if joint.kind is JointKind.PRISMATIC else 'rad'
-    return (
-        f'<div class="rv-cell{near}" style="--at:{100 * share:.0f}%"><b>{name}</b>'
-        f'<span>{position:+.3f} {unit}</span><i></i></div>'
-    )
+def joint_texts(
+    tree: KinematicTree, positions: Mapping[str, float]
+) -> dict[str, tuple[str, float]]:
+    """Return position in words and share of the range of each joint that is known."""
+    found = {}
+    for joint in tree.movable():
+        position = positions.get(joint.name)
+        if position is not None:
+            low, high = travel(joint)
+            unit = 'm' if joint.kind is JointKind.PRISMATIC else 'rad'
+            share = round(min(max((position - low) / (high - low), 0.0), 1.0), 3)
+            found[joint.name] = (f'{position:+.3f} {unit}', share)
+    return found

@@ -184,6 +184,12 @@ class PlanActions(Protocol):
     def execute(self) -> None:
         """Execute what was planned."""
 
+    def go_on(self) -> None:
+        """Go on with the execution: its button is held."""
+
+    def let_go(self) -> None:
+        """Cancel the execution: its button was let go."""
+
     def show_again(self) -> None:
         """Show once more what was planned."""
 

@@ -19,6 +19,8 @@ from pathlib import Path
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
+from .live import Live
+
 STOP_PATH = '/stop'
 STOP_HEADER = 'X-Robot-Stop'
 """What no page of another site can send without being asked."""
@@ -43,11 +45,15 @@ class StopAnswer:
 
 
 class Overlay:
-    """Answers requests for STOP, and adds itself to the page that viser serves."""
+    """Answers requests for STOP, and adds itself to the page that viser serves.
 
-    def __init__(self, stop: Callable[[], Future[StopAnswer]]) -> None:
+    Attributes:
+        live: Its connections with the pages.
+    """
+
+    def __init__(self, stop: Callable[[], Future[StopAnswer]], live: Live) -> None:
         """Set what STOP does: in the server's thread, without waiting for the robot."""
-        self._stop = stop
+        self._stop, self.live = stop, live
         self._html = Path(__file__).with_name('overlay.html').read_bytes()
         self._page = b''
 

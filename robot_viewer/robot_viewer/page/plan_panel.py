@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Coroutine, Mapping, Sequence
 from functools import partial
-from html import escape
 from itertools import pairwise
 from typing import Any
 
@@ -25,6 +24,7 @@ from viser import (
 )
 
 from ..link_poses import links_beyond
+from .live import Hold, Live
 from .motion_plan import (
     DRAGGED,
     NO_GOAL,
@@ -37,18 +37,18 @@ from .motion_plan import (
 )
 from .robot_scene import put, RobotScene, Tint
 from .scene_objects import SceneObjects
-from .sliders import add_speed
-from .style import Color, NEUTRAL, WANTED
+from .sliders import Share
+from .style import BAD, Color, GOOD, line, NEUTRAL, PLAIN, WANTED
 
-GHOST_TINT: Tint = (0.91, 0.35, 0.05, 0.45)
-LINE_COLOR = (232, 89, 12)
+GHOST_TINT: Tint = (0.05, 0.52, 0.6, 0.4)
+LINE_COLOR = (24, 100, 171)
 LINE_WIDTH = 3.0
 """In [px]."""
 GOAL_SIZE, OBJECT_SIZE = 0.22, 0.2
 """Of the arrows by which something is dragged in [m]."""
 BOX_SIZE = (0.2, 0.2, 0.2)
 """Of a new box in [m]."""
-DONE, FAILED, PLAIN = '#2f9e44', '#e03131', '#868e96'
+HOLD_EXECUTE = 'Hold to execute'
 
 
 class PlanPanel:
@@ -60,11 +60,11 @@ class PlanPanel:
         robot: RobotScene,
         tree: KinematicTree,
         groups: Sequence[str],
-        actions: tuple[PlanActions, SceneActions, Order],
+        ways: tuple[PlanActions, SceneActions, Order, Live, Share],
     ) -> None:
         self._server, self._robot, self._tree = server, robot, tree
-        plan, scene, self._order = actions
-        self._plan, self._scene = plan, scene
+        plan, scene, self._order, live, speed = ways
+        self._plan, self._scene, self._live = plan, scene, live
         self._path = robot.path_of(tree.root)
         self._ghost: RobotScene | None = None
         self._links: frozenset[str] = frozenset()
@@ -77,22 +77,30 @@ class PlanPanel:
         with self._folder:
             self._group = self._dropdown('Group', groups, plan.choose_group)
             self._goal = self._dropdown('Goal', (NO_GOAL, DRAGGED), plan.choose_goal)
-            speed = add_speed(gui)
-            self._button('Plan', lambda: plan.plan(speed()))
-            self._execute = self._button('Execute', plan.execute, WANTED)
-            self._again = self._button('Show again', plan.show_again)
+            self._button('Plan motion', lambda: plan.plan(speed()), WANTED)
             self._outcome: GuiHtmlHandle = gui.add_html('')
+            self._again = self._button('Show motion again', plan.show_again)
+            self._hold, html = live.button(
+                Hold(
+                    HOLD_EXECUTE,
+                    lambda: self._order(plan.go_on),
+                    lambda: self._order(plan.let_go),
+                    lambda: self._order(plan.execute),
+                )
+            )
+            gui.add_html(f'<div class="rv-one">{html}</div>')
             self._object = self._dropdown('Object', (NO_OBJECT,), scene.choose_object)
-            self._remove = self._button('Remove it', scene.remove_object)
+            self._remove = self._button('Remove object', scene.remove_object)
             self._size = gui.add_vector3(
                 'Size [m]', BOX_SIZE, min=(0.01, 0.01, 0.01), max=(3.0, 3.0, 3.0), step=0.01
             )
-            self._button('Add a box', self._add_box)
+            self._button('Add box', self._add_box)
         self.allow(execute=False)
         self.choose_object(NO_OBJECT, None)
 
     def remove(self) -> None:
         """Remove all of it from the page; what is attached to the robot goes with the robot."""
+        self._live.remove(self._hold)
         self._folder.remove()
         self._objects.remove()
         for node in (self._ghost, self._line, self._goal_gizmo, self._object_gizmo):
@@ -133,7 +141,7 @@ class PlanPanel:
                 self._ghost.show(seen=False)
             return
         if self._ghost is None:
-            self._ghost = self._robot.ghost(self._links, GHOST_TINT)
+            self._ghost = self._robot.ghost('ghost', self._links, GHOST_TINT)
         self._ghost.place(positions)
         self._ghost.show(seen=True)
 
@@ -154,19 +162,13 @@ class PlanPanel:
 
     def say(self, text: str, *, failed: bool | None = None) -> None:
         """Show what became of the last request."""
-        if not text:
-            self._outcome.content = ''
-            return
-        color = PLAIN if failed is None else FAILED if failed else DONE
-        self._outcome.content = (
-            f'<div style="margin:0.3em 1em"><span style="color:{color}">&#9679;</span> '
-            f'{escape(text)}</div>'
-        )
+        color = PLAIN if failed is None else BAD if failed else GOOD
+        self._outcome.content = line(text, color) if text else ''
 
     def allow(self, *, execute: bool) -> None:
         """Enable the buttons that need a plan."""
-        for button in (self._execute, self._again):
-            button.disabled = not execute
+        self._again.disabled = not execute
+        (self._live.off.discard if execute else self._live.off.add)(self._hold)
 
     def show_objects(self, objects: Sequence[SceneObject]) -> None:
         """Show what is in the planning scene."""
@@ -180,6 +182,7 @@ class PlanPanel:
         if name in self._object.options:
             _choose(self._object, name)
         self._remove.disabled = thing is None
+        self._remove.label = f'Remove {"object" if thing is None else name}'
         path = '' if thing is None else f'{self._robot.path_of(thing.frame)}/chosen'
         if self._object_gizmo is not None and self._object_gizmo.name != path:
             self._object_gizmo.remove()

@@ -1,109 +1,139 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a page shows of a robot and lets people do: STOP, joints, drives, jogging, walking."""
+"""The page of a robot: its groups Drive, Plan or Body, See and Diagnose, below STOP and state."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import redirect_stdout
-from dataclasses import dataclass, field
 from functools import partial
 from html import escape
 import io
 import time
-from typing import Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
-from urdf_reader import JointKind, KinematicTree, Transform
+from urdf_reader import KinematicTree, Transform
 from viser import (
+    ClientHandle,
     GuiButtonHandle,
     GuiDropdownHandle,
-    GuiEvent,
     GuiFolderHandle,
     GuiHtmlHandle,
     GuiSliderHandle,
     GuiTabGroupHandle,
     GuiTabHandle,
+    Icon,
     ViserServer,
 )
 
 from first_motion import JointKind as MotionKind
 
 from ..loopback import shown_host
+from ..robot_state import ALLOW, FOLLOWS, Level, RobotState, Status
 from .aim import History
 from .body_panel import BodyPanel
-from .deadman import Deadman, HEARTBEAT
 from .drive_table import drive_html
 from .first_motion_panel import FirstMotionActions, FirstMotionPanel
 from .gate import Gate
-from .jog_panel import JogActions, Jogged, JogPanel
+from .jog_panel import JogActions, JogPanel, joint_texts, Offered
+from .live import Hold, Live
 from .log import Log
 from .motion_plan import Order, PlanActions, SceneActions
 from .overlay import Overlay, StopAnswer
 from .plan_panel import PlanPanel
 from .robot_scene import Ground, RobotScene, start_position, travel
-from .sliders import add_speed, Share, value_of
-from .style import CAUTION, NEUTRAL, THREE_COLUMNS, WANTED
-from .target_panel import PlotPanel, TargetPanel
+from .sliders import add_speed, value_of
+from .standing import feet_of
+from .style import (
+    BAD,
+    CAUTION,
+    GOOD,
+    NEUTRAL,
+    pad,
+    PRESENT,
+    sentence,
+    status_line,
+    THREE_COLUMNS,
+    WANTED,
+    WARNING,
+)
+from .target_panel import PlotPanel
 
 Velocity: TypeAlias = tuple[float, float, float]
 
-SILENCE = 1.0
-"""Without joint states after which the robot counts as out of reach in [s]."""
-SILENT = (
-    'nothing from the robot for {:.0f} s: is the link cut, or has it ended? What is held here '
-    'stops by itself; STOP may not reach the rest: use the emergency stop'
-)
+ARM_SPEED, LEGS_SPEED = 20.0, 30.0
+"""In the beginning, in [%]."""
+PANEL_WIDTH = 400
+"""In [px]."""
 WALKS: Mapping[str, Velocity] = {
-    'forward': (0.3, 0.0, 0.0),
-    'back': (-0.3, 0.0, 0.0),
-    'left': (0.0, 0.15, 0.0),
-    'right': (0.0, -0.15, 0.0),
-    'turn left': (0.0, 0.0, 1.5),
-    'turn right': (0.0, 0.0, -1.5),
+    'Turn left': (0.0, 0.0, 1.5),
+    'Forward': (0.3, 0.0, 0.0),
+    'Turn right': (0.0, 0.0, -1.5),
+    'Left': (0.0, 0.15, 0.0),
+    'Back': (-0.3, 0.0, 0.0),
+    'Right': (0.0, -0.15, 0.0),
 }
 """Velocities at full speed: forwards and to the left in [m/s], of a turn in [rad/s]."""
-
-COLORS = ('#2f9e44', '#e8a400', '#e03131', '#868e96')
-"""Of the levels of a status: good, warning, error, stale."""
-DRIVE_GROUPS: Mapping[str, tuple[str, ...]] = {
-    '': ('enable', 'recover', 'halt'),
-    'Mode': (
-        'cyclic_position_mode',
-        'interpolated_position_mode',
-        'position_mode',
-        'velocity_mode',
-    ),
-    'Seldom needed': ('init', 'home', 'quick_stop', 'disable'),
+MODES: Mapping[str, str] = {
+    'Stand': 'stand',
+    'Walk': 'walk',
+    'Lie down': 'lie',
+    'Turn': 'turn',
+    'Relax': 'relax',
+    'Get up': 'get_up',
+    'Follow policy': 'policy',
 }
-"""Services of a drive by what they are for; what has a title is folded."""
-BUTTON_COLORS = {
-    'enable': WANTED,
-    'home': CAUTION,
-    'quick_stop': CAUTION,
-    'disable': CAUTION,
-    'relax': CAUTION,
+"""Modes of a walking robot by their buttons."""
+IN_FAULT = frozenset({'lie', 'relax', 'get_up'})
+"""Those that are possible with a fault."""
+GAITS = ('trot', 'crawl', 'pace')
+DRIVE_GROUPS: Mapping[str, Mapping[str, str]] = {
+    '': {'Enable': 'enable', 'Recover': 'recover', 'Halt': 'halt'},
+    'Seldom needed': {
+        'Initialise': 'init',
+        'Home': 'home',
+        'Quick stop': 'quick_stop',
+        'Cyclic position mode': 'cyclic_position_mode',
+        'Interpolated position mode': 'interpolated_position_mode',
+        'Position mode': 'position_mode',
+        'Velocity mode': 'velocity_mode',
+    },
 }
-STALE = 3
-WORST = (2, STALE, 1, 0)
+"""Services of a drive by what they are for and their labels; what has a title is folded."""
+DISABLE, SINKS = 'disable', 'Disable: no torque, the arm may sink (hold 1 s)'
+DISABLE_AFTER = 1.0
+"""How long that is held in [s]."""
+MOTIONS = frozenset({'home', 'init'})
+"""Services of a drive that may move it."""
+BUTTON_COLORS = {'enable': WANTED, 'home': CAUTION, 'quick_stop': CAUTION, 'relax': CAUTION}
+NO_DRIVE, ALL_DRIVES = 'none chosen', 'all drives'
+WORST = (2, 3, 1, 0)
 """Levels of a status, the worst first."""
-
-
-@dataclass(frozen=True, slots=True)
-class Status:
-    """How something is.
-
-    Attributes:
-        name: What.
-        level: 0 good, 1 warning, 2 error, 3 stale, as in diagnostic_msgs.
-        message: In words.
-        values: What was measured, by name.
-    """
-
-    name: str
-    level: int
-    message: str
-    values: Mapping[str, str] = field(default_factory=dict)
+VIEWS: Mapping[str, tuple[str, Velocity]] = {
+    'Fit': ('F', (0.65, -0.65, 0.58)),
+    'Front': ('X', (1.1, 0.0, 0.2)),
+    'Side': ('Y', (0.0, -1.1, 0.2)),
+    'Top': ('T', (0.001, 0.0, 1.3)),
+}
+"""Hotkey and place of the camera of each view, by the size of the robot."""
+LOW_PICTURE = 420
+"""Height of a picture in [px] below which the camera is nearer."""
+NOTHING: Mapping[str, str] = {
+    'Drive': 'No robot is here yet.',
+    'Plan': 'Start the bring-up with --plan.',
+    'Body': 'Nothing is known of the body yet.',
+    'See': '',
+    'Diagnose': '',
+}
+"""What an empty group says."""
+ICONS = {
+    'Drive': Icon.DEVICE_GAMEPAD_2,
+    'Plan': Icon.ROUTE,
+    'Body': Icon.ROTATE_360,
+    'See': Icon.EYE,
+    'Diagnose': Icon.STETHOSCOPE,
+}
 
 
 class Actions(JogActions, Protocol):
@@ -112,8 +142,11 @@ class Actions(JogActions, Protocol):
     def stop(self) -> Future[StopAnswer]:
         """Stop whatever moves; the future has the robot's answer."""
 
-    def call(self, service: str) -> None:
-        """Call a Trigger service."""
+    def act(self, action: str) -> None:
+        """Do the action that is wanted now, if it is still this one."""
+
+    def call(self, what: str, services: Sequence[str]) -> None:
+        """Call Trigger services at the same time; what they are for, in words."""
 
     def walk(self, velocity: Velocity) -> None:
         """Command a velocity in [m/s] and [rad/s] once."""
@@ -124,21 +157,20 @@ class Actions(JogActions, Protocol):
     def publish_joints(self, positions: Mapping[str, float]) -> None:
         """Publish joint states."""
 
-    def aim(self, controller: str, targets: Mapping[str, float], share: float) -> None:
-        """Send the joints of a controller to targets, at a share of their greatest velocity."""
-
 
 class RobotPage:
     """A page in a browser; shows come from one thread, actions leave in any.
 
     Attributes:
         url: Where it is, with the token where it needs one.
+        live: Its buttons that are held, and what its overlay shows.
+        last: What was said last, with the time.
     """
 
     def __init__(self, host: str, port: int, actions: Actions) -> None:
         self._actions = actions
-        self._deadman = Deadman()
-        gate = Gate(host, Overlay(self._stop))
+        self.live = Live(self._command)
+        gate = Gate(host, Overlay(self._stop, self.live))
         with gate.before(), redirect_stdout(io.StringIO()):  # viser draws its own banner
             self._server = ViserServer(host, port, label='robot', verbose=False)
         self.url = f'http://{shown_host(host)}:{self._server.get_port()}'
@@ -148,109 +180,219 @@ class RobotPage:
         gui = self._server.gui
         gui.configure_theme(show_logo=False, show_share_button=False, brand_color=WANTED)
         gui.main_panel.dock_right()
+        gui.main_panel.set_width(PANEL_WIDTH)
         self._server.scene.set_up_direction('+z')
         self._ground = Ground(self._server.scene)
-        self._answer = gui.add_html(_line('no robot description yet', COLORS[3]))
-        self._silence: GuiHtmlHandle = gui.add_html('')
-        self._tabs: GuiTabGroupHandle = gui.add_tab_group()
-        self._pages: dict[str, GuiTabHandle] = {}
-        self._units: dict[str, str] = {}
-        self._joints: GuiHtmlHandle | None = None
+        for view, (key, _) in VIEWS.items():
+            command = gui.add_command(f'View: {view}', hotkey=key, icon=Icon.CAMERA)  # type: ignore[arg-type]
+            command.on_trigger(partial(self._look_from, view))
+        self._server.on_client_connect(lambda client: self._place_camera(client, 'Fit'))
+        self._log = Log()
+        self.last = ''
+        self._tree: KinematicTree | None = None
+        self._tabs: GuiTabGroupHandle | None = None
+        self._lay_out(('Drive', 'Plan', 'See', 'Diagnose'))
+
+    def _lay_out(self, groups: Sequence[str]) -> None:
+        """Make the groups anew; what was in them is offered again."""
+        if self._tabs is not None:
+            self._tabs.remove()
+        gui = self._server.gui
+        self._tabs = gui.add_tab_group()
+        self._groups: dict[str, GuiTabHandle] = {}
+        self._notes: dict[str, GuiHtmlHandle] = {}
+        for group in groups:
+            self._groups[group] = self._tabs.add_tab(group, ICONS[group])
+            with self._groups[group]:
+                self._notes[group] = gui.add_html(sentence(NOTHING[group]))
         self._sliders: dict[str, GuiSliderHandle[float]] = {}
-        self._statuses: GuiHtmlHandle | None = None
-        self._offered: set[str] = set()
         self._drives: dict[str, tuple[str, ...]] = {}
-        self._drive_panel: GuiFolderHandle | None = None
-        self._drive: GuiDropdownHandle[str] | None = None
-        self._drive_state: GuiHtmlHandle | None = None
-        self._targets: dict[str, TargetPanel] = {}
+        self._offered = Offered()
+        self._jog: JogPanel | None = None
         self._plots: PlotPanel | None = None
         self._plan: PlanPanel | None = None
         self._body: BodyPanel | None = None
         self._first_motion: FirstMotionPanel | None = None
-        self._jog: JogPanel | None = None
-        self._jogged: tuple[KinematicTree, Jogged] | None = None
-        self._log = Log()
-        self._log_html: GuiHtmlHandle | None = None
-        self._tree: KinematicTree | None = None
+        self._modes: dict[str, GuiButtonHandle] = {}
+        self._disable: int | None = None
+        self._walk_holds: dict[int, Velocity] = {}
+        with self._groups['Drive']:
+            self._speed = add_speed(gui, ARM_SPEED if 'Plan' in groups else LEGS_SPEED)
+        with self._groups['See']:
+            self._add_checkboxes()
+            self._see: GuiFolderHandle = gui.add_folder(None)
+        with self._groups['Diagnose']:
+            self._statuses: GuiHtmlHandle = gui.add_html('')
+            self._drive_panel: GuiFolderHandle = gui.add_folder(None)
+            self._drive: GuiDropdownHandle[str] | None = None
+            self._drive_state: GuiHtmlHandle | None = None
+            self._first_motion_folder = gui.add_folder(
+                'First motion', expand_by_default=False, visible=False
+            )
+            with gui.add_folder('Log'):
+                self._log_html: GuiHtmlHandle = gui.add_html('')
+
+    def _add_checkboxes(self) -> None:
+        gui = self._server.gui
+        target = gui.add_checkbox('Show target', True)
+        frames = gui.add_checkbox('Show frames', False)
+        target.on_update(lambda _: self._show_target(seen=target.value))
+        frames.on_update(lambda _: self._show_frames(seen=frames.value))
+
+    def _show_target(self, *, seen: bool) -> None:
+        if self._jog is not None and self._jog.target is not None:
+            self._jog.target.seen = seen
+
+    def _show_frames(self, *, seen: bool) -> None:
+        if self._scene is not None:
+            self._scene.show_frames(seen=seen)
 
     @property
     def watched(self) -> bool:
         """Whether a page is open."""
-        return bool(self._server.get_clients())
+        return self.live.open or bool(self._server.get_clients())
 
     def close(self) -> None:
         """Serve it no more."""
         with redirect_stdout(io.StringIO()):
             self._server.stop()
 
+    # -- what is shown
+
     def show_robot(self, tree: KinematicTree) -> list[str]:
         """Show another robot; return what of it cannot be shown, in words."""
-        if self._plan is not None:
-            self._plan.remove()
-            self._plan = None
-        if self._body is not None:
-            self._body.remove()
-            self._body = None
-        if self._scene is not None:
-            self._scene.remove()
-        self.offer_sliders(offered=False)
+        for panel in (self._plan, self._body, self._jog, self._scene):
+            if panel is not None:
+                panel.remove()
+        second = 'Body' if feet_of(tree) else 'Plan'
+        self._lay_out(('Drive', second, 'See', 'Diagnose'))
         self._tree = tree
-        slides = {joint.name for joint in tree.movable() if joint.kind is JointKind.PRISMATIC}
-        self._units = {j.name: 'm' if j.name in slides else 'rad' for j in tree.movable()}
         self._scene = RobotScene(self._server.scene, tree)
-        far = 0.65 * self._scene.size + 0.25  # [m]
-        self._server.initial_camera.position = (far, -far, 0.9 * far)
+        self._server.initial_camera.position = self._camera('Fit')
         self._server.initial_camera.look_at = (0.0, 0.0, 0.3 * self._scene.size)
         for client in self._server.get_clients().values():
-            client.camera.position = self._server.initial_camera.position
-            client.camera.look_at = self._server.initial_camera.look_at
+            self._place_camera(client, 'Fit')
+        self.offer_drive(Offered(), force=True)
         self.say(f'robot {tree.name}')
         return self._scene.notes
+
+    def _camera(self, view: str) -> Velocity:
+        size = self._scene.size + 0.4 if self._scene is not None else 1.0
+        x, y, z = VIEWS[view][1]
+        return x * size, y * size, z * size
+
+    def _look_from(self, view: str, event: Any) -> None:  # noqa: ANN401
+        if event.client is not None:
+            self._place_camera(event.client, view)
+
+    def _place_camera(self, client: ClientHandle, view: str) -> None:
+        near = 0.8 if 0 < client.camera.image_height < LOW_PICTURE else 1.0
+        height = 0.3 * self._scene.size if self._scene is not None else 0.3
+        x, y, z = (near * part for part in self._camera(view))
+        client.camera.position = (x, y, z + height if view != 'Top' else z)
+        client.camera.look_at = (0.0, 0.0, height)
 
     def show_joints(self, positions: Mapping[str, float]) -> None:
         """Show where the joints are in [rad] and [m]."""
         if self._scene is not None:
             self._scene.place(positions)
 
-    def list_joints(self, positions: Mapping[str, float], age: float | None) -> None:
-        """Show the numbers of the joints, and how old they are in [s]; None for never."""
-        if self._joints is None:
-            with self._tab('Joints'):
-                self._joints = self._server.gui.add_html('')
-        old = 'no joint states' if age is None else f'{age:.1f} s old' if age > 1.0 else ''
-        rows = [
-            (name, f'{positions[name]:+.3f} {unit}')
-            for name, unit in self._units.items()
-            if name in positions
-        ]
-        self._joints.content = _table(rows) + (_line(old, COLORS[1]) if old else '')
-        if self._jog is not None:
-            self._jog.show(positions if age is not None and age < SILENCE else {})
-
-    def show_silence(self, age: float | None) -> None:
-        """Show a banner while nothing is received from the robot."""
-        text = '' if age is None or age <= SILENCE else _line(SILENT.format(age), COLORS[2])
-        if self._silence.content != text:
-            self._silence.content = text
-
     def show_base(self, pose: Transform) -> None:
         """Show how the root link is in the world, and that it moves there."""
         if self._scene is not None:
             self._scene.place_base(self._ground.pass_below(pose))
 
+    def follow(self, positions: Mapping[str, float]) -> None:
+        """Show the target beside where the joints are."""
+        if self._jog is not None and self._jog.target is not None:
+            self._jog.target.follow(positions)
+
+    def show_state(
+        self,
+        state: RobotState,
+        positions: Mapping[str, float],
+        *,
+        stop: str,
+        simulated: bool,
+        program: str,
+        listens: str,
+    ) -> None:
+        """Show how the robot is, and enable what may be done then.
+
+        Args:
+            state: The answer to whether it may be moved.
+            positions: Of the joints in [rad] or [m]; none where they are unknown.
+            stop: Stage of the STOP that counts: braking, stopped, failed, or empty.
+            simulated: A simulation runs beside the page.
+            program: Name of a program that moves it; empty for none.
+            listens: Where the page looks for robots, in words.
+        """
+        self.live.movable = state.movable
+        faulty = state.level is Level.FAULT
+        for mode, button in self._modes.items():
+            able = state.movable or (faulty and mode in IN_FAULT)
+            button.disabled = not able or self.live.stopped
+        tree = self._tree
+        self.live.show(
+            {
+                'word': state.word,
+                'level': state.level.value,
+                'sentence': state.sentence,
+                'action': state.action,
+                'movable': state.movable,
+                'stop': stop,
+                'simulated': simulated,
+                'program': program,
+                'robot': '' if tree is None else tree.name,
+                'said': self.last,
+                'listens': listens,
+                'joints': {} if tree is None else joint_texts(tree, positions),
+            }
+        )
+
+    def show_mode(self, mode: str) -> None:
+        """Show the mode of a walking robot, and which arrows move it then."""
+        for name, button in self._modes.items():
+            color = PRESENT if name == mode else BUTTON_COLORS.get(name, NEUTRAL)
+            if button.color != color:
+                button.color = color
+        for number, (x, y, _) in self._walk_holds.items():
+            off = mode not in FOLLOWS or (mode == 'turn' and bool(x or y))
+            (self.live.off.add if off else self.live.off.discard)(number)
+
     def show_statuses(self, statuses: Sequence[Status]) -> None:
         """Show how everything is, what is worst first."""
         self._show_drive(statuses)
-        if self._statuses is None:
-            with self._tab('Status'):
-                self._statuses = self._server.gui.add_html('')
         ordered = sorted(statuses, key=lambda status: (WORST.index(status.level), status.name))
-        self._statuses.content = ''.join(
-            f'{_line(status.name, COLORS[status.level], strong=True)}'
-            f'<div style="margin:0 0 0.5em 1em">{escape(status.message)}</div>'
+        html = ''.join(
+            f'{status_line(status.name, status.level)}'
+            f'<div style="margin:0 12px 0.5em 2.2em">{escape(status.message)}</div>'
             for status in ordered
         )
+        if self._statuses.content != html:
+            self._statuses.content = html
+
+    def _show_drive(self, statuses: Sequence[Status]) -> None:
+        """Show what the chosen drive reports."""
+        if self._drive is None or self._drive_state is None:
+            return
+        drives = {status.name: status for status in statuses if status.name.endswith(': drive')}
+        buses = [status for status in statuses if status.name.endswith(': bus')]
+        chosen = drives.get(f'{self._drive.value.rpartition("/")[2]}: drive')
+        bus = buses[0].values if len(buses) == 1 else {}
+        html = '' if chosen is None else drive_html(chosen.message, chosen.values, bus)
+        if self._drive_state.content != html:
+            self._drive_state.content = html
+
+    def plot(self, history: History, now: float) -> None:
+        """Draw what the joints did until now."""
+        if self._plots is None and history.joints:
+            with self._see:
+                self._plots = PlotPanel(self._server, history.joints)
+        if self._plots is not None:
+            self._plots.show(history, now)
+
+    # -- what is offered
 
     def offer_sliders(self, *, offered: bool) -> None:
         """Offer sliders of the joints, where no other node publishes them."""
@@ -262,7 +404,7 @@ class RobotPage:
                 slider.remove()
             self._sliders = {}
             return
-        with self._tab('Joints'):
+        with self._groups['Drive']:
             for joint in tree.movable():
                 if joint.mimic is None:
                     low, high = travel(joint)
@@ -278,71 +420,61 @@ class RobotPage:
         found = {name: tuple(verbs) for name, verbs in services.items()}
         if found == self._drives:
             return
-        if self._drive_panel is not None:
-            self._drive_panel.remove()
         self._drives, gui = found, self._server.gui
-        with self._tab('Drives'):
+        self._drive_panel.remove()
+        if self._disable is not None:
+            self.live.remove(self._disable)
+        with self._groups['Diagnose']:
             self._drive_panel = gui.add_folder(None)
+        self._drive_panel.order = self._statuses.order + 0.5
         with self._drive_panel:
-            self._drive = drive = gui.add_dropdown('Drive', ('all', *services))
+            self._drive = drive = gui.add_dropdown('Drive', (NO_DRIVE, ALL_DRIVES, *services))
             self._drive_state = gui.add_html('')
             verbs = {verb for each in services.values() for verb in each}
             for title, group in DRIVE_GROUPS.items():
-                offered = [verb for verb in group if verb in verbs]
-                if offered:
-                    with gui.add_folder(title or None, expand_by_default=not title):
-                        gui.add_html(THREE_COLUMNS)
-                        for verb in offered:
-                            self._add_verb(verb, found, drive)
+                with gui.add_folder(title or None, expand_by_default=not title):
+                    gui.add_html(THREE_COLUMNS)
+                    for label, verb in group.items():
+                        if verb in verbs:
+                            color = BUTTON_COLORS.get(verb, NEUTRAL)
+                            button = gui.add_button(label, color=color)
+                            button.on_click(partial(self._press, drive, label, verb))
+                    if title and DISABLE in verbs:
+                        self._add_disable(drive)
 
-    def _add_verb(
-        self, verb: str, found: Mapping[str, Sequence[str]], drive: GuiDropdownHandle[str]
-    ) -> None:
-        label, color = verb.replace('_', ' '), BUTTON_COLORS.get(verb, NEUTRAL)
-        button = self._server.gui.add_button(label, color=color)
-        button.on_click(partial(self._call, found, drive, verb))
+    def _add_disable(self, drive: GuiDropdownHandle[str]) -> None:
+        pressed = [0.0]
 
-    def _show_drive(self, statuses: Sequence[Status]) -> None:
-        """Show what the chosen drive reports; of all drives those that are not well."""
-        if self._drive is None or self._drive_state is None:
+        def start() -> None:
+            pressed[0] = time.monotonic()
+
+        def act() -> None:
+            if pressed[0] and time.monotonic() - pressed[0] >= DISABLE_AFTER:
+                pressed[0] = 0.0
+                self._call(drive, 'Disable', DISABLE)
+
+        hold = Hold(SINKS, act, lambda: None, start, always=True)
+        self._disable, html = self.live.button(hold)
+        self._server.gui.add_html(f'<div class="rv-one">{html}</div>')
+
+    def offer_drive(self, offered: Offered, *, force: bool = False) -> None:
+        """Offer to drive an arm: joints, tool, targets and grippers."""
+        if self._scene is None or self._tree is None or 'Plan' not in self._groups:
             return
-        drives = {status.name: status for status in statuses if status.name.endswith(': drive')}
-        buses = [status for status in statuses if status.name.endswith(': bus')]
-        chosen = drives.get(f'{self._drive.value.rpartition("/")[2]}: drive')
-        if chosen is not None:
-            bus = buses[0].values if len(buses) == 1 else {}
-            self._drive_state.content = drive_html(chosen.message, chosen.values, bus)
+        if offered == self._offered and not force:
             return
-        unwell = [status for status in drives.values() if status.level]
-        self._drive_state.content = ''.join(
-            _line(f'{status.name}: {status.message}', COLORS[status.level]) for status in unwell
-        ) or _line('no drive reports anything wrong', COLORS[0])
-
-    def offer_targets(self, controller: str, joints: Sequence[str]) -> bool:
-        """Offer to send the joints of a controller somewhere; whether it could be."""
-        tree = self._tree
-        if tree is None or controller in self._targets:
-            return tree is not None
-        movable = {joint.name: joint for joint in tree.movable()}
-        known = [movable[name] for name in joints if name in movable]
-        with self._tab('Targets'):
-            self._targets[controller] = TargetPanel(
-                self._server, known, partial(self._actions.aim, controller)
+        if self._jog is not None:
+            self._jog.remove()
+        self._offered = offered
+        self._notes['Drive'].visible = False
+        with self._groups['Drive']:
+            self._jog = JogPanel(
+                self._server,
+                self._scene,
+                self._tree,
+                offered,
+                (self._actions, self.live, self._speed),
             )
-        return True
-
-    def follow(self, controller: str, *, busy: bool, positions: Mapping[str, float]) -> None:
-        """Set the sliders of a controller to its joints' positions."""
-        if controller in self._targets:
-            self._targets[controller].follow(positions, busy=busy)
-
-    def plot(self, history: History, now: float) -> None:
-        """Draw what the joints did until now."""
-        if self._plots is None and history.joints:
-            with self._tab('Plots'):
-                self._plots = PlotPanel(self._server, history.joints)
-        if self._plots is not None:
-            self._plots.show(history, now)
 
     def offer_plan(
         self, groups: Sequence[str], actions: tuple[PlanActions, SceneActions, Order]
@@ -352,18 +484,26 @@ class RobotPage:
         Returns:
             Where to show what is planned; None as long as there is no robot.
         """
-        if self._scene is None or self._tree is None:
+        if self._scene is None or self._tree is None or 'Plan' not in self._groups:
             return None
-        with self._tab('Plan'):
-            self._plan = PlanPanel(self._server, self._scene, self._tree, groups, actions)
+        self._notes['Plan'].visible = False
+        with self._groups['Plan']:
+            self._plan = PlanPanel(
+                self._server, self._scene, self._tree, groups, (*actions, self.live, self._speed)
+            )
         return self._plan
 
     def offer_body(self) -> BodyPanel | None:
         """Offer what is known of the body of a walking robot; None as long as there is none."""
         if self._scene is None or self._tree is None:
             return None
-        with self._tab('Body'):
-            self._body = BodyPanel(self._server, self._scene.path_of(self._tree.root))
+        self._notes['Body'].visible = False
+        with self._groups['Body']:
+            self._body = BodyPanel(
+                self._server,
+                self._scene.path_of(self._tree.root),
+                lambda: self.live.movable and not self.live.stopped,
+            )
         return self._body
 
     def offer_first_motion(
@@ -372,129 +512,93 @@ class RobotPage:
         """Offer the first motion of joints, in the place of those before."""
         if self._first_motion is not None:
             self._first_motion.remove()
-        with self._tab('First motion'):
-            self._first_motion = FirstMotionPanel(self._server, joints, actions, self._held)
+        self._first_motion_folder.visible = True
+        with self._first_motion_folder:
+            self._first_motion = FirstMotionPanel(self._server, joints, actions, self.live)
         return self._first_motion
 
-    def offer_jog(self, joints: Sequence[str], grippers: Sequence[str]) -> None:
-        """Offer to jog the tool and joints as long as a button is held, and to move grippers."""
-        jogged = Jogged(tuple(joints), tuple(grippers), self._actions)
-        if self._tree is None or (self._tree, jogged) == self._jogged:
-            return
-        if self._jog is not None:
-            self._jog.remove()
-        with self._tab('Jog'):
-            self._jog = JogPanel(self._server, self._tree, jogged, self._held)
-        self._jogged = self._tree, jogged
-
-    def offer_walk(self, modes: Collection[str]) -> None:
+    def offer_walk(self, *, policy: bool) -> None:
         """Offer to walk as long as a button is held, and the modes of the robot."""
-        if not self._offer('Walk'):
+        if self._modes or 'Body' not in self._groups:
+            if 'policy' in self._modes:
+                self._modes['policy'].visible = policy
             return
-        with self._tab('Walk'):
-            self._server.gui.add_html(THREE_COLUMNS)
-            for mode in modes:
-                color = BUTTON_COLORS.get(mode, NEUTRAL)
-                button = self._server.gui.add_button(mode, color=color)
-                button.on_click(partial(self._request, mode))
-            speed = add_speed(self._server.gui)
+        gui = self._server.gui
+        self._notes['Drive'].visible = False
+        with self._groups['Drive']:
             rest = partial(self._actions.walk, (0.0, 0.0, 0.0))
+            holds = []
             for title, velocity in WALKS.items():
-                self._held(title, partial(self._walk, speed, velocity), rest)
+                number, html = self.live.button(Hold(title, partial(self._walk, velocity), rest))
+                self._walk_holds[number] = velocity
+                holds.append(html)
+            with gui.add_folder('Posture'):
+                gui.add_html(THREE_COLUMNS)
+                for label, mode in MODES.items():
+                    button = gui.add_button(label, color=BUTTON_COLORS.get(mode, NEUTRAL))
+                    button.on_click(partial(self._request, mode))
+                    self._modes[mode] = button
+                self._modes['policy'].visible = policy
+                gait = gui.add_dropdown('Gait', GAITS)
+                gait.on_update(lambda _: self._request(f'gait:{gait.value}', None))
+            with gui.add_folder('Hold to walk'):
+                gui.add_html(pad(holds))
+
+    # -- what people do, in threads of the page
+
+    def _command(self, word: str, rest: str) -> None:
+        if word == 'act':
+            self._actions.act(rest)
+        elif word == 'say':
+            self.say(rest, failed=True)
 
     def _stop(self) -> Future[StopAnswer]:
-        self._deadman.stop()  # or a button that is held would go on
-        try:
-            for panel in list(self._targets.values()):
-                panel.lock()  # or a slider that is dragged
-            if (body := self._body) is not None:
-                body.lock()
-        finally:  # whatever fails on the page
-            answer = self._actions.stop()
-        return answer
+        self.live.stop()  # or a button that is held would go on
+        return self._actions.stop()
 
-    def say(self, text: str, *, failed: bool | None = False) -> None:
-        """Show what became of the last request; with None that is not known yet."""
-        color = COLORS[1 if failed is None else 2 if failed else 0]
-        self._answer.content = _line(text, color)
-        self._log.add(time.time(), 'page', text, color)
+    def allow(self) -> None:
+        """Let the page move the robot again after STOP; nothing moves by that."""
+        self.live.stopped = False
 
-    def log(self, at: float, who: str, text: str, *, failed: bool) -> None:
-        """Keep what a node of the robot said."""
-        self._log.add(at, who, text, COLORS[2 if failed else 1])
-
-    def list_log(self) -> None:
-        """Show what was said."""
-        if self._log_html is None:
-            with self._tab('Log'):
-                self._log_html = self._server.gui.add_html('')
-        if self._log_html.content != self._log.html:
-            self._log_html.content = self._log.html
-
-    def _offer(self, what: str) -> bool:
-        """Whether something is offered for the first time; it stays as it was then."""
-        new = what not in self._offered
-        self._offered.add(what)
-        return new
-
-    def _tab(self, label: str) -> GuiTabHandle:
-        if label not in self._pages:
-            self._pages[label] = self._tabs.add_tab(label)
-        return self._pages[label]
-
-    def _held(
-        self, label: str, act: Callable[[], None], rest: Callable[[], None]
-    ) -> GuiButtonHandle:
-        """Add a button that acts as long as it is held, and rests when it is let go."""
-        which = object()
-
-        def beat(event: GuiEvent[GuiButtonHandle]) -> None:
-            if self._deadman.beat(event.client_id, which, time.monotonic()):
-                act()
-
-        def release(event: GuiEvent[GuiButtonHandle]) -> None:
-            if self._deadman.release(event.client_id, which, time.monotonic()):
-                rest()
-
-        button = self._server.gui.add_button(label, color=NEUTRAL)
-        button.on_hold(beat, 1.0 / HEARTBEAT)
-        button.on_click(release)  # a click ends where the button is let go
-        return button
-
-    def _walk(self, speed: Share, velocity: Velocity) -> None:
-        x, y, turn = (speed() * part for part in velocity)
+    def _walk(self, velocity: Velocity) -> None:
+        x, y, turn = (self._speed() * part for part in velocity)
         self._actions.walk((x, y, turn))
 
-    def _call(
-        self,
-        services: Mapping[str, Sequence[str]],
-        drive: GuiDropdownHandle[str],
-        verb: str,
-        _: object,
-    ) -> None:
-        chosen = services if drive.value == 'all' else [drive.value]
-        for name in chosen:
-            if verb in services[name]:
-                self._actions.call(f'{name}/{verb}')
+    def _press(self, drive: GuiDropdownHandle[str], label: str, verb: str, _: object) -> None:
+        self._call(drive, label, verb)
+
+    def _call(self, drive: GuiDropdownHandle[str], label: str, verb: str) -> None:
+        if drive.value == NO_DRIVE:
+            self.say(f'{label}: choose a drive first', failed=True)
+        elif self.live.stopped and verb in MOTIONS:
+            self.say(f'{label}: stopped; press {ALLOW} first', failed=True)
+        else:
+            chosen = self._drives if drive.value == ALL_DRIVES else [drive.value]
+            services = [f'{name}/{verb}' for name in chosen if verb in self._drives[name]]
+            self._actions.call(f'{label} {drive.value.rpartition("/")[2]}', services)
 
     def _request(self, mode: str, _: object) -> None:
-        self._actions.set_mode(mode)
+        if self.live.stopped:
+            self.say(f'mode {mode}: stopped; press {ALLOW} first', failed=True)
+        else:
+            self._actions.set_mode(mode)
 
     def _publish_sliders(self) -> None:
         self._actions.publish_joints({n: value_of(each) for n, each in self._sliders.items()})
 
+    # -- the log
 
-def _line(text: str, color: str, *, strong: bool = False) -> str:
-    weight = 'bold' if strong else 'normal'
-    return (
-        f'<div style="font-weight:{weight};margin:0.2em 1em"><span style="color:{color}">&#9679;'
-        f'</span> {escape(text)}</div>'
-    )
+    def say(self, text: str, *, failed: bool | None = False) -> None:
+        """Show what became of the last request; with None that is not known yet."""
+        now = time.time()
+        self.last = f'{time.strftime("%H:%M:%S", time.localtime(now))}  {text}'
+        self._log.add(now, 'page', text, WARNING if failed is None else BAD if failed else GOOD)
 
+    def log(self, at: float, who: str, text: str, *, failed: bool) -> None:
+        """Keep what a node of the robot said."""
+        self._log.add(at, who, text, BAD if failed else WARNING)
 
-def _table(rows: Sequence[tuple[str, str]]) -> str:
-    cells = ''.join(
-        f'<tr><td>{escape(name)}</td><td style="text-align:right">{escape(value)}</td></tr>'
-        for name, value in rows
-    )
-    return f'<table style="margin:0 1em;font-variant-numeric:tabular-nums">{cells}</table>'
+    def list_log(self) -> None:
+        """Show what was said."""
+        if self._log_html.content != self._log.html:
+            self._log_html.content = self._log.html

@@ -29,6 +29,8 @@ from ..shapes import Meshes, PLAIN, shapes_of
 ROOT = '/robot'
 Tint: TypeAlias = tuple[float, float, float, float]
 """Red, green, blue and opacity from 0 to 1."""
+AXES = (0.1, 0.004)
+"""Length and radius of the axes of joints in [m]."""
 SECTION = 0.5
 """Between thick lines of the ground in [m]."""
 
@@ -115,20 +117,26 @@ class RobotScene:
         """
         put(self._base, pose)
 
-    def ghost(self, links: frozenset[str], tint: Tint) -> RobotScene:
+    def ghost(self, name: str, links: frozenset[str], tint: Tint) -> RobotScene:
         """Return the robot once more, on the same base, with joints of its own.
 
         Args:
+            name: Of its node in the scene.
             links: Those that are seen.
             tint: Their color.
         """
-        look = Look(f'{ROOT}/ghost', links, tint)
+        look = Look(f'{ROOT}/{name}', links, tint)
         return RobotScene(self._scene, self._tree, look=look, meshes=self._meshes)
 
     def show(self, *, seen: bool) -> None:
         """Show or hide it."""
         if self._base.visible is not seen:
             self._base.visible = seen
+
+    def show_frames(self, *, seen: bool) -> None:
+        """Show or hide the axes of the joints' frames."""
+        for frame in self._frames.values():
+            frame.show_axes = seen
 
     def path_of(self, frame: str) -> str:
         """Return the node of a frame; that of the world where it is no link.
@@ -146,7 +154,9 @@ class RobotScene:
         joints = {joint.child: joint for joint in self._tree.joints}
         for link, path in self._paths.items():
             if link in joints:
-                frame = self._scene.add_frame(path, show_axes=False)
+                frame = self._scene.add_frame(
+                    path, show_axes=False, axes_length=AXES[0], axes_radius=AXES[1]
+                )
                 put(frame, joints[link].origin)
                 self._frames[joints[link].name] = frame
 

@@ -1,24 +1,54 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Colors by what a button does, and marks of panels for the overlay's style sheet.
+"""Colors by their meaning, marks for the overlay's style sheet, and short pieces of HTML.
 
-Red is for STOP and faults alone. Contrast with the text on it is at least 4.5.
+Red is for STOP and faults alone. Contrast with the text on a color is at least 4.5.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from html import escape
 from typing import TypeAlias
 
 Color: TypeAlias = tuple[int, int, int]
 
 NEUTRAL: Color = (233, 236, 239)
-"""Of buttons that move as long as they are held, look, stop or choose."""
+"""Of buttons that look, stop or choose."""
 WANTED: Color = (24, 100, 171)
 """Of the action that is wanted next, which gives power or executes what was shown."""
 CAUTION: Color = (255, 212, 59)
 """Of what moves the robot by itself, or takes the torque: it may sink."""
+PRESENT: Color = (52, 58, 64)
+"""Of the mode that the robot is in."""
 
+GOOD, WARNING, BAD, PLAIN = '#237032', '#ffd43b', '#c92a2a', '#495057'
+LEVEL_MARKS = (('✓', GOOD), ('⚠', '#8a6100'), ('⛔', BAD), ('?', PLAIN))
+"""Of the levels of a status, good, warning, error and stale: an icon and its color."""
 THREE_COLUMNS = '<b class="rv-pad3"></b>'
 """Marks a panel whose buttons stand in three columns."""
-JOINT_ROWS = '<b class="rv-pad"></b>'
-"""Marks a panel of rows: a cell, and two buttons."""
+
+
+def line(text: str, color: str = PLAIN, *, strong: bool = False, mark: str = '&#9679;') -> str:
+    """Return a line behind a mark."""
+    weight = 'bold' if strong else 'normal'
+    return (
+        f'<div style="font-weight:{weight};margin:0.2em 12px;overflow-wrap:anywhere">'
+        f'<span style="color:{color}">{mark}</span> {escape(text)}</div>'
+    )
+
+
+def status_line(text: str, level: int) -> str:
+    """Return a line with the icon of a level."""
+    mark, color = LEVEL_MARKS[level]
+    return line(text, color, strong=level not in {0, 3}, mark=mark)
+
+
+def pad(buttons: Iterable[str], kind: str = 'rv-pad') -> str:
+    """Return buttons that are held, in columns."""
+    return f'<div class="{kind}">{"".join(buttons)}</div>'
+
+
+def sentence(text: str) -> str:
+    """Return a sentence of a panel."""
+    return f'<div style="margin:0.3em 12px">{escape(text)}</div>'

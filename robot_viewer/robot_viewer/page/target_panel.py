@@ -1,15 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Sliders that send an arm to a target, and plots of how well it follows."""
+"""A target of an arm, which it moves to while a button is held; and plots of how it follows."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-import time
+from typing import Protocol
 
 import numpy as np
-from urdf_reader import Joint
+from urdf_reader import Joint, KinematicTree
 from viser import (
     GuiDropdownHandle,
     GuiEvent,
@@ -19,72 +19,96 @@ from viser import (
     ViserServer,
 )
 
+from ..link_poses import links_beyond
 from .aim import History, KEPT
-from .robot_scene import travel
-from .sliders import add_speed, value_of
-from .style import WANTED
+from .live import Hold
+from .robot_scene import RobotScene, Tint, travel
+from .sliders import Share, value_of
+from .style import NEUTRAL, pad, sentence
 
-UNTOUCHED = 1.0
-"""Time in [s] after which a slider follows its joint again."""
-UNLOCK = 'Stopped: let the sliders send again'
+HOLD_TARGET = 'Hold to move to the target'
+TARGET_TINT: Tint = (0.44, 0.28, 0.91, 0.35)
+REACHED = 0.01
+"""How near to the target in [rad] or [m] it is not shown any more."""
 HEIGHT = 170
 """Of a plot in [px]."""
-TARGET_COLOR, POSITION_COLOR, ERROR_COLOR = '#e8590c', '#1971c2', '#c2255c'
+TARGET_COLOR, POSITION_COLOR, ERROR_COLOR = '#7048e8', '#1864ab', '#495057'
 
-Aim = Callable[[Mapping[str, float], float], None]
-"""Takes targets by joint, and the share of the greatest velocity."""
+
+class AimActions(Protocol):
+    """What moves joints to a target."""
+
+    def aim(self, targets: Mapping[str, float], share: float) -> None:
+        """Move joints to targets as long as this comes."""
+
+    def let_go(self) -> None:
+        """Stop that motion."""
 
 
 class TargetPanel:
-    """A slider for each joint of a controller: whoever moves one sends that joint where it shows.
+    """A slider for each joint; it moves a violet target, and the joint only while it is held.
 
-    Only what a person does in a browser sends anything; sliders that follow the robot do not, nor
-    do any after STOP until they are unlocked.
+    Attributes:
+        seen: The target is shown.
     """
 
-    def __init__(self, server: ViserServer, joints: Sequence[Joint], aim: Aim) -> None:
-        self._aim = aim
-        self._touched = 0.0
-        gui = server.gui
-        gui.add_markdown('Moves to where a slider is put; STOP ends it.')
-        self._unlock = gui.add_button(UNLOCK, color=WANTED, visible=False)
-        self._unlock.on_click(lambda _: self._set_locked(locked=False))
-        self._speed = add_speed(gui, 20.0)
+    def __init__(
+        self,
+        server: ViserServer,
+        robot: RobotScene,
+        tree: KinematicTree,
+        joints: Sequence[Joint],
+        ways: tuple[AimActions, Share, Callable[[Hold], str]],
+    ) -> None:
+        self._robot, self._links = robot, links_beyond(tree, frozenset(j.name for j in joints))
+        self._actions, self._speed, hold = ways
+        self._ghost: RobotScene | None = None
+        self._targets: dict[str, float] = {}
         self._sliders: dict[str, GuiSliderHandle[float]] = {}
+        self.seen = True
+        gui = server.gui
+        gui.add_html(sentence('Sliders move the violet target only.'))
+        gui.add_html(pad([hold(Hold(HOLD_TARGET, self._move, self._actions.let_go))], 'rv-one'))
         for joint in joints:
             low, high = travel(joint)
             slider = gui.add_slider(joint.name, low, high, (high - low) / 1000.0, low)
             slider.on_update(partial(self._moved, joint.name))
             self._sliders[joint.name] = slider
+        gui.add_button('Put the target where the robot is', color=NEUTRAL).on_click(
+            lambda _: self._targets.clear()
+        )
 
-    def follow(self, positions: Mapping[str, float], *, busy: bool) -> None:
-        """Set the sliders to the joints' positions, unless a person moves them.
-
-        Args:
-            positions: Where the joints are.
-            busy: They are on their way to a target.
-        """
-        if busy or time.monotonic() - self._touched < UNTOUCHED:
-            return
+    def follow(self, positions: Mapping[str, float]) -> None:
+        """Show the target; without one the sliders follow the joints."""
+        targets = dict(self._targets)
+        if targets and all(
+            abs(positions.get(name, np.inf) - at) < REACHED for name, at in targets.items()
+        ):
+            self._targets.clear()
+            targets = {}
         for name, slider in self._sliders.items():
             position = min(max(positions.get(name, slider.value), slider.min), slider.max)
-            if abs(position - slider.value) > slider.step:
+            if name not in targets and abs(position - slider.value) > slider.step:
                 slider.value = position  # type: ignore[misc]  # it has a setter
+        if targets and self.seen and self._ghost is None:
+            self._ghost = self._robot.ghost('target', self._links, TARGET_TINT)
+        if self._ghost is not None:
+            self._ghost.show(seen=bool(targets) and self.seen)
+            if targets:
+                self._ghost.place({**positions, **targets})
 
-    def lock(self) -> None:
-        """Send nothing until somebody unlocks the sliders: one may be dragged, or be late."""
-        self._set_locked(locked=True)
-
-    def _set_locked(self, *, locked: bool) -> None:
-        self._unlock.visible = locked
+    def remove(self) -> None:
+        """Remove the target from the scene."""
+        if self._ghost is not None:
+            self._ghost.remove()
 
     def _moved(self, joint: str, event: GuiEvent[GuiSliderHandle[float]]) -> None:
-        if event.client_id is None:  # it follows its joint
-            return
-        if self._unlock.visible:
-            return
-        self._touched = time.monotonic()
-        self._aim({joint: value_of(event.target)}, self._speed())
+        if event.client_id is not None:  # or it follows its joint
+            self._targets[joint] = value_of(event.target)
+
+    def _move(self) -> None:
+        if self._targets:
+            self._actions.aim(dict(self._targets), self._speed())
 
 
 class PlotPanel:

@@ -1,0 +1,152 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The state of the robot on the page and on /diagnostics, and the one action that it wants."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Future
+from functools import partial
+import os
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+
+from ..page.overlay import StopAnswer
+from ..page.robot_page import RobotPage
+from ..robot_state import ALLOW, Level, robot_state, RobotState, SILENCE, Stop
+from .trigger_calls import TriggerCalls
+from .watch import OWN, Watch
+
+REPORT_PERIOD = 1.0
+"""Time between two statuses of the robot on /diagnostics in [s], where it does not change."""
+PUSH_PERIOD = 0.5
+"""The same of what is shown on pages that are open: without it they have lost their server."""
+STAGES = {None: 'braking', True: 'stopped', False: 'failed'}
+"""How far a STOP has come, by whether the robot has confirmed that it stands."""
+
+
+class Judge:
+    """Finds out whether the robot may be moved; everything in the thread of the node.
+
+    Attributes:
+        robot: Its name; empty for none.
+        services: Full names of the Trigger services that may be called.
+        simulated: A simulation runs beside the page.
+    """
+
+    def __init__(self, node: Node, page: RobotPage, watch: Watch, calls: TriggerCalls) -> None:
+        self._node, self._page, self._watch, self._calls = node, page, watch, calls
+        self.robot, self.simulated = '', False
+        self.services: frozenset[str] = frozenset()
+        self._stop: Stop | None = None
+        self._acting = ''
+        self._state = RobotState('', Level.UNKNOWN, '')
+        self._reported_at = self._pushed_at = 0.0
+        self._reported: object = None
+        self._pushed: object = None
+        self._publisher = node.create_publisher(DiagnosticArray, 'diagnostics', 10)
+
+    def judge(
+        self,
+        positions: Mapping[str, float],
+        *,
+        publishes: bool,
+        limit: str,
+        battery: str,
+        executes: bool,
+        controllers: Iterable[str],
+    ) -> None:
+        """Find out how the robot is; show it, and report it.
+
+        Args:
+            positions: Of its joints in [rad] or [m].
+            publishes: It was seen to publish joint states.
+            limit: What limits its motion, in words of the servo.
+            battery: In words.
+            executes: A plan of the page is executed.
+            controllers: Of trajectories, by their full names.
+        """
+        now, live = time.monotonic(), self._page.live
+        seen = self._watch.seen(self.robot, self.services, publishes=publishes)
+        seen.stop, seen.acting = self._stop, self._acting
+        seen.limit, seen.battery = limit, battery
+        program = ''
+        if live.held:
+            seen.mover = f'{live.held} is held on a page.'
+        elif executes:
+            seen.mover = 'The plan is executed while its button is held.'
+        elif seen.moving:
+            names = ', '.join(name.rpartition('/')[2] for name in controllers)
+            program = f'a program ({names})' if names else 'a program'
+            seen.mover = f'A{program[1:]} moves it.'
+        self._state = state = robot_state(seen)
+        shown = state, self._stop, self.simulated, program, live.holder
+        if shown != self._reported or now - self._reported_at > REPORT_PERIOD:
+            self._reported, self._reported_at = shown, now
+            self._publish(state)
+        known = positions if seen.silence < SILENCE else {}
+        drawn = shown, tuple(known.values()), self._page.last
+        if self._page.watched and (drawn != self._pushed or now - self._pushed_at > PUSH_PERIOD):
+            self._pushed, self._pushed_at = drawn, now
+            self._page.show_state(
+                state,
+                known,
+                stop='' if self._stop is None else STAGES[self._stop.stands],
+                simulated=self.simulated,
+                program=program,
+                listens=f'It listens in ROS domain {os.environ.get("ROS_DOMAIN_ID") or 0}.',
+            )
+
+    def _publish(self, state: RobotState) -> None:
+        message = DiagnosticArray()
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        values = {
+            'word': state.word,
+            'sentence': state.sentence,
+            'action': state.action,
+            'color': state.level.value,
+        }
+        message.status.append(
+            DiagnosticStatus(
+                name=f'{self._node.get_name()}{OWN}',
+                level=bytes([state.level.diagnostic]),
+                message=str(state),
+                values=[KeyValue(key=key, value=value) for key, value in values.items()],
+            )
+        )
+        self._publisher.publish(message)
+
+    def stop(
+        self, answer: Future[StopAnswer], order: Callable[[Callable[[], None]], None]
+    ) -> None:
+        """Record a STOP, and what the robot answers to it."""
+        self._stop = stop = Stop()
+        answer.add_done_callback(lambda done: order(partial(self._has_stopped, stop, done)))
+
+    def _has_stopped(self, stop: Stop, answer: Future[StopAnswer]) -> None:
+        if self._stop is stop:  # the last one counts, and none that was allowed after
+            self._stop = Stop(answer.result().text, answer.result().stands)
+
+    def act(self, action: str) -> None:
+        """Do the action that is wanted now, if it is still this one."""
+        state = self._state
+        if action != state.action:
+            self._page.say(f'{action}: the state is another one now', failed=True)
+        elif action == ALLOW:
+            self._stop = None
+            self._page.allow()
+            self._page.say('motion is allowed; nothing moves by that')
+        else:
+            self._acting = action
+            self._call(action, [group for group in state.calls if group])
+
+    def _call(self, action: str, groups: list[tuple[str, ...]]) -> None:
+        """Call the next group of services, while each of those before succeeds."""
+        if not groups:
+            self._acting = ''
+            return
+        self._calls.call_all(
+            action, groups[0], lambda well: self._call(action, groups[1:] if well else [])
+        )

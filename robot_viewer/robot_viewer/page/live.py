@@ -1,0 +1,170 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The overlay's own connection with each page: heartbeats of held buttons in, the state out.
+
+viser has one sender for all inputs of a page, which drops the older of two that come within 50 ms.
+Held buttons and the state of the robot have a WebSocket of their own, on the same port.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from html import escape
+import itertools
+import json
+import time
+
+from websockets.asyncio.server import broadcast, ServerConnection
+from websockets.exceptions import ConnectionClosed
+
+from .deadman import Deadman
+
+LIVE_PATH = '/live'
+NO_PAGE = 0
+"""No page has this number."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """A button that acts as long as it is held.
+
+    Attributes:
+        label: What it is called, and what is held.
+        act: Called with each heartbeat.
+        rest: Called when it is let go.
+        start: Called with the first heartbeat of a press.
+        always: It counts whatever state the robot is in, but not after STOP.
+    """
+
+    label: str
+    act: Callable[[], None]
+    rest: Callable[[], None]
+    start: Callable[[], None] | None = None
+    always: bool = False
+
+
+class Live:
+    """The pages that are open, and the buttons that are held on them.
+
+    Attributes:
+        movable: The state of the robot lets it be moved.
+        off: Numbers of buttons that would do nothing now.
+        stopped: STOP was pressed, and nothing was allowed since.
+        held: Label of the button that is held; empty for none.
+    """
+
+    def __init__(self, command: Callable[[str, str], None]) -> None:
+        """Set what a command of a page does: its word and what stands behind it."""
+        self._command = command
+        self._deadman = Deadman()
+        self._numbers = itertools.count(1)
+        self._holds: dict[int, Hold] = {}
+        self._pages: dict[int, tuple[ServerConnection, str]] = {}
+        self._started: set[tuple[int, int]] = set()  # presses that have begun
+        self._label = ''
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._last = ''
+        self.movable = self.stopped = False
+        self.off: set[int] = set()
+
+    # -- buttons
+
+    def button(self, hold: Hold) -> tuple[int, str]:
+        """Return the number of a new button and its HTML."""
+        number = next(self._numbers)
+        self._holds[number] = hold
+        kind = 'rv-hold rv-always' if hold.always else 'rv-hold'
+        label = f'<span>{escape(hold.label)}</span>'
+        return (
+            number,
+            f'<button class="{kind}" data-hold="{number}" tabindex="-1">{label}</button>',
+        )
+
+    def remove(self, number: int) -> None:
+        """Have a button act no more."""
+        self._holds.pop(number, None)
+        self.off.discard(number)
+
+    @property
+    def open(self) -> bool:
+        """Whether a page is open."""
+        return bool(self._pages)
+
+    @property
+    def held(self) -> str:
+        """Label of the button that is held; empty for none."""
+        return self._label if self._deadman.held(time.monotonic()) else ''
+
+    @property
+    def holder(self) -> int:
+        """The page that has control."""
+        return int(self._deadman.holder or NO_PAGE)  # type: ignore[call-overload, no-any-return]
+
+    def stop(self) -> None:
+        """Have what is held let go first, and nothing move until it is allowed."""
+        self.stopped = True
+        self._deadman.stop()
+
+    def _beat(self, page: int, number: int) -> None:
+        hold = self._holds.get(number)
+        if hold is None or self.stopped or not (self.movable or hold.always):
+            return
+        if not self._deadman.beat(page, number, time.monotonic()):
+            return
+        self._label = hold.label
+        if (page, number) not in self._started:
+            self._started.add((page, number))
+            if hold.start is not None:
+                hold.start()
+        hold.act()
+
+    def _release(self, page: int, number: int) -> None:
+        self._started.discard((page, number))
+        hold = self._holds.get(number)
+        if self._deadman.release(page, number, time.monotonic()) and hold is not None:
+            hold.rest()
+
+    # -- pages
+
+    async def serve(self, connection: ServerConnection) -> None:
+        """Serve a page until it is closed."""
+        self._loop = asyncio.get_running_loop()
+        page = next(self._numbers)
+        kind = 'computer'
+        self._pages[page] = connection, kind
+        try:
+            await connection.send(json.dumps({'you': page}))
+            if self._last:
+                await connection.send(self._last)
+            async for text in connection:
+                word, _, rest = str(text).partition(' ')
+                if word in {'beat', 'free'} and rest.isdecimal():
+                    (self._beat if word == 'beat' else self._release)(page, int(rest))
+                elif word == 'hello':
+                    self._pages[page] = connection, 'phone' if rest == 'phone' else kind
+                elif word == 'take':
+                    if not self._deadman.take(page, time.monotonic()):
+                        self._command('say', 'Another page holds a button: let go there first')
+                else:
+                    self._command(word, rest)
+        except ConnectionClosed:
+            pass
+        finally:
+            self._pages.pop(page, None)
+            self._started = {press for press in self._started if press[0] != page}
+            self._deadman.leave(page)
+
+    def show(self, state: dict[str, object]) -> None:
+        """Show a state on all pages, from any thread."""
+        kind = self._pages.get(self.holder, (None, ''))[1]
+        more = {'holder': self.holder, 'kind': kind, 'off': sorted(self.off)}
+        self._last = json.dumps({**state, **more})
+        if self._loop is not None:
+            with suppress(RuntimeError):  # it has ended
+                self._loop.call_soon_threadsafe(self._send, self._last)
+
+    def _send(self, text: str) -> None:
+        broadcast([connection for connection, _ in list(self._pages.values())], text)

@@ -1,0 +1,140 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""May the robot be moved? The worst that was seen counts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import itertools
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from robot_viewer.robot_state import ALLOW, Level, robot_state, Seen, Status, Stop
+
+ON = {'state': 'Operation enabled', 'mode': 'Cyclic position', 'online': 'True'}
+GOOD = Status('j1: drive', 0, 'enabled', ON)
+FAULT = Status('j1: drive', 2, 'x', {'state': 'Fault', 'error_code': '0x2310 over current'})
+OTHER_FAULT = replace(FAULT, name='j2: drive')
+LOST = Status('j1: drive', 2, 'offline, waiting for the device', {'online': 'False'})
+BOOTS = Status(
+    'j1: drive', 2, 'offline, configuring', {'online': 'False', 'boot_phase': 'configuring'}
+)
+OFF = Status('j1: drive', 0, 'off', {'state': 'Switch on disabled', 'mode': 'No mode'})
+NO_MODE = Status('j1: drive', 0, 'on', ON | {'mode': 'No mode'})
+OLD = Status('j1: drive', 3, 'unknown for 9 s; before: enabled', ON)
+SERVICES = frozenset(
+    f'/{drive}/{verb}'
+    for drive in ('j1', 'j2', 'xj1')
+    for verb in ('recover', 'init', 'cyclic_position_mode')
+) | {'/controller_node/clear_fault'}
+ROBOT = Seen('panda', statuses=[GOOD], services=SERVICES)
+
+
+def legs(level: int, state: str, message: str = '', velocity: str = '0 0 0') -> Status:
+    """Return a status of the controller of a quadruped."""
+    values = {'state': state, 'goal': state, 'velocity': velocity}
+    return Status('controller_node: state', level, message or state, values)
+
+
+@pytest.mark.parametrize(
+    ('seen', 'word', 'part', 'action', 'calls'),
+    [
+        (Seen(), 'NO ROBOT', 'Start one', '', 0),
+        (replace(ROBOT, silence=12.0), 'NO CONTACT WITH THE ROBOT', 'for 12 s. STOP may', '', 0),
+        (replace(ROBOT, statuses=[OLD]), 'NO CONTACT WITH THE ROBOT', 'unknown for 9 s', '', 0),
+        (
+            replace(ROBOT, statuses=[FAULT], stop=Stop('x', stands=True)),
+            'FAULT',
+            'j1: 0x2310 over current. Remove the cause, then recover.',
+            'Recover j1',
+            1,
+        ),
+        (replace(ROBOT, statuses=[FAULT, OTHER_FAULT]), 'FAULT (2)', 'j1: ', 'Recover all 2', 2),
+        (replace(ROBOT, statuses=[LOST]), 'FAULT', 'offline', 'Recover j1', 1),
+        (replace(ROBOT, statuses=[FAULT], acting='Recover j1'), 'FAULT', 'Recover j1 ...', '', 0),
+        (replace(ROBOT, statuses=[BOOTS]), 'NOT ENABLED', 'j1: offline, configuring.', '', 0),
+        (
+            replace(ROBOT, statuses=[GOOD, Status('master: bus', 2, 'bus off')]),
+            'FAULT',
+            'master: bus: bus off',
+            '',
+            0,
+        ),
+        (replace(ROBOT, stop=Stop()), 'STOPPING', 'not confirmed yet', ALLOW, 0),
+        (
+            replace(ROBOT, stop=Stop('no', stands=False)),
+            'STOP NOT CONFIRMED',
+            'use the emergency stop. no',
+            ALLOW,
+            0,
+        ),
+        (
+            replace(ROBOT, stop=Stop('stopped: j1. stand: j2', stands=True)),
+            'STOPPED',
+            'Stopped: j1; the others stand. Nothing moves from this page',
+            ALLOW,
+            0,
+        ),
+        (
+            replace(ROBOT, stop=Stop('stopped', stands=True), moving=True),
+            'MOVING',
+            'A program moves it after STOP',
+            ALLOW,
+            0,
+        ),
+        (replace(ROBOT, statuses=[OFF]), 'NOT ENABLED', '1 of 1 drives', 'Enable j1', 2),
+        (replace(ROBOT, statuses=[NO_MODE]), 'NOT ENABLED', 'no mode', 'Select the mode', 1),
+        (replace(ROBOT, limit='j2 is at its end'), 'AT A LIMIT', 'J2 is at its end.', '', 0),
+        (replace(ROBOT, moving=True), 'MOVING', 'A program moves it.', '', 0),
+        (ROBOT, 'READY', 'Hold a button to move.', '', 0),
+        (replace(ROBOT, statuses=[]), 'READY', 'no drives', '', 0),
+        (replace(ROBOT, statuses=[legs(0, 'stand')]), 'STANDING', 'Press Walk', '', 0),
+        (replace(ROBOT, statuses=[legs(0, 'walk')]), 'READY', 'Hold an arrow', '', 0),
+        (
+            replace(ROBOT, statuses=[legs(0, 'walk', velocity='0.1 0 0')]),
+            'WALKING',
+            'A program',
+            '',
+            0,
+        ),
+        (replace(ROBOT, statuses=[legs(1, 'lie', 'low')]), 'LYING', 'low.', '', 0),
+        (replace(ROBOT, statuses=[legs(0, 'to stand')]), 'MOVING', 'Mode to stand.', '', 0),
+        (replace(ROBOT, statuses=[legs(2, 'fault', 'fell')]), 'FAULT', 'fell.', 'Clear fault', 1),
+        (
+            replace(ROBOT, statuses=[legs(3, 'relax', 'waiting for /joint_states')]),
+            'NO CONTACT WITH THE ROBOT',
+            'waiting for',
+            '',
+            0,
+        ),
+    ],
+)
+def test_the_state_is_one_word_with_one_action(
+    seen: Seen, word: str, part: str, action: str, calls: int
+) -> None:
+    """As the page, /diagnostics and the terminal show it."""
+    state = robot_state(seen)
+    assert (state.word, state.action) == (word, action)
+    assert part in state.sentence
+    assert sum(map(len, state.calls)) == calls
+    assert not any('/xj1/' in service for group in state.calls for service in group)
+
+
+@given(
+    st.sampled_from([0.0, 12.0]),
+    st.lists(st.sampled_from([GOOD, FAULT, OFF, NO_MODE, OLD, BOOTS, LOST]), max_size=3),
+    st.sampled_from([None, Stop(), Stop('x', stands=True), Stop('x', stands=False)]),
+    st.booleans(),
+)
+def test_motion_is_possible_only_where_nothing_speaks_against_it(
+    silence: float, statuses: list[Status], stop: Stop | None, moving: bool
+) -> None:
+    """Green and amber mean that it may be moved; each other color has a reason."""
+    named = [replace(each, name=f'j{n}: drive') for n, each in zip(itertools.count(), statuses)]
+    state = robot_state(replace(ROBOT, silence=silence, statuses=named, stop=stop, moving=moving))
+    wrong = silence > 0.0 or stop is not None or any(each is not GOOD for each in statuses)
+    assert state.movable is not wrong
+    assert (state.level is Level.WELL) is not wrong
+    assert state.level.exit_code == 0 or wrong
