@@ -40,6 +40,11 @@ PAGE_TIMEOUT = 60_000  # [ms] on a busy machine
 TEXT_TIMEOUT = 5_000  # [ms] of a page that may hang
 PAGE_URL = r'the robot is seen at (http://localhost:\d+)$'
 """What a bring-up or demo prints of its page."""
+FEW_PICTURES = """
+const draw = window.requestAnimationFrame.bind(window);
+window.requestAnimationFrame = (act) => setTimeout(() => draw(act), 150);
+"""
+"""A page draws a few times a second: without a graphics card the robot needs the processor."""
 PICTURES = Path(__file__).parents[1] / 'build' / 'screenshots'
 """Where pictures of the tests are kept, to be looked at."""
 PANEL = 410  # [px] width of the controls at the right
@@ -136,6 +141,7 @@ def open_page(browser: Browser, url: str, **options: object) -> Page:
     """Open a page and wait until it shows the robot's controls."""
     page = browser.new_page(**({'viewport': SIZE} | options))  # type: ignore[arg-type]
     page.set_default_timeout(PAGE_TIMEOUT)
+    page.add_init_script(FEW_PICTURES)
     page.goto(url)
     # viser's own warning of a software renderer covers the scene
     page.add_style_tag(content='.mantine-Notifications-root { display: none }')
