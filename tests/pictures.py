@@ -3,7 +3,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Takes the pictures of the README: the pages of both demos in a real browser.
 
-Run: ``make pictures``; writes ``docs/arm.png``, ``docs/quadruped.png`` and ``docs/phone.png``. Needs
+Run: ``make pictures``; writes ``arm.png``, ``quadruped.png`` and ``phone.png`` in ``docs``. Needs
 Chromium.
 """
 

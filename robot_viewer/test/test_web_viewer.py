@@ -97,6 +97,10 @@ class Robot(ViewerRig):
         self.node.create_subscription(DiagnosticArray, 'diagnostics', take, 10)
         return found
 
+    def has_called(self, services: list[str]) -> bool:
+        """Whether these were called, in this order."""
+        return self.calls == services
+
     def called_until_enable(self) -> list[str]:
         """Return what the page has called, in order of names, when it has enabled both drives.
 
@@ -539,7 +543,7 @@ def test_the_action_calls_one_group_of_services_after_the_other(robot: Robot) ->
             'the mode',
         )
         robot.viewer.act('Enable joint1')
-        robot.spin_until(lambda called=called: robot.calls == called, 'calls')
+        robot.spin_until(partial(robot.has_called, called), 'calls')
         robot.spin_until(lambda: not robot.viewer._judge._acting, 'the end')
         robot.calls.clear()
 

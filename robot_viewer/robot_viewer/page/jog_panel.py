@@ -108,9 +108,8 @@ class JogPanel:
             with tabs.add_tab('Target'):
                 if offered.targets:
                     joints = [self._joints[name] for name in offered.targets]
-                    self.target = TargetPanel(
-                        server, robot, tree, joints, (actions, self._speed, self._hold)
-                    )
+                    aiming = actions.aim, actions.let_go, self._speed, self._hold
+                    self.target = TargetPanel(server, robot, tree, joints, aiming)
                 else:
                     self._gui.add_html(sentence('No trajectory controller moves these joints.'))
             with tabs.add_tab('Gripper'):

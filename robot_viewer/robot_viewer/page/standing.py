@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from html import escape
 import math
 
-from urdf_reader import KinematicTree, Quaternion, rotate, Transform, Vector
+from urdf_reader import KinematicTree, Quaternion, rotate, Vector
 
 FOOT = '_foot'
 """How the names of the links of feet end."""
@@ -147,16 +147,6 @@ def roll_pitch(attitude: Quaternion) -> tuple[float, float]:
     x, y, z, w = attitude
     sine = max(-1.0, min(1.0, 2.0 * (w * y - z * x)))
     return math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)), math.asin(sine)
-
-
-def level(attitude: Quaternion) -> Transform:
-    """Return the pose of a level frame in the root link.
-
-    Args:
-        attitude: Of the root link in a level frame.
-    """
-    x, y, z, w = attitude
-    return Transform(rotation=(-x, -y, -z, w))
 
 
 def horizon_html(attitude: Quaternion | None, battery: str) -> str:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Protocol
 
 import numpy as np
 from urdf_reader import Joint, KinematicTree
@@ -35,14 +34,8 @@ HEIGHT = 170
 TARGET_COLOR, POSITION_COLOR, ERROR_COLOR = '#7048e8', '#1864ab', '#495057'
 
 
-class AimActions(Protocol):
-    """What moves joints to a target."""
-
-    def aim(self, targets: Mapping[str, float], share: float) -> None:
-        """Move joints to targets as long as this comes."""
-
-    def let_go(self) -> None:
-        """Stop that motion."""
+Move = Callable[[Mapping[str, float], float], None]
+"""Moves joints to targets as long as it is called, at a share of the greatest velocity."""
 
 
 class TargetPanel:
@@ -58,17 +51,17 @@ class TargetPanel:
         robot: RobotScene,
         tree: KinematicTree,
         joints: Sequence[Joint],
-        ways: tuple[AimActions, Share, Callable[[Hold], str]],
+        ways: tuple[Move, Callable[[], None], Share, Callable[[Hold], str]],
     ) -> None:
         self._robot, self._links = robot, links_beyond(tree, frozenset(j.name for j in joints))
-        self._actions, self._speed, hold = ways
+        self._aim, let_go, self._speed, hold = ways
         self._ghost: RobotScene | None = None
         self._targets: dict[str, float] = {}
         self._sliders: dict[str, GuiSliderHandle[float]] = {}
         self.seen = True
         gui = server.gui
         gui.add_html(sentence('Sliders move the violet target only.'))
-        gui.add_html(pad([hold(Hold(HOLD_TARGET, self._move, self._actions.let_go))], 'rv-one'))
+        gui.add_html(pad([hold(Hold(HOLD_TARGET, self._move, let_go))], 'rv-one'))
         for joint in joints:
             low, high = travel(joint)
             slider = gui.add_slider(joint.name, low, high, (high - low) / 1000.0, low)
@@ -108,7 +101,7 @@ class TargetPanel:
 
     def _move(self) -> None:
         if self._targets:
-            self._actions.aim(dict(self._targets), self._speed())
+            self._aim(dict(self._targets), self._speed())
 
 
 class PlotPanel:
