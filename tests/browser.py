@@ -182,7 +182,14 @@ def state_is(page: Page, word: str) -> None:
 
 def act(page: Page, action: str) -> None:
     """Press the action of the state."""
-    page.locator('#rv-do').filter(has_text=action).click()
+    page.locator('#rv-do').filter(has_text=action).click(force=True)
+
+
+def show(page: Page, *tabs: str) -> None:
+    """Show a group of the page, and tabs in it."""
+    for tab in tabs:
+        # forced: a busy machine draws too seldom for playwright to find out that something stands
+        page.get_by_role('tab', name=tab, exact=True).click(force=True)
 
 
 def hold(page: Page, button: str) -> None:
@@ -218,8 +225,8 @@ def slider_value(page: Page, slider: int) -> float:
 
 def choose(page: Page, dropdown: str, option: str) -> None:
     """Choose an option of a dropdown of the open tab."""
-    page.get_by_label(dropdown, exact=True).click()
-    page.get_by_role('option', name=option, exact=True).click()
+    page.get_by_label(dropdown, exact=True).click(force=True)
+    page.get_by_role('option', name=option, exact=True).click(force=True)
 
 
 def drag_arrow(page: Page, color: str, way: int) -> None:

@@ -53,7 +53,7 @@ def take_one(browser: Browser, url: str, group: str, size: dict[str, int], path:
     """Take one picture."""
     phone = size is PHONE
     page = chromium.open_page(browser, url, viewport=size, has_touch=phone, is_mobile=phone)
-    page.get_by_role('tab', name=group, exact=True).click(timeout=1e3 * STARTING)
+    chromium.show(page, group)
     page.wait_for_timeout(1e3 * MOVING)
     page.screenshot(path=path, timeout=chromium.PAGE_TIMEOUT)
     page.close()

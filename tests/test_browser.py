@@ -94,9 +94,7 @@ class Seen:
 
     def show(self, group: str, tab: str = '') -> Page:
         """Show a group of the page, and a tab in it, in which motion is allowed."""
-        self.page.get_by_role('tab', name=group, exact=True).click()
-        if tab:
-            self.page.get_by_role('tab', name=tab, exact=True).click()
+        chromium.show(self.page, group, *([tab] if tab else []))
         self.allow(self.page)
         return self.page
 
@@ -112,7 +110,7 @@ class Seen:
 
     def type_into(self, slider: int, text: str) -> None:
         """Type into the number box beside a slider of the open tab, without an end."""
-        self.box(slider).click()
+        self.box(slider).click(force=True)
         self.page.keyboard.press('Control+a')
         self.page.keyboard.type(text)
         assert self.box(slider).input_value() == text
@@ -121,10 +119,9 @@ class Seen:
         """Turn the tool about the base's axis; back, as at its limit the joint would not move."""
         self.allow(page)
         if page.locator('#rv-take').is_visible():
-            page.locator('#rv-take').click()
+            page.locator('#rv-take').click(force=True)
             page.locator('body:not(.rv-other)').wait_for()
-        page.get_by_role('tab', name='Drive', exact=True).click()
-        page.get_by_role('tab', name='Tool', exact=True).click()
+        chromium.show(page, 'Drive', 'Tool')
         chromium.choose(page, 'Along axes of', BASE)
         chromium.hold(page, TURN if self.position(WRIST) > self.wrist else TURN_BACK)
         self.wait(self.moves, 'a jog')
@@ -215,7 +212,7 @@ def words_of_stop(page: Page, pattern: str) -> Locator:
 
 def press(page: Page, button: str) -> None:
     """Press a button of the open tab."""
-    page.get_by_role('button', name=button, exact=True).click()
+    page.get_by_role('button', name=button, exact=True).click(force=True)
 
 
 def add_box(seen: Seen, place: tuple[float, float, float]) -> None:
@@ -253,7 +250,7 @@ def test_a_dragged_goal_and_a_box(seen: Seen) -> None:
         GetPlanningScene, '/get_planning_scene', request
     ).scene.world.collision_objects
     assert box.pose != Pose(position=Point(x=0.6, z=0.1)), 'moved or turned'
-    page.get_by_role('button', name='Remove', exact=False).click()
+    page.get_by_role('button', name='Remove', exact=False).click(force=True)
     page.get_by_text('box1 is removed').wait_for()
 
 
@@ -284,7 +281,7 @@ def test_a_goal_is_planned_shown_and_executed(seen: Seen) -> None:
     page.get_by_text(re.compile('(GOAL|START_STATE)_IN_COLLISION: .*pillar')).wait_for()
     page.locator('.rv-hold.rv-off').filter(has_text=HOLD_EXECUTE).wait_for()
     chromium.choose(page, 'Object', 'pillar')
-    page.get_by_role('button', name='Remove', exact=False).click()
+    page.get_by_role('button', name='Remove', exact=False).click(force=True)
     page.get_by_text('pillar is removed').wait_for()
     press(page, 'Plan motion')
     page.get_by_text('the motion takes').wait_for()
@@ -329,13 +326,13 @@ def test_a_target_moves_the_arm_while_its_button_is_held(seen: Seen) -> None:
     other.mouse.up()
     chromium.hold(page, HOLD_TARGET)
     seen.wait(seen.moves, 'a motion')
-    other.locator('#robot-stop').click()
+    other.locator('#robot-stop').click(force=True)
     seen.wait_for_rest()
     assert abs(seen.position() - wanted) > 0.05, 'the STOP of another page'
     page.mouse.up()
     for each in (page, other):
         chromium.state_is(each, 'STOPPED')
-    other.locator('#rv-take').click()
+    other.locator('#rv-take').click(force=True)
     chromium.act(other, ALLOW)
     page.locator('#rv-who').filter(has_text='another page').wait_for()
     other.close()
@@ -396,7 +393,7 @@ def test_a_single_joint_and_the_tool_along_its_own_axes(seen: Seen) -> None:
     seen.wait_for_rest()
     for name, position in zip(before.name, before.position, strict=True):
         assert name == WRIST or abs(seen.position(name) - position) < MOVES, name
-    page.get_by_role('tab', name='Tool', exact=True).click()
+    chromium.show(page, 'Tool')
     chromium.choose(page, 'Along axes of', 'panda_link7')
     chromium.hold(page, 'Z −')
     seen.wait(seen.moves, 'a jog')
@@ -468,7 +465,7 @@ def test_a_finger_on_a_phone(seen: Seen) -> None:
     seen.wait_for_rest()
     chromium.picture(page, 'phone')
     stop = page.locator('#robot-stop')
-    stop.tap()
+    stop.tap(force=True)
     chromium.state_is(page, 'STOPPED')
     words_of_stop(page, '^stopped$').wait_for()
     page.context.close()
@@ -483,7 +480,7 @@ def test_a_fault_has_two_presses_to_motion(seen: Seen) -> None:
     chromium.state_is(page, 'FAULT')
     page.locator('#rv-state').filter(has_text=re.compile('panda_joint3.*over current')).wait_for()
     for group in ('Plan', 'See', 'Diagnose', 'Drive'):
-        page.get_by_role('tab', name=group, exact=True).click()
+        chromium.show(page, group)
         assert page.locator('#rv-do').inner_text() == 'Recover panda_joint3'
     chromium.hold(page, '3 +')
     seen.wait_for_rest()
@@ -497,8 +494,8 @@ def test_a_fault_has_two_presses_to_motion(seen: Seen) -> None:
     page.mouse.up()
     seen.wait_for_rest()
     page = seen.show('Diagnose')
-    page.get_by_label('Drive', exact=True).click()
-    page.get_by_role('option', name='/panda_joint3', exact=True).click()
+    page.get_by_label('Drive', exact=True).click(force=True)
+    page.get_by_role('option', name='/panda_joint3', exact=True).click(force=True)
     page.get_by_role('cell', name='Operation enabled', exact=True).wait_for()
 
 
@@ -536,7 +533,7 @@ def test_a_robot_that_stops_late(seen: Seen) -> None:
 def test_a_robot_that_does_not_answer_has_not_stopped(seen: Seen) -> None:
     """Its process hangs, is killed, and the page's own end: the page says what to do."""
     page = seen.show('Diagnose')
-    page.get_by_label('Drive', exact=True).click()  # with a dropdown open
+    page.get_by_label('Drive', exact=True).click(force=True)  # with a dropdown open
     (robot,) = processes_of(seen, '/motion_node')
     robot.suspend()
     try:
