@@ -23,6 +23,7 @@ from arm_model import (
     Pose,
     RobotModel,
 )
+from arm_model.scene import clearances
 
 ARMS = [*(robot(name) for name in ROBOTS), chain('zpyypz'), two_arms()]
 """The robots, a chain with sliding joints, and a tree."""
@@ -42,11 +43,12 @@ def among_things() -> RobotModel:
 
 
 @pytest.mark.parametrize('model', [*ARMS, among_things()], ids=lambda model: model.name)
-@pytest.mark.parametrize('stride', [0.003, 0.05, 1.0])
+@pytest.mark.parametrize(('stride', 'at_once'), [(0.003, 100), (0.05, 0), (1.0, 0), (1.0, 100)])
 def test_what_is_known_is_a_lower_bound_and_exact_where_it_matters(
-    model: RobotModel, stride: float
+    model: RobotModel, stride: float, at_once: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """On random walks with short and long steps, for each pair at each step."""
+    """On random walks, for each pair at each step, also where spheres tell what is far apart."""
+    monkeypatch.setattr(clearances, 'AT_ONCE', at_once)
     rng = np.random.default_rng(5)
     lower, upper = np.maximum(model.limits.lower, -4.0), np.minimum(model.limits.upper, 4.0)
     at, within = (lower + upper) / 2.0, 0.05

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from ..arrays import Array, Native
+from ..arrays import Array, Native, Places
 from .planning_scene import PlanningScene
 
 AT_ONCE = 100
@@ -65,6 +65,14 @@ class Clearances:
         self._results = scene.geometry.createData()
         self._found = list(self._results.distanceResults)  # they refer to it
         self._of_cells = scene.of_cells.tolist()
+        shapes = [each.geometry for each in scene.geometry.geometryObjects]
+        self._radii: Array = np.array([each.aabb_radius for each in shapes])
+        self._centers = [  # a plane has none
+            each.aabb_center if np.isfinite(each.aabb_radius) else np.zeros(3) for each in shapes
+        ]
+        self._pair_shapes: Places = np.array(
+            [(each.first, each.second) for each in scene.geometry.collisionPairs], int
+        ).reshape(-1, 2)
         self._distances: Array = np.full(len(scene.pairs), -np.inf)
         self._places: Array = np.zeros_like(scene.distance_rate_bounds)
 
@@ -95,6 +103,12 @@ class Clearances:
         (doubtful,) = (bounds < within).nonzero()
         if not doubtful.size:
             return bounds
+        if doubtful.size > AT_ONCE:
+            apart = self._between_spheres(positions)
+            far = apart[doubtful] >= within
+            known, doubtful = doubtful[far], doubtful[~far]
+            bounds[known] = self._distances[known] = apart[known]
+            self._places[known] = positions
         pairs = doubtful.tolist()
         found = self.measure(positions, pairs)
         of_cells = self._of_cells
@@ -107,6 +121,21 @@ class Clearances:
         self._places[doubtful] = positions
         return bounds
 
+    def _between_spheres(self, positions: Array) -> Array:
+        """Return the distance between the spheres around the shapes of each pair in [m]."""
+        self._place(positions)
+        placed = zip(self._results.oMg, self._centers, strict=True)
+        centers = np.array([placement.act(center) for placement, center in placed])
+        first, second = self._pair_shapes.T
+        between = np.linalg.norm(centers[first] - centers[second], axis=1)
+        apart: Array = between - self._radii[first] - self._radii[second]
+        return apart
+
+    def _place(self, positions: Array) -> None:
+        native, geometry = self._kinematics.native, self._scene.geometry
+        expanded = self._kinematics.expanded(positions)
+        pin.updateGeometryPlacements(native, self._data, geometry, self._results, expanded)
+
     def measure(self, positions: Array, pairs: Sequence[int]) -> Sequence[Native]:
         """Measure some pairs, regardless of what is known of them.
 
@@ -117,10 +146,8 @@ class Clearances:
             The results of coal for all pairs, by their numbers. Only those of the pairs asked for
             are current; the next measurement overwrites them.
         """
-        native, geometry, results = self._kinematics.native, self._scene.geometry, self._results
-        expanded = self._kinematics.expanded(positions)
-        pin.updateGeometryPlacements(native, self._data, geometry, results, expanded)
-        found = self._found
+        geometry, results, found = self._scene.geometry, self._results, self._found
+        self._place(positions)
         # all at once, which is quicker than one by one; other threads wait meanwhile
         if len(pairs) == len(found) <= AT_ONCE:
             pin.computeDistances(geometry, results)
