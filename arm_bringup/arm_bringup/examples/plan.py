@@ -62,6 +62,7 @@ from .arm import ActionRun, ANSWER_TIMEOUT, ArmDemo, EndRequested, parse, run
 SLOW, CAREFUL, USUAL, FREE = 0.1, 0.2, 0.4, 0.5
 """Shares of the limits at which the arm meets a box, follows lines, goes around, moves freely."""
 PLANNING_TIME, IK_TIMEOUT = 5.0, 0.5
+SEARCH_TIME = 5.0  # of a motion of an arm without a table, by the clock in [s]
 """Longest time for planning, as MoveGroupInterface asks for, and for inverse kinematics in [s]."""
 JOINT_TOLERANCE, POSITION_TOLERANCE, TURN_TOLERANCE = 1e-4, 1e-4, 1e-3
 """Tolerances of goals as MoveGroupInterface has them in [rad], [m] and [rad]."""
@@ -774,8 +775,10 @@ def box_ahead(model: RobotModel, rows: Sequence[Array]) -> CollisionObject | Non
 def find_swing(model: RobotModel, home: Array) -> Swing | None:
     """Return a motion between poses that a box makes worth planning; None where none is found."""
     planner, reach = Planner(model), max(model.reach, LEAST_REACH)
-    poses = [home, *model.poses.values()]
+    poses, until = [home, *model.poses.values()], time.monotonic() + SEARCH_TIME
     for begin, end in permutations(poses, 2):
+        if time.monotonic() > until:
+            break  # an SRDF with many poses
         tips = (model.pose(each).position for each in (begin, end))
         if math.dist(*tips) < LEAST_SWING * reach:
             continue
