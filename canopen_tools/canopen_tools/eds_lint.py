@@ -39,6 +39,7 @@ from canopen_core.standard import (
     ObjectDictionary,
     ObjectEntry,
     PDO_COUNT_MAX,
+    pdo_object,
     PREDEFINED_MAX,
     profile_number,
 )
@@ -148,12 +149,6 @@ MANDATORY: dict[tuple[int, int], str] = {
 """What every CANopen device has (CiA 301, 7.5.2)."""
 
 
-COUNTED_BY_USE = (
-    range(Index.PREDEFINED_ERROR_FIELD, Index.PREDEFINED_ERROR_FIELD + 1),
-    range(Index.RPDO_MAPPING, Index.RPDO_MAPPING + 0x200),
-    range(Index.TPDO_MAPPING, Index.TPDO_MAPPING + 0x200),
-)
-"""Objects whose sub-index 0 counts what is in use, not what there is."""
 RPDO_TARGETS = (Index.CONTROLWORD, Index.TARGET_POSITION, Index.TARGET_VELOCITY)
 TPDO_VALUES = (Index.STATUSWORD, Index.POSITION_ACTUAL)
 DIRECTED = (AccessType.READ_WRITE_TPDO, AccessType.READ_WRITE_RPDO)
@@ -230,8 +225,9 @@ class _Linter:
             what = f'{object_address(index)} has no sub-index 0'
             self._add(first, '', what, 'add it', error=True)
             return
-        count = first.default
-        if not isinstance(count, int) or any(index in indices for indices in COUNTED_BY_USE):
+        count, pdo = first.default, pdo_object(index)
+        counts_use = index == Index.PREDEFINED_ERROR_FIELD or (pdo is not None and pdo.is_mapping)
+        if not isinstance(count, int) or counts_use:
             return
         if count != highest:
             self._add(

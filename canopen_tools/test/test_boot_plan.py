@@ -20,7 +20,8 @@ from arm_canopen.config import (
     NodeConfig,
 )
 from arm_canopen.config.model.boot_plan import WATCH_KEY
-from arm_canopen.master.configuration import Configurator, PDO_OBJECTS
+from arm_canopen.master.configuration import Configurator
+from canopen_core.standard import pdo_object
 from canopen_tools.cli.diff import expected_defaults, expected_objects
 from canopen_tools.dcf.concise import device_writes
 
@@ -110,7 +111,7 @@ def test_take_over_and_diff_find_what_boot_leaves_and_every_change_of_it(held: i
     }
     assert all(item.fits(scene.store.read(*item.address)) for item in expected)
     assert scene.differences() == []
-    pdos = [item for item in kept if item.index in PDO_OBJECTS]
+    pdos = [item for item in kept if pdo_object(item.index)]
     assert (0x1A01, 1) in {item.address for item in pdos}
     for item in pdos:
         variable = scene.store.find(*item.address)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from canopen_core import SdoAbortError, SdoError, SdoTimeoutError
-from canopen_core.standard import Index, is_setting, object_address, PDO_COUNT_MAX
+from canopen_core.standard import Index, is_setting, object_address, pdo_object
 
 from ..config.model import BusConfig, SdoWrite
 from ..config.model.boot_plan import (
@@ -24,16 +24,6 @@ from ..config.model.boot_plan import (
 from .events import EventKind, Severity
 from .remote_node import RemoteNode
 
-PDO_OBJECTS = frozenset(
-    first + number
-    for first in (
-        Index.RPDO_COMMUNICATION,
-        Index.RPDO_MAPPING,
-        Index.TPDO_COMMUNICATION,
-        Index.TPDO_MAPPING,
-    )
-    for number in range(PDO_COUNT_MAX)
-)
 UNWATCHED = (
     'so it goes on with its last command when the master dies. Give it a time that it takes (the '
     "master's heartbeat_producer times heartbeat_multiplier), or write heartbeat_consumer: false "
@@ -88,7 +78,7 @@ class Configurator:
         """
         found = []
         for write in held_after_boot(self._bus, self._node.config):
-            if write.index not in PDO_OBJECTS or write.is_own_timer:
+            if pdo_object(write.index) is None or write.is_own_timer:
                 continue
             try:
                 present = await self._node.sdo.read(*write.address, self._sdo_timeout)

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from canopen_core import BootError, CodecError, SdoAbortError, SdoError
 from canopen_core.standard import (
+    axis_of,
     AXIS_OFFSET,
     decode,
     Index,
@@ -24,7 +25,6 @@ from .process_image import SentRpdo
 from .remote_node import RemoteNode
 from .remote_objects import start_value
 
-AXES_START = 0x6000  # objects of the first axis of a drive
 DUMMY_MAX = 0x001F  # objects below stand for gaps in a mapping (CiA 301, 7.4.7.1)
 POSITION_TARGETS = {
     TARGET_OBJECTS[mode]
@@ -80,10 +80,9 @@ def _is_readable(node: RemoteNode, mapped: MappedObject) -> bool:
 def _source(node: RemoteNode, mapped: MappedObject) -> MappedObject | None:
     """Return the object with the first value of an RPDO; None where the driver has it."""
     index = mapped.index
-    axis = (index - AXES_START) // AXIS_OFFSET * AXIS_OFFSET
-    first_axis = index - axis
+    first_axis, axis = axis_of(index)
     if node.config.is_drive and (first_axis, mapped.subindex) in POSITION_TARGETS:
-        return replace(mapped, index=Index.POSITION_ACTUAL + axis, subindex=0)
+        return replace(mapped, index=Index.POSITION_ACTUAL + AXIS_OFFSET * axis, subindex=0)
     if first_axis == Index.MODE_OF_OPERATION:
         return mapped
     offset = node.config.is_drive and first_axis in OFFSETS

@@ -81,6 +81,8 @@ from .objects import (
     OFFSETS,
     PDO_BITS_MAX,
     PDO_COUNT_MAX,
+    pdo_object,
+    PdoObject,
     slow_timeout,
 )
 from .pdo import (
@@ -147,6 +149,7 @@ __all__ = [
     'ObjectEntry',
     'OperationMode',
     'PdoCodec',
+    'PdoObject',
     'Statusword',
     'Value',
     'abort_text',
@@ -176,6 +179,7 @@ __all__ = [
     'object_path',
     'parse_heartbeat',
     'parse_nmt',
+    'pdo_object',
     'profile_number',
     'rpdo_default',
     'sdo',

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import NamedTuple
 
 
 class Index(IntEnum):
@@ -174,6 +175,22 @@ _SIGNED = frozenset(
         (Index.TARGET_VELOCITY, 0),
     }
 )
+
+
+class PdoObject(NamedTuple):
+    """A parameter object of a PDO."""
+
+    direction: str  # ``rpdo`` or ``tpdo``, as the device sees it
+    number: int  # of the PDO, from 1
+    is_mapping: bool  # it has the mapping, and not the communication parameters
+
+
+def pdo_object(index: int) -> PdoObject | None:
+    """Return which PDO an object is a parameter of (CiA 301, 7.5.2.35 to 7.5.2.38), if of any."""
+    kind, offset = divmod(index - Index.RPDO_COMMUNICATION, PDO_COUNT_MAX)
+    if not 0 <= kind < 4:
+        return None
+    return PdoObject('tpdo' if kind & 2 else 'rpdo', offset + 1, bool(kind & 1))
 
 
 def axis_of(index: int) -> tuple[int, int]:

@@ -10,7 +10,7 @@ import logging
 from pathlib import Path
 
 from canopen_core import SdoAbortError
-from canopen_core.standard import AbortCode, encode, Index, Value
+from canopen_core.standard import AbortCode, axis_of, COMMANDS, encode, Index, OFFSETS, Value
 
 from .object_store import Integer, ObjectStore, refusal, Variable
 
@@ -25,16 +25,13 @@ GROUPS: dict[int, tuple[int, int]] = {
 """First and last index of what a sub-index stores; those above 3 are the manufacturer's."""
 MANUFACTURER = (0x2000, 0x5FFF)
 
-AXIS_SPACING = 0x800  # between the same objects of two axes (CiA 402-1)
-PROCESS_DATA = frozenset(
-    {0x6040, 0x6042, 0x6060, 0x6071, 0x607A, 0x60B0, 0x60B1, 0x60B2, 0x60C1, 0x60FF}
-)
-"""What commands the drive is no parameter: nothing may move because it was stored."""
 NEVER_STORED = frozenset(
     {
         Index.PREDEFINED_ERROR_FIELD,
         Index.STORE_PARAMETERS,
         Index.RESTORE_PARAMETERS,
+        *COMMANDS,  # nothing may move because it was stored
+        *OFFSETS,
     }
 )
 
@@ -189,15 +186,8 @@ class ParameterStorage:
 
 
 def _is_parameter(variable: Variable) -> bool:
-    entry = variable.entry
-    index = entry.index
-    if index >= 0x6000:
-        index = 0x6000 + (index - 0x6000) % AXIS_SPACING
-    return (
-        entry.access.writable
-        and entry.access.readable
-        and index not in NEVER_STORED | PROCESS_DATA
-    )
+    access, (index, _) = variable.entry.access, axis_of(variable.entry.index)
+    return access.writable and access.readable and index not in NEVER_STORED
 
 
 def _check(variable: Integer, signature: int, value: Value) -> None:

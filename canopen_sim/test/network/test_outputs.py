@@ -22,9 +22,16 @@ from drive_samples import (
 import pytest
 
 from arm_canopen import BusError, CanopenError, CodecError, OperationMode
-from arm_canopen.config import NodeConfig
+from arm_canopen.config import NodeConfig, PdoConfig
 from arm_canopen.config.model.checks import check_bus
-from canopen_core.standard import NmtCommand
+from canopen_core.standard import (
+    AccessType,
+    DataType,
+    MappedObject,
+    NmtCommand,
+    ObjectDictionary,
+    ObjectEntry,
+)
 from canopen_sim import Fault, FaultInjection
 
 MODULE = 'module'
@@ -170,6 +177,28 @@ def test_the_position_of_a_drive_is_read_once_for_all_its_targets() -> None:
     requests = net.frames(0x602, since=configured)
     begun = [data for data in requests if data[:4] == b'\x40\x64\x60\0']
     assert len(begun) == 1
+
+
+@pytest.mark.parametrize('index', [0x207A, 0x20B0])
+def test_an_object_of_the_vendor_is_no_target_nor_offset(index: int) -> None:
+    """Its number shares the last digits with one; the RPDO carries what the device holds."""
+    entry = ObjectEntry(
+        index, 0, 'Gain', DataType.UNSIGNED32, access=AccessType.READ_WRITE, pdo_mappable=True
+    )
+    config = drive_config(JOINT, 2)
+    mapped = PdoConfig(
+        4, True, SPEEDS, 1, mapping=(MappedObject(index, 0, entry.data_type),), configured=True
+    )
+    config = replace(
+        config,
+        dictionary=ObjectDictionary([*config.dictionary, entry]),
+        rpdos=(*config.rpdos, mapped),
+    )
+    held = ObjectDictionary([*drive_dictionary(), replace(entry, default=7)])
+    net = VirtualNetwork(bus_config(config), dictionaries={JOINT: held})
+    net.boot()
+    net.run(0.1)
+    assert set(speeds(net, 0.0)) == {7}
 
 
 def test_a_boot_write_that_fits_no_type_is_refused() -> None:

@@ -14,7 +14,7 @@ import re
 
 from arm_canopen.config import BusConfig, DriveConfig, load_bus, NodeConfig, PdoConfig
 from canopen_core.standard import (
-    AXIS_OFFSET,
+    axis_of,
     CobId,
     DataType,
     Index,
@@ -167,12 +167,11 @@ def _scale(
 ) -> tuple[float, float, str]:
     """Return factor, offset and unit of an object; (1, 0) where bus.yml gives it no scale."""
     axes = {axis.channel: axis for axis in node.axes} if node.is_drive else {}
-    channel, rest = divmod(entry.index - 0x6000, AXIS_OFFSET)
+    index, channel = axis_of(entry.index)
     axis = axes.get(channel)
-    if axis is None or entry.index < 0x6000:
+    if axis is None:
         return 1, 0, ''
     unit = 'm' if (axis.name or node.name) in sliding else 'rad'
-    index = 0x6000 + rest
     if index in POSITIONS:
         return *_way(axis, 'pos', is_sent=is_sent, offset=True), unit
     if index in DISTANCES:

@@ -11,21 +11,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 import struct
 
-from arm_canopen.config import boot_writes, BootWrite, BusConfig, NodeConfig, RPDO, SdoWrite, TPDO
+from arm_canopen.config import boot_writes, BootWrite, BusConfig, NodeConfig, SdoWrite
 from canopen_core.standard import (
     COB_ID_INVALID,
     DataType,
     encode,
     Index,
     ObjectEntry,
-    PDO_COUNT_MAX,
+    pdo_object,
 )
 
 COUNT = struct.Struct('<I')
 ENTRY = struct.Struct('<HBI')
-MAPPINGS = frozenset(
-    way.mapping + number for way in (RPDO, TPDO) for number in range(PDO_COUNT_MAX)
-)
 
 EXPECTED_REVISION = 0x1F87  # of the devices, in the master's dictionary (CiA 302-2)
 EXPECTED_SERIAL = 0x1F88
@@ -77,7 +74,9 @@ def _is_needed(node: NodeConfig, write: BootWrite, *, complete: bool) -> bool:
 
     Our boot tries those, and goes on where the device refuses them; another master would fail.
     """
-    if write.is_own_timer or (write.index in MAPPINGS and not write.requested):
+    pdo = pdo_object(write.index)
+    is_own_mapping = pdo is not None and pdo.is_mapping and not write.requested
+    if write.is_own_timer or is_own_mapping:
         return False
     if complete or not write.unless_default:
         return True

@@ -9,15 +9,9 @@ from canopen_core.standard import (
     Index,
     object_address,
     ObjectDictionary,
-    PDO_COUNT_MAX,
+    pdo_object,
 )
 
-_PDO_RECORDS: tuple[tuple[Index, str], ...] = (
-    (Index.RPDO_COMMUNICATION, 'RPDO{} communication'),
-    (Index.RPDO_MAPPING, 'RPDO{} mapping'),
-    (Index.TPDO_COMMUNICATION, 'TPDO{} communication'),
-    (Index.TPDO_MAPPING, 'TPDO{} mapping'),
-)
 _STANDARD_NAMES: dict[int, str] = {
     index: index.name.replace('_', ' ').capitalize() for index in Index
 }
@@ -46,7 +40,7 @@ class ObjectNames:
 
 
 def _standard_name(index: int) -> str:
-    for base, name in _PDO_RECORDS:
-        if base <= index < base + PDO_COUNT_MAX:
-            return name.format(index - base + 1)
+    if pdo := pdo_object(index):
+        what = 'mapping' if pdo.is_mapping else 'communication'
+        return f'{pdo.direction.upper()}{pdo.number} {what}'
     return _STANDARD_NAMES.get(index, '')

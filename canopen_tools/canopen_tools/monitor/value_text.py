@@ -21,7 +21,7 @@ from canopen_core.standard import (
     mapped_place,
     mode_title,
     object_address,
-    PDO_COUNT_MAX,
+    pdo_object,
     sdo,
     Value,
 )
@@ -132,17 +132,12 @@ def value_text(index: int, subindex: int, value: Value) -> str:
 
 
 def _text_of(index: int, subindex: int) -> Callable[[int], str] | None:
-    if _is_pdo(index, Index.RPDO_COMMUNICATION, Index.TPDO_COMMUNICATION):
+    pdo = pdo_object(index)
+    if pdo is not None and not pdo.is_mapping:
         return _cob_id_text if subindex == _COB_ID_SUBINDEX else None
     if not subindex:
         return _TEXTS.get(index)
-    if _is_pdo(index, Index.RPDO_MAPPING, Index.TPDO_MAPPING):
-        return _mapping_text
-    return _RECORD_TEXTS.get(index)
-
-
-def _is_pdo(index: int, *bases: int) -> bool:
-    return any(base <= index < base + PDO_COUNT_MAX for base in bases)
+    return _RECORD_TEXTS.get(index) if pdo is None else _mapping_text
 
 
 def data_text(index: int, subindex: int, data_type: DataType | None, data: bytes) -> str:

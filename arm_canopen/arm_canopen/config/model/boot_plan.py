@@ -22,7 +22,7 @@ from canopen_core.standard import (
     Index,
     MAPPED_LENGTH_MASK,
     object_address,
-    PDO_COUNT_MAX,
+    pdo_object,
     SYNC_PRODUCER,
     TIME_CONSUMER,
     TIME_PRODUCER,
@@ -30,7 +30,7 @@ from canopen_core.standard import (
 
 from ..units import HUNDRED_MICROSECONDS, MILLISECONDS
 from .bus import BusConfig, NodeConfig, SdoWrite
-from .pdo import Direction, EVENT_TIMER_SUBINDEX, PdoConfig, RPDO, TPDO
+from .pdo import Direction, EVENT_TIMER_SUBINDEX, PdoConfig, TPDO
 
 COB_ID_BITS = COB_ID_INVALID | COB_ID_EXTENDED | CAN_ID_MASK
 """Bits that bus.yml decides of a COB-ID; the device has bit 30 as it can."""
@@ -77,15 +77,9 @@ class BootWrite:
     @property
     def is_own_timer(self) -> bool:
         """Whether it sets the event timer of a TPDO without a request of bus.yml."""
-        number = self.index - TPDO.communication
-        is_timer = 0 <= number < PDO_COUNT_MAX and self.subindex == EVENT_TIMER_SUBINDEX
-        return is_timer and not self.requested
-
-    @property
-    def _is_mapped(self) -> bool:
-        areas = (RPDO.mapping, TPDO.mapping)
-        in_area = any(0 <= self.index - first < PDO_COUNT_MAX for first in areas)
-        return in_area and self.subindex > 0
+        pdo, is_timer = pdo_object(self.index), self.subindex == EVENT_TIMER_SUBINDEX
+        of_tpdo = pdo is not None and pdo.direction == TPDO.name and not pdo.is_mapping
+        return of_tpdo and is_timer and not self.requested
 
     def text(self, held: bytes | None = None) -> str:
         """Write the bits that count as a hexadecimal number: its own, or those of a device."""
@@ -102,7 +96,8 @@ class BootWrite:
 
     def fits(self, held: bytes) -> bool:
         """Return whether a value of the device is what is wanted."""
-        if self._is_mapped and held:
+        pdo = pdo_object(self.index)
+        if pdo is not None and pdo.is_mapping and self.subindex and held:
             held = bytes((held[0] & MAPPED_LENGTH_MASK,)) + held[1:]
         if self.mask is None or len(held) != len(self.data):
             return held == self.data

@@ -29,7 +29,7 @@ from canopen_core.standard import (
     object_address,
     ObjectDictionary,
     ObjectEntry,
-    PDO_COUNT_MAX,
+    pdo_object,
     REAL_FORMATS,
     SIGNED_BITS,
     Value,
@@ -43,12 +43,6 @@ from ..read.document import Item, Scalar, ScalarKind, YamlMap
 from ..read.section import block, listing, read_section
 from ..sections import SDO_KEYS, U8_MAX
 
-PDO_OBJECTS = (
-    (Index.RPDO_COMMUNICATION, 'rpdo'),
-    (Index.RPDO_MAPPING, 'rpdo'),
-    (Index.TPDO_COMMUNICATION, 'tpdo'),
-    (Index.TPDO_MAPPING, 'tpdo'),
-)
 OWN_KEYS: dict[tuple[int, int], str] = {
     (Index.PRODUCER_HEARTBEAT, 0): 'heartbeat_producer',
     (Index.CONSUMER_HEARTBEAT, 1): 'heartbeat_consumer',
@@ -136,12 +130,11 @@ def _writable_entry(dictionary: ObjectDictionary, index: int, subindex: int) -> 
 
 def _check_purpose(index: int, subindex: int) -> None:
     """Refuse objects that the master writes itself; a second writer would contradict it."""
-    for first, name in PDO_OBJECTS:
-        if first <= index < first + PDO_COUNT_MAX:
-            raise RefusedError(
-                f'{object_address(index)} configures a PDO, and the master would not know of it',
-                f'set it below {name}: {index - first + 1}:',
-            )
+    if pdo := pdo_object(index):
+        raise RefusedError(
+            f'{object_address(index)} configures a PDO, and the master would not know of it',
+            f'set it below {pdo.direction}: {pdo.number}:',
+        )
     if key := OWN_KEYS.get((index, subindex)):
         raise RefusedError(
             f'{object_address(index)} is written by the master, which has to know it',
@@ -229,7 +222,6 @@ def _range_remedy(data_type: DataType, value: Value) -> str:
 
 ACTIONS = frozenset({Index.STORE_PARAMETERS, Index.RESTORE_PARAMETERS})
 """Objects that do something when they are written."""
-PDOS = range(Index.RPDO_COMMUNICATION, 0x1C00)
 PROGRAMS_AND_NMT = range(0x1F50, 0x1FA0)  # CiA 302-2 and -3
 
 
@@ -249,8 +241,8 @@ def parameter_writes(eds: Eds, findings: Findings) -> tuple[SdoWrite, ...]:
 def _is_setting(entry: ObjectEntry) -> bool:
     index = entry.index
     others = index in ACTIONS or index in ERROR_CONTROL or index == Index.SDO_SERVER
-    ranges = index in PDOS or index in PROGRAMS_AND_NMT
-    return entry.access.writable and not (others or ranges)
+    others = others or pdo_object(index) is not None or index in PROGRAMS_AND_NMT
+    return entry.access.writable and not others
 
 
 def _data(entry: ObjectEntry, eds: Eds, findings: Findings) -> bytes | None:
