@@ -44,6 +44,8 @@ PORT_REMEDY = 'another --port'
 """What a second bring-up on a port has to choose."""
 CONTROLLER_FIRST, THEN_BRIDGE, SIMULATOR_LAST = range(3)
 """Order of stopping: the controller, then the bridge, then the robot."""
+THROWING = 10.0
+"""Stiffness of servos [N m/rad] that throw a robot off its back."""
 SIMULATOR = Executable('quad_sim', 'fake_xgo')
 BRIDGE = Executable('quad_hardware', 'hardware_node')
 CONTROLLER = Executable('quad_controller', 'controller_node')
@@ -151,8 +153,8 @@ def _controller_parameters(stack: Stack) -> dict[str, str]:
         values['policy'] = str(stack.policy)
     if stack.record is not None:
         values['record'] = str(stack.record)
-    if stack.simulate:  # no person is hurt, and nothing breaks
-        values['get_up_swings'] = 'true'
+    if stack.simulate and stack.servo is not None and _stiffness(stack.servo) >= THROWING:
+        values['get_up_swings'] = 'true'  # no person is hurt, and nothing breaks
     return values
 
 

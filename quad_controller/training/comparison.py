@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 import shutil
 
@@ -13,11 +14,17 @@ from progress import Progress
 from quad_controller import Velocity
 from quad_controller.gait.parameters import LOW_AND_WIDE
 from quad_controller.policy.report import table_text
-from quad_controller.policy_check.arenas import AS_MADE, Conditions, TIPPING_PUSH
+from quad_controller.policy_check.arenas import (
+    AS_MADE,
+    Conditions,
+    RobotChoice,
+    TIPPING_PUSH,
+)
 from quad_controller.policy_check.course import CourseFigures, Passage
 from quad_controller.policy_check.main import run as check_policy
 from quad_controller.policy_check.trial import Candidate, run_trials, shipped_walkers, Trial
 
+SERVO = 'firm'  # what it is trained with
 CHANCE = 0.25  # share of the falls that may be chance
 
 GAIT, LOW_GAIT = 'gait', 'gait, low and wide'
@@ -122,6 +129,8 @@ def judge(folder: Path, policies: Mapping[str, Path], progress: Progress, durati
     progress.say('comparing ...')
     walkers = {GAIT: Candidate(), LOW_GAIT: Candidate(gait=LOW_AND_WIDE)}
     walkers |= shipped_walkers() | {name: Candidate(path) for name, path in policies.items()}
+    trained_on = RobotChoice(servo=SERVO)
+    walkers = {name: replace(who, robot=trained_on) for name, who in walkers.items()}
     compared = compare(walkers, duration)
     text = table(compared)
     (folder / 'figures.txt').write_text(f'{text}\n', encoding='utf-8')
@@ -131,7 +140,7 @@ def judge(folder: Path, policies: Mapping[str, Path], progress: Progress, durati
     code = 0
     for walk in CHECKED_WALKS:
         progress.say(f'check_policy {path} --walk {" ".join(map(str, walk))}')
-        code = max(code, check_policy([str(path), '--walk', *map(str, walk)]))
+        code = max(code, check_policy([str(path), '--servo', SERVO, '--walk', *map(str, walk)]))
     progress.say(text)
     verdict = 'accepted' if code == 0 else 'refused'
     progress.say(f'{path} is what {chosen} made; check_policy: {verdict}')

@@ -164,7 +164,8 @@ def test_a_dead_imu_says_no_number_and_the_servos_follow() -> None:
 def test_a_limp_servo_gives_way_and_comes_back() -> None:
     """One servo lets go: the robot sinks there, the board says so; afterwards it holds again."""
     fault = 'limp,at=0.5,for=1,motor=11'
-    robot = VirtualRobot('--start', 'stand', '--noise', 'none', '--fault', fault)
+    still = '--start', 'stand', '--noise', 'none', '--servo', 'firm'
+    robot = VirtualRobot(*still, '--fault', fault)
     robot.send(ON)
     servos = robot.simulation.board.servos
     before, *_, after = (read_state(frame) for frame in robot.run(1.4))

@@ -377,3 +377,15 @@ def test_a_target_comes_with_the_next_refresh_after_its_delay() -> None:
     assert [round(at, 3) for at in came[4:]] == [0.3, 0.3, 0.3, 0.3, 0.7, 0.7]
     with pytest.raises(TargetError):
         robot.set_targets({'tail_joint': 0.0})
+
+
+def test_targets_of_before_the_torque_count_with_it() -> None:
+    """A servo that wakes goes where it was sent before, though that target is on the way."""
+    robot = Robot(URDF, ServoParameters(stiffness=5.0, delay=0.02))
+    robot.set_torque(False)
+    robot.step(0.5)
+    held = robot.joint_positions
+    robot.set_targets(held)
+    robot.set_torque(True, hold=False)
+    robot.step(0.5)
+    assert robot.joint_positions == pytest.approx(held, abs=0.03)

@@ -112,7 +112,7 @@ def test_it_reports_that_it_is_ready(ros: bool, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ('arguments', 'message'),
     [
-        (['--servo', 'strong'], 'give firm or vendor_rl, or kp,kv'),
+        (['--servo', 'strong'], 'give nominal or firm or vendor_rl, or kp,kv'),
         (['--servo', 'kv=1'], 'needs kp'),
         (['--slope', '80'], 'slope of'),
         (['--friction', '0'], 'friction 0'),

@@ -81,7 +81,7 @@ def test_golden_bytes(tmp_path: Path) -> None:
 
 def test_what_a_resting_robot_reports(tmp_path: Path) -> None:
     """Firmware, battery, level attitude, one g upwards, and the servos of the standing pose."""
-    with robot(tmp_path, '--start', 'stand') as (client, _):
+    with robot(tmp_path, '--start', 'stand', '--servo', 'firm') as (client, _):
         assert client.firmware().startswith('L-')
         assert client.battery() == 100
         acceleration, rate, attitude = client.imu()

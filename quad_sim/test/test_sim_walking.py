@@ -23,7 +23,8 @@ JOINTS = movable_joints(robot_urdf('lite'))
 
 def standing(*arguments: str) -> VirtualRobot:
     """A robot of protocol v1 on its feet."""
-    return VirtualRobot('--start', 'stand', '--noise', 'none', *arguments, protocol=V1)
+    still = '--start', 'stand', '--noise', 'none', '--servo', 'firm'
+    return VirtualRobot(*still, *arguments, protocol=V1)
 
 
 def write(robot: VirtualRobot, register: int, byte: int) -> None:

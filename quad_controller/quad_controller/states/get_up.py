@@ -42,9 +42,10 @@ REACH_TOLERANCE = 0.01  # [rad] that a joint may be short of a pose
 
 BY_HAND = 'put it on its feet by hand, then call ~/clear_fault, or request get_up again'
 ON_ITS_BACK = (
-    'it lies on its back, and only a throw at full speed is known to turn it over, tried in '
-    'simulation alone: put it on its feet or on a side by hand, or allow that by the parameter '
-    'get_up_swings and stand clear; then request get_up again'
+    'it lies on its back, and only a throw at full speed is known to turn it over, by servos of '
+    '10 N m/rad in simulation; as published they are too soft: put it on its feet or on a side '
+    'by hand, or allow that by the parameter get_up_swings and stand clear; then request get_up '
+    'again'
 )
 WITH_AN_ARM = (
     'it lies on its back and its arm, and how it turns over there is not known; put it on its '

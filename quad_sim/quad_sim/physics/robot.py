@@ -169,6 +169,8 @@ class Robot:
         unknown = sorted(set(names) - set(self.joint_names))
         if unknown:
             raise SetupError(f'no joint is named {", ".join(unknown)}')
+        if on and not hold:  # what was sent before the torque comes before it, too
+            self._take_targets(self._steps + self._delay + self._refresh)
         for name in names:
             index = self.joint_names.index(name)
             switched_on = on and not self.torque_on(name)
@@ -230,9 +232,7 @@ class Robot:
         self._remainder -= count
         model, data, ramp, inertial = self._model, self._data, self._ramp, self._inertial
         for _ in range(count):
-            while self._coming and self._coming[0][0] <= self._steps:
-                _, targets, duration = self._coming.popleft()
-                ramp.approach(targets, duration)
+            self._take_targets(self._steps)
             ramp.advance()
             data.ctrl[:] = self._set_points()
             if self._push_until is not None and self._steps >= self._push_until:
@@ -334,6 +334,12 @@ class Robot:
         return disturb(truth, self._noise, self._random)
 
     # -- inside
+
+    def _take_targets(self, until: int) -> None:
+        """Begin to approach the targets that come up to a step."""
+        while self._coming and self._coming[0][0] <= until:
+            _, targets, duration = self._coming.popleft()
+            self._ramp.approach(targets, duration)
 
     def _set_points(self) -> Array:
         """Return what the servos pull to: nowhere within their free width."""
