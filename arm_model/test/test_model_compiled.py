@@ -86,6 +86,7 @@ def test_distances_are_those_of_coal(shape: Shape, pose: Pose, seed: int) -> Non
     for within in (0.001, 0.1, 1.0):
         bounds = core(scene).least(place, within)
         assert (bounds <= np.maximum(expected, 0.0) + ROUNDING).all()
+        assert (bounds[apart] >= np.minimum(expected[apart], within) - EXACT).all()
         assert core(scene).clear(place, within) == bool((found >= within).all())
 
 

@@ -3,8 +3,8 @@
 """The compiled core of motion checks: motions.c, built by the C compiler of the machine.
 
 It is built at its first use, in half a second, and kept in ``$XDG_CACHE_HOME/arm_model/compiled``
-(``~/.cache/arm_model/compiled``), one file for each content of the source. Where there is no
-compiler, or it fails, one warning says so, and the same checks run in Python, several times
+(``~/.cache/arm_model/compiled``), one file for each source, compiler and processor. Where there
+is no compiler, or it fails, one warning says so, and the same checks run in Python, several times
 slower. ``ARM_MODEL_COMPILED=0`` asks for that.
 """
 
@@ -19,6 +19,7 @@ import logging
 import os
 from pathlib import Path
 import platform
+import shlex
 import shutil
 import subprocess
 import tempfile
@@ -249,10 +250,11 @@ def _built() -> Path:
     Raises:
         OSError, ValueError, SubprocessError: It cannot be built.
     """
-    compiler = os.environ.get('CC') or shutil.which('cc') or shutil.which('gcc')
+    compiler = shlex.split(os.environ.get('CC', ''))
+    compiler = compiler or [each for each in ('cc', 'gcc') if shutil.which(each)][:1]
     if not compiler:
         raise OSError('there is no C compiler')
-    key = (SOURCE.read_bytes(), *map(str.encode, (compiler, *FLAGS, platform.machine())))
+    key = (SOURCE.read_bytes(), *map(str.encode, (*compiler, *FLAGS, _processor())))
     digest = hashlib.sha256(b'\0'.join(key)).hexdigest()
     hulls = cache_folder()
     folder = Path(tempfile.mkdtemp(prefix='arm_model-')) if hulls is None else hulls.parent
@@ -260,10 +262,20 @@ def _built() -> Path:
     if not target.is_file():
         target.parent.mkdir(parents=True, exist_ok=True)
         with _beside(target) as made:
-            command = [compiler, *FLAGS, '-o', str(made), str(SOURCE), '-lm']
+            command = [*compiler, *FLAGS, '-o', str(made), str(SOURCE), '-lm']
             subprocess.run(command, check=True, capture_output=True, text=True, timeout=BUILD_TIME)
             made.replace(target)  # in one step: other processes build it, too
     return target
+
+
+def _processor() -> str:
+    """Return what tells processors apart whose programs differ: a home may serve several."""
+    try:
+        lines = Path('/proc/cpuinfo').read_text(encoding='ascii', errors='replace').splitlines()
+    except OSError:
+        lines = []
+    features = next((line for line in lines if line.startswith(('flags', 'Features'))), '')
+    return f'{platform.machine()} {features}'
 
 
 @contextlib.contextmanager

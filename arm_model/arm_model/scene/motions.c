@@ -56,7 +56,7 @@ typedef struct {
   Pair *pair;
   double *x, *y, *z, *dots; /* points of hulls, by coordinate */
   double *rates;            /* how fast each joint changes a pair's distance at most */
-  double *motions, *left, *state, *way, *turns;
+  double *motions, *left, *state, *way, *turns; /* turns: four rows */
   Part *parts;
   int part_room;
   int *arena;
@@ -249,7 +249,7 @@ static double distance(World *w, int number, double enough) {
   }
   minus(b->center, a->center, apart);
   least = sqrt(dot(apart, apart)) - a->radius - b->radius; /* which hold what is swept, too */
-  if (least >= enough || least >= FAR + 0.25 * enough) return least;
+  if (least >= enough) return least;
   for (int i = 0; i < 3; i++) {
     for (int j = 0; j < 3; j++) {
       b_in_a[3 * i + j] = a->world[i] * b->world[j] + a->world[3 + i] * b->world[3 + j] +
@@ -270,7 +270,7 @@ static double distance(World *w, int number, double enough) {
     if (gap > least) {
       least = gap;
       memcpy(pair->direction, d, sizeof d);
-      if (least >= enough || least >= FAR + 0.25 * enough) return least;
+      if (least >= enough) return least;
     }
     if (count && most - least <= (least < NEAR ? CONVERGED_NEAR : CONVERGED)) return least;
     for (int i = 0; i < count; i++) {
@@ -378,7 +378,7 @@ World *world_new(int joints, int columns, int shapes, int pairs, int points,
   w->x = doubles(points), w->y = doubles(points), w->z = doubles(points);
   w->dots = doubles(points), w->rates = doubles(pairs * joints), w->motions = doubles(pairs);
   w->left = doubles(pairs), w->state = doubles(joints), w->way = doubles(joints);
-  w->turns = doubles(2 * joints), w->part_room = 64, w->arena_room = 4 * pairs + 64;
+  w->turns = doubles(4 * joints), w->part_room = 64, w->arena_room = 4 * pairs + 64;
   w->parts = calloc(w->part_room, sizeof *w->parts), w->arena = ints(w->arena_room);
   if (!(w->factors && w->offsets && w->placements && w->axes && w->poses && w->parents &&
         w->slides && w->shape && w->pair && w->x && w->y && w->z && w->dots && w->rates &&
@@ -440,7 +440,7 @@ static int doubtful(World *w, const Part *part, const double *required, const do
   for (int i = 0; i < part->count; i++) {
     int pair = part->first < 0 ? i : w->arena[part->first + i];
     double moved = share * motions[pair], need = fmax(moved, required[pair]);
-    double apart = distance(w, pair, need);
+    double apart = distance(w, pair, fmin(need, fmax(required[pair], FAR + 0.25 * need)));
     if (apart < required[pair]) {
       w->hit = pair;
       return -1;
@@ -519,8 +519,8 @@ int world_path(World *w, int segments, const double *starts, const double *coeff
                int cells, const double *times, const double *along, const double *turned,
                double first_part, const double *required, double *where) {
   int queued = 0, room = 0, count, n = w->joints;
-  double whole = along[cells - 1], before[64], middle[64], after[64];
-  if (n > 64) return -1;
+  double whole = along[cells - 1];
+  double *before = w->turns + n, *middle = w->turns + 2 * n, *after = w->turns + 3 * n;
   count = (int)fmax(ceil(whole / first_part), 1.0);
   for (int i = 0; i < count; i++) {
     double half = 0.5 * whole / count;
