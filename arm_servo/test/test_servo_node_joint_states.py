@@ -18,13 +18,10 @@ from servo_drives import Drives, PERIOD
 from urdf_reader import Mimic
 
 from arm_servo.ros.joint_state_broadcaster import (
-    JointSample,
     JointSamples,
     JointStateBroadcaster,
     MAX_AGE,
 )
-
-GRIPPER = JointSample(0.04, 0.0, 100.0)
 
 
 def ready() -> tuple[Drives, JointSamples]:
@@ -60,7 +57,7 @@ def test_a_drive_that_is_silent_is_left_out() -> None:
 def test_drives_beside_the_arm_are_there() -> None:
     """A gripper is no joint of the group, and a joint of the robot."""
     drives, samples = ready()
-    samples.receive('gripper', replace(GRIPPER, time=drives.now))
+    samples.receive(['gripper'], [0.04], [0.0], drives.now)
     found = samples.fresh(drives.gateway.snapshot, drives.now)
     assert list(found) == [*drives.source.axes, 'gripper']
     assert found['gripper'].position == 0.04

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import core_commands
 from isolation import Isolation
@@ -20,8 +20,7 @@ from arm_model import ModelError
 from arm_model.ros import GroupModels
 from arm_servo import check_parameters, CoreSettings, MotionCore
 from arm_servo.ros.group_motion import Offers
-from arm_servo.ros.parameter_names import check_names
-from arm_servo.ros.parameter_sheet import ParameterSheet
+from arm_servo.ros.parameter_check import check_names, ParameterSheet
 from arm_servo.ros.servo.parameters import declare_servo, ServoParameters
 from arm_servo.ros.topics_backend import build_motion
 
@@ -319,7 +318,7 @@ def test_nodes_begin_with_upstream_parameters(
 def servo_parameters(**values: object) -> ServoParameters:
     """Return what the servo reads of a configuration."""
     sheet = ParameterSheet('servo_node', {'moveit_servo': values})
-    return declare_servo(sheet.node, robot('panda'))
+    return declare_servo(cast('Node', sheet), robot('panda'))
 
 
 @pytest.mark.parametrize(

@@ -27,8 +27,7 @@ import numpy as np
 from arm_model import Array, frozen, Mask, RobotModel, RobotState, turned_twists
 
 from ..report import Cause, Limiter, MotionReport
-from .reach_limit import ReachLimit
-from .singularity import Directions, directions
+from .singularity import Directions, directions, ReachLimit
 from .velocity_bounds import Bounds, VelocityBounds, VelocityBoundsSettings
 
 AXES = ('x', 'y', 'z', 'rotation x', 'rotation y', 'rotation z')  # names of the axes of a twist

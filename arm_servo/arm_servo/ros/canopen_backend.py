@@ -25,7 +25,7 @@ from .controller_manager import ControllerManager, declare_manager
 from .group_motion import build_groups, by_check, MakeNode, Offers
 from .joint_state_broadcaster import JointStateBroadcaster
 from .other_programs import watch_other_programs
-from .parameter_names import check_names
+from .parameter_check import check_names
 from .scene_listener import SceneListener
 
 if TYPE_CHECKING:

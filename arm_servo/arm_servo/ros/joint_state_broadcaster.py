@@ -5,9 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
-import math
 import time
 
 from control_msgs.msg import DynamicJointState, InterfaceValue
@@ -18,6 +15,7 @@ from sensor_msgs.msg import JointState
 from urdf_reader import Mimic
 
 from node_runner import ParameterReader
+from robot_primitives import JointSample, JointStateStore
 
 from ..core.gateway import CommandGateway
 from ..core.snapshot import Snapshot
@@ -28,31 +26,18 @@ MAX_AGE = 0.5
 """Age at which a measured value is published no more in [s]: as long as a drive may be silent."""
 
 
-@dataclass(frozen=True, slots=True)
-class JointSample:
-    """What was measured of a joint."""
-
-    position: float  # in [rad]
-    velocity: float  # in [rad/s]
-    time: float  # when, as steady time in [s]
-
-
-class JointSamples:
+class JointSamples(JointStateStore):
     """What is known of the arm's joints, of drives beside them, and of joints that mimic these."""
 
     def __init__(self, joints: Sequence[str], mimics: Mapping[str, Mimic]) -> None:
-        self._joints, self._mimics = list(joints), mimics
-        self._received: dict[str, JointSample] = {}
-
-    def receive(self, joint: str, sample: JointSample) -> None:
-        """Store what the drive of another joint has measured."""
-        self._received[joint] = sample
+        super().__init__()
+        self._order, self._mimics = list(joints), mimics
 
     def fresh(self, snapshot: Snapshot, now: float) -> dict[str, JointSample]:
         """Return what was measured lately, the arm's joints first."""
         fresh = {
             name: sample
-            for name, sample in (self._of_the_arm(snapshot) | self._received).items()
+            for name, sample in (self._of_the_arm(snapshot) | dict(self.samples())).items()
             if now - sample.time <= MAX_AGE
         }
         for name, mimic in self._mimics.items():
@@ -64,12 +49,15 @@ class JointSamples:
         measured = snapshot.measured
         if measured is None:
             return {}
-        ages = np.zeros(len(self._joints)) if snapshot.ages is None else snapshot.ages
-        rows = zip(self._joints, measured.position, measured.velocity, ages, strict=True)
-        return {
-            name: JointSample(float(position), float(velocity), snapshot.time - float(age))
-            for name, position, velocity, age in rows
-        }
+        ages = np.zeros(len(self._order)) if snapshot.ages is None else snapshot.ages
+        rows = zip(
+            self._order,
+            measured.position.tolist(),
+            measured.velocity.tolist(),
+            (snapshot.time - ages).tolist(),
+            strict=True,
+        )
+        return {name: JointSample(*row) for name, *row in rows}
 
 
 def _mimicked(mimic: Mimic, source: JointSample) -> JointSample:
@@ -116,7 +104,7 @@ class JointStateBroadcaster:
         self._dynamic = node.create_publisher(DynamicJointState, 'dynamic_joint_states', 10)
         for name in others:
             topic = f'{name}/joint_states'
-            node.create_subscription(JointState, topic, partial(self._receive, name), 10)
+            node.create_subscription(JointState, topic, self._receive, 10)
         node.create_timer(1.0 / self.rate, self._publish)
 
     def entry(self) -> Controller:
@@ -129,15 +117,9 @@ class JointStateBroadcaster:
         """Publish, or stop publishing."""
         self.active = active
 
-    def _receive(self, name: str, message: JointState) -> None:
-        if name not in message.name:
-            return
-        place = list(message.name).index(name)
-        if place < len(message.position) and math.isfinite(message.position[place]):
-            has_velocity = place < len(message.velocity)
-            velocity = message.velocity[place] if has_velocity else math.nan
-            sample = JointSample(message.position[place], velocity, time.monotonic())
-            self._samples.receive(name, sample)
+    def _receive(self, message: JointState) -> None:
+        now = time.monotonic()
+        self._samples.receive(message.name, message.position, message.velocity, now)
 
     def _publish(self) -> None:
         now = time.monotonic()

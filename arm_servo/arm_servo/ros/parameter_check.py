@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the nodes refuse of their parameters, and what they would refuse of a file."""
+"""Names of parameters: what the nodes refuse, and what they would refuse of a file."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any, TYPE_CHECKING
+from types import SimpleNamespace
+from typing import Any, cast, TYPE_CHECKING
 
 from arm_model import ModelError, RobotModel
 
@@ -17,6 +18,38 @@ if TYPE_CHECKING:
 
 Declare = Callable[['Node'], object]  # declares the parameters of a node
 EVERY_NODE = '/**'  # name in a parameter file that stands for all nodes
+
+OF_OTHERS = (
+    *('publish_robot_description', 'publish_robot_description_semantic'),
+    *('robot_description_name', 'publish_dynamic_joint_states'),
+    *(
+        f'moveit_servo.{name}'
+        for name in (
+            *('check_octomap_collisions', 'command_out_topic', 'command_out_type', 'joint_topic'),
+            *('publish_joint_accelerations', 'scene_collision_proximity_threshold'),
+        )
+    ),
+)
+"""Parameters that have no effect on some nodes, and look like those that have."""
+
+OF_PROGRAM = {'backend', 'jogging', 'trajectories'}  # read by motion_node before its nodes
+
+
+def check_names(nodes: Sequence[Node]) -> None:
+    """Refuse misspelt parameters of the nodes of a program, and log once those of none of them.
+
+    Configurations of MoveIt and ros2_control have many of the latter, and work as they are.
+
+    Raises:
+        ParameterError: A name looks like one that there is.
+    """
+    from node_runner import refuse_misspelt
+
+    unknown = {name for node in nodes for name in refuse_misspelt(node, OF_OTHERS)} - OF_PROGRAM
+    unused = [name for name in unknown if not any(node.has_parameter(name) for node in nodes)]
+    if unused:
+        names = ', '.join(sorted(unused))
+        nodes[0].get_logger().info(f'parameters without effect here: {names}')
 
 
 def check_parameters(models: GroupModels, document: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -33,15 +66,13 @@ def check_parameters(models: GroupModels, document: Mapping[str, Any]) -> list[t
     """
     from node_runner import ParameterError, refuse_misspelt
 
-    from .parameter_names import OF_OTHERS
-    from .parameter_sheet import ParameterSheet
-
     problems = []
     for name, declare in _nodes(models, document).items():
         sheet = ParameterSheet(name, _given(document, name))
         try:
-            declare(sheet.node)
-            refuse_misspelt(sheet.node, OF_OTHERS)
+            node = cast('Node', sheet)
+            declare(node)
+            refuse_misspelt(node, OF_OTHERS)
         except (ParameterError, ModelError) as error:
             problems.append((name, str(error)))
     return problems
@@ -103,3 +134,54 @@ def _given(document: Mapping[str, Any], node: str) -> dict[str, Any]:
         if name in names and isinstance(table, dict):
             given |= table.get('ros__parameters') or {}
     return given
+
+
+class ParameterSheet:
+    """What declarations need of a node; made of the tables of a parameter file."""
+
+    def __init__(self, name: str, table: Mapping[str, Any]) -> None:
+        """Read what the file has for a node.
+
+        Args:
+            table: Parameters by name; tables in it are names with dots.
+        """
+        self._name = name
+        self._parameter_overrides = {
+            key: SimpleNamespace(name=key, value=value) for key, value in flat(table).items()
+        }
+        self._declared: dict[str, Any] = {}
+
+    def get_name(self) -> str:
+        """Return the name of the node."""
+        return self._name
+
+    def declare_parameter(
+        self, name: str, value: object, *_descriptor: object, **_: object
+    ) -> SimpleNamespace:
+        """Keep a parameter."""
+        self._declared[name] = SimpleNamespace(name=name, value=value)
+        return self.get_parameter(name)
+
+    def has_parameter(self, name: str) -> bool:
+        """Whether it was declared."""
+        return name in self._declared
+
+    def get_parameter(self, name: str) -> SimpleNamespace:
+        """Return what was declared."""
+        parameter: SimpleNamespace = self._declared[name]
+        return parameter
+
+    def get_parameters_by_prefix(self, prefix: str) -> dict[str, SimpleNamespace]:
+        """Return what was declared below a prefix; empty for all."""
+        return {name: it for name, it in self._declared.items() if name.startswith(prefix)}
+
+
+def flat(table: Mapping[str, Any], prefix: str = '') -> dict[str, Any]:
+    """Return tables in tables as names with dots."""
+    names: dict[str, Any] = {}
+    for name, value in table.items():
+        if isinstance(value, dict):
+            names |= flat(value, f'{prefix}{name}.')
+        else:
+            names[f'{prefix}{name}'] = value
+    return names

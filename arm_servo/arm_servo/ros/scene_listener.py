@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from functools import partial
-import math
 import time
 
 from moveit_msgs.msg import PlanningScene
@@ -19,6 +18,7 @@ from arm_model import ArmError, Array
 from arm_model import PlanningScene as Scene
 from arm_model.ros import apply_planning_scene
 from node_runner import LATCHED
+from robot_primitives import JointStateStore
 
 from ..controllers.controller import Source
 from ..core.gateway import CommandGateway
@@ -90,15 +90,15 @@ class SceneListener:
         self._assuming = list(self._updaters)  # the same for joints beside them
         self._placed: dict[SceneUpdater, float] = {}  # since when
         self._joints = JointPlaces()
-        self._places: dict[str, float] = {}
         commanded = {name for gateway in self._gateways for name in gateway.model.joints}
-        self._awaited = {name for each in self._updaters for name in each.others} - commanded
+        awaited = {name for each in self._updaters for name in each.others} - commanded
+        self._states = JointStateStore(awaited)
         node.create_subscription(PlanningScene, TOPIC, self._take, LATCHED)
         # raw: its meshes take long to read, which is left out where nobody needs them
         node.create_subscription(
             PlanningScene, FOREIGN_TOPIC, self._take_foreign, LATCHED, raw=True
         )
-        if self._awaited:
+        if awaited:
             node.create_subscription(JointState, joint_topic, self._take_joints, 10)
         node.create_timer(LOOK_PERIOD, self._look)
 
@@ -121,15 +121,12 @@ class SceneListener:
         self._submit()
 
     def _take_joints(self, message: JointState) -> None:
-        self._places.update(
-            (name, place)
-            for name, place in zip(message.name, message.position, strict=False)
-            if name in self._awaited and math.isfinite(place)
-        )
+        self._states.receive(message.name, message.position, [], self._clock())
 
     def _look(self) -> None:
         """See where the joints are, and have applied what is new."""
-        places, commanded = dict(self._places), set[str]()
+        places = {name: each.position for name, each in self._states.samples().items()}
+        commanded = set[str]()
         for gateway in self._gateways:
             snapshot, names = gateway.snapshot, gateway.model.joints
             reference = snapshot.reference

@@ -35,7 +35,7 @@ from ..io.topic_output import ARRAY, declare_output, TopicOutput, TRAJECTORY
 from .controller_manager import ControllerManager, declare_manager
 from .group_motion import build_arm, build_groups, by_check, MakeNode, Offers
 from .other_programs import watch_other_programs
-from .parameter_names import check_names
+from .parameter_check import check_names
 from .scene_listener import SceneListener
 from .servo.parameters import PREFIX
 

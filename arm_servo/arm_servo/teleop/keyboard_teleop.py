@@ -19,7 +19,7 @@ from operator_input import (
     Style,
 )
 
-from .jog import Frame, Jog, JointJog, Scales, Steps
+from .jog import CartesianJog, Frame, Jog, JointJog, Scales, Steps, Vector
 from .key_map import (
     FRAMES,
     HELP,
@@ -33,12 +33,14 @@ from .key_map import (
     STOP_KEYS,
     TOOL,
 )
-from .screen import motion_part, servo_part, ServoReport
 
 SPEED_STEP_FACTOR = 1.25  # of a speed key
 MIN_SPEED = 0.01  # share of full speed
 TAP_SPEED_FACTOR = 0.2  # while a key may be up already: without releases that takes 0.5 s
 NOTE_PERIOD = 1.0  # in which a stroke that moves nothing is not reported again
+
+ServoReport = tuple[int, str]
+"""Code of a servo's status, where 0 is well and a negative one refuses; and the same in words."""
 
 
 class WatchedServo(Robot, Protocol):
@@ -188,3 +190,36 @@ class KeyboardTeleop(KeyMapping):
     def _let_go(self) -> None:
         self._held.clear()
         self._step = None
+
+
+def servo_part(report: ServoReport | None, *, paused: bool) -> StatusPart:
+    """Show what the servo reports; None for nothing."""
+    if paused:
+        return 'paused', Style.YELLOW
+    if report is None:
+        return 'servo ?', Style.YELLOW
+    code, message = report
+    if code == 0:
+        return 'servo ok', Style.BOLD
+    return message, Style.RED if code < 0 else Style.YELLOW
+
+
+def motion_part(jog: Jog | None, joints: tuple[str, ...]) -> StatusPart:
+    """Show what moves, by the names of the joints as far as they are known."""
+    match jog:
+        case JointJog(joint, velocity):
+            known = joints[joint] if joint < len(joints) else f'joint {joint + 1}'
+            return f'{known} {_sign(velocity)}', Style.GREEN
+        case CartesianJog(linear, angular):
+            return ' '.join([*_axes('', linear), *_axes('turn ', angular)]), Style.GREEN
+    return f'{"idle":<12}', Style.DIM
+
+
+def _axes(word: str, vector: Vector) -> list[str]:
+    return [
+        f'{word}{axis} {_sign(value)}' for axis, value in zip('xyz', vector, strict=True) if value
+    ]
+
+
+def _sign(value: float) -> str:
+    return '+' if value > 0 else '-'

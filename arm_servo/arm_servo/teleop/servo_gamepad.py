@@ -4,15 +4,89 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import sys
 
 from arm_model import ArmError
 from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt
+from operator_input import CommandStream, DeadmanMapping
 from operator_input.devices import InputDevices
+from operator_input.gamepad import Axis, Button, Deadman, GamepadState, Grip
 from operator_input.ros import declare_gamepad, run_teleop, TeleopNode
 
-from .gamepad_teleop import GamepadTeleop
+from .jog import CartesianJog, Frame, Jog, JointJog
+from .keyboard_teleop import WatchedServo
 from .servo_link import ServoLink
+
+FRAME_BUTTONS = {Button.SELECT: Frame.BASE, Button.START: Frame.TOOL}
+"""Buttons that choose along whose axes the tool is jogged."""
+
+JOINT_BUTTONS = {Button.WEST: -1, Button.EAST: 1}
+"""Buttons that choose the joint before and the next one."""
+
+
+class GamepadTeleop(DeadmanMapping):
+    """Moves while the deadman is held and a stick is away from rest.
+
+    At rest it asks for nothing, so that it does not overrule a trajectory.
+
+    Attributes:
+        frame: Along whose axes the tool is jogged.
+        joint: Place of the joint that the d-pad moves.
+    """
+
+    robot: WatchedServo
+
+    def __init__(
+        self,
+        robot: WatchedServo,
+        deadman: Deadman,
+        stream: CommandStream[Jog],
+        speeds: tuple[float, float],
+        warn: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        """Start idle, with the shares of full speed at a stick's end, without and with turbo."""
+        super().__init__(robot, deadman, stream, warn)
+        self.frame = Frame.BASE
+        self.joint = 0
+        self._speeds = dict(zip((Grip.HELD, Grip.TURBO), speeds, strict=True))
+
+    def wanted(self, now: float) -> Jog | None:
+        """Return the motion that is wanted; None without the deadman, and at rest."""
+        speed = self._speeds.get(self.grip)
+        if speed is None:
+            return None
+        up = self.state.axis(Axis.DPAD_Y)
+        if up:
+            return JointJog(self.joint, up * speed)
+        jog = direction(self.state, self.frame).scaled(speed, speed)
+        return jog if any(jog.linear) or any(jog.angular) else None
+
+    def feed(self, state: GamepadState) -> list[str]:
+        """Process a state of the gamepad; return what was chosen, in words."""
+        before, joints = self.take(state), len(self.robot.names.joints)
+        for button in state.pressed_since(before):
+            if button in FRAME_BUTTONS:
+                self.frame = FRAME_BUTTONS[button]
+                return [f'{self.frame.value} frame']
+            if button in JOINT_BUTTONS and joints:
+                self.joint = (self.joint + JOINT_BUTTONS[button]) % joints
+                return [f'the d-pad moves joint {self.joint + 1}']
+        return []
+
+
+def direction(state: GamepadState, frame: Frame) -> CartesianJog:
+    """Return where the sticks point, along the axes of a frame.
+
+    The left stick moves along x and y, the triggers along z (right up, left down); the right stick
+    turns about y and z, the d-pad's sides about x.
+    """
+    z = state.axis(Axis.RIGHT_TRIGGER) - state.axis(Axis.LEFT_TRIGGER)
+    return CartesianJog(
+        (state.axis(Axis.LEFT_Y), state.axis(Axis.LEFT_X), z),
+        (-state.axis(Axis.DPAD_X), state.axis(Axis.RIGHT_Y), state.axis(Axis.RIGHT_X)),
+        frame,
+    )
 
 
 class ServoGamepad(TeleopNode):

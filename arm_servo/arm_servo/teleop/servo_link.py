@@ -23,7 +23,7 @@ from node_runner import LATCHED, ParameterReader
 from operator_input import CommandStream
 
 from .jog import CommandType, Frame, Jog, JointJog, rest_of, Scales, ServoRequest, Vector
-from .screen import ServoReport
+from .keyboard_teleop import ServoReport
 from .servo_settings import ServoSettings
 
 FLUSH_TIMEOUT = Duration(nanoseconds=300_000_000)

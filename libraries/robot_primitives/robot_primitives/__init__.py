@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from .joint_states import JointSample, JointStateStore
 from .stream_gate import StreamGate, StreamRules
 
-__all__ = ['StreamGate', 'StreamRules']
+__all__ = ['JointSample', 'JointStateStore', 'StreamGate', 'StreamRules']
