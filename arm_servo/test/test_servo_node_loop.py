@@ -15,7 +15,7 @@ from servo_commands import jog as jog_joints
 from servo_commands import outcome
 from servo_elsewhere import Elsewhere, jog, PERIOD, swing
 
-from arm_servo import NotReadyError
+from arm_servo import MotionCore, NotReadyError
 from arm_servo.io.joint_feedback import JointFeedback
 from arm_servo.io.motion_thread import MotionThread
 from arm_trajectory import GoalCode
@@ -82,17 +82,23 @@ def test_an_arm_that_stands_a_little_off_is_not_sent_there() -> None:
     assert np.abs(arm.path()[sent] - last).max() < 1e-4
 
 
-def test_a_cycle_that_raises_is_the_end_and_the_arm_comes_to_rest() -> None:
+@pytest.mark.parametrize('what', ['cycle', 'core'])
+def test_a_cycle_that_raises_is_the_end_and_the_arm_comes_to_rest(
+    what: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The thread reports the error, and brakes without the core before it ends."""
     arm = Elsewhere()
     arm.run(5)
     jog(arm, 30)
     failed = threading.Event()
 
-    def step(now: float, period: float) -> None:
+    def step(*_: object) -> None:
         raise ArithmeticError('no solution')
 
-    arm.cycle.step = step  # type: ignore[method-assign]
+    if what == 'cycle':
+        monkeypatch.setattr(arm.cycle, 'step', step)
+    else:  # which ends all that was commanded
+        monkeypatch.setattr(MotionCore, 'step', step)
     thread = MotionThread(arm.cycle, 0.001)
     before = len(arm.points)
     thread.start(failed.set)

@@ -219,7 +219,7 @@ class MotionQueue:
             return
         needed = _preparation_time(request)
         if not at_rest and basis.source is not Source.TRAJECTORY and needed > MAX_FORESIGHT:
-            # nobody can foresee a jog for so long; a goal that is refused does not stop it
+            # a jog cannot be foreseen for so long; a goal that is refused does not stop it
             rest = replace(basis, state=RobotState.at_rest(basis.state.position))
             self._core.prepare(_aged(request, elapsed), rest)
             self._order_rest(command)

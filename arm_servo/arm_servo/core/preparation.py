@@ -57,7 +57,7 @@ class PreparedScene:
 
     version: int  # number of the scene; 0 is the robot alone
     clearances: Clearances  # of the cycle
-    # looks for contact on paths, in the thread that prepares motions; None where nobody wants that
+    # looks for contact on paths, in the thread that prepares motions; None without such checks
     check: PathCheck | None
 
     @classmethod

@@ -31,7 +31,7 @@ class JogRequest:
     # link, or pose in the base, about whose origin a twist turns and along whose axes it is given,
     # and in which a pose is given; None for the tip, and for the base
     frame: str | Pose | None = None
-    client: Hashable = None  # who asks: standing still is a command only for whoever is jogging
+    client: Hashable = None  # who asks: standing still is a command only for the client that jogs
 
     @property
     def is_zero(self) -> bool:

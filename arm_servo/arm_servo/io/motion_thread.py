@@ -58,7 +58,7 @@ class MotionCycle:
     @property
     def at_rest(self) -> bool:
         """Whether nothing moves."""
-        return not self._gateway.is_following or self._quiet
+        return self._quiet
 
     def step(self, now: float, period: float) -> None:
         """Run a cycle."""

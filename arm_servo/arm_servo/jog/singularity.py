@@ -130,7 +130,7 @@ def distance_to_singularity(
 ) -> float:
     """Return how far along the last joint direction its singular value is gone, to first order.
 
-    At the border of the reach the arm folds there to one side or the other: whoever runs through
+    At the border of the reach the arm folds there to one side or the other: an arm that goes on
     comes back on the other side.
 
     Args:

@@ -94,7 +94,7 @@ class SceneListener:
         awaited = {name for each in self._updaters for name in each.others} - commanded
         self._states = JointStateStore(awaited)
         node.create_subscription(PlanningScene, TOPIC, self._take, LATCHED)
-        # raw: its meshes take long to read, which is left out where nobody needs them
+        # raw: its meshes take long to read, which is left out where they have no use
         node.create_subscription(
             PlanningScene, FOREIGN_TOPIC, self._take_foreign, LATCHED, raw=True
         )
@@ -124,7 +124,7 @@ class SceneListener:
         self._states.receive(message.name, message.position, [], self._clock())
 
     def _look(self) -> None:
-        """See where the joints are, and have applied what is new."""
+        """Read where the joints are, and submit what is new."""
         places = {name: each.position for name, each in self._states.samples().items()}
         commanded = set[str]()
         for gateway in self._gateways:

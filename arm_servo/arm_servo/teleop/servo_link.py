@@ -85,7 +85,7 @@ class ServoLink:
         return self._report[0]
 
     def serve(self, now: float) -> None:
-        """Ask the servo what is not known yet."""
+        """Request from the servo what is not known yet."""
         self._settings.serve(now)
 
     def publish(self, command: Jog) -> None:

@@ -157,7 +157,7 @@ class GripperController:
         point, measured = snapshot.set_point, snapshot.measured
         if command is None or not command.ended.done() or snapshot.paused:
             return
-        if point is None or measured is None:  # nobody commands them any more
+        if point is None or measured is None:  # they are commanded no more
             self._abandoned = None
             return
         if command is not self._newest or point.source is Source.TRAJECTORY:  # another does
