@@ -240,6 +240,19 @@ def test_a_line_gets_slower_instead_of_failing() -> None:
     check_on(Line(pose, goal.pose), name, plan.path, 300)
 
 
+@pytest.mark.parametrize('way', [(0.0, 0.0, -0.05), (-0.05, 0.0, -0.02), (0.05, 0.0, 0.0)])
+def test_a_line_may_begin_with_a_straight_wrist(way: tuple[float, ...]) -> None:
+    """Where it leads in the plane of the arm; beside it the wrist would have to turn first."""
+    straight = frozen([0.0] * 6)
+    pose = tip('gp110').pose(straight)
+    goal = PoseGoal(Pose(pose.rotation, pose.position + np.array(way)))
+    path = motion('gp110', MotionRequest(straight, [goal], 'LIN')).path
+    check_on(Line(pose, goal.pose), 'gp110', path, 300)
+    beside = PoseGoal(Pose(pose.rotation, pose.position + np.array([0.0, 0.05, 0.0])))
+    with pytest.raises(PlanningError, match=r'singular at 0% of the way'):
+        motion('gp110', MotionRequest(straight, [beside], 'LIN'))
+
+
 def test_a_line_through_a_singularity_is_refused_with_its_place() -> None:
     """As is one out of reach, and one that ends in another configuration."""
     straight = frozen([0.0] * 6)

@@ -43,6 +43,7 @@ MAX_CORRECTION = 0.3
 """Greatest motion of a joint in a Newton step in [rad]: more leads to another configuration."""
 
 DIFFERENCE = 1e-6  # share of a curve between the places of a difference quotient
+SINGULAR = 1e-7  # share of the largest singular value below which one counts as none
 SHARPNESS = 16  # exponent of the smooth maximum
 
 MAX_SLOWDOWN = 200.0
@@ -179,9 +180,18 @@ class _Tracer:
         return _Place(share, positions, first, (after - first) / DIFFERENCE)
 
     def _field(self, share: float, positions: Array) -> Array:
-        """Return how joints follow the curve: derivatives by the share."""
+        """Return how joints follow the curve: derivatives by the share.
+
+        The arm may begin where it is singular, such as with a straight wrist, if what it has left
+        there leads along the curve.
+        """
         _, jacobian = self._link.pose_and_jacobian(positions)
-        return self._solved(jacobian, self._curve.twist(share), share)
+        twist = self._curve.twist(share)
+        if share <= DIFFERENCE:
+            solved = np.linalg.lstsq(jacobian, twist, rcond=SINGULAR)[0]
+            if np.abs(jacobian @ solved - twist).max() < SINGULAR * np.abs(twist).max():
+                return np.asarray(solved, dtype=float)
+        return self._solved(jacobian, twist, share)
 
     def _solved(self, jacobian: Array, twist: Array, share: float) -> Array:
         try:
