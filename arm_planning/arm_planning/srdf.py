@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 import math
 from pathlib import Path
 import re
 from typing import Any
 from xml.etree import ElementTree as ET
-from xml.sax.saxutils import quoteattr
 
 from urdf_reader import DescriptionError, Joint, KinematicTree, Pair, parse_srdf, read_urdf
 
@@ -83,7 +83,7 @@ def make_srdf(
     pairs = sample_link_pairs(urdf, samples, folder)
     chosen = _by_user(previous)
     reasons = _reasons(pairs) | chosen
-    opening = previous or f'<?xml version="1.0"?>\n<robot name={quoteattr(tree.name)}>\n'
+    opening = previous or f'<?xml version="1.0"?>\n<robot name={_quoted(tree.name)}>\n'
     head = END.sub('', PAIR_LINE.sub('', opening))
     if before is None or not before.groups:
         head = '\n'.join([head.rstrip(), '', *_groups(tree)])
@@ -103,8 +103,8 @@ def make_srdf(
 def _closed(head: str, reasons: Mapping[Pair, str]) -> str:
     """Return the whole text, pairs last and in a fixed order."""
     lines = [
-        f'  <disable_collisions link1={quoteattr(first)} link2={quoteattr(second)}'
-        f' reason={quoteattr(reason)}/>'
+        f'  <disable_collisions link1={_quoted(first)} link2={_quoted(second)}'
+        f' reason={_quoted(reason)}/>'
         for reason, first, second in sorted(
             (reason, *sorted(pair)) for pair, reason in reasons.items()
         )
@@ -138,18 +138,18 @@ def _groups(tree: KinematicTree) -> list[str]:
         raise ModelError(f'{tree.name}: no chain of joints that move; there is no group to make')
     for chain in chains:
         lines += [
-            f'  <group name={quoteattr(chain.name)}>',
-            f'    <chain base_link={quoteattr(chain.base)} tip_link={quoteattr(chain.tip)}/>',
+            f'  <group name={_quoted(chain.name)}>',
+            f'    <chain base_link={_quoted(chain.base)} tip_link={_quoted(chain.tip)}/>',
             '  </group>',
         ]
         if chain.tool:
             tool = f'{chain.name}_tool'
-            lines.append(f'  <group name={quoteattr(tool)}>')
-            lines += [f'    <link name={quoteattr(link)}/>' for link in chain.tool]
+            lines.append(f'  <group name={_quoted(tool)}>')
+            lines += [f'    <link name={_quoted(link)}/>' for link in chain.tool]
             lines += [
                 '  </group>',
-                f'  <end_effector name={quoteattr(tool)} group={quoteattr(tool)}',
-                f'    parent_link={quoteattr(chain.tip)} parent_group={quoteattr(chain.name)}/>',
+                f'  <end_effector name={_quoted(tool)} group={_quoted(tool)}',
+                f'    parent_link={_quoted(chain.tip)} parent_group={_quoted(chain.name)}/>',
             ]
     return lines
 
@@ -223,8 +223,8 @@ def _ready_poses(
         if READY in model.poses:
             notes.append(f'group {group}: pose {READY} is kept, quality {quality:.2f} of 0 to 1')
             continue
-        lines = [f'    <joint name={quoteattr(name)} value="{at:g}"/>' for name, at in values]
-        state = f'  <group_state name="{READY}" group={quoteattr(group)}>'
+        lines = [f'    <joint name={_quoted(name)} value="{at:g}"/>' for name, at in values]
+        state = f'  <group_state name="{READY}" group={_quoted(group)}>'
         text += '\n'.join(['\n', state, *lines, '  </group_state>'])
         notes.append(f'group {group}: pose {READY} found, quality {quality:.2f} of 0 to 1')
     return text, notes
@@ -272,3 +272,8 @@ def _name(pair: Pair) -> str:
 
 def _named(pairs: Mapping[Pair, str] | frozenset[Pair] | set[Pair]) -> str:
     return ', '.join(sorted(map(_name, pairs)))
+
+
+def _quoted(value: str) -> str:
+    """Return the value of an attribute in XML."""
+    return f'"{escape(value)}"'

@@ -18,7 +18,6 @@ import hashlib
 import logging
 import os
 from pathlib import Path
-import platform
 import shlex
 import shutil
 import subprocess
@@ -275,7 +274,7 @@ def _processor() -> str:
     except OSError:
         lines = []
     features = next((line for line in lines if line.startswith(('flags', 'Features'))), '')
-    return f'{platform.machine()} {features}'
+    return f'{os.uname().machine} {features}'
 
 
 @contextlib.contextmanager

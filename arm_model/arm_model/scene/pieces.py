@@ -15,7 +15,6 @@ import subprocess
 import sys
 from tempfile import TemporaryDirectory
 
-import coacd
 import numpy as np
 
 from ..arrays import Array, Places
@@ -79,6 +78,8 @@ def _closed(triangles: Places) -> bool:
 
 def main(body: str, pieces: str) -> None:
     """Read a body and write its pieces."""
+    import coacd  # which programs that load robots need not wait for
+
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_LIMIT, CPU_LIMIT))
     coacd.set_log_level('error')
     with np.load(body) as stored:

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 import contextlib
+from html import escape
 import io
 import os
 from pathlib import Path
 import re
 import tempfile
 from typing import Any
-from xml.sax.saxutils import escape
 
 from .exceptions import XacroError
 
@@ -60,7 +60,7 @@ def expand_xacro(
     expanded = str(document.toprettyxml(indent='  '))
     # the overlay is gone: files in it are named where they are
     inside = re.compile(re.escape(f'{overlay}/') + r'([\w-]+)')
-    return inside.sub(lambda found: escape(str(packages[found[1]])), expanded)
+    return inside.sub(lambda found: escape(str(packages[found[1]]), quote=False), expanded)
 
 
 def _missing(path: Path, words: str) -> XacroError | None:
