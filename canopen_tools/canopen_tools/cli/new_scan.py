@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 import re
@@ -96,14 +96,13 @@ def scanned_devices(options: argparse.Namespace, folder: Path) -> list[NewDevice
                 'is this its bit rate?'
             )
         _require_present({*choices, *options.without}, {each.node_id for each in found})
+        scan = _Scan(session, choices, candidates, folder)
         devices, problems = [], []
         for each in sorted(found, key=lambda device: device.node_id):
             if each.node_id in options.without:
                 continue
             try:
-                devices.append(
-                    _device(session, each, choices.get(each.node_id), candidates, folder)
-                )
+                devices.append(scan.device(each))
             except NoMatchError as error:
                 problems.append(f'{_title(each)}: {error}')
     if problems:
@@ -163,77 +162,76 @@ def _title(found: Found) -> str:
     return f'node {found.node_id}{who}'
 
 
-def _device(
-    session: Session,
-    found: Found,
-    choice: _Choice | None,
-    candidates: Sequence[Eds],
-    folder: Path,
-) -> NewDevice:
-    """Return a device that was found."""
-    node = found.node_id
-    if found.twice:
-        raise NoMatchError(
-            'several devices have this node id; switch all but one of them off, and give each one '
-            'of its own (canopen lss, or its switches)'
-        )
-    match = _match(session, found, choice, candidates, folder)
-    is_drive = NewDevice('', node, match.eds).is_drive
-    name = choice.name if choice is not None else f'{"joint" if is_drive else "device"}{node}'
-    reason = f'{identity_text(_identity(found))}; {match.eds.path.name}: {match.reason}'
-    print_line(f'node {node} is {name}: {reason}')
-    values = _values(session, node) if is_drive else {}
-    return NewDevice(name, node, match.eds, values=values, found=f'scanned: {reason}')
+@dataclass(frozen=True, slots=True)
+class _Scan:
+    """What tells which EDS the devices on a bus have."""
 
+    session: Session
+    choices: Mapping[int, _Choice]  # what the command line says, by node id
+    candidates: Sequence[Eds]  # EDS files to choose from
+    folder: Path  # gets the EDS files that devices have in themselves
 
-def _match(
-    session: Session,
-    found: Found,
-    choice: _Choice | None,
-    candidates: Sequence[Eds],
-    folder: Path,
-) -> Match:
-    identity, node = _identity(found), found.node_id
-    if choice is not None and choice.eds is not None:
-        differs = (choice_id := eds_identity(choice.eds)).vendor_id and (
-            (choice_id.vendor_id, choice_id.product_code)
-            != (identity.vendor_id, identity.product_code)
-        )
-        note = f', though it is for {identity_text(choice_id)}' if differs else ''
-        return Match(choice.eds, f'as said{note}')
-    try:
-        return match_eds(identity, candidates)
-    except SeveralMatchError as error:
-        raise NoMatchError(f'{error}; choose with NAME=FILE.eds@{node}') from error
-    except NoMatchError as error:
-        stored = _stored_eds(session, found, folder)
-        if stored is None:
+    def device(self, found: Found) -> NewDevice:
+        """Return a device that was found.
+
+        Raises:
+            NoMatchError: It has no EDS, or shares its node id.
+        """
+        node, choice = found.node_id, self.choices.get(found.node_id)
+        if found.twice:
             raise NoMatchError(
-                f'{error}, and it has none in 0x1021; get it from its vendor and name its file or '
-                f'folder, choose one with NAME=FILE.eds@{node}, or leave it out: --without {node}'
-            ) from error
-        return Match(stored, 'from the device itself (0x1021)')
+                'several devices have this node id; switch all but one of them off, and give each '
+                'one of its own (canopen lss, or its switches)'
+            )
+        match = self._match(found, choice)
+        is_drive = NewDevice('', node, match.eds).is_drive
+        name = choice.name if choice is not None else f'{"joint" if is_drive else "device"}{node}'
+        reason = f'{identity_text(_identity(found))}; {match.eds.path.name}: {match.reason}'
+        print_line(f'node {node} is {name}: {reason}')
+        values = _values(self.session, node) if is_drive else {}
+        return NewDevice(name, node, match.eds, values=values, found=f'scanned: {reason}')
 
+    def _match(self, found: Found, choice: _Choice | None) -> Match:
+        identity, node = _identity(found), found.node_id
+        if choice is not None and choice.eds is not None:
+            differs = (choice_id := eds_identity(choice.eds)).vendor_id and (
+                (choice_id.vendor_id, choice_id.product_code)
+                != (identity.vendor_id, identity.product_code)
+            )
+            note = f', though it is for {identity_text(choice_id)}' if differs else ''
+            return Match(choice.eds, f'as said{note}')
+        try:
+            return match_eds(identity, self.candidates)
+        except SeveralMatchError as error:
+            raise NoMatchError(f'{error}; choose with NAME=FILE.eds@{node}') from error
+        except NoMatchError as error:
+            stored = self._stored_eds(found)
+            if stored is None:
+                raise NoMatchError(
+                    f'{error}, and it has none in 0x1021; get it from its vendor and name its '
+                    f'file or folder, choose one with NAME=FILE.eds@{node}, or leave it out: '
+                    f'--without {node}'
+                ) from error
+            return Match(stored, 'from the device itself (0x1021)')
 
-def _stored_eds(session: Session, found: Found, folder: Path) -> Eds | None:
-    """Read the EDS that a device has in itself; None where it has none that can be read."""
-    client = session.client(found.node_id)
-    try:
-        form = session.read(client, STORE_FORMAT, 0, TIMEOUT)
-        if int.from_bytes(form, 'little') != UNCOMPRESSED:
+    def _stored_eds(self, found: Found) -> Eds | None:
+        """Read the EDS that a device has in itself; None where it has none that can be read."""
+        session, client = self.session, self.session.client(found.node_id)
+        try:
+            form = session.read(client, STORE_FORMAT, 0, TIMEOUT)
+            if int.from_bytes(form, 'little') != UNCOMPRESSED:
+                return None
+            data = session.read(client, STORE_EDS, 0, TIMEOUT, block=True)
+        except SdoError:
             return None
-        data = session.read(client, STORE_EDS, 0, TIMEOUT, block=True)
-    except SdoError:
-        return None
-    identity = _identity(found)
-    path = folder / (
-        f'{identity.vendor_id:08X}_{identity.product_code:08X}_{identity.revision_number:08X}.eds'
-    )
-    path.write_bytes(data.rstrip(b'\0'))
-    try:
-        return load_eds(path)
-    except ConfigError:
-        return None
+        who = _identity(found)
+        name = f'{who.vendor_id:08X}_{who.product_code:08X}_{who.revision_number:08X}.eds'
+        path = self.folder / name
+        path.write_bytes(data.rstrip(b'\0'))
+        try:
+            return load_eds(path)
+        except ConfigError:
+            return None
 
 
 def _values(session: Session, node: int) -> dict[tuple[int, int], int]:
