@@ -14,7 +14,7 @@ import difflib
 from enum import auto, Enum
 from functools import partial
 import re
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from canopen_core.standard import AbortCode, object_address
 
@@ -209,6 +209,68 @@ FAULTS: dict[str, Fault] = {fault.label: fault for fault in Fault}
 """Faults by name."""
 
 
+def _whole(text: str) -> int:
+    value = int(text, 0)
+    if not 0 <= value < 1 << 32:
+        raise ValueError(text)
+    return value
+
+
+def _object(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r'(?:0x)?([0-9a-f]{4})(?:[:/]([0-9a-f]{1,2}))?', text, re.IGNORECASE)
+    if match is None:
+        raise ValueError(text)
+    return int(match[1], 16), int(match[2] or '0', 16)
+
+
+def _abort(text: str) -> int:
+    name = text.upper()
+    return AbortCode[name] if name in AbortCode.__members__ else _whole(text)
+
+
+def _kept(text: str) -> bool:
+    words = {'true': True, 'yes': True, 'kept': True, 'false': False, 'no': False, 'lost': False}
+    word = words.get(text.lower())
+    if word is None:
+        raise ValueError(text)
+    return word
+
+
+class Setting(NamedTuple):
+    """How a setting is read, and what it may be."""
+
+    read: Callable[[str], object]
+    wanted: str
+    allows: Callable[[Any], bool] = lambda value: True
+
+
+_signed = partial(int, base=0)
+WHOLE_NUMBER = Setting(_whole, 'a whole number, such as 10 or 0x0A')
+COUNT = Setting(_whole, 'a whole number of 0 or more', lambda value: value >= 0)
+TIME = Setting(float, 'a time of 0 s or more', lambda value: 0.0 <= value < float('inf'))
+UNIT = Setting(
+    float,
+    'a unit above 0 in [inc/s] or [inc/s^2]',
+    lambda value: value is None or 0.0 < value < float('inf'),
+)
+SETTINGS: dict[str, Setting] = {
+    'duration': TIME,
+    'delay': TIME,
+    'probability': Setting(float, 'a number of 0 to 1', lambda value: 0.0 <= value <= 1.0),
+    'count': COUNT,
+    'pdo': COUNT,
+    'axis': COUNT,
+    'velocity': UNIT,
+    'acceleration': UNIT,
+    'position': Setting(_signed, 'a whole number of [inc]'),
+    'value': Setting(_signed, 'a whole number, such as -1000 or 0x0A'),
+    'object': Setting(_object, "an object, such as 0x6064 or '0x607D:02'"),
+    'abort': Setting(_abort, 'an SDO abort code, such as 0x08000000 or general'),
+    'position_kept': Setting(_kept, 'true or false'),
+}
+"""Settings that are not whole numbers of 32 bits, or may not be all of them."""
+
+
 @dataclass(frozen=True, slots=True)
 class FaultInjection:
     """One fault with its settings."""
@@ -246,18 +308,9 @@ class FaultInjection:
         Raises:
             ValueError: A number is out of range, or a setting is not one of this fault.
         """
-        for name in ('duration', 'delay'):
-            value = getattr(self, name)
-            if not 0.0 <= value < float('inf'):
-                raise ValueError(f'{name} {value} is not a time of 0 s or more')
-        if not 0.0 <= self.probability <= 1.0:
-            raise ValueError(f'probability {self.probability} is not 0 to 1')
-        for name in ('velocity', 'acceleration'):
-            unit = getattr(self, name)
-            if unit is not None and not 0.0 < unit < float('inf'):
-                raise ValueError(f'{name} {unit} is not a unit above 0')
-        if min(self.count, self.pdo, self.axis) < 0:
-            raise ValueError('count, pdo and axis are 0 or more')
+        for name, setting in SETTINGS.items():
+            if not setting.allows(value := getattr(self, name)):
+                raise ValueError(f'{name} {value} is not {setting.wanted}')
         allowed = ('fault', 'duration', *self.fault.value.settings)
         for field in fields(self):
             if field.name not in allowed and getattr(self, field.name) != field.default:
@@ -333,54 +386,3 @@ def unknown(what: str, name: str, known: Iterable[str]) -> str:
     close = difflib.get_close_matches(name, names, n=1)
     remedy = f'did you mean {close[0]!r}?' if close else f'choose one of {", ".join(names)}'
     return f'unknown {what} {name!r}; {remedy}'
-
-
-def _whole(text: str) -> int:
-    value = int(text, 0)
-    if not 0 <= value < 1 << 32:
-        raise ValueError(text)
-    return value
-
-
-def _object(text: str) -> tuple[int, int]:
-    match = re.fullmatch(r'(?:0x)?([0-9a-f]{4})(?:[:/]([0-9a-f]{1,2}))?', text, re.IGNORECASE)
-    if match is None:
-        raise ValueError(text)
-    return int(match[1], 16), int(match[2] or '0', 16)
-
-
-def _abort(text: str) -> int:
-    name = text.upper()
-    return AbortCode[name] if name in AbortCode.__members__ else _whole(text)
-
-
-def _kept(text: str) -> bool:
-    words = {'true': True, 'yes': True, 'kept': True, 'false': False, 'no': False, 'lost': False}
-    word = words.get(text.lower())
-    if word is None:
-        raise ValueError(text)
-    return word
-
-
-class SettingReader(NamedTuple):
-    """How the text of a setting is read, and what it should be."""
-
-    read: Callable[[str], object]
-    wanted: str
-
-
-_signed = partial(int, base=0)
-WHOLE_NUMBER = SettingReader(_whole, 'a whole number, such as 10 or 0x0A')
-SETTINGS: dict[str, SettingReader] = {
-    'duration': SettingReader(float, 'a time in [s]'),
-    'delay': SettingReader(float, 'a time in [s]'),
-    'probability': SettingReader(float, 'a number of 0 to 1'),
-    'velocity': SettingReader(float, 'a number of [inc/s]'),
-    'acceleration': SettingReader(float, 'a number of [inc/s^2]'),
-    'position': SettingReader(_signed, 'a whole number of [inc]'),
-    'value': SettingReader(_signed, 'a whole number, such as -1000 or 0x0A'),
-    'object': SettingReader(_object, "an object, such as 0x6064 or '0x607D:02'"),
-    'abort': SettingReader(_abort, 'an SDO abort code, such as 0x08000000 or general'),
-    'position_kept': SettingReader(_kept, 'true or false'),
-}
-"""Settings that are not whole numbers of 32 bits."""
