@@ -106,10 +106,10 @@ class Configurator:
         except SdoTimeoutError as error:
             if own is None:
                 raise
-            remedy = (
-                f'if it is slow at that, write timeout_ms: {round(5e3 * timeout)} to its entry'
-            )
-            raise SdoTimeoutError(f'{error}; {remedy} in {own.place.key or "sdo"}') from error
+            raise SdoTimeoutError(
+                f'{error}; if it is slow at that, write timeout_ms: {round(5e3 * timeout)} to its '
+                f'entry in {own.place.key or "sdo"}'
+            ) from error
 
     async def read_number(self, index: int, subindex: int) -> int:
         """Read an object as an unsigned number.
