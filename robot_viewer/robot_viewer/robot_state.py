@@ -99,7 +99,7 @@ class Seen:
         statuses: Its diagnostics that are not old.
         services: Full names of the Trigger services that may be called.
         stop: The STOP that counts.
-        moving: Its joints move.
+        moving: Its joints move; of a walking robot, it follows a velocity.
         mover: What moves it, in words; empty where that is unknown.
         limit: What limits its motion, in the words of the servo.
         acting: What was requested by the action and goes on, in words.
@@ -256,8 +256,7 @@ def _legs_state(seen: Seen, legs: Status) -> RobotState:
     notes = f' {legs.message}.' if legs.level == 1 else ''
     battery = f' Battery {seen.battery}.' if seen.battery else ''
     level = Level.WARNING if legs.level == 1 else Level.WELL
-    walks = any(float(part) for part in legs.values.get('velocity', '').split())
-    if seen.mover or (mode in FOLLOWS and walks):
+    if seen.mover or seen.moving:
         who = seen.mover or 'A program moves it.'
         return RobotState('WALKING', level, f'{who}{notes}')
     if mode in FOLLOWS:
@@ -280,6 +279,12 @@ def _arm_state(seen: Seen, drives: Mapping[str, Status]) -> RobotState:
     if not drives:
         return RobotState('READY', Level.WELL, 'Its joints are shown; it has no drives here.')
     return RobotState('READY', Level.WELL, 'Hold a button to move.')
+
+
+def walks(legs: Status) -> bool:
+    """Return whether the controller of a walking robot follows a velocity."""
+    velocity = legs.values.get('velocity', '').split()
+    return legs.values.get('state') in FOLLOWS and any(float(part) for part in velocity)
 
 
 def _boots(status: Status) -> bool:

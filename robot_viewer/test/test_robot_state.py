@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from robot_viewer.robot_state import ALLOW, Level, robot_state, Seen, Status, Stop
+from robot_viewer.robot_state import ALLOW, Level, robot_state, Seen, Status, Stop, walks
 
 ON = {'state': 'Operation enabled', 'mode': 'Cyclic position', 'online': 'True'}
 GOOD = Status('j1: drive', 0, 'enabled', ON)
@@ -32,9 +32,9 @@ SERVICES = frozenset(
 ROBOT = Seen('panda', statuses=[GOOD], services=SERVICES)
 
 
-def legs(level: int, state: str, message: str = '', velocity: str = '0 0 0') -> Status:
+def legs(level: int, state: str, message: str = '') -> Status:
     """Return a status of the controller of a quadruped."""
-    values = {'state': state, 'goal': state, 'velocity': velocity}
+    values = {'state': state, 'goal': state, 'velocity': '0 0 0'}
     return Status('controller_node: state', level, message or state, values)
 
 
@@ -93,7 +93,7 @@ def legs(level: int, state: str, message: str = '', velocity: str = '0 0 0') -> 
         (replace(ROBOT, statuses=[legs(0, 'stand')]), 'STANDING', 'Press Walk', '', 0),
         (replace(ROBOT, statuses=[legs(0, 'walk')]), 'READY', 'Hold an arrow', '', 0),
         (
-            replace(ROBOT, statuses=[legs(0, 'walk', velocity='0.1 0 0')]),
+            replace(ROBOT, statuses=[legs(0, 'walk')], moving=True),
             'WALKING',
             'A program',
             '',
@@ -138,3 +138,13 @@ def test_motion_is_possible_only_where_nothing_speaks_against_it(
     assert state.movable is not wrong
     assert (state.level is Level.WELL) is not wrong
     assert state.level.exit_code == 0 or wrong
+
+
+@pytest.mark.parametrize(
+    ('state', 'velocity', 'expected'),
+    [('walk', '0.100 0.000 0.000', True), ('walk', '0 0 0', False), ('stand', '0.1 0 0', False)],
+)
+def test_legs_walk_where_they_follow_a_velocity(state: str, velocity: str, expected: bool) -> None:
+    """Their joints move while they stand up, too."""
+    status = legs(0, state)
+    assert walks(replace(status, values={**status.values, 'velocity': velocity})) is expected

@@ -12,7 +12,7 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 
-from ..robot_state import LEGS, Seen, STALE, Status
+from ..robot_state import LEGS, Seen, STALE, Status, walks
 
 STATUS_AGE = 5.0
 """Time in [s] after which a status that does not come again is unknown."""
@@ -116,11 +116,12 @@ class Watch:
             services: Full names of Trigger services.
             publishes: It was seen to publish joint states.
         """
-        now = time.monotonic()
+        now, legs = time.monotonic(), self.legs
+        moved = now - self._moved_at < STILL_AFTER
         return Seen(
             robot=robot,
             silence=self.silence(now, publishes=publishes),
             statuses=self.aged(now),
             services=frozenset(services),
-            moving=now - self._moved_at < STILL_AFTER,
+            moving=any(map(walks, legs)) if legs else moved,  # legs move while it stands, too
         )
