@@ -212,7 +212,6 @@ def test_stop_is_in_reach_and_nothing_overlaps_or_moves(
         }
         assert not moved, state.word
         assert not page.evaluate(CONTRASTS), state.word
-    chromium.picture(page, f'page-{size}')
     see(page, shown, READY)
     shown.page.say('done')
     page.locator('#rv-foot').filter(has_text='done').wait_for(state='attached')

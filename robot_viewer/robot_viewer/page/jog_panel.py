@@ -11,7 +11,7 @@ from html import escape
 from typing import Protocol, TypeAlias
 
 from urdf_reader import Joint, JointKind, KinematicTree
-from viser import GuiDropdownHandle, GuiFolderHandle, GuiHtmlHandle, GuiTabGroupHandle, ViserServer
+from viser import GuiDropdownHandle, GuiFolderHandle, GuiTabGroupHandle, ViserServer
 
 from .live import Hold, Live
 from .robot_scene import RobotScene, travel
@@ -97,7 +97,7 @@ class JogPanel:
         with self._folder:
             tabs: GuiTabGroupHandle = self._gui.add_tab_group()
             with tabs.add_tab('Joints'):
-                self._rows: GuiHtmlHandle = self._gui.add_html(self._joint_rows(offered.joints))
+                self._gui.add_html(self._joint_rows(offered.joints))
                 if not offered.joints:
                     self._gui.add_html(sentence('No servo_node jogs these joints.'))
             with tabs.add_tab('Tool'):
