@@ -34,7 +34,7 @@ class Bench:
         self.client = client
         self.plans = 0
         self.stops = True
-        self.stale = 0
+        self.stale = self.moving = 0
         self.refusal: PlanningError | None = None
         self.executions: list[Done] = []
         self.may_plan = threading.Event()
@@ -44,6 +44,7 @@ class Bench:
             prepare=partial(self._prepare, 1),
             prepare_sequence=partial(self._prepare, 2),
             display=lambda _: None,
+            is_moving=self._is_moving,
         )
         execution: Any = SimpleNamespace(start=self._start, stop=self._stop, stops=0)
         self.execution = execution
@@ -51,6 +52,10 @@ class Bench:
             MotionAction(client.node, kind, planning, self.background, execution)
             for kind in (single_motion(planning), sequence(planning))
         ]
+
+    def _is_moving(self, _group: str) -> bool:
+        self.moving -= 1
+        return self.moving >= 0
 
     def _prepare(self, count: int, *_: Any) -> Callable[[], PlannedMotion]:
         if self.stale:
@@ -239,3 +244,23 @@ def test_a_goal_that_waits_for_joint_states_can_be_canceled(bench: Bench) -> Non
     assert status == GoalStatus.STATUS_CANCELED
     assert result.error_code.val == PlanningCode.PREEMPTED
     assert not bench.plans
+
+
+def test_a_goal_waits_until_the_arm_has_come_to_rest(bench: Bench) -> None:
+    """After a jog; of one that goes on moving the execution is refused as ever."""
+    for moving in (3, 1000):
+        bench.moving = moving
+        handle = bench.send(MoveGroup, 'move_action', MoveGroup.Goal())
+        bench.client.spin_until(lambda: bool(bench.executions), TIMEOUT, 'execution')
+        assert bench.moving in {-1, 1000 - 10}
+        bench.executions.pop()(PlanningCode.SUCCESS, '')
+        assert bench.result(handle)[0] == GoalStatus.STATUS_SUCCEEDED
+
+
+def test_what_only_plans_does_not_wait_for_rest(bench: Bench) -> None:
+    """It begins where the arm is."""
+    bench.moving = 1000
+    goal = MoveGroup.Goal()
+    goal.planning_options.plan_only = True
+    bench.result(bench.send(MoveGroup, 'move_action', goal))
+    assert (bench.plans, bench.moving) == (1, 1000)

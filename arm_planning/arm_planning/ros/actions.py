@@ -27,8 +27,8 @@ from .planning import PlannedMotion, PlanningThreads, sequence_group, sequence_r
 STOP = 'stop'  # the event that stops everything
 REPLAN_ATTEMPTS = 5  # how often a goal that does not say so is planned anew at most, as in MoveIt
 STATE_WAITS, STATE_PERIOD = 10, 0.1
-"""How often joint states that are unknown or too old are looked for again, and time between two
-looks in [s]; MoveIt waits for a second, too."""
+"""How often joint states that are unknown or too old are looked for again, or rest is waited for
+after a jog, and time between two looks in [s]; MoveIt waits for states for a second, too."""
 
 Prepare = Callable[[Any, bool, Callable[[], bool]], Callable[[], PlannedMotion]]
 Answer = Callable[[MoveItErrorCodes, PlannedMotion | None, bool], Any]
@@ -210,6 +210,12 @@ class MotionAction:
         self._plan(goal)
 
     def _plan(self, goal: _Goal) -> None:
+        executes = not goal.handle.request.planning_options.plan_only
+        lane = self._kind.group(goal.handle.request)
+        if executes and goal.state_waits < STATE_WAITS and self._planning.is_moving(lane):
+            goal.state_waits += 1
+            self._after(goal, STATE_PERIOD, self._plan)
+            return
         try:
             work = self._kind.prepare(
                 goal.handle.request, goal.replans > 0, lambda: goal.is_canceled
@@ -222,7 +228,6 @@ class MotionAction:
             else:
                 self._refuse(goal, error)
             return
-        lane = self._kind.group(goal.handle.request)
         goal.work = self._background.submit(work, lambda done: self._planned(goal, done), lane)
 
     def _refuse(self, goal: _Goal, refusal: PlanningError) -> None:

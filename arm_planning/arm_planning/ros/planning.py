@@ -119,6 +119,10 @@ class PlanningThreads:
             lambda asked: sequence_group(asked.request.items),
         )
 
+    def is_moving(self, group: str) -> bool:
+        """Whether a joint of a group moves."""
+        return self._monitor.is_moving(group)
+
     def prepare(
         self,
         message: Any,  # noqa: ANN401

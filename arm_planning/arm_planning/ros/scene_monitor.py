@@ -37,6 +37,9 @@ DEPTH = 100  # messages of changes that may wait: each of them counts
 NO_OCTOMAP = 'OcTree'  # id of an octomap without data: it takes the place of the present one
 STATE_TIMEOUT = 1.0  # age at which joint states count no more in [s]
 
+SPEED_PERIOD, REST_SPEED = 0.05, 0.02
+"""Time in [s] over which speeds of joints are measured, and below which in [rad/s] one rests."""
+
 REST_PERIOD, REST_TOLERANCE = 0.25, 1e-3
 """A robot whose joints move by less in such a time in [s] rests, in [rad] or [m]."""
 
@@ -65,6 +68,8 @@ class SceneMonitor:
         self._node = node
         self._places: dict[str, float] = {}
         self._arrivals: dict[str, float] = {}
+        self._marks: dict[str, tuple[float, float]] = {}  # places of a while ago, and when
+        self._speeds: dict[str, float] = {}
         self._listeners: list[Callable[[], None]] = []
         # first: a controller that has found it does not read the meshes of the other one
         self._collisions = node.create_publisher(PlanningScene, 'collision_scene', LATCHED)
@@ -102,6 +107,11 @@ class SceneMonitor:
                 )
         self._check_received(joints)
         return {joint: self._places[joint] for joint in joints}
+
+    def is_moving(self, group: str) -> bool:
+        """Whether a joint of a group moves, such as after a jog; not where it is unknown."""
+        joints = self.robot.group_joints().get(group, ())
+        return any(self._speeds.get(joint, 0.0) > REST_SPEED for joint in joints)
 
     def positions(self, message: Any = None) -> Array:  # noqa: ANN401  # messages have no type
         """Return the positions of all joints of the robot in [rad].
@@ -178,6 +188,10 @@ class SceneMonitor:
         for name, position in zip(message.name, message.position, strict=False):
             if position == position:  # noqa: PLR0124  # not NaN
                 self._places[name], self._arrivals[name] = position, now
+                place, since = self._marks.setdefault(name, (position, now))
+                if now - since >= SPEED_PERIOD:
+                    self._speeds[name] = abs(position - place) / (now - since)
+                    self._marks[name] = position, now
 
     def _change_by(self, topic: str, as_scene: Any) -> Callable[[Any], None]:  # noqa: ANN401
         def receive(message: Any) -> None:  # noqa: ANN401
