@@ -6,9 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
-from contextlib import closing
+from contextlib import closing, suppress
 import gzip
-from http.client import HTTPConnection
+from http import HTTPStatus
+from http.client import BadStatusLine, HTTPConnection
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -106,6 +107,19 @@ def get(page: RobotPage, path: str = '/', **headers: str) -> tuple[int, str, str
         return answer.status, answer.read().decode(), answer.headers.get('Set-Cookie', '')
     finally:
         connection.close()
+
+
+def test_a_request_that_is_no_get_leaves_no_traceback(
+    page: RobotPage, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Websockets reads no other one: it would log an error for each."""
+    place = urlsplit(page.url)
+    with closing(HTTPConnection(place.hostname or '', place.port, timeout=TIMEOUT)) as connection:
+        connection.request('POST', '/stop')
+        with suppress(BadStatusLine, ConnectionError):
+            assert connection.getresponse().status >= HTTPStatus.BAD_REQUEST
+    assert get(page)[0]  # it is served after that
+    assert not [each for each in caplog.records if each.exc_info]
 
 
 def cookie_of(page: RobotPage) -> dict[str, str]:

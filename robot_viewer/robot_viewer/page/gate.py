@@ -16,6 +16,7 @@ import hmac
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
 from inspect import isawaitable
+import logging
 import os
 from pathlib import Path
 import secrets
@@ -26,6 +27,7 @@ from urllib.parse import parse_qs, urlsplit
 import websockets.asyncio.server as websocket_server
 from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
+from websockets.exceptions import InvalidMessage
 from websockets.http11 import Request, Response
 
 from ..loopback import is_loopback
@@ -36,6 +38,16 @@ COOKIE = 'robot_viewer_token_{}'
 """By port: a browser sends the cookies of a host to all its ports, and each page has one."""
 HTTP_PORT = 80
 KEPT_AS = 'robot_viewer_token'
+
+
+def _is_failure(record: logging.LogRecord) -> bool:
+    """Whether a record is not about a client that speaks no HTTP, or requests no GET."""
+    return not (record.exc_info and isinstance(record.exc_info[1], InvalidMessage))
+
+
+LOGGER = logging.getLogger(__name__)
+"""What websockets logs, with a traceback each."""
+LOGGER.addFilter(_is_failure)
 
 
 class Gate:
@@ -101,6 +113,7 @@ class Gate:
         def guarded(serve_viser: Any, *args: Any, **options: Any) -> Any:  # noqa: ANN401
             self._serving = True
             options['process_request'] = partial(self._process, options.get('process_request'))
+            options['logger'] = LOGGER
             options['open_timeout'] = 2.0 * ANSWER_TIMEOUT  # or it would end before the answer
             return serve(partial(self._connected, serve_viser), *args, **options)
 
