@@ -33,6 +33,7 @@ REQUIREMENTS: Mapping[str, Sequence[str]] = {
     'python3-rich': ['rich>=13'],
     'python3-ruckig-pip': ['ruckig>=0.19'],
     'python3-serial': ['pyserial>=3.5'],
+    'python3-pycollada-pip': ['pycollada'],
     'python3-trimesh-pip': ['trimesh'],
     'python3-viser-pip': ['viser'],
     'python3-websockets': ['websockets'],

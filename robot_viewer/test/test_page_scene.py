@@ -117,14 +117,28 @@ def test_a_mesh_that_no_reader_takes_is_named(
     assert found.startswith(note)
 
 
-def test_a_mesh_is_shown_in_its_own_unit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+COLLADA = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><created>2026-01-01T00:00:00</created><modified>2026-01-01T00:00:00</modified>
+<unit name="millimeter" meter="0.001"/><up_axis>Z_UP</up_axis></asset>
+<library_geometries><geometry id="link"><mesh>
+<source id="points"><float_array id="numbers" count="12">0 0 0 9 0 0 0 8 0 0 0 7</float_array>
+<technique_common><accessor source="#numbers" count="4" stride="3"><param name="X" type="float"/>
+<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="corners"><input semantic="POSITION" source="#points"/></vertices>
+<triangles count="4"><input semantic="VERTEX" source="#corners" offset="0"/>
+<p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles></mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="scene"><node id="node"><instance_geometry url="#link"/>
+</node></visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#scene"/></scene></COLLADA>"""
+
+
+def test_a_mesh_is_shown_in_its_own_unit(tmp_path: Path) -> None:
     """A COLLADA file in millimetres, once; the reader leaves the unit to us."""
-    unit = '<COLLADA><asset><unit name="millimeter" meter="0.001"/></asset></COLLADA>'
-    (tmp_path / 'a.dae').write_text(unit)
-    monkeypatch.setattr(trimesh, 'load', lambda *_, **__: trimesh.creation.box())
+    (tmp_path / 'a.dae').write_text(COLLADA)
     shapes = shapes_of(read_urdf(URDF.format(mesh='a.dae')))
-    _, scale = Meshes(tmp_path).read(next(each for each in shapes if each.shape == 'mesh'))
+    mesh, scale = Meshes(tmp_path).read(next(each for each in shapes if each.shape == 'mesh'))
     assert scale == pytest.approx((0.002, 0.002, 0.002))
+    assert mesh.extents == pytest.approx((9.0, 8.0, 7.0))
 
 
 def test_a_color_that_is_none_is_named_and_its_shape_is_there(server: ViserServer) -> None:

@@ -61,6 +61,8 @@ OPTIONAL = {
 """Packages that are used where they are built, and that colcon need not build for this one."""
 FOR_PEOPLE = {'arm_bringup': {'canopen_tools'}}
 """Packages whose commands look at what a bring-up started."""
+READERS = {'robot_viewer': {'python3-pycollada-pip'}}
+"""What a library imports that is imported, for one format of a file."""
 OF_MODULES = {
     module.name: name for name, package in PACKAGES.items() for module in package.modules
 }
@@ -150,7 +152,8 @@ def test_what_is_imported_has_its_key(name: str) -> None:
     folder = PACKAGES[name].folder
     modules = {*imported(*PACKAGES[name].modules, folder / 'launch')} - {name}
     found = keys(name, 'exec_depend', 'depend')
-    needed = keys_of_imports(modules) | STARTED.get(name, set()) | FOR_PEOPLE.get(name, set())
+    others = (table.get(name, set()) for table in (STARTED, FOR_PEOPLE, READERS))
+    needed = keys_of_imports(modules).union(*others)
     missing = needed - found - OPTIONAL.get(name, set())
     assert not missing, f'add an exec_depend to {name}/package.xml'
     assert not found - needed, f'{name} imports none of these: remove them from its package.xml'
