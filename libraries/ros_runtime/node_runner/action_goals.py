@@ -17,11 +17,12 @@ from rclpy.task import Future
 RESULT_TIMEOUT = 10.0
 """Time in [s] that an ended goal is kept for late requests, as by rcl; rclpy keeps it for 900."""
 
-ANSWER_DELAY = 0.005
+ANSWER_DELAY = 0.02
 """Least time in [s] from a request to its answer.
 
 Clients of rclpy 7.1 note a request after it was sent, and drop an answer that another thread gets
-before: 1 of 40 motions of pymoveit2 waited for ever. Python switches threads every 5 ms.
+before: 1 of 40 motions of pymoveit2 waited for ever. Python switches threads every 5 ms, and with
+several of them, or on a busy computer, it takes some switches.
 """
 
 
