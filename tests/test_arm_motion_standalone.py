@@ -205,7 +205,7 @@ def test_jogging_goes_out_as_trajectories(isolation: Isolation, tmp_path: Path) 
 @pytest.mark.parametrize(
     ('program', 'arguments', 'words'),
     [
-        ('motion_node', ['backend:=can'], 'choose one of canopen, topics'),
+        ('motion_node', ['backend:=can'], 'it must be canopen or topics'),
         ('servo_node', ['group:=arm'], "'arm'"),
         ('servo_node', ['moveit_servo.scale.linaer:=0.2'], "did you mean 'moveit_servo.scale.lin"),
         ('trajectory_controller', ['joints:=[a, b]'], 'not those of the group'),

@@ -13,7 +13,6 @@ from urdf_reader import find_group, KinematicTree, SemanticDescription
 from process_supervisor import parameters_by_node, StartError
 
 from .description import read_semantic
-from .drive_check import check_drives
 from .exceptions import RobotError
 from .findings import error, Finding, warning
 from .groups import choose_groups, MovedGroups
@@ -22,8 +21,9 @@ from .robots import Robot, SETTINGS
 
 if TYPE_CHECKING:
     from arm_canopen.config import AxisUnits
-    from arm_model import RobotModel
+    from arm_model import JointLimits, RobotModel
 
+LONGER = 5.0  # times the way of a stop within the limits, from which on one surprises
 START = 'ready'
 """Pose of the SRDF from which an arm starts."""
 SINGULAR = 0.05
@@ -247,3 +247,39 @@ def _controllers(
     for node, reason in refused:
         remedy = 'correct it: the node would end with these words; see the README of arm_servo'
         yield error(f'{place}, {node}', reason, remedy)
+
+
+def check_drives(
+    place: str, drives: Mapping[str, AxisUnits | None], limits: JointLimits
+) -> Iterable[Finding]:
+    """Check speed limit and decelerations of each drive; None where these are unknown."""
+    from canopen_core.standard import Index
+
+    rows = zip(limits.names, limits.velocity, limits.acceleration, strict=True)
+    for name, velocity, acceleration in rows:
+        drive = drives.get(name)
+        motion = drive.motion if drive is not None else {}
+        greatest = motion.get(Index.MAX_PROFILE_VELOCITY)
+        if greatest and velocity > greatest:
+            yield warning(
+                place,
+                f'{name} may have {velocity:.4g} per second, and its drive takes up to '
+                f'{greatest:.4g} (0x607F in bus.yml or the EDS): the arm is not led then',
+                'lower its max_velocity, or raise 0x607F in the sdo list of bus.yml',
+            )
+        ramps = [
+            (motion[index], index)
+            for index in (Index.PROFILE_DECELERATION, Index.QUICK_STOP_DECELERATION)
+            if motion.get(index)
+        ]
+        deceleration, index = min(ramps, default=(acceleration, None))
+        if index is not None and LONGER * deceleration < acceleration:
+            speed = min(velocity, greatest or velocity)
+            yield warning(
+                place,
+                f'{name}: halted at full speed its drive goes on for '
+                f'{speed**2 / (2.0 * deceleration):.3g} (0x{index:04X} is {deceleration:.3g} per '
+                f's2), within its limits it would be {speed**2 / (2.0 * acceleration):.3g}',
+                f'raise 0x{index:04X} in the sdo list of bus.yml to about {acceleration:.3g} '
+                'per s2, in units of the drive',
+            )

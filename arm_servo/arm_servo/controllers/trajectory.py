@@ -67,11 +67,6 @@ class Feedback:
     actual: RobotState  # what was measured
     timer: TimerState  # how it runs through the trajectory
 
-    @property
-    def speed_scaling(self) -> float:
-        """Seconds of the trajectory per second."""
-        return self.timer.speed_scaling
-
 
 class Execution(Controller):
     """One trajectory on its way.
@@ -125,11 +120,6 @@ class Execution(Controller):
         timer = TimerState(0.0, self._timer.speed_scaling, 0.0, speed_scaling, wait)
         self.feedback = Feedback(0.0, RobotState.at_rest(begin_point.position), state, timer)
 
-    @property
-    def duration(self) -> float:
-        """How long its path lasts at full speed in [s]."""
-        return self.path.duration
-
     def contact(self, check: PathCheck, begin: float = 0.0) -> PathContact | None:
         """Return the first contact on its path; for any thread.
 
@@ -137,7 +127,7 @@ class Execution(Controller):
             begin: Time of the path from which on it is looked for in [s].
         """
         found = check.contact(
-            lambda times: self.path.positions(times + begin), max(self.duration - begin, 0.0)
+            lambda times: self.path.positions(times + begin), max(self.path.duration - begin, 0.0)
         )
         return found and replace(found, time=found.time + begin)
 

@@ -40,7 +40,7 @@ from ..controllers.controller import (
 )
 from ..controllers.jog import Jog
 from ..controllers.target import SingleTarget
-from ..controllers.trajectory import Execution, Feedback
+from ..controllers.trajectory import Execution
 from ..exceptions import NotReadyError
 from ..report import Cause, Limiter, MotionReport
 from .moving_arms import Neighbours
@@ -148,11 +148,6 @@ class MotionCore:
         """The trajectory or the single target that moves the arm; None without one."""
         active = self._active
         return active if isinstance(active, Execution | SingleTarget) else None
-
-    @property
-    def feedback(self) -> Feedback | None:
-        """Where the trajectory is; None without one."""
-        return None if self.execution is None else self.execution.feedback
 
     @property
     def speed_scaling(self) -> float:

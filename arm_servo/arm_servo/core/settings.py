@@ -17,8 +17,6 @@ class CoreSettings:
     servo: ServoSettings = field(default_factory=ServoSettings)  # how jogging behaves
     # how trajectories are followed
     execution: ExecutionSettings = field(default_factory=ExecutionSettings)
-    # time without a fresh jog command after which the arm comes to rest in [s]
-    timeout: float = 0.1
     # least distance between links that a jog and its stop may bring about in [m]; None is any
     clearance: float | None = 0.005
     # whether a trajectory or a single target is refused on whose way links meet

@@ -123,7 +123,6 @@ def _settings(
     return CoreSettings(
         default.servo if jogging is None else jogging.settings,
         default.execution if trajectory is None else trajectory.execution,
-        default.timeout if jogging is None else jogging.timeout,
         default.clearance if jogging is None else jogging.clearance,
         check_self_collision=check,
     )

@@ -8,9 +8,7 @@ program with its parameters set.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from enum import Enum
+from collections.abc import Callable, Mapping
 import sys
 import threading
 
@@ -47,95 +45,67 @@ servo_node and trajectory_controller for the same arm.
 """
 
 
-class Backend(Enum):
-    """Where the drives are."""
+def _serve_canopen(stop: threading.Event, offers: Offers) -> None:
+    from .canopen_backend import serve_canopen  # arm_canopen is not loaded where it has no use
 
-    CANOPEN = 'canopen'
-    TOPICS = 'topics'
-
-
-@dataclass(frozen=True, slots=True)
-class Program:
-    """What is run."""
-
-    backend: Backend  # where the drives are
-    offers: Offers = field(default_factory=Offers)  # what is offered to clients
+    serve_canopen(stop, offers)
 
 
-def _declared() -> Program:
-    """Return what the parameters of the node ``motion_node`` say; it is there for them only."""
+Serve = Callable[[threading.Event, Offers], None]  # runs a back end until stopped
+BACKENDS: Mapping[str, Serve] = {'canopen': _serve_canopen, 'topics': serve_topics}
+
+
+def _serve_declared(stop: threading.Event, _: Offers) -> None:
+    """Run what the parameters of the node ``motion_node`` say; it is there for them only."""
     node = Node(NAME)
     try:
         read = ParameterReader(node)
-        backend = read.text(
-            'backend', Backend.CANOPEN.value, 'canopen, or topics: drives elsewhere'
-        )
+        serve = read.choice('backend', 'canopen', BACKENDS, 'where the drives are')
         offers = Offers(
             read.flag('jogging', 'offer servo_node', default=True),
             read.flag('trajectories', 'offer the trajectory controller', default=True),
         )
     finally:
         node.destroy_node()
-    known = [each.value for each in Backend]
-    if backend not in known:
-        raise ModelError(f'backend {backend!r}: choose one of {", ".join(known)}')
     if not (offers.jogging or offers.trajectories):
         raise ModelError('jogging and trajectories are both false: nothing would move the arm')
-    return Program(Backend(backend), offers)
+    serve(stop, offers)
 
 
-def _serve(stop: threading.Event, program: Program) -> None:
-    if program.backend is Backend.TOPICS:
-        serve_topics(stop, program.offers)
-        return
-    from .canopen_backend import serve_canopen  # arm_canopen is not loaded where it has no use
-
-    serve_canopen(stop, program.offers)
-
-
-def run_motion(name: str, program: Program | None, args: Sequence[str] | None = None) -> int:
+def _run(name: str, serve: Serve, *, jogging: bool = True, trajectories: bool = True) -> int:
     """Run until Ctrl-C or SIGTERM.
-
-    Args:
-        program: What is run; None for what parameters say.
-        args: ROS arguments; None takes those of the process.
 
     Returns:
         Exit code: 0, or 1 when parameters, the arm or the bus are refused.
     """
     sys.setswitchinterval(SWITCH_INTERVAL)
-    return run_program(
-        name,
-        lambda stop: _serve(stop, program or _declared()),
-        ArmError,
-        args=args,
-        help_text=HELP,
-    )
+    offers = Offers(jogging, trajectories)
+    return run_program(name, lambda stop: serve(stop, offers), ArmError, help_text=HELP)
 
 
 def main() -> int:
     """Run what the parameters say."""
-    return run_motion(NAME, None)
+    return _run(NAME, _serve_declared)
 
 
 def motion_master() -> int:
     """Run motion_node with drives on a CAN bus."""
-    return run_motion('master', Program(Backend.CANOPEN))
+    return _run('master', _serve_canopen)
 
 
 def motion_controller() -> int:
     """Run motion_node with drives elsewhere."""
-    return run_motion('motion_controller', Program(Backend.TOPICS))
+    return _run('motion_controller', serve_topics)
 
 
 def trajectory_controller() -> int:
     """Run motion_node with drives elsewhere, for trajectories only: beside a servo, or none."""
-    return run_motion('trajectory_controller', Program(Backend.TOPICS, Offers(jogging=False)))
+    return _run('trajectory_controller', serve_topics, jogging=False)
 
 
 def servo_node() -> int:
     """Run motion_node with drives elsewhere, for jogging only: beside ros2_control."""
-    return run_motion('servo_node', Program(Backend.TOPICS, Offers(trajectories=False)))
+    return _run('servo_node', serve_topics, trajectories=False)
 
 
 if __name__ == '__main__':
