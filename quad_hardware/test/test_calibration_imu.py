@@ -32,7 +32,7 @@ from quad_hardware import CommandError
 from quad_hardware.calibration.imu import find_mounting, Stance
 from quad_hardware.calibration.main import run_calibrate
 from quad_hardware.calibration.parameter_file import imu_parameters, read_parameters
-from quad_hardware.calibration.robot import ImuReading
+from quad_hardware.calibration.robot import ImuReading, mean_attitude
 from quad_hardware.estimation import Estimator, EstimatorSettings, ImuMounting
 from quad_hardware.estimation.filters import STANDARD_GRAVITY
 from quad_hardware.joints import JointMap, servo_of
@@ -297,3 +297,13 @@ def test_a_person_finds_it_and_the_file_has_it(tmp_path: Path, protocol: Protoco
         assert 'rates_checked' not in found
     else:
         assert (found['rate_signs'], found['rates_checked']) == ([1.0, -1.0, 1.0], True)
+
+
+@given(st.lists(st.floats(-180.0, 180.0), min_size=1, max_size=15), st.floats(85.0, 89.9))
+def test_the_mean_of_attitudes_nose_up_is_one_of_them(rolls: list[float], pitch: float) -> None:
+    """There roll and yaw leap together from one report to the next, and the body hardly turns."""
+    seen = [(roll, 90.0, roll) for roll in rolls]
+    assert mean_attitude(seen)[1] == pytest.approx(90.0, abs=0.1)
+    level = mean_attitude([(0.0, pitch, 179.0), (0.0, pitch, -179.0)])
+    assert abs(math.remainder(level[2] - 180.0, 360.0)) < 0.5
+    assert level[1] == pytest.approx(pitch, abs=0.5)

@@ -12,7 +12,7 @@ import math
 from statistics import fmean, median
 import threading
 
-from quad_description.rotations import Vector
+from quad_description.rotations import from_rpy, normalized, roll_pitch_yaw, Vector
 
 from ..exceptions import NoAnswerError
 from ..link import Driver, LinkOptions, LinkState
@@ -62,14 +62,14 @@ class LimpRobot:
             NoAnswerError: The robot does not report, or no number; the message has the reason.
         """
         way, reports = self._read()
-        roll, pitch, yaw = map(_mean_angle, zip(*(r.attitude for r in reports), strict=True))
-        if not all(map(math.isfinite, (roll, pitch, yaw))):
+        if not all(map(math.isfinite, (angle for r in reports for angle in r.attitude))):
             raise NoAnswerError('the IMU reports no number; switch the robot off and on')
+        attitude = mean_attitude(r.attitude for r in reports)
         forces = [each.acceleration for each in reports if each.acceleration is not None]
         if not forces:
-            return ImuReading((roll, pitch, yaw), None, way)
+            return ImuReading(attitude, None, way)
         x, y, z = map(fmean, zip(*forces, strict=True))
-        return ImuReading((roll, pitch, yaw), (x, y, z), way)
+        return ImuReading(attitude, (x, y, z), way)
 
     @contextmanager
     def limp(self) -> Iterator[None]:
@@ -127,8 +127,13 @@ def limp_robot(options: LinkOptions, motors: Collection[int]) -> Iterator[LimpRo
         robot.driver.stop()
 
 
-def _mean_angle(degrees: Iterable[float]) -> float:
-    """Return the mean of angles [deg] that may be on both sides of 180."""
-    angles = [math.radians(angle) for angle in degrees]
-    sines, cosines = map(math.sin, angles), map(math.cos, angles)
-    return math.degrees(math.atan2(fmean(sines), fmean(cosines)))
+def mean_attitude(attitudes: Iterable[Vector]) -> Vector:
+    """Return the mean of roll, pitch and yaw [deg]; not of each, they leap with the nose up."""
+    rotations = [from_rpy(*map(math.radians, attitude)) for attitude in attitudes]
+    first, sums = rotations[0], [0.0] * 4
+    for rotation in rotations:  # a quaternion and its negative are one rotation
+        sign = math.copysign(1.0, sum(a * b for a, b in zip(first, rotation, strict=True)))
+        sums = [total + sign * part for total, part in zip(sums, rotation, strict=True)]
+    x, y, z, w = sums
+    roll, pitch, yaw = map(math.degrees, roll_pitch_yaw(normalized((x, y, z, w))))
+    return roll, pitch, yaw
