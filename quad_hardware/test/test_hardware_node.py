@@ -209,6 +209,7 @@ def test_servos_that_still_pull_are_not_said_to_be_without_torque(rig: NodeRig) 
     answer = rig.client.call(SetBool, '/hardware_node/torque', SetBool.Request(data=False))
     assert not answer.success
     assert 'still report load' in answer.message
+    assert rig.client.call(SetBool, '/hardware_node/torque', SetBool.Request(data=True)).success
 
 
 def test_torque_is_taken_and_given_by_service(rig: NodeRig) -> None:
