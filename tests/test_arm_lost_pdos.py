@@ -84,9 +84,10 @@ class Arm:
         return moved / (self.to - self.begin)
 
 
-@pytest.mark.parametrize('every', [False, True], ids=['one', 'all'])
 @pytest.mark.parametrize(
-    'mode', [OperationMode.CYCLIC_POSITION, OperationMode.INTERPOLATED_POSITION]
+    ('mode', 'every'),
+    [(OperationMode.CYCLIC_POSITION, False), (OperationMode.INTERPOLATED_POSITION, True)],
+    ids=['one', 'all'],
 )
 def test_a_silent_joint_stops_the_arm_on_its_path(mode: OperationMode, every: bool) -> None:
     """All seven stop in step within the time-out and the stop; the result names the drive."""
@@ -112,12 +113,9 @@ def test_a_silent_joint_stops_the_arm_on_its_path(mode: OperationMode, every: bo
         assert arm.net.drives[name].view.state is DriveState.OPERATION_ENABLED
 
 
-@pytest.mark.parametrize(
-    'mode', [OperationMode.CYCLIC_POSITION, OperationMode.INTERPOLATED_POSITION]
-)
-def test_a_joint_without_set_points_stops_the_arm(mode: OperationMode) -> None:
+def test_a_joint_without_set_points_stops_the_arm() -> None:
     """It stands at once; the others stop on the path, and nothing jumps when it receives again."""
-    arm = Arm(mode)
+    arm = Arm(OperationMode.CYCLIC_POSITION)
     arm.lose(RPDOS, LOST)
     arm.net.run(TIME_OUT + STOP_TIME)
     rest = arm.progress()

@@ -10,13 +10,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from arm_canopen.config import (
-    BusConfig,
-    MasterConfig,
-    NodeConfig,
-    PdoConfig,
-    SdoWrite,
-)
+from arm_canopen import BusConfig, NodeConfig
+from arm_canopen.config import MasterConfig, PdoConfig, SdoWrite
 from canopen_core.eds import load_eds
 from canopen_core.standard import MappedObject, ObjectDictionary, rpdo_default, tpdo_default
 

@@ -223,6 +223,12 @@ class Axis:
         return self._mode_shown is self.mode and self.view.mode == self.mode.number
 
     @property
+    def halt_bits(self) -> int:
+        """Bit 8 while what acts on the drive is halted, also for what ends its operation."""
+        held = self.holding_mode
+        return NO_BITS if held is None else self.halt.bits(held)
+
+    @property
     def accepts_targets(self) -> bool:
         """Whether a target of the selected mode would be executed; else see :attr:`refusal`."""
         return (
@@ -378,9 +384,7 @@ class Axis:
             for mode in (*self.modes.values(), self.mode):
                 if not mode.by_sdo:
                     mode.preload(actual)
-        if held is None or self.goal is not DriveState.OPERATION_ENABLED:
-            return NO_BITS
-        return self.halt.bits(held)
+        return self.halt_bits
 
     def _command(self) -> Command:
         state = self.view.state

@@ -530,9 +530,11 @@ class AxisCommands:
         """
         axis = self.axis
         mode = self._configured_mode()
-        if mode is None or axis.mode.number or axis.view.mode:
+        if mode is None or axis.mode.number:
             return
         if not self.needs_mode:
+            if axis.view.mode:
+                return
             axis.goal = DriveState.OPERATION_ENABLED
             with contextlib.suppress(TimeoutError):
                 await self._scheduler.until(
@@ -548,7 +550,7 @@ class AxisCommands:
                 'that is done at once'
             )
             axis.goal = DriveState.SWITCHED_ON
-        await self.switch(mode)
+        await self.switch(self.mode_to_return_to())  # one that it shows goes with the next RPDO
 
     def _configured_mode(self) -> Mode | None:
         """Return the first mode that bus.yml names and the drive has."""
@@ -684,7 +686,7 @@ class AxisCommands:
             await self._end_halt_at_rest(acting)
             axis.select(mode)
         await self.until(
-            lambda: axis.shows_mode,
+            lambda: axis.mode is mode and axis.shows_mode,  # a lost device has mode 0
             timeout,
             f'mode {mode.number.title} in 0x6061',
             'does its switching_state in bus.yml fit?',

@@ -254,15 +254,16 @@ class StopSequence:
         """Write the controlword of this step; the step does not wait for the answer."""
         quick_stop = self.goal is DriveState.QUICK_STOP_ACTIVE
         command = Command.QUICK_STOP if quick_stop else Command.DISABLE_VOLTAGE
-        self._scheduler.background(self._written(command))
+        # a drive without quick stop stays halted
+        self._scheduler.background(self._written(command | self._axis.halt_bits))
 
-    async def _written(self, command: Command) -> None:
+    async def _written(self, command: int) -> None:
         axis, place = self._axis, self._view.at(Index.CONTROLWORD)
         try:
-            await axis.node.objects.write_object(place, 0, int(command), urgent=True)
+            await axis.node.objects.write_object(place, 0, command, urgent=True)
         except (SdoError, CodecError) as error:
             self._sdo_error = str(error)
-            if axis.mutes_controlword and axis.can_send(int(command)):
+            if axis.mutes_controlword and axis.can_send(command):
                 axis.unmute_controlword()
 
     async def _within(self, timeout: float, condition: Callable[[], bool]) -> bool:

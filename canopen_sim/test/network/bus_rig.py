@@ -14,6 +14,7 @@ from collections import deque
 from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
+from enum import auto, Enum
 import logging
 import struct
 from typing import Any, Protocol
@@ -22,21 +23,22 @@ from drive_samples import bus_config, SCALE
 
 from arm_canopen import (
     AxisFeedback,
+    BusConfig,
     BusError,
     CanopenMaster,
     DriveState,
     Event,
+    NodeConfig,
     OperationMode,
+    Promise,
     Refusal,
     Setpoint,
     Severity,
 )
-from arm_canopen.config import BusConfig, NodeConfig
 from arm_canopen.master.runner import Clock
-from arm_canopen.master.scheduler import Promise
 from canopen_core.can import Bus, Frame
 from canopen_core.can.frame import checked
-from canopen_core.standard import ObjectDictionary
+from canopen_core.standard import Controlword, ObjectDictionary, Statusword
 from canopen_sim import Device, ServoModel
 from canopen_sim import Drive as SimulatedDrive
 
@@ -57,6 +59,19 @@ VELOCITY_MODES = (
 )
 TORQUE_MODES = (OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE)
 MODES = (*POSITION_MODES, *VELOCITY_MODES, *TORQUE_MODES)
+
+
+def with_modes(rows: Sequence[Any], *offsets: int) -> list[tuple[Any, OperationMode]]:
+    """Return each row with some modes, by default a position, a velocity and a torque mode or so.
+
+    The modes go on from row to row, so that rows of one kind meet all of them.
+    """
+    steps = offsets or (0, 3, 6)
+    return [
+        (row, MODES[(number + step) % len(MODES)])
+        for number, row in enumerate(rows)
+        for step in steps
+    ]
 
 
 class Station(Protocol):
@@ -510,6 +525,58 @@ class Leader:
     def released(self, axis: str, refusal: Refusal) -> None:
         """Keep the cause."""
         self.losses.setdefault(axis, refusal)
+
+
+class SetPointKind(Enum):
+    """When a drive sees the edge of bit 4, and whether it raises bit 12."""
+
+    ALWAYS = auto()
+    NEVER = auto()
+    NEVER_ACKNOWLEDGES = auto()
+    UNLESS_FULL = auto()  # an edge that came while bit 12 was set is lost for good
+    AFTER_HALT = auto()  # bit 4 counts as 0 while bit 8 is set
+    EDGE_AFTER_HALT = auto()  # an edge that came under halt is lost for good
+    WORD_AFTER_HALT = auto()  # so is one in the word that ends the halt
+
+
+class SetPoints:
+    """Makes another kind of drive, in mode 1, of the first one, which takes set-points always."""
+
+    def __init__(self, net: VirtualNetwork, kind: SetPointKind) -> None:
+        """Alter its controlwords and statuswords from now on."""
+        self._kind = kind
+        node_id = net.network.config.nodes[0].node_id
+        self._status, self._command = 0x180 + node_id, 0x200 + node_id
+        self._offered = self._lost = self._halted = False
+        self._full = True
+        net.wire.alters = self
+
+    def __call__(self, sender: str, frame: Frame) -> Frame:
+        """Take out bit 4 where it is not seen, or bit 12."""
+        if frame.can_id not in (self._status, self._command):
+            return frame
+        data = bytearray(frame.data)
+        positions = data[2:3] == bytes((OperationMode.PROFILE_POSITION,))
+        if frame.can_id == self._status:
+            self._full = bool(data[1] & Statusword.SET_POINT_ACKNOWLEDGE >> 8)
+            if positions and self._kind is SetPointKind.NEVER_ACKNOWLEDGES:
+                data[1] &= ~(Statusword.SET_POINT_ACKNOWLEDGE >> 8)
+        elif self._is_lost(int.from_bytes(data[:2], 'little')) and positions:
+            data[0] &= ~int(Controlword.NEW_SET_POINT)
+        return frame._replace(data=bytes(data))
+
+    def _is_lost(self, word: int) -> bool:
+        before, self._halted = self._halted, bool(word & Controlword.HALT)
+        offered = bool(word & Controlword.NEW_SET_POINT)
+        rising, self._offered = offered and not self._offered, offered
+        blind = {
+            SetPointKind.NEVER: True,
+            SetPointKind.UNLESS_FULL: self._full,
+            SetPointKind.EDGE_AFTER_HALT: self._halted,
+            SetPointKind.WORD_AFTER_HALT: self._halted or before,
+        }.get(self._kind, False)
+        self._lost = offered and (self._lost or (rising and blind))
+        return self._lost or (self._kind is SetPointKind.AFTER_HALT and self._halted)
 
 
 def booted(*nodes: NodeConfig, **master: Any) -> VirtualNetwork:

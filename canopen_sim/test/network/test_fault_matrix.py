@@ -11,11 +11,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
+import itertools
 import random
 import re
 from typing import Any
 
-from bus_rig import MODES, POSITION_MODES, TORQUE_MODES, VELOCITY_MODES, VirtualNetwork
+from bus_rig import (
+    MODES,
+    POSITION_MODES,
+    TORQUE_MODES,
+    VELOCITY_MODES,
+    VirtualNetwork,
+    with_modes,
+)
 from diagnostic_msgs.msg import DiagnosticStatus
 from drive_samples import (
     bus_config,
@@ -393,8 +401,7 @@ DEVIATIONS = {
 }
 
 
-@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
-@pytest.mark.parametrize('deviations', DEVIATIONS.values(), ids=DEVIATIONS)
+@pytest.mark.parametrize(('deviations', 'mode'), with_modes([*DEVIATIONS.values()]))
 def test_a_drive_that_deviates_is_used_as_any_other(
     deviations: tuple[Deviation | FaultInjection, ...], mode: OperationMode
 ) -> None:
@@ -577,19 +584,27 @@ TPDOS, RPDOS = (0x180, 0x280, 0x380), (0x200, 0x300, 0x400)
 STREAMED = (OperationMode.INTERPOLATED_POSITION, OperationMode.CYCLIC_POSITION)
 
 
-@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
-@pytest.mark.parametrize('names', [(FAULTY,), (FAULTY, WITNESS)], ids=['one', 'all'])
 @pytest.mark.parametrize(
-    'lost', [TPDOS, RPDOS, (*TPDOS, *RPDOS)], ids=['TPDOs lost', 'RPDOs lost', 'both lost']
+    ('loss', 'mode'),
+    with_modes(
+        list(
+            itertools.product(
+                (TPDOS, RPDOS, (*TPDOS, *RPDOS)),  # lost
+                ((FAULTY,), (FAULTY, WITNESS)),
+            )
+        ),
+        *(0, 1, 3, 6),
+    ),
 )
 def test_lost_pdos_in_motion(
-    lost: tuple[int, ...], names: tuple[str, ...], mode: OperationMode
+    loss: tuple[tuple[int, ...], tuple[str, ...]], mode: OperationMode
 ) -> None:
     """A drive that cannot be seen is halted and refuses targets; one without RPDOs is reported.
 
     A halt that does not reach it becomes a quick stop by SDO; else it stays enabled. When the PDOs
     come again nothing moves before a new target.
     """
+    lost, names = loss
     arm = Arm()
     arm.move(mode)
     silent, deaf = set(TPDOS) <= set(lost), set(RPDOS) <= set(lost)
@@ -632,16 +647,18 @@ NO_HALT = (Deviation.HALT_IGNORED,)
 NO_STOP = (Deviation.HALT_IGNORED, Deviation.QUICK_STOP_IGNORED)
 
 
-@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
 @pytest.mark.parametrize(
-    ('stop', 'ignored'),
-    [('halt', NO_HALT), ('halt', NO_STOP), ('quick_stop', NO_STOP), ('shutdown', NO_STOP)],
-    ids=['halt', 'halt and quick stop', 'quick stop', 'shutdown'],
+    ('ignoring', 'mode'),
+    with_modes(
+        [('halt', NO_HALT), ('halt', NO_STOP), ('quick_stop', NO_STOP), ('shutdown', NO_STOP)],
+        *(0, 2, 4, 6),
+    ),
 )
 def test_a_stop_that_the_drive_ignores(
-    stop: str, ignored: tuple[Deviation, ...], mode: OperationMode
+    ignoring: tuple[str, tuple[Deviation, ...]], mode: OperationMode
 ) -> None:
     """A stronger one follows at once, and the answer names the state in which the motor stands."""
+    stop, ignored = ignoring
     arm = Arm()
     arm.move(mode)
     if mode in POSITION_MODES:
@@ -661,6 +678,7 @@ def test_a_stop_that_the_drive_ignores(
 
 
 PRE_OPERATIONAL, STOP = NmtCommand.ENTER_PRE_OPERATIONAL, NmtCommand.STOP
+STOPS = ('halt', 'quick_stop', 'disable', 'shutdown')
 IN_PRE_OPERATIONAL = [(0.1, 0.3), (1.0, 0.05), (1.0, 0.3), (1.0, 1.2)]
 """Period of the heartbeat, and time from the NMT command to the stop, in [s]."""
 
@@ -674,13 +692,13 @@ def slow_heartbeat(period: float, **faulty: Any) -> Arm:
     return Arm(3.0 * period, heartbeat_producer=period, sdo_writes=writes, **faulty)
 
 
-@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
-@pytest.mark.parametrize('stop', ['halt', 'quick_stop', 'disable', 'shutdown'])
-@pytest.mark.parametrize(('period', 'wait'), IN_PRE_OPERATIONAL)
-def test_a_stop_in_pre_operational(
-    period: float, wait: float, stop: str, mode: OperationMode
-) -> None:
+@pytest.mark.parametrize(
+    ('moment', 'mode'),
+    with_modes([(*moment, stop) for moment in IN_PRE_OPERATIONAL for stop in STOPS]),
+)
+def test_a_stop_in_pre_operational(moment: tuple[float, float, str], mode: OperationMode) -> None:
     """The device takes SDOs, so its motor stands when the answer comes, whenever that is."""
+    period, wait, stop = moment
     arm = slow_heartbeat(period)
     arm.move(mode)
     arm.net.send_as('tool', Frame(0, bytes((PRE_OPERATIONAL, NODE_ID))))
@@ -692,9 +710,13 @@ def test_a_stop_in_pre_operational(
     arm.stands(FAULTY)
 
 
-@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
-@pytest.mark.parametrize('stop', ['halt', 'disable'])
-@pytest.mark.parametrize('wait', [0.05, 0.3])
+@pytest.mark.parametrize(
+    ('wait', 'stop', 'mode'),
+    [
+        (*row, mode)
+        for row, mode in with_modes(list(itertools.product((0.05, 0.3), ('halt', 'disable'))))
+    ],
+)
 def test_a_stop_while_no_pdos_pass_and_nothing_says_why(
     wait: float, stop: str, mode: OperationMode
 ) -> None:

@@ -5,12 +5,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from enum import auto, Enum
 from functools import partial
 import math
 import struct
 
-from bus_rig import booted, JOINT, MODES, TORQUE_MODES, VELOCITY_MODES, VirtualNetwork
+from bus_rig import (
+    booted,
+    JOINT,
+    MODES,
+    SetPointKind,
+    SetPoints,
+    TORQUE_MODES,
+    VELOCITY_MODES,
+    VirtualNetwork,
+)
 from drive_samples import (
     bus_config,
     drive_config,
@@ -26,11 +34,10 @@ from hypothesis import given, Phase, settings, strategies
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen import DriveError, DriveState, OperationMode, Severity
+from arm_canopen import DriveError, DriveState, NodeConfig, OperationMode, Severity
 from arm_canopen.cia402.halt import UNDER_HALT_TIME
 from arm_canopen.cia402.modes import Move
 from arm_canopen.cia402.state import VelocityEstimate, WINDOW
-from arm_canopen.config import NodeConfig
 from arm_canopen.config.model.drive import RecoveryPolicy
 from canopen_core.can import Frame
 from canopen_core.standard import Controlword, ObjectDictionary, Statusword
@@ -176,7 +183,7 @@ def test_a_full_drive_that_receives_nothing_gets_the_move_later() -> None:
     """A drive that ignores set-points while its buffer is full makes its moves, then the new."""
     net = running_in(OperationMode.PROFILE_POSITION)
     full(net)
-    SetPoints(net, Kind.UNLESS_FULL)
+    SetPoints(net, SetPointKind.UNLESS_FULL)
     net.commands[JOINT].move(Move(-0.2))
     go(net, 6.0)
     assert net.motor() == pytest.approx(-0.2, abs=2e-3)
@@ -203,7 +210,7 @@ def test_a_target_that_is_not_taken_does_not_end_the_halt() -> None:
     net.run(0.4)
     net.do(JOINT, 'halt', preempt=True)
 
-    SetPoints(net, Kind.NEVER)
+    SetPoints(net, SetPointKind.NEVER)
     commands, begin = net.commands[JOINT], net.motor()
     with pytest.raises(DriveError, match='stays halted'):
         net.result(commands.deliver(lambda: commands.set_target(0.0)))
@@ -217,7 +224,7 @@ def test_a_target_that_is_not_taken_does_not_end_the_halt() -> None:
 def test_a_drive_without_acknowledge_is_reported_once() -> None:
     """It goes to every target, and queued moves wait for the one before (bit 10)."""
     net = running_in(OperationMode.PROFILE_POSITION)
-    SetPoints(net, Kind.NEVER_ACKNOWLEDGES)
+    SetPoints(net, SetPointKind.NEVER_ACKNOWLEDGES)
     for target in (0.3, 0.6, 0.1):
         net.target(target)
         go(net, 2.5)
@@ -239,11 +246,11 @@ def test_a_drive_that_sees_no_set_point_has_not_taken_its_target() -> None:
     """It does not count as one without acknowledge, as it does not move; the next target goes."""
     net = running_in(OperationMode.PROFILE_POSITION)
     commands = net.commands[JOINT]
-    SetPoints(net, Kind.NEVER)
+    SetPoints(net, SetPointKind.NEVER)
     with pytest.raises(DriveError, match=r'has not taken its target .*bit 12'):
         net.result(commands.deliver(lambda: commands.set_target(0.5)))
     assert_rests(net)
-    SetPoints(net, Kind.NEVER_ACKNOWLEDGES)
+    SetPoints(net, SetPointKind.NEVER_ACKNOWLEDGES)
     for target in (0.0, 0.3):  # the first is where it stands
         net.result(commands.deliver(partial(commands.set_target, target)))
     go(net, 2.5)
@@ -254,12 +261,12 @@ def test_a_drive_that_acknowledges_no_more_is_judged_by_its_motion() -> None:
     """A target that moves it is answered as taken, and one that does not as refused."""
     net = running_in(OperationMode.PROFILE_POSITION)
     commands = net.commands[JOINT]
-    for kind, target in ((Kind.ALWAYS, 0.1), (Kind.NEVER_ACKNOWLEDGES, 0.5)):
+    for kind, target in ((SetPointKind.ALWAYS, 0.1), (SetPointKind.NEVER_ACKNOWLEDGES, 0.5)):
         SetPoints(net, kind)
         net.result(commands.deliver(partial(commands.set_target, target)))
         go(net, 2.0)
         assert net.motor() == pytest.approx(target, abs=2e-3)
-    SetPoints(net, Kind.NEVER)
+    SetPoints(net, SetPointKind.NEVER)
     with pytest.raises(DriveError, match=r'has not taken its target .*bit 12'):
         net.result(commands.deliver(partial(commands.set_target, 0.1)))
     assert_rests(net)
@@ -459,57 +466,14 @@ HALT_OPTION = 0x605D
 UNSHRUNK = (Phase.explicit, Phase.reuse, Phase.generate)  # an example takes long
 
 
-class Kind(Enum):
-    """When a drive sees the edge of bit 4, and whether it raises bit 12."""
-
-    ALWAYS = auto()
-    NEVER = auto()
-    NEVER_ACKNOWLEDGES = auto()
-    UNLESS_FULL = auto()  # an edge that came while bit 12 was set is lost for good
-    AFTER_HALT = auto()  # bit 4 counts as 0 while bit 8 is set
-    EDGE_AFTER_HALT = auto()  # an edge that came under halt is lost for good
-    WORD_AFTER_HALT = auto()  # so is one in the word that ends the halt
+REFUSE_WHEN_FULL = (
+    SetPointKind.UNLESS_FULL,
+    SetPointKind.AFTER_HALT,
+    SetPointKind.EDGE_AFTER_HALT,
+)
 
 
-class SetPoints:
-    """Makes a kind of drive of the simulated one, which takes set-points at any time."""
-
-    def __init__(self, net: VirtualNetwork, kind: Kind) -> None:
-        """Alter its controlwords and statuswords from now on."""
-        self._kind = kind
-        self._offered = self._lost = self._halted = False
-        self._full = True
-        net.wire.alters = self
-
-    def __call__(self, sender: str, frame: Frame) -> Frame:
-        """Take out bit 4 where it is not seen, or bit 12."""
-        data = bytearray(frame.data)
-        if frame.can_id == STATUS_PDO:
-            self._full = bool(data[1] & Statusword.SET_POINT_ACKNOWLEDGE >> 8)
-            if self._kind is Kind.NEVER_ACKNOWLEDGES:
-                data[1] &= ~(Statusword.SET_POINT_ACKNOWLEDGE >> 8)
-        elif frame.can_id == COMMAND_PDO and self._is_lost(int.from_bytes(data[:2], 'little')):
-            data[0] &= ~int(Controlword.NEW_SET_POINT)
-        return frame._replace(data=bytes(data))
-
-    def _is_lost(self, word: int) -> bool:
-        before, self._halted = self._halted, bool(word & Controlword.HALT)
-        offered = bool(word & Controlword.NEW_SET_POINT)
-        rising, self._offered = offered and not self._offered, offered
-        blind = {
-            Kind.NEVER: True,
-            Kind.UNLESS_FULL: self._full,
-            Kind.EDGE_AFTER_HALT: self._halted,
-            Kind.WORD_AFTER_HALT: self._halted or before,
-        }.get(self._kind, False)
-        self._lost = offered and (self._lost or (rising and blind))
-        return self._lost or (self._kind is Kind.AFTER_HALT and self._halted)
-
-
-REFUSE_WHEN_FULL = (Kind.UNLESS_FULL, Kind.AFTER_HALT, Kind.EDGE_AFTER_HALT)
-
-
-def halting(kind: Kind, option: int = 1, *, leads: bool = False) -> VirtualNetwork:
+def halting(kind: SetPointKind, option: int = 1, *, leads: bool = False) -> VirtualNetwork:
     """Return a network whose drive begins to go to a target in mode 1."""
     writes = (*MOTION_WRITES, sdo_write(HALT_OPTION, 0, option))
     config = drive_config(JOINT, NODE_ID, sdo_writes=writes)
@@ -545,7 +509,7 @@ def answer(net: VirtualNetwork, target: float) -> tuple[str, float]:
     return ('' if promise.error is not None else str(promise.result())), beyond
 
 
-@pytest.mark.parametrize('kind', [kind for kind in Kind if kind is not Kind.NEVER])
+@pytest.mark.parametrize('kind', [kind for kind in SetPointKind if kind is not SetPointKind.NEVER])
 @settings(max_examples=6, phases=UNSHRUNK)
 @given(
     new=st.floats(-0.5, 0.5),
@@ -555,7 +519,7 @@ def answer(net: VirtualNetwork, target: float) -> tuple[str, float]:
     leads=st.booleans(),
 )
 def test_a_halt_ends_with_the_new_target_or_with_an_error(
-    kind: Kind, new: float, option: int, under_way: float, queued: int, *, leads: bool
+    kind: SetPointKind, new: float, option: int, under_way: float, queued: int, *, leads: bool
 ) -> None:
     """The axis goes to the new target and never on to an old one; else the answer says so."""
     net = halting(kind, option, leads=leads)
@@ -570,7 +534,7 @@ def test_a_halt_ends_with_the_new_target_or_with_an_error(
             assert beyond < ACCURACY
             assert not net.drives[JOINT].halt.held
         else:
-            assert kind is Kind.WORD_AFTER_HALT or (queued and kind in REFUSE_WHEN_FULL)
+            assert kind is SetPointKind.WORD_AFTER_HALT or (queued and kind in REFUSE_WHEN_FULL)
             assert beyond < BRAKING
             assert net.drives[JOINT].halt.held
             assert abs(net.drives[JOINT].view.velocity) < ACCURACY
@@ -583,7 +547,7 @@ def test_a_halt_ends_with_the_new_target_or_with_an_error(
 @pytest.mark.parametrize('verb', ['halt', 'disable', 'select'])
 def test_a_target_that_is_stopped_before_it_is_taken_is_an_error(verb: str) -> None:
     """Whoever stops the axis meanwhile, the answer is not that it goes there."""
-    net = halting(Kind.AFTER_HALT)
+    net = halting(SetPointKind.AFTER_HALT)
     net.run(0.5)
     net.do(JOINT, 'halt', preempt=True)
     net.run(0.5)
@@ -603,7 +567,7 @@ def test_a_target_that_is_stopped_before_it_is_taken_is_an_error(verb: str) -> N
 
 def test_only_the_first_target_waits_for_an_acknowledge_under_halt() -> None:
     """That a drive sees set-points only after a halt is learned, and no warning is due."""
-    net = halting(Kind.EDGE_AFTER_HALT)
+    net = halting(SetPointKind.EDGE_AFTER_HALT)
     commands = net.commands[JOINT]
     waited = []
     for target in (-0.1, 0.1):

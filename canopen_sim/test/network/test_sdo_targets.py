@@ -7,11 +7,9 @@ And drives whose EDS leaves something out, or that have none, and PDOs that lack
 
 from __future__ import annotations
 
-import contextlib
 from dataclasses import replace
 from itertools import cycle
 from pathlib import Path
-import random
 import re
 
 from bus_rig import booted, VirtualNetwork
@@ -28,14 +26,16 @@ import pytest
 from arm_canopen import (
     DriveError,
     DriveState,
+    load_bus,
+    NodeConfig,
     OperationMode,
+    Promise,
     SdoAbortError,
     SdoTimeoutError,
     Severity,
 )
 from arm_canopen.cia402.modes import Move
-from arm_canopen.config import BootWrite, DEFAULT_DRIVE, load_bus, NodeConfig
-from arm_canopen.master.scheduler import Promise
+from arm_canopen.config import BootWrite, DEFAULT_DRIVE
 from canopen_core.eds import load_eds
 from canopen_core.standard import ObjectDictionary
 from canopen_sim import Fault, FaultInjection
@@ -464,78 +464,6 @@ SELECTED = (
     OperationMode.VELOCITY,
     OperationMode.PROFILE_VELOCITY,
 )
-
-
-class Client:
-    """Commands a drive at random, which is silent, refuses, and is written to by others.
-
-    Attributes:
-        net: The network.
-        commanded: A target may be in force, or on its way.
-        log: What was done.
-    """
-
-    def __init__(self, seed: int) -> None:
-        """Enable the drive."""
-        self.net = booted(unmapped())
-        self.net.do(JOINT, 'init')
-        self.commanded = False
-        self.log: list[str] = []
-        self._random = random.Random(seed)
-
-    def act(self) -> None:
-        """Do one thing."""
-        often = (self._deliver, self._stop, self._select)
-        seldom = (self._enable, self._leave_behind, self._disturb, self._calm)
-        act = self._random.choice((*often, *often, *seldom))
-        self.log.append(act.__name__)
-        with contextlib.suppress(DriveError):
-            act()
-
-    def _deliver(self) -> None:
-        answered = give(self.net, self._random.uniform(-0.3, 0.3))
-        self.net.run(self._random.choice((0.0, 0.005, 0.05, 0.3, 1.0)))
-        self.commanded |= not answered.done or answered.error is None
-
-    def _stop(self) -> None:
-        self.commanded = False
-        self.net.do(JOINT, self._random.choice(('halt', 'disable')), preempt=True)
-
-    def _select(self) -> None:
-        if 'already' not in self.net.select(JOINT, self._random.choice(SELECTED)):
-            self.commanded = False
-
-    def _enable(self) -> None:
-        self.net.do(JOINT, 'enable')
-
-    def _leave_behind(self) -> None:
-        drive = self.net.drives[JOINT]
-        acting = TARGETS.get(OperationMode(drive.view.mode))
-        idle = [index for index in TARGETS.values() if index != acting or not drive.acts]
-        leave_behind(self.net, self._random.choice(idle), self._random.randint(-3_000, 3_000))
-
-    def _disturb(self) -> None:
-        if self._random.random() < 0.5:
-            refuse(self.net, self._random.choice(list(TARGETS.values())))
-        else:
-            self.net.wire.loses = lambda sender, frame: frame.can_id == REQUEST
-
-    def _calm(self) -> None:
-        accept(self.net)
-        self.net.wire.loses = lambda sender, frame: False
-
-
-@pytest.mark.parametrize('seed', range(8))
-def test_nothing_moves_that_was_not_commanded(seed: int) -> None:
-    """Stopped, switched or enabled, the axis rests until a target came after that."""
-    client = Client(seed)
-    for _ in range(30):
-        client.act()
-        if not client.commanded:
-            client.net.run(1.0)
-            before = client.net.motor()
-            client.net.run(0.3)
-            assert client.net.motor() == pytest.approx(before, abs=1e-3), client.log
 
 
 def without_default(*indices: int) -> ObjectDictionary:
