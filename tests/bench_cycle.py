@@ -22,10 +22,9 @@ from isolation import reserve
 import psutil
 from simulated_arm import SimulatedArm
 
-from arm_canopen import Event
+from arm_canopen import Event, load_bus
 from arm_canopen.cia402.axis import Axis
 from arm_canopen.cia402.motion_group import MotionGroup
-from arm_canopen.config import load_bus
 from arm_canopen.master.network import Network
 from arm_canopen.master.runner import NetworkThread
 from canopen_core.can import open_bus

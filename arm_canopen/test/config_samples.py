@@ -9,8 +9,7 @@ import textwrap
 
 from eds_samples import eds_text
 
-from arm_canopen import ConfigError
-from arm_canopen.config import BusConfig, load_bus
+from arm_canopen import BusConfig, ConfigError, load_bus
 from canopen_core import Problem
 
 ARTICLE_BUS = Path(__file__).parent / 'data' / 'panda' / 'bus.yml'

@@ -14,7 +14,8 @@ from config_samples import added, BUS, load_text, TWO_AXES_EDS, write_bus
 from eds_samples import DRIVE_ROWS, eds_text, Row
 import pytest
 
-from arm_canopen.config import check_file, load_bus
+from arm_canopen import load_bus
+from arm_canopen.config import check_file
 from arm_canopen.config.model.checks import check_bus, Report
 from arm_canopen.config.model.checks.drives import period_setting
 from canopen_core import Problem

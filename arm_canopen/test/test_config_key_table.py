@@ -14,8 +14,7 @@ from eds_samples import DRIVE_ROWS, eds_text, Row
 import pytest
 import yaml
 
-from arm_canopen import ConfigError
-from arm_canopen.config import BusConfig
+from arm_canopen import BusConfig, ConfigError
 from arm_canopen.config.keys import Key, Kind, Use
 from arm_canopen.config.sections import (
     DEVICE_KEYS,

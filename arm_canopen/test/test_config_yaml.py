@@ -9,8 +9,7 @@ from pathlib import Path
 from config_samples import added, BUS, errors_of, load_text, write_bus
 import pytest
 
-from arm_canopen import CanopenError, ConfigError
-from arm_canopen.config import load_bus
+from arm_canopen import CanopenError, ConfigError, load_bus
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from lifecycle_msgs.msg import State
 from lifecycle_msgs.msg import Transition as TransitionMessage
 import pytest
 
-from arm_canopen import CanopenError, LifecycleError
+from arm_canopen import CanopenError, LifecycleError, Scheduler
 from arm_canopen.master.lifecycle import (
     LifecycleState,
     Managed,
@@ -19,7 +19,6 @@ from arm_canopen.master.lifecycle import (
     TRANSITIONS,
     Verb,
 )
-from arm_canopen.master.scheduler import Scheduler
 
 PRIMARY = [state for state in LifecycleState if 1 <= state <= 4]
 

@@ -12,11 +12,10 @@ import time
 
 import pytest
 
-from arm_canopen import BusError
-from arm_canopen.config import BusConfig, MasterConfig
+from arm_canopen import BusConfig, BusError, Promise
+from arm_canopen.config import MasterConfig
 from arm_canopen.master.network import Network
 from arm_canopen.master.runner import Clock, NetworkThread
-from arm_canopen.master.scheduler import Promise
 from canopen_core.can import Frame, VirtualBus, VirtualWire
 from canopen_core.standard import CobId
 

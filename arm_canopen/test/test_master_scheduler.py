@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen import SdoError
-from arm_canopen.master.scheduler import Promise, Scheduler, Task
+from arm_canopen import Promise, Scheduler, SdoError
+from arm_canopen.master.scheduler import Task
 
 Act: TypeAlias = Callable[[Scheduler, Promise[int]], None]
 

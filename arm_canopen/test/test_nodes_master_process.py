@@ -15,6 +15,7 @@ import rclpy
 from rclpy.node import Node
 
 from arm_canopen import (
+    BusConfig,
     BusError,
     CanopenError,
     CanopenMaster,
@@ -24,7 +25,7 @@ from arm_canopen import (
     MasterProcess,
     Severity,
 )
-from arm_canopen.config import BusConfig, MasterConfig
+from arm_canopen.config import MasterConfig
 from arm_canopen.master.runner import NetworkThread
 from arm_canopen.nodes import master
 from canopen_core.can import VirtualBus, VirtualWire

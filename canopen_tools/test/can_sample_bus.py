@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from arm_canopen.config import BusConfig, MasterConfig, NodeConfig, PdoConfig
+from arm_canopen import BusConfig, NodeConfig
+from arm_canopen.config import MasterConfig, PdoConfig
 from canopen_core.standard import DataType, MappedObject, ObjectDictionary, ObjectEntry
 
 DRIVE_OBJECTS = ObjectDictionary(

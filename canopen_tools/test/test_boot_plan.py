@@ -10,6 +10,7 @@ from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, sdo_write, with_defaults
 import pytest
 
+from arm_canopen import NodeConfig
 from arm_canopen.config import (
     boot_writes,
     BootWrite,
@@ -17,7 +18,6 @@ from arm_canopen.config import (
     held_after_boot,
     HeldConsumers,
     Identity,
-    NodeConfig,
 )
 from arm_canopen.config.model.boot_plan import WATCH_KEY
 from arm_canopen.master.configuration import Configurator

@@ -14,7 +14,8 @@ import pytest
 
 from canopen_core.can import Frame
 from canopen_core.standard import ConsumerHeartbeatTime
-from canopen_tools.monitor import Description, FrameDescriber, FrameFilter, FrameKind
+from canopen_tools import Description, FrameDescriber
+from canopen_tools.monitor import FrameFilter, FrameKind
 from canopen_tools.monitor.line_format import LineFormat, TimeStyle
 from canopen_tools.monitor.value_text import value_text
 from canopen_tools.ros_arguments import split_ros_arguments

@@ -11,7 +11,7 @@ import pytest
 
 from canopen_core.can import Frame
 from canopen_core.standard import sdo
-from canopen_tools.monitor import FrameDescriber
+from canopen_tools import FrameDescriber
 from canopen_tools.monitor.object_names import ObjectNames
 from canopen_tools.monitor.sdo_follower import SdoFollower
 

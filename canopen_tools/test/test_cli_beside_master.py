@@ -15,8 +15,7 @@ from config_samples import ARTICLE_BUS
 from device_rig import EDS
 import pytest
 
-from arm_canopen import Event, EventKind, SdoError, Severity
-from arm_canopen.config import load_bus
+from arm_canopen import Event, EventKind, load_bus, SdoError, Severity
 from arm_canopen.master.network import Network
 from arm_canopen.master.runner import NetworkThread
 from canopen_core.can import open_bus

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
+from arm_canopen import load_bus, NodeConfig
 from arm_canopen.cia402.units import Units
-from arm_canopen.config import load_bus, NodeConfig
 from canopen_core.standard import Index, PdoCodec
 from canopen_tools.cli.main import main
 

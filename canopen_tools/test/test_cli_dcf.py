@@ -13,7 +13,8 @@ from eds_samples import eds_text
 import pytest
 from tool_environment import REPOSITORY
 
-from arm_canopen.config import BusConfig, load_bus, SdoWrite
+from arm_canopen import BusConfig, load_bus
+from arm_canopen.config import SdoWrite
 from canopen_core.eds import load_eds
 from canopen_tools import lint_eds
 from canopen_tools.cli.diff import expected_objects

@@ -11,8 +11,7 @@ from drive_samples import bus_config
 from eds_samples import eds_text
 import pytest
 
-from arm_canopen import Severity
-from arm_canopen.config import BusConfig, load_bus, NodeConfig
+from arm_canopen import BusConfig, load_bus, NodeConfig, Severity
 from canopen_core.standard import ObjectDictionary
 from canopen_tools.cli.diff import expected_objects
 from canopen_tools.dcf.concise import device_writes

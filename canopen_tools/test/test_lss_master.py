@@ -18,8 +18,8 @@ from arm_canopen import LssError, Promise, Scheduler
 from canopen_core.can import Frame
 from canopen_core.standard import lss, UNCONFIGURED
 from canopen_sim import DeviceHost
+from canopen_tools import FrameDescriber
 from canopen_tools.lss_master import LssMaster
-from canopen_tools.monitor import FrameDescriber
 
 pytestmark = pytest.mark.slow
 

@@ -11,8 +11,7 @@ from bus_rig import VirtualNetwork
 from drive_samples import DRIVE_EDS
 import pytest
 
-from arm_canopen import DriveError, DriveState, OperationMode
-from arm_canopen.config import load_bus
+from arm_canopen import DriveError, DriveState, load_bus, OperationMode
 from canopen_core.standard import AXIS_OFFSET, Index
 
 EDS = DRIVE_EDS.with_name('cia402_two_axes.eds')

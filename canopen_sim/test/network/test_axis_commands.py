@@ -35,14 +35,15 @@ import pytest
 from arm_canopen import (
     DriveError,
     DriveState,
+    NodeConfig,
     OperationMode,
+    Promise,
     Severity,
 )
 from arm_canopen.cia402.modes.homing import HomingProgress
 from arm_canopen.cia402.modes.profile_position import Move, QUEUE_MAX
-from arm_canopen.config import DriveConfig, NodeConfig
+from arm_canopen.config import DriveConfig
 from arm_canopen.config.model.drive import RecoveryPolicy
-from arm_canopen.master.scheduler import Promise
 from canopen_core.can import Frame
 from canopen_core.standard import NmtCommand
 from canopen_sim import Fault, FaultInjection, ServoModel

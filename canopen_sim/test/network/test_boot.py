@@ -27,8 +27,8 @@ from scripted_device import (
     STOP,
 )
 
-from arm_canopen import CanopenError, EventKind, Severity
-from arm_canopen.config import Identity, NodeConfig
+from arm_canopen import CanopenError, EventKind, NodeConfig, Severity
+from arm_canopen.config import Identity
 from arm_canopen.config.model import Place
 from arm_canopen.master.remote_node import BootPhase, LONGEST_PAUSE, RemoteNode, STABLE_TIME
 from canopen_core.can import Frame

@@ -20,6 +20,7 @@ from arm_canopen import (
     CodecError,
     DriveError,
     DriveState,
+    NodeConfig,
     OperationMode,
     Refusal,
     RefusalCause,
@@ -27,7 +28,7 @@ from arm_canopen import (
 )
 from arm_canopen.cia402.modes import Move
 from arm_canopen.cia402.units import Units
-from arm_canopen.config import DriveConfig, NodeConfig
+from arm_canopen.config import DriveConfig
 from canopen_core.can import Frame
 from canopen_core.standard import DataType
 

@@ -20,22 +20,17 @@ from arm_canopen import (
     BusError,
     CodecError,
     EventKind,
+    MasterFrames,
+    NodeConfig,
     OtherMasterError,
     SdoAbortError,
     SdoTimeoutError,
     Severity,
 )
-from arm_canopen.config import NodeConfig
 from arm_canopen.master.emergency_log import EmergencyLog
 from arm_canopen.master.life_signs import Guarding
 from arm_canopen.master.network import Network, NEVER, UPDATE_SHARE
-from arm_canopen.master.other_master import (
-    describe,
-    listen,
-    LISTENING_TIME,
-    MasterFrames,
-    refuse_other_master,
-)
+from arm_canopen.master.other_master import describe, listen, LISTENING_TIME, refuse_other_master
 from arm_canopen.master.remote_node import RESET_TIME
 from arm_canopen.master.status import node_status
 from canopen_core.can import Frame, VirtualBus, VirtualWire

@@ -35,8 +35,16 @@ from hypothesis import example, given, Phase, settings
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen import BusConfig, CanopenError, DriveError, DriveState, OperationMode, Severity
-from arm_canopen.config import load_bus, PdoConfig
+from arm_canopen import (
+    BusConfig,
+    CanopenError,
+    DriveError,
+    DriveState,
+    load_bus,
+    OperationMode,
+    Severity,
+)
+from arm_canopen.config import PdoConfig
 from canopen_core.standard import (
     CobId,
     NmtCommand,

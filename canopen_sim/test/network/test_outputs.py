@@ -21,8 +21,8 @@ from drive_samples import (
 )
 import pytest
 
-from arm_canopen import BusError, CanopenError, CodecError, OperationMode
-from arm_canopen.config import NodeConfig, PdoConfig
+from arm_canopen import BusError, CanopenError, CodecError, NodeConfig, OperationMode
+from arm_canopen.config import PdoConfig
 from arm_canopen.config.model.checks import check_bus
 from canopen_core.standard import (
     AccessType,

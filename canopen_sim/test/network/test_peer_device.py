@@ -16,7 +16,7 @@ import can
 import canopen
 from drive_samples import bus_config, drive_config, DRIVE_EDS
 
-from arm_canopen.config import NodeConfig
+from arm_canopen import NodeConfig
 from canopen_core.can import Frame
 
 NODE_ID = 2

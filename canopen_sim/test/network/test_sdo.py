@@ -16,10 +16,17 @@ from hypothesis import strategies as st
 import pytest
 from sdo_byte_server import SdoByteServer
 
-from arm_canopen import BusError, SdoAbortError, SdoError, SdoTimeoutError
-from arm_canopen.master.scheduler import Promise, Scheduler
+from arm_canopen import (
+    BusError,
+    Promise,
+    Scheduler,
+    SdoAbortError,
+    SdoClient,
+    SdoError,
+    SdoTimeoutError,
+)
 from arm_canopen.master.sdo_block_client import BURST
-from arm_canopen.master.sdo_client import BLOCK_MIN, SdoClient
+from arm_canopen.master.sdo_client import BLOCK_MIN
 from canopen_core.can import Frame
 from canopen_core.standard import DataType, ObjectDictionary, ObjectEntry
 from canopen_sim.objects.object_store import ObjectStore

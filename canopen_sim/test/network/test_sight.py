@@ -23,14 +23,17 @@ from drive_samples import (
 import pytest
 
 from arm_canopen import (
+    BusConfig,
     DriveError,
     DriveState,
+    load_bus,
+    NodeConfig,
     OperationMode,
     RefusalCause,
     Severity,
 )
 from arm_canopen.cia402.following_watch import Following, FollowingWatch
-from arm_canopen.config import boot_writes, BusConfig, load_bus, NodeConfig
+from arm_canopen.config import boot_writes
 from arm_canopen.config.model import Place
 from arm_canopen.config.model.checks import check_bus
 from arm_canopen.config.model.pdo import with_event_timer

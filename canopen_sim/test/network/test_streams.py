@@ -21,11 +21,11 @@ from arm_canopen import (
     DriveError,
     DriveState,
     OperationMode,
+    Promise,
     RefusalCause,
     Severity,
 )
 from arm_canopen.config.model.drive import RecoveryPolicy
-from arm_canopen.master.scheduler import Promise
 
 pytestmark = pytest.mark.slow
 

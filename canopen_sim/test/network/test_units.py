@@ -19,8 +19,8 @@ from drive_samples import (
 )
 import pytest
 
-from arm_canopen import DriveError, OperationMode, Setpoint, Severity
-from arm_canopen.config import DriveConfig, NodeConfig
+from arm_canopen import DriveError, NodeConfig, OperationMode, Setpoint, Severity
+from arm_canopen.config import DriveConfig
 
 JOINT = 'joint1'
 
