@@ -14,6 +14,7 @@ import resource
 import subprocess
 import sys
 from tempfile import TemporaryDirectory
+from threading import Event
 
 import numpy as np
 
@@ -21,6 +22,9 @@ from ..arrays import Array, Places
 
 CPU_LIMIT, TIME_LIMIT = 20, 60.0
 """Seconds of a processor, and by the clock, for one body: those of arms take 0.2 to 9."""
+
+BUSY = Event()
+"""Set when a body was not cut in time: the others of this process are left to the next start."""
 
 MANY_TRIANGLES = 5000
 """A body of more is remeshed first: CoACD's time grows with their number."""
@@ -51,6 +55,8 @@ def cut(corners: Array, triangles: Places) -> Sequence[Array]:
     """
     if not _closed(triangles):
         return ()
+    if BUSY.is_set():
+        raise TimeoutError
     with TemporaryDirectory(prefix='arm_model-') as folder:
         body, pieces = Path(folder, 'body.npz'), Path(folder, 'pieces.npz')
         np.savez(body, corners=corners, triangles=triangles)
@@ -64,6 +70,7 @@ def cut(corners: Array, triangles: Places) -> Sequence[Array]:
             with np.load(pieces) as stored:
                 return [stored[name] for name in stored.files]
         except subprocess.TimeoutExpired as error:
+            BUSY.set()
             raise TimeoutError from error
         except (OSError, ValueError, subprocess.SubprocessError):
             return ()
