@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Set-points as messages to a controller elsewhere, as moveit_servo sends them."""
+"""Set-points as messages to a controller elsewhere, as moveit_servo sends them, and their loop."""
 
 from __future__ import annotations
 
@@ -12,12 +12,16 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_model import ModelError
 from arm_model.ros import duration_fields
-from node_runner import ParameterReader
+from node_runner import declare_thread_priority, ParameterReader
 
 from ..controllers.controller import SetPoint
+from .following import FollowingLimits
 
 TRAJECTORY = 'trajectory_msgs/JointTrajectory'
 ARRAY = 'std_msgs/Float64MultiArray'
+
+THREAD_PRIORITY = 40
+"""SCHED_FIFO priority of the loop, unless a parameter says another; that of moveit_servo."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +63,49 @@ def declare_output(node: Node, prefix: str, topic: str, kind: str) -> OutputPara
             ' least one of them'
         )
     return parameters
+
+
+@dataclass(frozen=True, slots=True)
+class LoopParameters:
+    """How the loop runs."""
+
+    period: float  # its period in [s]
+    joint_topic: str  # topic of the joint states
+    joint_timeout: float  # age at which a joint state counts no more in [s]
+    priority: int  # SCHED_FIFO priority of its thread; 0 is none
+    following: FollowingLimits  # when the arm counts as not following
+
+
+def declare_loop(node: Node, prefix: str) -> LoopParameters:
+    """Declare how the loop runs.
+
+    Args:
+        prefix: Before each name, with its dot.
+    """
+    read = ParameterReader(node, prefix)
+    return LoopParameters(
+        read.number('publish_period', 0.01, (0.001, 0.1), 'period of the loop [s]'),
+        read.text('joint_topic', 'joint_states', 'topic of the joint states'),
+        read.number(
+            'joint_state_timeout',
+            0.5,
+            (0.02, 10.0),
+            'silence of a joint at which the arm comes to rest [s]',
+        ),
+        declare_thread_priority(read, THREAD_PRIORITY),
+        FollowingLimits(
+            read.number(
+                'following_error_limit',
+                0.2,
+                (0.0, 10.0),
+                'distance of a joint from where it was sent at which the arm comes to rest [rad];'
+                ' 0 is any',
+            ),
+            read.number(
+                'following_delay', 0.2, (0.0, 1.0), 'how late it may be where it was sent [s]'
+            ),
+        ),
+    )
 
 
 class TopicOutput:

@@ -83,12 +83,11 @@ def _nodes(models: GroupModels, document: Mapping[str, Any]) -> dict[str, Declar
     from arm_model.ros import same_robot
     from node_runner import ParameterReader
 
-    from ..io.topic_output import ARRAY, declare_output, TRAJECTORY
+    from ..io.topic_output import ARRAY, declare_loop, declare_output, TRAJECTORY
     from .controller_manager import declare_manager
     from .gripper.parameters import declare_gripper
     from .joint_state_broadcaster import declare_broadcaster
     from .servo.parameters import declare_servo, PREFIX
-    from .topics_backend import declare_loop
     from .trajectory.parameters import declare_check, declare_trajectory
 
     main, *others = models.arms

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 import threading
 import time
 
@@ -16,10 +15,8 @@ from sensor_msgs.msg import JointState
 from arm_model import RobotModel
 from arm_model.ros import declare_groups, declare_robot
 from node_runner import (
-    declare_thread_priority,
     LINGER,
     notify_ready,
-    ParameterReader,
     raise_thread_priority,
     settle_process_memory,
     spin,
@@ -28,10 +25,10 @@ from node_runner import (
 from ..core.gateway import CommandGateway, start_worker
 from ..core.motion_core import MotionCore
 from ..core.settings import CoreSettings
-from ..io.following import FollowingLimits, FollowingWatch
+from ..io.following import FollowingWatch
 from ..io.joint_feedback import JointFeedback
 from ..io.motion_thread import MotionCycle, MotionThread
-from ..io.topic_output import ARRAY, declare_output, TopicOutput, TRAJECTORY
+from ..io.topic_output import ARRAY, declare_loop, declare_output, TopicOutput, TRAJECTORY
 from .controller_manager import ControllerManager, declare_manager
 from .group_motion import build_arm, build_groups, by_check, MakeNode, Offers
 from .other_programs import watch_other_programs
@@ -39,55 +36,9 @@ from .parameter_check import check_names
 from .scene_listener import SceneListener
 from .servo.parameters import PREFIX
 
-THREAD_PRIORITY = 40
-"""SCHED_FIFO priority of the loop, unless a parameter says another; that of moveit_servo."""
-
 ARRAY_TOPIC = 'forward_position_controller/commands'
 """Default of command_out_topic, the name that ros2_controllers' examples use; that of a group
 beside the main one begins with the group's name."""
-
-
-@dataclass(frozen=True, slots=True)
-class LoopParameters:
-    """How the loop runs."""
-
-    period: float  # its period in [s]
-    joint_topic: str  # topic of the joint states
-    joint_timeout: float  # age at which a joint state counts no more in [s]
-    priority: int  # SCHED_FIFO priority of its thread; 0 is none
-    following: FollowingLimits  # when the arm counts as not following
-
-
-def declare_loop(node: Node, prefix: str) -> LoopParameters:
-    """Declare how the loop runs.
-
-    Args:
-        prefix: Before each name, with its dot.
-    """
-    read = ParameterReader(node, prefix)
-    return LoopParameters(
-        read.number('publish_period', 0.01, (0.001, 0.1), 'period of the loop [s]'),
-        read.text('joint_topic', 'joint_states', 'topic of the joint states'),
-        read.number(
-            'joint_state_timeout',
-            0.5,
-            (0.02, 10.0),
-            'silence of a joint at which the arm comes to rest [s]',
-        ),
-        declare_thread_priority(read, THREAD_PRIORITY),
-        FollowingLimits(
-            read.number(
-                'following_error_limit',
-                0.2,
-                (0.0, 10.0),
-                'distance of a joint from where it was sent at which the arm comes to rest [rad];'
-                ' 0 is any',
-            ),
-            read.number(
-                'following_delay', 0.2, (0.0, 1.0), 'how late it may be where it was sent [s]'
-            ),
-        ),
-    )
 
 
 def serve_topics(stop: threading.Event, offers: Offers) -> None:
