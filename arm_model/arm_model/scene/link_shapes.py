@@ -81,7 +81,8 @@ def _loose(fullness: Mapping[str, float]) -> Sequence[str]:
     links = ', '.join(f'{link} ({100 * share:.0f} %)' for link, share in fullness.items())
     note = (
         f'meshes are checked as convex hulls, which these links fill in part only: {links}, and'
-        ' which could not be cut into pieces (not closed, hollow or too intricate);'
+        ' which could not be cut into pieces (not closed, hollow, too intricate, or the computer'
+        ' too busy);'
         ' where that refuses too much, give them several <collision> of convex parts'
     )
     return (note,)

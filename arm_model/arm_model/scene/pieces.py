@@ -35,12 +35,13 @@ MAX_PIECES = 16
 SETTINGS = {
     'threshold': 0.1,
     'max_convex_hull': MAX_PIECES,
-    'preprocess_resolution': 30,
+    'preprocess_resolution': 20,
     'resolution': 500,
     'mcts_nodes': 10,
-    'mcts_iterations': 60,
+    'mcts_iterations': 20,
 }
-"""A third of the time of CoACD's defaults, for as many pieces of L, fork and ring."""
+"""An eighth of the time of CoACD's defaults, for as many pieces of L, fork and ring; a finger of
+17,330 triangles takes 4 s of a processor, with 60 iterations and resolution 30 11 s."""
 
 
 def cut(corners: Array, triangles: Places) -> Sequence[Array]:
