@@ -17,7 +17,6 @@ import pytest
 from quad_controller import (
     find_policy,
     GaitGenerator,
-    GaitParameters,
     load_policy,
     ParameterError,
     PolicyError,
@@ -31,7 +30,7 @@ from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy.observation import gravity, Situation
 from quad_controller.policy.options import GravitySource, ImuFrame
 from quad_description import ImuSample, JointSample
-from quad_gait_physics import MODEL, PhysicsRig
+from quad_gait_physics import FIRM, firm, MODEL, PhysicsRig
 from quad_gait_policies import FakeNetwork, joined, metadata, STAND, TERMS, write_policy
 from quad_gait_rig import ARM_ROBOT, ROBOT, tilted, UPRIGHT
 
@@ -376,10 +375,10 @@ def test_files_that_are_none_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('velocity', [Velocity(0.2), Velocity(-0.1, 0.05, 0.6)])
 def test_the_shipped_policy_walks(velocity: Velocity) -> None:
-    """The imitation of the gait goes as commanded in physics, and does not fall."""
-    stand = GaitGenerator(MODEL, GaitParameters()).stand_targets
+    """It goes as commanded in physics with the servos of its training, and does not fall."""
+    stand = GaitGenerator(MODEL, FIRM).stand_targets
     policy = load_policy(SHIPPED, MODEL, stand, PolicyOptions(), PERIOD)
-    rig = PhysicsRig(policy=policy.runner)
+    rig = PhysicsRig(firm(), FIRM, policy.runner)
     rig.mode('policy')
     rig.run(1.5, velocity)
     travel = rig.travel(10.0, velocity)

@@ -32,12 +32,12 @@ from quad_controller.policy.options import GravitySource
 from quad_controller.policy.runner import PolicyRunner
 from quad_controller.recording import inputs_of, PolicyRun, read_recording, TOPIC, unpack
 from quad_controller.replay_policy import feed, statistics_of
-from quad_description import JointSample, robot_urdf, RobotState
-from quad_gait_physics import MODEL
+from quad_description import JointSample, RobotState
+from quad_gait_physics import FIRM, firm, MODEL
 from quad_gait_rig import PERIOD, ROBOT, STANDING, UPRIGHT
 from quad_msgs.msg import ControllerStep
 from quad_sim import Terrain
-from quad_sim.physics import PhysicsBackend, Robot
+from quad_sim.physics import PhysicsBackend
 from rosbag_files import BagReader, METADATA_FILE
 
 FORWARD = Velocity(0.15)
@@ -49,7 +49,7 @@ AS_SHIPPED = PolicyOptions()
 
 def shipped(options: PolicyOptions = AS_SHIPPED) -> PolicyRunner:
     """Return the policy that is shipped, anew."""
-    stand = GaitGenerator(MODEL, GaitParameters()).stand_targets
+    stand = GaitGenerator(MODEL, FIRM).stand_targets
     return load_policy(find_policy('trot_imitation'), MODEL, stand, options, PERIOD).runner
 
 
@@ -62,9 +62,8 @@ def walk(
 ) -> Path:
     """Record a walk in physics: standing up by the gait, then by the policy that is shipped."""
     policy = shipped(options)
-    robot = Robot(robot_urdf()) if terrain is None else Robot(robot_urdf(), terrain=terrain)
-    backend = PhysicsBackend(robot, PERIOD)
-    controller = Controller(MODEL, GaitParameters(), StateParameters(), policy=policy)
+    backend = PhysicsBackend(firm() if terrain is None else firm(terrain), PERIOD)
+    controller = Controller(MODEL, FIRM, StateParameters(), policy=policy)
     run = PolicyRun('trot_imitation', options, PERIOD)
     recorder = Recorder(folder, run.about, backlog=10_000)
     assert not run.keep_contract(folder)

@@ -123,6 +123,8 @@ MEASURED: Mapping[Source, Callable[[Observed, ObservationTerm], npt.ArrayLike]] 
 }
 """Numbers of the terms that need nothing but what is measured and declared."""
 
+ROUNDING = 1e-6  # [m/s] of a velocity in a recording
+
 
 class ObservationBuilder:
     """Fills one buffer, step after step."""
@@ -205,7 +207,8 @@ class ObservationBuilder:
         return lambda seen: measured(seen, term)
 
     def _phase(self, term: ObservationTerm, velocity: Velocity) -> tuple[float, float]:
-        if math.hypot(velocity.x, velocity.y, velocity.yaw) < term.phase_threshold:
+        # a recording rounds to 32 bits, and a replay has to find the same
+        if math.hypot(velocity.x, velocity.y, velocity.yaw) < term.phase_threshold - ROUNDING:
             return 0.0, 0.0
         angle = math.tau * math.fmod(self._time / term.phase_period, 1.0)
         return math.sin(angle), math.cos(angle)
