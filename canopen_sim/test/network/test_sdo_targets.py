@@ -459,13 +459,6 @@ def test_of_values_behind_one_that_failed_only_the_newest_is_sent() -> None:
     assert dropped.error is None
 
 
-SELECTED = (
-    OperationMode.PROFILE_POSITION,
-    OperationMode.VELOCITY,
-    OperationMode.PROFILE_VELOCITY,
-)
-
-
 def without_default(*indices: int) -> ObjectDictionary:
     """Return the drive's dictionary as a vendor writes it: objects without defaults."""
     return ObjectDictionary(
