@@ -65,7 +65,7 @@ CONTRASTS = """() => {
   for (const e of document.querySelectorAll(read)) {
     const b = e.getBoundingClientRect();
     const seen = document.elementFromPoint(b.left + b.width / 2, b.top + b.height / 2);
-    if (!e.innerText?.trim() || !seen || !(e.contains(seen) || seen.contains(e))) continue;
+    if (!e.innerText?.trim() || !(e.contains(seen) || seen?.matches('button'))) continue;
     const [one, two] = [light(numbers(getComputedStyle(e).color)), light(back(e))];
     const ratio = (Math.max(one, two) + 0.05) / (Math.min(one, two) + 0.05);
     if (ratio < 4.5) found.push([e.innerText, ratio]);
