@@ -162,7 +162,7 @@ def texts() -> Iterator[str]:
 def picture(page: Page, name: str) -> bytes:
     """Take a picture of the whole page, keep it, and return it as PNG."""
     PICTURES.mkdir(parents=True, exist_ok=True)
-    return page.screenshot(path=PICTURES / f'{name}.png', timeout=PAGE_TIMEOUT)
+    return page.screenshot(path=PICTURES / f'{name}.png', timeout=3 * PAGE_TIMEOUT)
 
 
 def colors_of_scene(png: bytes) -> int:

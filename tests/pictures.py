@@ -55,7 +55,7 @@ def take_one(browser: Browser, url: str, group: str, size: dict[str, int], path:
     page = chromium.open_page(browser, url, viewport=size, has_touch=phone, is_mobile=phone)
     chromium.show(page, group)
     page.wait_for_timeout(1e3 * MOVING)
-    page.screenshot(path=path, timeout=chromium.PAGE_TIMEOUT)
+    page.screenshot(path=path, timeout=3 * chromium.PAGE_TIMEOUT)
     page.close()
 
 
