@@ -24,7 +24,8 @@ print(*{name.partition('.')[0] for name in sys.modules})
 CORE_LOADED = """
 import importlib, pkgutil, sys
 import arm_canopen
-parts = [f'arm_canopen.{part}' for part in ('cia402', 'config', 'joints', 'master')]
+parts = [f'arm_canopen.{part}' for part in ('cia402', 'cia402.modes', 'config', 'master')]
+importlib.import_module('arm_canopen.joints')
 for part in (*parts, 'canopen_core.eds', 'canopen_core.standard'):
     package = importlib.import_module(part)
     for module in pkgutil.iter_modules(package.__path__, f'{package.__name__}.'):

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from urdf_reader import Mimic
 
-from arm_canopen.joints.aggregator import JointAggregator, JointSample, JointSet, STALE_AFTER
-from arm_canopen.joints.robot_joints import RobotJoint
+from arm_canopen.joints import JointAggregator, JointSample, JointSet, RobotJoint, STALE_AFTER
 
 PERIOD_NS = 10_000_000
 NAMES = ['elbow', 'wrist', 'base']  # URDF order, which is no alphabetical one

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from arm_canopen.joints.silence_watch import SilenceWatch, START_TIMEOUT
+from arm_canopen.joints import SilenceWatch, START_TIMEOUT
 
 PERIOD = 2.0  # [s] between two looks
 JOINTS = ['base', 'elbow']

@@ -8,7 +8,7 @@ import pytest
 from urdf_reader import Mimic
 
 from arm_canopen import CanopenError
-from arm_canopen.joints.robot_joints import movable_joints, RobotJoint
+from arm_canopen.joints import movable_joints, RobotJoint
 
 PARTS = """
   <joint name="z_first" type="revolute">{0}<child link="b"/></joint>

@@ -21,9 +21,7 @@ from node_runner import (
     run_node,
 )
 
-from ..joints.aggregator import JointSample
-from ..joints.robot_joints import RobotJoint
-from ..joints.silence_watch import SilenceWatch
+from ..joints import JointSample, RobotJoint, SilenceWatch
 from .joint_states import on_description, RobotJointStates
 
 WATCH_PERIOD = 2.0  # [s] between two looks for joints without states

@@ -18,8 +18,7 @@ from canopen_core import CanopenError
 from node_runner import LATCHED
 
 from ..cia402.state import AxisState
-from ..joints.aggregator import JointAggregator, JointSample, JointSet
-from ..joints.robot_joints import movable_joints, RobotJoint
+from ..joints import JointAggregator, JointSample, JointSet, movable_joints, RobotJoint
 from .output_thread import OutputThread
 
 

@@ -1,16 +1,43 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Puts the states of single joints together, one set for each moment."""
+"""Joint states of single drives, put together into those of a robot, one set for each moment."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from .robot_joints import RobotJoint
+from urdf_reader import DescriptionError, Mimic, read_urdf
+
+from canopen_core import CanopenError
 
 STALE_AFTER = 0.5  # [s] without news a joint is no longer published
+START_TIMEOUT = 30.0  # [s] in which the first state of a joint comes, or comes again after an end
+
+
+@dataclass(frozen=True, slots=True)
+class RobotJoint:
+    """A joint with one variable."""
+
+    name: str  # name in the URDF
+    mimic: Mimic | None = None  # what it follows, None when it moves by itself
+
+
+def movable_joints(robot_description: str) -> list[RobotJoint]:
+    """Return the revolute, continuous and prismatic joints in the order of the URDF, XML text.
+
+    Raises:
+        CanopenError: It is no URDF, or has no movable joint.
+    """
+    try:
+        tree = read_urdf(robot_description)
+    except DescriptionError as error:
+        raise CanopenError(str(error)) from error
+    joints = [RobotJoint(joint.name, joint.mimic) for joint in tree.movable()]
+    if not joints:
+        raise CanopenError('the robot description has no revolute, continuous or prismatic joint')
+    return joints
 
 
 class JointSample(NamedTuple):
@@ -106,3 +133,37 @@ class JointAggregator:
 
     def _is_recent(self, name: str, now: float) -> bool:
         return name in self._arrivals and now - self._arrivals[name] <= STALE_AFTER
+
+
+class SilenceWatch:
+    """Distinguishes a lost drive from a master that has not started yet, or has ended.
+
+    A master that ends takes its publishers out of the graph; a drive that is lost does not.
+    """
+
+    def __init__(self, joints: Iterable[str], now: float) -> None:
+        self._absent_since: dict[str, float] = dict.fromkeys(joints, now)
+        self._silent: frozenset[str] = frozenset()
+
+    def note(self, joint: str) -> None:
+        """The state of a joint has come."""
+        self._absent_since.pop(joint, None)
+
+    def look(self, silent: Iterable[str], published: Iterable[str], now: float) -> list[str]:
+        """Return the joints that are missing; call it every few seconds.
+
+        The ``silent`` have no states now; those of the ``published`` have a publisher in the
+        graph.
+        """
+        before, self._silent = self._silent, frozenset(silent)
+        there = set(published)
+        missing = []
+        for joint in silent:
+            if joint not in there and joint not in self._absent_since:
+                self._absent_since[joint] = now
+            absent_since = self._absent_since.get(joint)
+            # a master that ends is silent for a moment before its publishers go
+            was_silent = joint in before and absent_since is None
+            if was_silent or (absent_since is not None and now - absent_since > START_TIMEOUT):
+                missing.append(joint)
+        return missing
