@@ -136,6 +136,7 @@ class Axis:
         # a mode is shown to the drive a cycle after the target that holds it there has left
         self._mode_led = self._mode_shown = self.mode
         self._controlword = 0
+        self._mode_sent: int | None = None  # in the RPDO
         self._state = DriveState.UNKNOWN  # that the last cycle has seen
         self._reset_began: float | None = None
         self._braking = BrakingWatch()
@@ -300,8 +301,14 @@ class Axis:
             self._found()
         if view.state is not before:
             self._state_changed(before)
-        self._watch_sight()
-        self._watch_braking()
+        if view.fresh or not self.acts:
+            self._unseen_since = None
+        else:
+            self._watch_sight()
+        if self.halt.held or self.goal is not DriveState.OPERATION_ENABLED:
+            self._watch_braking()
+        else:
+            self._braking.clear()
         self._watch_following()
         if self.phase is Phase.FOUND and view.ready:
             self.phase = Phase.READY
@@ -401,10 +408,13 @@ class Axis:
         self._controlword = int(command) | bits
         self.controlword_writer.write(self._controlword)
         number = int(self._mode_shown.number)
-        if number or not self._no_mode_zero:
+        if not number and self._no_mode_zero:
+            if not self.view.mode or self.mode_writer.by_sdo:
+                return
+            number = self.view.mode  # keeps the mode that it has
+        if number != self._mode_sent or self.mode_writer.by_sdo:
             self.mode_writer.write(number)
-        elif self.view.mode and not self.mode_writer.by_sdo:
-            self.mode_writer.write(self.view.mode)  # keeps the mode that it has
+            self._mode_sent = number
 
     # Its controlword by SDO: the RPDOs that carry it are kept back then.
 
@@ -679,9 +689,6 @@ class Axis:
     def _watch_sight(self) -> None:
         """Bring a drive to rest that acts on targets and has stopped to send its state."""
         view = self.view
-        if view.fresh or not self.acts:
-            self._unseen_since = None
-            return
         if self._unseen_since is None:
             self._unseen_since = self._scheduler.now
         if self._is_led_to_rest() or self.halt.rests:
