@@ -163,7 +163,7 @@ class AxisCommands:
     async def _delivered(self, command: Callable[[], str]) -> str:
         axis = self.axis
         mode, answer = axis.mode, command()
-        delivery, motion = self._delivery, self.axis.motions
+        delivery, motion = self._delivery, axis.motions
         try:
             await self._taken(mode, delivery)
         except DriveError as error:  # a target that was reported as failed must not move it later
@@ -171,7 +171,7 @@ class AxisCommands:
                 raise
             if isinstance(mode, ProfilePosition) and mode.withdraw(delivery, error):
                 raise DriveError(f'{error}; it is withdrawn') from error
-            if axis.accepts_targets and self.axis.motions == motion:
+            if axis.accepts_targets and axis.motions == motion:
                 axis.hold()
             raise
         return answer
@@ -599,7 +599,7 @@ class AxisCommands:
         """
         axis = self.axis
         acting = axis.holding_mode
-        enabled = axis.goal is self.axis.view.state is DriveState.OPERATION_ENABLED
+        enabled = axis.goal is axis.view.state is DriveState.OPERATION_ENABLED
         if not enabled or acting is None:
             return
         if acting.number in (*TORQUE_MODES, OperationMode.NO_MODE):
@@ -707,9 +707,9 @@ class AxisCommands:
                 'without; disable it, select the mode, and enable it again'
             )
         axis.select(acting)
-        actual = self.axis.view.actual()
+        actual = axis.view.actual()
         if isinstance(acting, ProfilePosition):
-            here = self.axis.view.units.position.commanded(actual.position_inc)
+            here = axis.view.units.position.commanded(actual.position_inc)
             delivery = acting.set_target(here)
         else:
             delivery = acting.preload(actual)
@@ -718,7 +718,7 @@ class AxisCommands:
             lambda: not axis.halt.leaving, RESUME_TIMEOUT + 1.0, 'the end of its halt'
         )
         if axis.halt.held:
-            raise DriveError(f'{self.axis.name} stays halted: {NOT_TAKEN}')
+            raise DriveError(f'{axis.name} stays halted: {NOT_TAKEN}')
 
     async def _clear_buffer(self) -> None:
         """Empty the buffer of mode 7, and open it, where the drive has one (0x60C4:06)."""
