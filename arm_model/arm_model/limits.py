@@ -206,7 +206,8 @@ def _row(joint: Joint, table: Mapping[str, Any], defaults: dict[str, list[str]])
     if not isinstance(entry, dict):
         raise LimitsError(f'joint {name} of the limits file is {entry!r}, a table is needed')
     if unknown := sorted(set(entry) - KNOWN_KEYS):
-        close = difflib.get_close_matches(unknown[0], KNOWN_KEYS, n=1)
+        longer = [key for key in KNOWN_KEYS if key.startswith(unknown[0])]
+        close = longer or difflib.get_close_matches(unknown[0], KNOWN_KEYS, n=1)
         meant = f' (is {close[0]!r} meant?)' if close else ''
         raise LimitsError(f'joint {name}: unknown key {unknown[0]!r}{meant} in the limits file')
 

@@ -195,6 +195,7 @@ BROKEN: dict[str, tuple[Callable[[Texts], Texts], str]] = {
     'word for a number': (entry(max_jerk='high'), "'high'"),
     'wider velocity': (entry(max_velocity=3.0), 'wider than the description'),
     'wider positions': (entry(min_position=-3, max_position=1), 'wider than the description'),
+    'shortened key': (entry(has_jerk=True), r"'has_jerk' \(is 'has_jerk_limits' meant"),
     'misspelt key': (entry(max_yerk=1.0), r"'max_yerk' \(is 'max_jerk' meant"),
     'no group': (lambda t: (t[0], '<robot name="chain"/>', t[2]), 'groups none'),
     'srdf no xml': (lambda t: (t[0], '<robot', t[2]), 'SRDF is no XML'),
