@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.cia402.modes.setpoint_profile import ProfileLimits, SetpointProfile
+from arm_canopen.cia402.modes.setpoint_profile import SetpointProfile
+from arm_canopen.cia402.parameters import ProfileLimits
 
 CYCLE = 0.01  # [s]
 LIMITS = ProfileLimits(1.0, 10.0, 10.0)

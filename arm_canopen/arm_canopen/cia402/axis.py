@@ -16,6 +16,7 @@ from ..master.events import EventKind, Severity
 from ..master.process_image import SentRpdo
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Promise, Scheduler, Task
+from .controlword import ControlwordOutput
 from .following_watch import Following, FollowingWatch, MARGIN_TIME
 from .halt import Halt
 from .modes import (
@@ -32,7 +33,7 @@ from .quirks import quirks_of
 from .state import AxisState, DriveStatus, FAULTY, LOOK_PERIOD, POWERED
 from .state_machine import Command, fault_reset, next_command
 from .stop import BrakingWatch, StopSequence
-from .units import check_setpoint, check_target
+from .targets import check_setpoint, check_target
 
 FOLLOWS_COMMAND = int(Statusword.FOLLOWS_COMMAND)
 FOLLOWING_ERROR = int(Statusword.FOLLOWING_ERROR)
@@ -112,7 +113,10 @@ class Axis:
         self.modes = build_modes(self.view, self.warn)
         self.mode = self.modes[OperationMode.NO_MODE]
         self.halt = Halt()
-        self.stop = StopSequence(self, scheduler)
+        self.controlword = ControlwordOutput(node, at(Index.CONTROLWORD))
+        self.stop = StopSequence(
+            self.view, self.controlword, scheduler, self.report, lambda: self.halt_bits
+        )
         self.failure = ''
         self.resetting = False
         self.motions = 0
@@ -125,13 +129,7 @@ class Axis:
             self.view.units,
         )
         self._scheduler = scheduler
-        self.controlword_writer = node.objects.writer(at(Index.CONTROLWORD))
         self.mode_writer = node.objects.writer(at(Index.MODE_OF_OPERATION))
-        self._controlling = [
-            output
-            for output in image.rpdos
-            if any(mapped.index == at(Index.CONTROLWORD) for mapped in output.config.mapping)
-        ]
         self._no_mode_zero = quirks_of(self.config.quirks).no_mode_zero
         # a mode is shown to the drive a cycle after the target that holds it there has left
         self._mode_led = self._mode_shown = self.mode
@@ -328,9 +326,9 @@ class Axis:
         elif self.node.taken_over:
             return  # its RPDOs go on to carry what another master had commanded
         elif unseen:
-            self.mute_controlword()  # it may move, and would coast
+            self.controlword.keep_back()  # it may move, and would coast
         leads = self._enables and not (unseen or self.stop.running)
-        if leads and self.controlword_muted:
+        if leads and self.controlword.kept_back:
             raise CanopenError('the RPDO with its controlword is kept back, with another axis')
         self._send(command, bits)
 
@@ -406,7 +404,7 @@ class Axis:
     def _send(self, command: Command, bits: int = NO_BITS) -> None:
         """Write controlword and mode."""
         self._controlword = int(command) | bits
-        self.controlword_writer.write(self._controlword)
+        self.controlword.writer.write(self._controlword)
         number = int(self._mode_shown.number)
         if not number and self._no_mode_zero:
             if not self.view.mode or self.mode_writer.by_sdo:
@@ -415,41 +413,6 @@ class Axis:
         if number != self._mode_sent or self.mode_writer.by_sdo:
             self.mode_writer.write(number)
             self._mode_sent = number
-
-    # Its controlword by SDO: the RPDOs that carry it are kept back then.
-
-    @property
-    def controlword_muted(self) -> bool:
-        """Whether an RPDO with the controlword of this axis is kept back, for whichever axis."""
-        for output in self._controlling:  # noqa: SIM110  # in every cycle: half of what any() costs
-            if output.kept_back_by:
-                return True
-        return False
-
-    @property
-    def mutes_controlword(self) -> bool:
-        """Whether it is kept back for this axis."""
-        return any(self in output.kept_back_by for output in self._controlling)
-
-    def mute_controlword(self) -> None:
-        """Keep every RPDO back that carries the controlword of this axis."""
-        for output in self._controlling:
-            output.kept_back_by.add(self)
-
-    def unmute_controlword(self) -> None:
-        """Send them again, as far as no other axis keeps them back."""
-        for output in self._controlling:
-            output.kept_back_by.discard(self)
-
-    def can_send(self, controlword: int) -> bool:
-        """Set the controlword, and return whether the RPDOs that carry it can be sent with it."""
-        try:
-            self.controlword_writer.write(controlword)
-            for output in self._controlling:
-                output.frame()
-        except Exception:  # noqa: BLE001  # whatever made the cycle fail may last
-            return False
-        return True
 
     # What is commanded in a mode.
 
@@ -531,7 +494,7 @@ class Axis:
             self.feed_forward.end()
         except Exception:  # noqa: BLE001  # its cause may hinder this, too
             self.stop.use_sdo()
-        if output in self._controlling:
+        if output in self.controlword.outputs:
             self.stop.use_sdo()
 
     def leave_operation(self) -> None:
@@ -585,7 +548,7 @@ class Axis:
         self.phase = Phase.FOUND
         if self.stop.running:
             return
-        self.unmute_controlword()
+        self.controlword.send_again()
         if self.view.state in POWERED and self.goal is None:
             self.warn(f'was found enabled, and is led to rest: {self.describe()}')
             self.leave_operation()

@@ -15,7 +15,6 @@ from ..config.model.drive import DriveConfig
 from ..config.model.factor_group import ACCELERATION_ADDRESSES, FACTOR_ADDRESSES, FactorGroup
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Promise, Scheduler, Task
-from .modes import OFFSET_OBJECTS, ProfileLimits
 from .units import Units
 
 RETRY_PERIOD = 1.0  # [s] after which what a drive did not answer is read again
@@ -25,6 +24,25 @@ RANGE_TIME = 10.0  # [s] in which those without 0x607F, too, cross their range (
 RAMP_TIME = 0.5  # [s] in which drives without 0x6083 get to their profile velocity
 DEFAULT_VELOCITY = 0.5  # [unit/s] for drives without any of these: slow, but moving
 DEFAULT_ACCELERATION = DEFAULT_VELOCITY / RAMP_TIME  # [unit/s^2]
+OFFSET_OBJECTS: dict[OperationMode, Index] = {
+    OperationMode.CYCLIC_POSITION: Index.POSITION_OFFSET,
+    OperationMode.CYCLIC_VELOCITY: Index.VELOCITY_OFFSET,
+    OperationMode.CYCLIC_TORQUE: Index.TORQUE_OFFSET,
+}
+"""What a drive adds to the target of a cyclic mode (CiA 402-2, clauses 13 to 15)."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProfileLimits:
+    """Limits of a profile, in user units."""
+
+    velocity: float  # largest speed towards a single target in [unit/s]
+    acceleration: float  # largest acceleration in [unit/s^2]
+    deceleration: float  # largest deceleration in [unit/s^2]
+    # largest speed along a stream of targets in [unit/s], where that is more
+    speed_limit: float = 0.0
+
+
 DEFAULT_PROFILE = ProfileLimits(DEFAULT_VELOCITY, DEFAULT_ACCELERATION, DEFAULT_ACCELERATION)
 NO_WINDOW = (0, 0xFFFF_FFFF)  # values of 0x6065 with which nothing is monitored
 DEFAULT_TORQUE_SLOPE_DEV = 1000.0  # [device units/s]: from 0 to the rated torque in a second

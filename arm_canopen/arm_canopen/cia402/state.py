@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 import math
+from typing import NamedTuple
 
 from canopen_core import CodecError, DriveError, SdoError
 from canopen_core.standard import (
@@ -28,7 +29,6 @@ from ..master.process_image import ReceivedTpdo
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler
 from ..master.status import node_status, NodeStatus
-from .modes import Actual
 from .parameters import DriveParameters, ParameterCache
 from .units import clamp, INT16_MAX, INT32_MAX, Units
 
@@ -121,6 +121,17 @@ class VelocityEstimate:
         if end <= begin or abs(last - first) <= FLICKER_INC:
             return 0.0
         return (last - first) / (end - begin)
+
+
+class Actual(NamedTuple):
+    """Where a drive is, or is held."""
+
+    # in [inc], as the drive reports it, so that no factor in bus.yml can make the target another
+    # one
+    position_inc: int
+    velocity: float = 0.0  # in user units per second; a moving drive is braked from it
+    velocity_dev: int = 0  # the same in device units, as the drive reports it
+    torque: int = 0  # 0x6077 in device units, 0 when it is unknown
 
 
 class AxisState:

@@ -8,24 +8,17 @@ slow down gets the next. "Unknown" is never "stopped".
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, fields
+from collections.abc import Callable
 import math
-from typing import Any, TYPE_CHECKING
 
-from canopen_core import CanopenError, CodecError, DriveError, SdoError
+from canopen_core import CodecError, SdoError
 from canopen_core.standard import DriveState, Index, NmtCommand, NmtState, statusword_text
 
 from ..master.events import Severity
-from ..master.scheduler import Promise, Scheduler, Task
-from .motion import Refusal, RefusalCause
-from .state import AxisState, FAULTY, POWERED
+from ..master.scheduler import Scheduler, Task
+from .controlword import ControlwordOutput
+from .state import AxisState
 from .state_machine import Command
-
-if TYPE_CHECKING:
-    from .axis import Axis
-    from .commands import AxisCommands
 
 REACTION_TIME = 0.5  # [s] in which a drive shows that it has got a command
 UNSEEN_TIMEOUT = 1.0  # [s] for it to show anything, beside the time of the ramp
@@ -35,7 +28,6 @@ SHUTDOWN_MAX = STOP_TIMEOUT + RAMP_MAX + 2 * STOP_TIMEOUT
 """Longest time of a shutdown in [s]: to brake, to lose the power, and to run out without it."""
 DISABLED = (DriveState.SWITCH_ON_DISABLED, DriveState.NOT_READY_TO_SWITCH_ON, DriveState.FAULT)
 """States without power; after UNKNOWN and in the reaction to a fault it may still move."""
-BRAKED_TIMEOUT = 10.0  # [s] for a halt to end in standstill, beside the time of the ramp
 FALLEN_RATIO = 0.98  # of the least speed so far, below which a speed is falling
 SLOWING_RATIO = 0.04  # of the time of a ramp, in which more than that has to be seen
 
@@ -74,13 +66,21 @@ class StopSequence:
     by SDO. A drive that a quick stop does not slow down loses its power.
     """
 
-    def __init__(self, axis: Axis, scheduler: Scheduler) -> None:
-        """Nothing runs before :meth:`begin`."""
+    def __init__(
+        self,
+        view: AxisState,
+        controlword: ControlwordOutput,
+        scheduler: Scheduler,
+        report: Callable[[Severity, str], None],
+        halt_bits: Callable[[], int],
+    ) -> None:
+        """Nothing runs before :meth:`begin`; ``halt_bits`` keep a drive halted meanwhile."""
         # state that the drive is led to, whatever else is commanded; None while it does not run
         self.goal: DriveState | None = None
-        self._axis = axis
-        self._view = axis.view
+        self._view = view
+        self._controlword = controlword
         self._scheduler = scheduler
+        self._send_report, self._halt_bits = report, halt_bits
         self._task: Task[None] | None = None
         self._sdo_error = ''
         self._quiet = False
@@ -124,7 +124,7 @@ class StopSequence:
             self._disables |= disables
             return
         self._quiet, self._disables = quiet, disables
-        self._axis.unmute_controlword()
+        self._controlword.send_again()
         self.goal = DriveState.QUICK_STOP_ACTIVE
         self._task = self._scheduler.background(self._run())
 
@@ -152,9 +152,9 @@ class StopSequence:
 
     def use_sdo(self) -> None:
         """Command the drive by SDO from now on, because its RPDO does not reach it."""
-        if self._axis.mutes_controlword:
+        if self._controlword.keeps_back:
             return
-        self._axis.mute_controlword()
+        self._controlword.keep_back()
         if self.running:
             self._write()
 
@@ -200,12 +200,12 @@ class StopSequence:
             waits = (DriveState.OPERATION_ENABLED, DriveState.UNKNOWN)
             return done() or self._gives_up() or (view.seen and view.state not in waits)
 
-        by_sdo = self._axis.controlword_muted or not view.node.operational
+        by_sdo = self._controlword.kept_back or not view.node.operational
         while True:
             if by_sdo:
                 if view.node.nmt_state is NmtState.STOPPED:  # in which it takes no SDO
                     view.node.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
-                self._axis.mute_controlword()
+                self._controlword.keep_back()
                 self._write()
             if await self._within(min(REACTION_TIME, left()), reacts) or not left():
                 break
@@ -248,23 +248,23 @@ class StopSequence:
                 shown = statusword_text(view.statusword)
             if view.speed_known:
                 shown += f'; {view.speed:.3g} per second'
-            self._axis.report(Severity.ERROR, f'{what}: {shown}{remedy}')
+            self._send_report(Severity.ERROR, f'{what}: {shown}{remedy}')
 
     def _write(self) -> None:
         """Write the controlword of this step; the step does not wait for the answer."""
         quick_stop = self.goal is DriveState.QUICK_STOP_ACTIVE
         command = Command.QUICK_STOP if quick_stop else Command.DISABLE_VOLTAGE
         # a drive without quick stop stays halted
-        self._scheduler.background(self._written(command | self._axis.halt_bits))
+        self._scheduler.background(self._written(command | self._halt_bits()))
 
     async def _written(self, command: int) -> None:
-        axis, place = self._axis, self._view.at(Index.CONTROLWORD)
+        place = self._view.at(Index.CONTROLWORD)
         try:
-            await axis.node.objects.write_object(place, 0, command, urgent=True)
+            await self._view.node.objects.write_object(place, 0, command, urgent=True)
         except (SdoError, CodecError) as error:
             self._sdo_error = str(error)
-            if axis.mutes_controlword and axis.can_send(command):
-                axis.unmute_controlword()
+            if self._controlword.keeps_back and self._controlword.can_send(command):
+                self._controlword.send_again()
 
     async def _within(self, timeout: float, condition: Callable[[], bool]) -> bool:
         """Return whether a condition holds in time, for a drive whose cycle may fail."""
@@ -282,216 +282,3 @@ class StopSequence:
         except TimeoutError:
             return False
         return True
-
-
-class StopCommands:
-    """Disable, halt, quick stop and shutdown of one axis."""
-
-    def __init__(self, commands: AxisCommands, scheduler: Scheduler) -> None:
-        self._axis = commands.axis
-        self._commands = commands
-        self._scheduler = scheduler
-
-    async def disable(self) -> str:
-        """Lead to Switched On, as ros2_canopen's service does; the motor is without torque."""
-        axis = self._axis
-        if not await self._ready_to_stop('disabled'):
-            return await self.shutdown()
-        if axis.view.state is DriveState.OPERATION_ENABLED:
-            await self._escalated(self._commands.reach(DriveState.SWITCHED_ON))
-        else:
-            await self._stay_disabled()
-        return await self.at_rest()
-
-    async def halt(self) -> str:
-        """Brake and stay enabled (bit 8, option code 0x605D); the next single target goes on.
-
-        A drive that this does not slow down, or that no PDO reaches, gets a quick stop.
-        """
-        axis = self._axis
-        if not await self._ready_to_stop('halted'):
-            return await self._quick_stop()
-        if self._is_quick_stopped():
-            return f'nothing to halt: {await self.at_rest()}'
-        if not axis.stays_enabled:
-            await self._stay_disabled()
-            return f'nothing to halt: {await self.at_rest()}'
-        # whatever was about to lead it elsewhere
-        axis.goal = DriveState.OPERATION_ENABLED
-        await self._escalated(self._commands.come_to_halt(BRAKED_TIMEOUT))
-        return axis.describe()
-
-    async def quick_stop(self) -> str:
-        """Quick stop; what follows at rest depends on the drive's option code 0x605A."""
-        axis = self._axis
-        reachable = await self._ready_to_stop('quick stop')
-        if not reachable or axis.view.state is DriveState.OPERATION_ENABLED:
-            return await self._quick_stop()
-        if not self._is_quick_stopped():
-            await self._stay_disabled()
-        return f'nothing to stop: {await self.at_rest()}'
-
-    async def shutdown(self) -> str:
-        """Bring the drive to rest and take its power away.
-
-        Raises:
-            DriveError: It was not seen to rest without power.
-        """
-        axis = self._axis
-        axis.interrupted = None
-        axis.released(Refusal(RefusalCause.SHUTDOWN))
-        self._require_booted()
-        axis.goal = DriveState.SWITCH_ON_DISABLED
-        await axis.stop.run()
-        if not await axis.stop.confirmed():
-            what = 'not seen to come to rest' if axis.stop.disabled else 'not disabled'
-            raise self._commands.refused(f'is {what}; cut its power')
-        return axis.describe()
-
-    async def _quick_stop(self) -> str:
-        """Quick stop by whatever reaches the drive; one that goes on loses its power."""
-        axis = self._axis
-        axis.goal = DriveState.QUICK_STOP_ACTIVE
-        await axis.stop.run(disables=False)
-        if not axis.stop.rests:
-            raise self._commands.refused('is not seen to come to rest; cut its power')
-        return axis.describe()
-
-    async def _escalated(self, stop: Coroutine[Promise[Any], None, None]) -> None:
-        """Await a stop; where it does not slow the drive down, the end of what follows it."""
-        axis = self._axis
-        try:
-            await stop
-        except DriveError:
-            if not axis.stop.running:
-                raise
-            await axis.stop.ended()
-            if not axis.stop.rests:
-                raise
-
-    async def at_rest(self, timeout: float = STOP_TIMEOUT) -> str:
-        """Describe the drive when it was seen to stand, in [s] beside the time of the ramp.
-
-        Waits for the end of what a halt leaves alone, too: a quick stop, the reaction to a fault.
-        """
-        view = self._axis.view
-
-        def rests() -> bool:
-            return view.stands and view.state is not DriveState.FAULT_REACTION_ACTIVE
-
-        with view.looking(), suppress(TimeoutError):
-            await self._scheduler.until(rests, timeout + self._axis.stop.ramp_time())
-        if not rests():
-            raise self._commands.refused('is not seen to come to rest; cut its power')
-        return self._axis.describe()
-
-    def _require_booted(self) -> None:
-        if not self._axis.node.was_booted:
-            raise self._commands.refused('is not known to stand, as it was never booted')
-
-    async def _ready_to_stop(self, reason: str) -> bool:
-        """End what moves the drive, now or later; True where PDOs can brake it."""
-        axis = self._axis
-        axis.interrupted = None
-        axis.released(Refusal(RefusalCause.COMMANDED, reason))
-        self._require_booted()
-        if not axis.node.operational or axis.stop.running:
-            return False
-        try:
-            await self._commands.ready(to_stop=True)
-        except DriveError:
-            return False  # it shows nothing, or not any more
-        self._commands.require_no_fault()
-        return True
-
-    async def _stay_disabled(self) -> None:
-        """Prevent enabling, also where the command for it is on its way."""
-        axis, commands = self._axis, self._commands
-        axis.leave_operation()
-        await axis.stop.ended()
-        await commands.settle()
-        await commands.until(
-            lambda: axis.view.state is not DriveState.OPERATION_ENABLED,
-            commands.quirks.state_timeout,
-            DriveState.SWITCH_ON_DISABLED.title,
-        )
-
-    def _is_quick_stopped(self) -> bool:
-        """Whether a quick stop runs or has ended; then no lesser stop takes its place."""
-        axis = self._axis
-        quick_stop = DriveState.QUICK_STOP_ACTIVE
-        if axis.view.state is not quick_stop and axis.goal is not quick_stop:
-            return False
-        axis.goal = quick_stop
-        return True
-
-
-@dataclass(frozen=True, slots=True)
-class StopReport:
-    """What became of the drives, by name."""
-
-    stopped: tuple[str, ...]  # they moved, and stand now; still under power
-    # they did not move visibly, and no target of before moves them any more
-    standing: tuple[str, ...]
-    unpowered: tuple[str, ...]  # they are not enabled, so nothing moves them
-    failed: tuple[str, ...]  # why it is not known that they stand, each with its name
-
-    def __str__(self) -> str:
-        """Return it in a sentence, what is worst first."""
-        named = (
-            ('NOT known to stand', '; '.join(self.failed)),
-            ('stopped', ', '.join(self.stopped)),
-            ('stand', ', '.join(self.standing)),
-            ('not enabled', ', '.join(self.unpowered)),
-        )
-        return '. '.join(f'{what}: {names}' for what, names in named if names) or 'no drives'
-
-
-async def stop_all(commands: Sequence[AxisCommands], scheduler: Scheduler) -> StopReport:
-    """Halt all drives, whatever moves them, and wait until each stands or has no power.
-
-    One that does not come to rest keeps no other from it.
-    """
-    ends = [scheduler.spawn(_stopped(each, scheduler)) for each in commands]
-    outcomes = [await end for end in ends]
-    return StopReport(
-        **{
-            each.name: tuple(text for outcome, text in outcomes if outcome == each.name)
-            for each in fields(StopReport)
-        }
-    )
-
-
-async def _stopped(commands: AxisCommands, scheduler: Scheduler) -> tuple[str, str]:
-    """Halt a drive; return its field of StopReport, and its name or why that is not known."""
-    view = commands.axis.view
-    moved = not view.stands
-    try:
-        try:
-            await _to_its_end(commands.request('halt'), commands, scheduler)
-        except CanopenError:
-            if not (view.seen and view.state in FAULTY):
-                raise
-        await commands.stops.at_rest(BRAKED_TIMEOUT)
-    except CanopenError as error:
-        return 'failed', str(error)
-    if view.state is DriveState.FAULT:  # its own reaction has ended its motion
-        return 'unpowered', f'{view.name} (faulted)'
-    if view.state not in POWERED:
-        return 'unpowered', view.name
-    return 'stopped' if moved else 'standing', view.name
-
-
-async def _to_its_end(halt: Promise[str], commands: AxisCommands, scheduler: Scheduler) -> None:
-    """Wait for a stop, or for the one that has taken its place."""
-    while True:
-        try:
-            await halt
-        except CanopenError:  # noqa: PERF203  # the other one may be replaced, too
-            await scheduler.timer(0.0)  # until the other one has begun
-            other = commands.stopping
-            if other is None or other is halt:
-                raise
-            halt = other
-        else:
-            return

@@ -17,7 +17,7 @@ from arm_msgs.action import Home
 from node_runner.action_goals import serve_goals
 
 from ..cia402.commands import AxisCommands
-from ..cia402.modes.homing import HomingProgress
+from ..cia402.homing import HomingProgress
 from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
 from .output_thread import OutputThread

@@ -15,7 +15,7 @@ from std_srvs.srv import Trigger
 from node_runner import create_deferred_service
 
 from ..cia402.commands import AxisCommands
-from ..cia402.stop import stop_all, StopReport
+from ..cia402.stop_all import stop_all, StopReport
 from ..master.runner import NetworkThread
 from .output_thread import OutputThread
 

@@ -40,7 +40,7 @@ from arm_canopen import (
     Promise,
     Severity,
 )
-from arm_canopen.cia402.modes.homing import HomingProgress
+from arm_canopen.cia402.homing import HomingProgress
 from arm_canopen.cia402.modes.profile_position import Move, QUEUE_MAX
 from arm_canopen.config import DriveConfig
 from arm_canopen.config.model.drive import RecoveryPolicy

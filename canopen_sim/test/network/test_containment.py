@@ -68,7 +68,7 @@ STEPS: dict[str, Callable[[VirtualNetwork, str], tuple[object, str]]] = {
     'stream': lambda net, name: (net.drives[name], 'stream'),
     'write': lambda net, name: (net.drives[name], 'write'),
     'mode': lambda net, name: (net.drives[name].mode, 'step'),
-    'controlword': lambda net, name: (net.drives[name].controlword_writer, 'write'),
+    'controlword': lambda net, name: (net.drives[name].controlword.writer, 'write'),
     'RPDO 1': lambda net, name: (rpdo(net, name, 1), '_pack'),
     'RPDO 2': lambda net, name: (rpdo(net, name, 2), '_pack'),
     'RPDO 3': lambda net, name: (rpdo(net, name, 3), '_pack'),

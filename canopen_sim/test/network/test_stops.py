@@ -20,7 +20,8 @@ from moving_drive import MovingDrive, NODE_ID, RAMP, STANDING
 import pytest
 
 from arm_canopen import DriveError, DriveState, EventKind, OperationMode, Severity
-from arm_canopen.cia402.stop import SHUTDOWN_MAX, stop_all, StopReport
+from arm_canopen.cia402.stop import SHUTDOWN_MAX
+from arm_canopen.cia402.stop_all import stop_all, StopReport
 from arm_canopen.config.model.drive import RecoveryPolicy
 from arm_canopen.library.canopen_master import leave_device
 from arm_canopen.master.remote_node import BootPhase
@@ -147,7 +148,7 @@ def owner_of(failing: MovingDrive, place: str) -> tuple[object, str]:
         'mode': (drive.mode, 'step'),
         'write': (drive, 'write'),
         'read': (drive, 'read'),
-        'controlword': (drive.controlword_writer, 'write'),
+        'controlword': (drive.controlword.writer, 'write'),
         'RPDO': (rpdo, '_pack'),
     }[place]
 
@@ -280,7 +281,7 @@ def test_a_shutdown_begins_by_rpdo_and_says_when_the_drive_keeps_its_power(
     failing.run(10.0)
     with pytest.raises(DriveError, match='joint1 is not disabled; cut its power'):
         failing.net.do(JOINT, 'shutdown', preempt=True)
-    failing.net.drives[JOINT].mute_controlword()
+    failing.net.drives[JOINT].controlword.keep_back()
     lose(failing, 0x600 + NODE_ID)
     failing.net.do(JOINT, 'shutdown', preempt=True)
     assert failing.device.state is DriveState.SWITCH_ON_DISABLED

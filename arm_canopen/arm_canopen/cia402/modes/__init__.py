@@ -5,26 +5,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
 
 from canopen_core.standard import Index, OperationMode, TARGET_OBJECTS
 
 from ...master.process_image import Writer
+from ..parameters import OFFSET_OBJECTS
+from ..state import AxisState
 from .cyclic_position import CyclicPosition, FeedForward, InterpolatedPosition
 from .homing import Homing
-from .mode import Actual, Mode, NO_BITS, NoMode, OFFSET_OBJECTS, OffsetTarget
+from .mode import Mode, NO_BITS, NoMode, OffsetTarget
 from .profile_position import Move, NEW_SET_POINT, ProfilePosition
 from .rates import CyclicTorque, CyclicVelocity, ProfileTorque, ProfileVelocity, Velocity
-from .setpoint_profile import ProfileLimits
-
-if TYPE_CHECKING:
-    from ..state import AxisState
 
 __all__ = [
     'NEW_SET_POINT',
     'NO_BITS',
-    'OFFSET_OBJECTS',
-    'Actual',
     'CyclicPosition',
     'FeedForward',
     'Homing',
@@ -32,7 +27,6 @@ __all__ = [
     'Mode',
     'Move',
     'NoMode',
-    'ProfileLimits',
     'ProfilePosition',
     'build_modes',
 ]

@@ -11,9 +11,11 @@ from canopen_core.standard import Controlword, OperationMode
 from ...master.process_image import IN_THE_IMAGE, Writer
 from ...master.scheduler import Promise
 from ..motion import Setpoint
+from ..parameters import ProfileLimits
+from ..state import Actual
 from ..units import Units
-from .mode import Actual, Mode, NO_BITS
-from .setpoint_profile import ProfileLimits, SetpointProfile
+from .mode import Mode, NO_BITS
+from .setpoint_profile import SetpointProfile
 
 
 class CyclicPosition(Mode):

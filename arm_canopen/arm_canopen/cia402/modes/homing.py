@@ -4,30 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from enum import Enum
-from typing import TYPE_CHECKING
-
-from canopen_core import CodecError, DriveError, SdoError
-from canopen_core.standard import Controlword, DriveState, Index, OperationMode, Statusword
+from canopen_core import DriveError
+from canopen_core.standard import Controlword, OperationMode
 
 from ...master.scheduler import completed, Promise
-from .mode import Actual, Mode, NO_BITS
-
-if TYPE_CHECKING:
-    from ..commands import AxisCommands
-
-EDGE_CYCLES = 3  # of SYNC in which a drive sees bit 4 cleared
-HOMING_START = 0.1  # [s] after which a drive has overwritten the homing bits of the last time
-
-
-class HomingProgress(Enum):
-    """What happens at the moment."""
-
-    ENABLING = 'enabling'
-    SWITCHING = 'switching to mode 6'
-    HOMING = 'homing'
-    DONE = 'done'
+from ..state import Actual
+from .mode import Mode, NO_BITS
 
 
 class Homing(Mode):
@@ -50,114 +32,3 @@ class Homing(Mode):
     def step(self, now: float, period: float, statusword: int) -> int:
         """Keep bit 4 while homing runs."""
         return Controlword.HOMING_START if self.started else NO_BITS
-
-
-async def home(
-    commands: AxisCommands,
-    method: int | None = None,
-    notify: Callable[[HomingProgress], None] = lambda progress: None,
-) -> str:
-    """Home a drive that is enabled, by a method of 0x6098 or, with None, the one in the drive.
-
-    It is left in mode 6. Ended from outside, bit 4 is cleared, which interrupts the homing. A
-    method that is given is for this time only: whatever happens, 0x6098 gets back the one that the
-    drive had.
-
-    Returns:
-        What was done, in words.
-
-    Raises:
-        DriveError: The drive has no homing, refuses the method, or fails.
-    """
-    axis = commands.axis
-    homing = axis.modes[OperationMode.HOMING]
-    supported = axis.view.parameters.supports(OperationMode.HOMING)
-    if not (isinstance(homing, Homing) and supported):
-        raise commands.refused('has no homing (mode 6 is not in 0x6502)')
-    stored = await _stored_method(commands)
-    method = await _choose(commands, method, stored)
-    try:
-        notify(HomingProgress.SWITCHING)
-        await commands.switch(homing)
-        notify(HomingProgress.HOMING)
-        await _run(commands, homing, f'the end of homing {method}')
-    finally:
-        if method != stored:
-            _put_back(commands, stored)
-    if axis.view.statusword & Statusword.HOMING_ERROR:
-        raise commands.refused(f'failed to home by method {method}')
-    notify(HomingProgress.DONE)
-    return f'homed by method {method}'
-
-
-async def _run(commands: AxisCommands, homing: Homing, what: str) -> None:
-    """Set bit 4 until the drive shows that it has ended, well or not."""
-    axis, view = commands.axis, commands.axis.view
-
-    def is_cut() -> bool:  # it is not enabled any more: its homing bits mean nothing then
-        view.observe()  # they come after the last cycle
-        return view.state is not DriveState.OPERATION_ENABLED
-
-    def is_over() -> bool:
-        if not (view.fresh and view.statusword_came(since)):
-            return False
-        word = view.statusword
-        done = Statusword.HOMING_ATTAINED
-        if not commands.quirks.homed_without_arrival:
-            done |= Statusword.TARGET_REACHED
-        return bool(word & Statusword.HOMING_ERROR) or word & done == done
-
-    # without a falling edge of bit 4 before, the drive would miss the start, and the bits of the
-    # last homing would pass for those of this one
-    await commands.pause(EDGE_CYCLES * axis.period)
-    homing.started = True
-    try:
-        await commands.pause(HOMING_START)
-        since = commands.now
-        await commands.until(
-            lambda: is_cut() or is_over(),
-            axis.config.homing_timeout,
-            what,
-            'raise homing_timeout_seconds in bus.yml where the way takes longer',
-        )
-    finally:
-        homing.started = False
-    if is_cut():
-        raise commands.refused('was cut off while it homed, and is not homed')
-
-
-async def _stored_method(commands: AxisCommands) -> int:
-    """Return what is in 0x6098 now, which the end of the last homing may just have changed."""
-    axis = commands.axis
-    try:
-        stored = await axis.node.objects.read_object(axis.view.at(Index.HOMING_METHOD))
-    except (SdoError, CodecError):
-        return axis.view.parameters.homing_method
-    return stored if isinstance(stored, int) else axis.view.parameters.homing_method
-
-
-def _put_back(commands: AxisCommands, method: int) -> None:
-    """Write a method without waiting, as there is no time to when the homing was cancelled."""
-    axis = commands.axis
-
-    def check(written: Promise[None]) -> None:
-        if written.error is not None:
-            axis.warn(f'the homing method {method} was not put back into 0x6098: {written.error}')
-
-    axis.node.objects.write_object(axis.view.at(Index.HOMING_METHOD), 0, method).when_done(check)
-
-
-async def _choose(commands: AxisCommands, method: int | None, stored: int) -> int:
-    """Return the method to home by; one that is given is in the drive then."""
-    axis = commands.axis
-    if method is None:
-        if not stored:
-            raise commands.refused('has no homing method (0x6098 is 0); name one')
-        return stored
-    if method == stored:
-        return method
-    try:
-        await axis.node.objects.write_object(axis.view.at(Index.HOMING_METHOD), 0, method)
-    except (SdoError, CodecError) as error:
-        raise DriveError(f'{axis.name} does not take homing method {method}: {error}') from error
-    return method

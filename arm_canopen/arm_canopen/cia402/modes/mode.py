@@ -11,34 +11,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import NamedTuple
 
 from canopen_core import DriveError
-from canopen_core.standard import Index, OperationMode, Statusword
+from canopen_core.standard import OperationMode, Statusword
 
 from ...master.process_image import Writer
 from ...master.scheduler import completed, Promise
+from ..state import Actual
 
 TARGET_REACHED = int(Statusword.TARGET_REACHED)
 NO_BITS = 0  # bits are plain numbers in the cycle, where operators of IntFlag cost too much
-
-OFFSET_OBJECTS: dict[OperationMode, Index] = {
-    OperationMode.CYCLIC_POSITION: Index.POSITION_OFFSET,
-    OperationMode.CYCLIC_VELOCITY: Index.VELOCITY_OFFSET,
-    OperationMode.CYCLIC_TORQUE: Index.TORQUE_OFFSET,
-}
-"""What a drive adds to the target of a cyclic mode (CiA 402-2, clauses 13 to 15)."""
-
-
-class Actual(NamedTuple):
-    """Where a drive is, or is held."""
-
-    # in [inc], as the drive reports it, so that no factor in bus.yml can make the target another
-    # one
-    position_inc: int
-    velocity: float = 0.0  # in user units per second; a moving drive is braked from it
-    velocity_dev: int = 0  # the same in device units, as the drive reports it
-    torque: int = 0  # 0x6077 in device units, 0 when it is unknown
 
 
 class OffsetTarget:

@@ -9,17 +9,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import Enum
 import math
-from typing import TYPE_CHECKING
 
 from canopen_core import DriveError
 from canopen_core.standard import Controlword, OperationMode, Statusword
 
 from ...master.process_image import Writer
 from ...master.scheduler import completed, Promise
-from .mode import Actual, Mode, TARGET_REACHED
-
-if TYPE_CHECKING:
-    from ..state import AxisState
+from ..state import Actual, AxisState
+from .mode import Mode, TARGET_REACHED
 
 ACKNOWLEDGE = int(Statusword.SET_POINT_ACKNOWLEDGE)
 NEW_SET_POINT = int(Controlword.NEW_SET_POINT)

@@ -14,8 +14,9 @@ from canopen_core.standard import OperationMode
 
 from ...master.process_image import IN_THE_IMAGE, Writer
 from ...master.scheduler import completed, Promise
+from ..state import Actual
 from ..units import Scale
-from .mode import Actual, Mode, NO_BITS
+from .mode import Mode, NO_BITS
 
 VL_RAMP = 0x70
 """Bits 4 to 6 of the velocity mode: ramp enabled, not locked, reference used (CiA 402-2, 16.3)."""

@@ -10,20 +10,9 @@ the line goes beyond none of the targets.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 import math
 
-
-@dataclass(frozen=True, slots=True)
-class ProfileLimits:
-    """Limits of a profile, in user units."""
-
-    velocity: float  # largest speed towards a single target in [unit/s]
-    acceleration: float  # largest acceleration in [unit/s^2]
-    deceleration: float  # largest deceleration in [unit/s^2]
-    # largest speed along a stream of targets in [unit/s], where that is more
-    speed_limit: float = 0.0
-
+from ..parameters import ProfileLimits
 
 SPREAD = 2.0  # intervals between targets over which the way to the newest one is spread
 LEARNING = 0.25  # share of the newest interval in their mean

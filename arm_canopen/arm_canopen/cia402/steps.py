@@ -1,0 +1,426 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The steps that commands to an axis are made of: each waits, and names what did not come."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import contextlib
+
+from canopen_core import CodecError, DriveError, SdoError, SdoTimeoutError
+from canopen_core.standard import DriveState, Index, OperationMode, Statusword
+
+from ..master.events import Severity
+from ..master.scheduler import Scheduler
+from .axis import Axis, NOT_TAKEN
+from .halt import RESUME_TIMEOUT
+from .modes import Mode, ProfilePosition
+from .motion import Refusal, RefusalCause
+from .quirks import quirks_of
+from .state import FAULTY
+from .stop import STOP_TIMEOUT
+from .targets import TORQUE_MODES
+
+BUFFER_CLEAR = 6  # sub-index of 0x60C4 (CiA 402-2, clause 12)
+BUFFER_EMPTY, BUFFER_OPEN = 0, 1
+BUFFER_ATTEMPTS = 4
+READY_TIMEOUT = 2.0  # [s] from operational to the first PDOs and parameters
+REFUSED_SHARE = 0.5  # of a time-out, after which a drive counts as one that refuses
+SETTLE_CYCLES = 3  # of SYNC after which an answer shows what a command has done
+
+
+class AxisSteps:
+    """Steps of commands to one axis.
+
+    Attributes:
+        axis: The axis.
+        quirks: Where it deviates from the standard.
+        needs_mode: Whether it refuses mode 0, or Operation enabled in that.
+    """
+
+    def __init__(self, axis: Axis, scheduler: Scheduler) -> None:
+        self.axis = axis
+        self.quirks = quirks_of(axis.config.quirks)
+        self.needs_mode = self.quirks.no_mode_zero
+        self._scheduler = scheduler
+        self._keeps_mode_under_halt = False
+
+    @property
+    def now(self) -> float:
+        """Steady time in [s]."""
+        return self._scheduler.now
+
+    async def ready(self, *, to_stop: bool = False) -> None:
+        """Wait for state and parameters of a drive that has just come up.
+
+        With ``to_stop`` a drive whose state is not fresh is ready, too.
+
+        Raises:
+            DriveError: It is offline, is being stopped or could not be, or does not send them.
+        """
+        axis = self.axis
+        self._require_operational()
+        if axis.stop.running and not to_stop:
+            raise self.refused('is being stopped')
+        if axis.failure:
+            await axis.stop.run()  # once more, as the first may not have reached the drive
+        await axis.stop.ended()
+        if axis.failure and not (to_stop or axis.stop.disabled):
+            raise self.refused('could not be stopped; cut its power')
+        axis.controlword.send_again()  # what is commanded next goes by RPDO again
+
+        def ready() -> bool:
+            known = to_stop and axis.view.state is not DriveState.UNKNOWN
+            return known or axis.view.ready or not axis.node.operational
+
+        try:
+            await self._scheduler.until(ready, READY_TIMEOUT)
+        except TimeoutError:
+            raise DriveError(self._why_not_ready()) from None
+        self._require_operational()
+
+    async def reach(self, goal: DriveState) -> None:
+        """Lead to a state.
+
+        Raises:
+            DriveError: It is not reached; then the drive is led to Switch On Disabled. It is not
+                enabled where it does not take the value that holds it.
+        """
+        axis = self.axis
+        enabling = goal is DriveState.OPERATION_ENABLED
+        if enabling and not axis.stays_enabled:
+            await self._begin_enabling()
+        timeout = self.quirks.state_timeout
+        if not enabling:  # it may brake first (0x605B, 0x605C)
+            timeout += axis.stop.ramp_time()
+        try:
+            if enabling:
+                await self._select_where_required(timeout)
+            axis.goal = goal
+            slow = 'if it only takes longer: `quirks: slow_states` in bus.yml'
+            await self.until(
+                lambda: axis.view.state is goal and not axis.stop.running,
+                timeout,
+                goal.title,
+                slow,
+            )
+        except BaseException:  # also when it is cancelled: the rest of the way is not awaited
+            axis.leave_operation()
+            raise
+
+    async def _begin_enabling(self) -> None:
+        """Clear what stopped it before, and hold it where it is."""
+        axis = self.axis
+        if axis.stop.running:
+            raise self.refused('is being stopped')
+        axis.failure = ''
+        mode, shown = axis.mode, axis.shown_mode
+        await self._preload(mode, 'is not enabled')
+        if shown is not mode:  # in which it may stay
+            await self._preload(shown, 'is not enabled')
+        if axis.failure:
+            raise self.refused('is not enabled')
+
+    async def _select_where_required(self, timeout: float) -> None:
+        """Select the mode of bus.yml for a drive that refuses Operation enabled without one.
+
+        An enabled drive shows within ``timeout`` in [s] that it does.
+        """
+        axis = self.axis
+        mode = self._configured_mode()
+        if mode is None or axis.mode.number:
+            return
+        if not self.needs_mode:
+            if axis.view.mode:
+                return
+            axis.goal = DriveState.OPERATION_ENABLED
+            with contextlib.suppress(TimeoutError):
+                await self._scheduler.until(
+                    lambda: axis.view.state is axis.goal or self._is_hopeless(),
+                    REFUSED_SHARE * timeout,
+                )
+            if axis.view.state is not DriveState.SWITCHED_ON or self._is_hopeless():
+                return
+            self.needs_mode = True
+            axis.warn(
+                'stays in Switched on while no mode is selected (0x6061 is 0): mode '
+                f'{mode.number.title} of bus.yml is selected first; with `quirks: no_mode_zero` '
+                'that is done at once'
+            )
+            axis.goal = DriveState.SWITCHED_ON
+        await self.switch(self.mode_to_return_to())  # one that it shows goes with the next RPDO
+
+    def _configured_mode(self) -> Mode | None:
+        """Return the first mode that bus.yml names and the drive has."""
+        axis = self.axis
+        for number in (
+            axis.config.position_mode,
+            axis.config.velocity_mode,
+            axis.config.effort_mode,
+        ):
+            mode = None if number is None else axis.modes.get(number)
+            if mode is not None and mode.number and axis.view.parameters.supports(mode.number):
+                return mode
+        return None
+
+    def mode_to_return_to(self) -> Mode:
+        """Return the mode for the time after homing; mode 0 only where the drive takes it."""
+        axis = self.axis
+        if axis.mode.number or not self.needs_mode:
+            return axis.mode
+        shown = axis.shown_mode
+        if shown is not None and shown.number not in (OperationMode.NO_MODE, OperationMode.HOMING):
+            return shown
+        return self._configured_mode() or axis.mode
+
+    async def return_to(self, mode: Mode) -> None:
+        """Select the mode of before homing again, unless the drive refuses that one."""
+        if mode is not self.axis.mode and (mode.number or not self.needs_mode):
+            await self.switch(mode)
+
+    async def _preload(self, mode: Mode | None, consequence: str) -> None:
+        """Write the holding value of a mode whose target goes by SDO, whatever the drive has."""
+        if mode is None or not mode.by_sdo:
+            return
+        try:
+            await self.axis.preload(mode)
+        except (SdoError, CodecError) as error:
+            raise self.refused(
+                f'{consequence}: it does not take the target that holds it in mode '
+                f'{mode.number.title} ({error})'
+            ) from error
+
+    async def come_to_rest(self) -> None:
+        """Halt what moves before another mode ends it with a jerk; the drive stays halted.
+
+        A torque is left alone: taking it away would drop a load.
+        """
+        axis = self.axis
+        acting = axis.holding_mode
+        enabled = axis.goal is axis.view.state is DriveState.OPERATION_ENABLED
+        if not enabled or acting is None:
+            return
+        if acting.number in (*TORQUE_MODES, OperationMode.NO_MODE):
+            return
+        await self.come_to_halt(STOP_TIMEOUT)
+
+    async def come_to_halt(self, timeout: float) -> None:
+        """Halt a drive that is enabled, and wait until it stands.
+
+        The ``timeout`` in [s] is beside the time of the ramp.
+
+        Raises:
+            DriveError: It does not come to rest; it stays halted.
+        """
+        axis, view = self.axis, self.axis.view
+        ramp = view.speed / view.parameters.profile.deceleration  # [s]
+        axis.hold()
+        await self.settle()
+        with view.looking():
+            await self.until(
+                lambda: axis.mode.braked and view.stands, timeout + ramp, 'standstill'
+            )
+
+    async def reset_fault(self) -> None:
+        """Reset a fault if there is one."""
+        axis = self.axis
+        if axis.view.state not in FAULTY:
+            return
+        axis.resetting = True
+        try:
+            await self.until(
+                lambda: axis.view.state not in FAULTY,
+                self.quirks.state_timeout,
+                'the end of the fault',
+            )
+        finally:
+            axis.resetting = False
+        axis.view.error = ''
+
+    async def switch(self, mode: Mode) -> None:
+        """Switch in the state that bus.yml wants, then return to the state of before.
+
+        Raises:
+            DriveError: 0x6061 does not show the mode in time; the one before is selected again.
+        """
+        axis = self.axis
+        before = axis.mode
+        enabled = axis.view.state is DriveState.OPERATION_ENABLED
+        switching_state = axis.config.switching_state
+        leave = enabled and switching_state is not DriveState.OPERATION_ENABLED
+        axis.released(Refusal(RefusalCause.MODE_SELECTED, mode.number.title))
+        await self.come_to_rest()
+        await self._preload(mode, 'is not switched')
+        if leave:
+            await self.reach(switching_state)
+        if mode.number is OperationMode.INTERPOLATED_POSITION:
+            await self._clear_buffer()
+        try:
+            await self._show(mode)
+        except BaseException:  # also when it is cancelled: it stays halted in either mode
+            axis.select_back(before)
+            raise
+        axis.halt.release()
+        if leave:
+            await self.reach(DriveState.OPERATION_ENABLED)
+
+    async def _show(self, mode: Mode) -> None:
+        """Select a mode, and wait until 0x6061 shows it."""
+        axis = self.axis
+        timeout = self.quirks.mode_timeout
+
+        def shown() -> bool:
+            return axis.view.mode == mode.number
+
+        axis.select(mode)
+        acting = axis.holding_mode
+        halted = acting is not None and bool(axis.halt.bits(acting))
+        if halted and not self._keeps_mode_under_halt:
+            with contextlib.suppress(TimeoutError):
+                await self._scheduler.until(
+                    lambda: shown() or self._is_hopeless(), REFUSED_SHARE * timeout
+                )
+        if halted and acting is not None and not shown():
+            await self._end_halt_at_rest(acting)
+            axis.select(mode)
+        await self.until(
+            lambda: axis.mode is mode and axis.shows_mode,  # a lost device has mode 0
+            timeout,
+            f'mode {mode.number.title} in 0x6061',
+            'does its switching_state in bus.yml fit?',
+        )
+        if halted and not axis.halt.held and not self._keeps_mode_under_halt:
+            self._keeps_mode_under_halt = True
+            axis.warn(
+                'ignores 0x6060 while it is halted (bit 8): from now on bit 8 is taken back at '
+                'rest while its mode is switched'
+            )
+
+    async def _end_halt_at_rest(self, acting: Mode) -> None:
+        """Clear bit 8 where the drive stands; no older target acts then."""
+        axis = self.axis
+        if acting.number in TORQUE_MODES:
+            raise self.refused(
+                'does not switch its mode while it is halted (bit 8), and a torque would move it '
+                'without; disable it, select the mode, and enable it again'
+            )
+        axis.select(acting)
+        actual = axis.view.actual()
+        if isinstance(acting, ProfilePosition):
+            here = axis.view.units.position.commanded(actual.position_inc)
+            delivery = acting.set_target(here)
+        else:
+            delivery = acting.preload(actual)
+        axis.halt.leave(self._scheduler.now, delivery)
+        await self.until(
+            lambda: not axis.halt.leaving, RESUME_TIMEOUT + 1.0, 'the end of its halt'
+        )
+        if axis.halt.held:
+            raise DriveError(f'{axis.name} stays halted: {NOT_TAKEN}')
+
+    async def _clear_buffer(self) -> None:
+        """Empty the buffer of mode 7, and open it, where the drive has one (0x60C4:06)."""
+        axis = self.axis
+        index = axis.view.at(Index.INTERPOLATION_CONFIGURATION)
+        entry = axis.node.config.dictionary.get(index, BUFFER_CLEAR)
+        if entry is None or not entry.access.writable:
+            return
+        for value in (BUFFER_EMPTY, BUFFER_OPEN):
+            failure: SdoError | None = None
+            for _ in range(BUFFER_ATTEMPTS):
+                failure = await self._written(index, BUFFER_CLEAR, value)
+                if not isinstance(failure, SdoTimeoutError):
+                    break
+            if isinstance(failure, SdoTimeoutError):
+                raise self.refused(f'did not open its buffer of mode 7 ({failure})')
+            if failure is not None:
+                axis.report(Severity.WARNING, f'its buffer of mode 7 is as it was: {failure}')
+                return
+
+    async def _written(self, index: int, subindex: int, value: int) -> SdoError | None:
+        """Write an object; return why that failed, or None."""
+        try:
+            await self.axis.node.objects.write_object(index, subindex, value)
+        except SdoError as error:
+            return error
+        return None
+
+    async def settle(self) -> None:
+        """Wait until the drive has shown what it makes of the command that was sent last."""
+        await self.pause(SETTLE_CYCLES * self.axis.period)
+
+    async def pause(self, duration: float) -> None:
+        """Wait for a time in [s]."""
+        await self._scheduler.timer(duration)
+
+    async def until(
+        self, condition: Callable[[], bool], timeout: float, what: str, remedy: str = ''
+    ) -> None:
+        """Wait for a condition, ``what`` in words, for at most ``timeout`` in [s].
+
+        The ``remedy`` helps where it takes longer and nothing else is known to keep the axis.
+
+        Raises:
+            DriveError: It does not hold in time, or the drive faults or is lost before.
+        """
+        try:
+            await self._scheduler.until(lambda: condition() or self._is_hopeless(), timeout)
+        except TimeoutError:
+            why = self._why() or (f' ({remedy})' if remedy else '')
+            raise self.refused(f'did not reach {what} within {timeout:g} s{why}') from None
+        if not condition():
+            await self.axis.view.read_error_code()
+            raise self.refused(f'did not reach {what}')
+
+    def _is_hopeless(self) -> bool:
+        axis = self.axis
+        faulted = axis.view.state in FAULTY and not axis.resetting
+        return not axis.node.operational or faulted or axis.stop.running
+
+    def require_no_fault(self) -> None:
+        """Refuse to go on with a drive that is faulted."""
+        if self.axis.view.state in FAULTY:
+            raise self.refused('is faulted; recover it first')
+
+    def refused(self, what: str) -> DriveError:
+        """Return an error with what went wrong, and the state of the axis."""
+        return DriveError(f'{self.axis.name} {what}: {self.axis.describe()}')
+
+    def way_to_enable(self) -> str:
+        """Name what enables the axis."""
+        return 'recover it' if self.axis.view.state in FAULTY else 'init or enable it'
+
+    def _why(self) -> str:
+        """Name the condition outside of the bus keeps the drive from being enabled."""
+        word = self.axis.view.statusword
+        if not word & Statusword.VOLTAGE_ENABLED:
+            return (
+                ' (no voltage at the power stage, bit 4: is the safe torque off or the e-stop on?)'
+            )
+        if not word & Statusword.REMOTE:
+            return ' (bit 9, remote, is not set: is the drive under local control?)'
+        if self.axis.view.state is DriveState.SWITCHED_ON and not self.axis.view.mode:
+            return (
+                ' (0x6061 is 0: does it refuse that without a mode? Select one before, or name '
+                'position_mode in bus.yml)'
+            )
+        return ''
+
+    def _require_operational(self) -> None:
+        if not self.axis.node.operational:
+            raise DriveError(f'{self.axis.name} is not operational: {self.axis.describe()}')
+
+    def _why_not_ready(self) -> str:
+        axis = self.axis
+        known = axis.view.state is not DriveState.UNKNOWN
+        if known and not axis.view.fresh:
+            return f'{axis.name} does not send its TPDOs any more: {axis.describe()}'
+        if not known:
+            return (
+                f'{axis.name} is operational, but its statusword, mode and position have not '
+                'come; do its TPDOs follow SYNC, and does the bus.yml have a sync_period?'
+            )
+        return (
+            f'{axis.name} has not answered the SDOs for its parameters (modes 0x6502, limits '
+            f'0x607D, profile 0x6081): {axis.describe()}'
+        )
