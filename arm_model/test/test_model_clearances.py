@@ -47,7 +47,7 @@ def among_things() -> RobotModel:
 def test_what_is_known_is_a_lower_bound_and_exact_where_it_matters(
     model: RobotModel, stride: float, at_once: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """On random walks, for each pair at each step, also where spheres tell what is far apart."""
+    """On random walks, for each pair at each step, also where spheres show what is far apart."""
     monkeypatch.setattr(clearances, 'AT_ONCE', at_once)
     rng = np.random.default_rng(5)
     lower, upper = np.maximum(model.limits.lower, -4.0), np.minimum(model.limits.upper, 4.0)

@@ -60,7 +60,7 @@ def scene_with(shape: Shape, pose: Pose, name: str = 'panda') -> PlanningScene:
     """An arm beside an object, one of its links thicker than it is."""
     model = robot(name)
     scene = model.scene.with_object(CollisionObject('thing', shape, pose=pose))
-    link = next(iter(reversed(model.scene.link_shapes)))
+    link = list(model.scene.link_shapes)[-1]
     return scene.with_contents(padding={link: PADDING})
 
 
@@ -96,7 +96,8 @@ def test_a_free_edge_is_free_between_its_ends(name: str) -> None:
     model, draw = robot(name), np.random.default_rng(1)
     scene = scene_with(Box(0.2, 0.5, 0.5), Pose(np.eye(3), np.array([0.6, 0.0, 0.4])), name)
     checked, reference = core(scene), Clearances(scene)
-    required, answers = np.full(len(scene.pairs), 1e-3), []
+    required = np.full(len(scene.pairs), 1e-3)
+    answers: list[bool] = []
     while len(answers) < 60:
         begin = draw.uniform(model.limits.lower, model.limits.upper)
         if not checked.clear(begin, 1e-3):

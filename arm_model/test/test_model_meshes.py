@@ -223,12 +223,11 @@ def test_a_body_of_several_materials_is_whole(tmp_path: Path) -> None:
     path.write_text(two_cubes(0.5), encoding='utf-8')
     whole = meshes.load_hulls(path)
     assert [len(each.points) for each in hulls] == [len(each.points) for each in whole]
-    assert np.array_equal(
-        *(
-            np.sort(np.concatenate([each.points for each in found]), axis=0)
-            for found in (hulls, whole)
-        )
+    coloured, plain = (
+        np.sort(np.concatenate([each.points for each in found]), axis=0)
+        for found in (hulls, whole)
     )
+    assert np.array_equal(coloured, plain)
 
 
 def test_without_a_cache_hulls_are_made_all_the_same(

@@ -13,7 +13,6 @@ from planning_messages import panda, QuietNode
 import pytest
 from sensor_msgs.msg import JointState
 
-from arm_planning.ros import scene_monitor
 from arm_planning.ros.scene_monitor import SceneMonitor
 
 JOINT = 'panda_joint1'
@@ -73,12 +72,12 @@ def test_a_robot_that_has_come_to_rest_is_shown_there_once() -> None:
 def test_an_arm_that_coasts_moves_until_it_stands(monkeypatch: pytest.MonkeyPatch) -> None:
     """Noise is no motion, and neither is what is not known yet."""
     node, now = TickingNode(), [100.0]
-    monkeypatch.setattr(scene_monitor.time, 'monotonic', lambda: now[0])
+    monkeypatch.setattr('arm_planning.ros.scene_monitor.time.monotonic', lambda: now[0])
     monitor = SceneMonitor(node, panda())  # type: ignore[arg-type]
-    moves = []
+    moves: list[tuple[float, bool]] = []
     for step in (0.0, 0.0005, 0.01, 0.005, 0.0005, -0.0005, 0.0):
         now[0] += 0.06
-        node.at(sum((step, *(each for each, _ in moves))))
+        node.at(step + sum(each for each, _ in moves))
         moves.append((step, monitor.is_moving('panda_arm')))
     assert [moving for _, moving in moves] == [False, False, True, True, False, False, False]
     assert not monitor.is_moving('no group')

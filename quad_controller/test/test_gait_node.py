@@ -155,7 +155,7 @@ def test_cmd_vel_is_served_as_twist_stamped_too(robot: Robot, isolation: Isolati
         def steps() -> bool:
             publisher.publish(message)
             pairs = zip(robot.positions, before, strict=True)
-            return max(abs(a - b) for a, b in pairs) > 0.2
+            return bool(max(abs(a - b) for a, b in pairs) > 0.2)
 
         robot.client.spin_until(steps, 20.0, 'steps')
 

@@ -322,7 +322,7 @@ def test_servos_that_carry_no_longer_are_a_problem_of_the_robot(
         assert state is not None
         said.append(state.servo_problem)
     assert said[:3] == ['', '', '']
-    assert words in said[3]
+    assert words in str(said[3])
     assert bool(said[3]) is bool(said[6]) is bool(words)
     assert said[7:] == ['', '']
 

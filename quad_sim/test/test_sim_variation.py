@@ -16,10 +16,10 @@ from quad_description import robot_urdf
 from quad_description.urdf_command import run as print_urdf
 from quad_sim import ServoModel, ServoParameters, Terrain
 from quad_sim.export_mjcf import run
-from quad_sim.options import parse_servo
 from quad_sim.physics import Robot, Variation
 from quad_sim.physics.model import build_model
 from quad_sim.physics.robot import TIMESTEP
+from quad_sim.plant.servo import parse_servo
 
 FIRM = ServoModel.FIRM.parameters
 

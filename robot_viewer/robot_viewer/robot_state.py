@@ -95,7 +95,7 @@ class Seen:
 
     Attributes:
         robot: Its name; empty for none.
-        silence: Time in [s] since it was heard last.
+        silence: Time in [s] since its last message.
         statuses: Its diagnostics that are not old.
         services: Full names of the Trigger services that may be called.
         stop: The STOP that counts.

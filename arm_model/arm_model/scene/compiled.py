@@ -268,7 +268,7 @@ def _built() -> Path:
 
 
 def _processor() -> str:
-    """Return what tells processors apart whose programs differ: a home may serve several."""
+    """Return the kind of this processor: a home may serve several, whose programs differ."""
     try:
         lines = Path('/proc/cpuinfo').read_text(encoding='ascii', errors='replace').splitlines()
     except OSError:

@@ -47,7 +47,6 @@ pytestmark = pytest.mark.slow
 
 NODE_ID = 2
 COMMAND_PDO = 0x200 + NODE_ID
-STATUS_PDO = 0x180 + NODE_ID
 RESTS_AFTER = 0.7  # [s] without a motion; longer than a set-point waits under a halt
 STANDING = 0.02  # [rad/s]
 

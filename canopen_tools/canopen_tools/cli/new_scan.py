@@ -164,7 +164,7 @@ def _title(found: Found) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Scan:
-    """What tells which EDS the devices on a bus have."""
+    """Finds the EDS of each device on a bus."""
 
     session: Session
     choices: Mapping[int, _Choice]  # what the command line says, by node id

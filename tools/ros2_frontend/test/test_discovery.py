@@ -38,7 +38,7 @@ def view(known: int, spin_time: float | None = None) -> Graph:
     """Return a graph in which some participants are known as those of ROS."""
     node = SimpleNamespace(
         context=SimpleNamespace(get_domain_id=lambda: 7),
-        get_publishers_info_by_topic=lambda topic, no_mangle: [topic] * known,
+        get_publishers_info_by_topic=lambda topic, **_: [topic] * known,
     )
     return Graph(SimpleNamespace(node=node), spin_time)  # type: ignore[arg-type]
 
