@@ -97,7 +97,7 @@ class Watch:
         return found
 
     def silence(self, now: float, *, publishes: bool) -> float:
-        """Return the time in [s] since the last message of the robot; 0 where it says nothing of itself.
+        """Return the time in [s] since the last message of the robot; 0 where it sends none.
 
         Args:
             now: Steady time.
