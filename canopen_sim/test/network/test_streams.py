@@ -241,6 +241,16 @@ def test_a_stream_never_jumps() -> None:
     assert max(steps) <= 1.01 * SCALE * PERIOD  # 1 rad/s
 
 
+@pytest.mark.parametrize('mode', [OperationMode.CYCLIC_POSITION, OperationMode.PROFILE_POSITION])
+def test_a_stream_may_begin_where_the_axis_stands(mode: OperationMode) -> None:
+    """As a path does that begins at rest; targets come in every fifth cycle."""
+    client = Publisher(mode)
+    for number in range(40):
+        client.commands.stream_target(0.02 * max(0, number - 3))
+        client.net.run(5 * PERIOD)
+    assert client.motor > 0.4
+
+
 def test_an_axis_that_does_not_stop_is_stopped_by_sdo() -> None:
     """Its RPDOs are lost, so it would go on at the last velocity that it received."""
     client = Publisher(OperationMode.PROFILE_VELOCITY)

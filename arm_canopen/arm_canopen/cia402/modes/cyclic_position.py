@@ -98,9 +98,9 @@ class CyclicPosition(Mode):
             position, self._position_inc = self._streamed
             profile.follow(position, period)
             self._streamed, self._stands = None, False
-        elif not (self._stands and profile.at_rest):
+        elif not (self._stands and profile.is_idle):
             self._position_inc = self._scale.to_device(profile.step(period, self._limits()))
-            self._stands = profile.at_rest
+            self._stands = profile.is_idle
         self._target.write(self._position_inc)
         return self.bits
 

@@ -67,6 +67,11 @@ class SetpointProfile:
         """Whether the set-point stands still and has nowhere to go."""
         return self.velocity == 0.0 and self.target in (None, self.position)
 
+    @property
+    def is_idle(self) -> bool:
+        """Whether a step changes nothing: it is at rest, and follows no stream of targets."""
+        return self._line is None and self.at_rest
+
     def go(self, target: float | None) -> None:
         """Go to a single target; without one brake to a stop."""
         self.target, self._line = target, None
