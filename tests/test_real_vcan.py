@@ -33,7 +33,7 @@ LOG_LINE = re.compile(r'\(\d+\.\d{6}\) vcan0 [0-9A-F]{3}#[0-9A-F]*')
 @pytest.mark.parametrize(
     'tests',
     [
-        ['arm_canopen/test/test_can_bus_contract.py', 'arm_canopen/test/test_can_socketcan.py'],
+        ['canopen_core/test/test_can_bus_contract.py', 'canopen_core/test/test_can_socketcan.py'],
         ['tests/test_real_vcan.py'],
     ],
     ids=['buses', 'bring-ups'],

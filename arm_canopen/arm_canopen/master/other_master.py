@@ -21,6 +21,7 @@ from ..config.model import BusConfig
 from .events import Event, EventKind, Report, Severity
 
 LISTENING_TIME = 0.2  # [s] a start takes longer by it; a master that runs may be held up as long
+CATCH_UP_MAX = 5.0  # [s] to read what has come until then, where this process is slow
 FRAMES_REPORTED = 3
 
 
@@ -112,14 +113,17 @@ def listen(bus: Bus, config: BusConfig, clock: Callable[[], float]) -> Counter[M
     known, found = MasterFrames(config), Counter[MasterFrame]()
     begin = clock()
     end = begin + LISTENING_TIME
-    while (left := end - clock()) > 0.0:
+    # thousands may wait from before, whose reading takes longer than the listening
+    while (left := end - clock()) > -CATCH_UP_MAX:
         try:
-            frames = bus.receive(left)
+            frames = bus.receive(max(0.0, left))
         except BusError:  # nothing can be received now; it raises again when it is used
             break
         # what came before may be the last words of a master that has ended since
         fresh = (known.read(frame) for frame in frames if frame.timestamp >= begin)
         found.update(kind for kind in fresh if kind is not None)
+        if left <= 0.0 and (not frames or frames[-1].timestamp >= end):
+            break
     return found
 
 

@@ -128,12 +128,17 @@ class Axis:
     @property
     def torque(self) -> float:
         """Torque that the demanded motion takes."""
+        inertia = 0.0 if self.arrived else self._acceleration / TORQUE_GAIN
+        return inertia + self.steady_torque if self.powered else 0.0
+
+    @property
+    def steady_torque(self) -> float:
+        """Torque that keeps the velocity, and holds the load at rest."""
         if not self.powered:
             return 0.0
         velocity = self.velocity
         dry = math.copysign(DRY_FRICTION, velocity) if velocity else 0.0
-        inertia = 0.0 if self.arrived else self._acceleration / TORQUE_GAIN
-        return inertia + dry + VISCOUS_FRICTION * velocity + self.load
+        return dry + VISCOUS_FRICTION * velocity + self.load
 
     def set_stops(self, low: float, high: float) -> None:
         """Put mechanical stops at positions, infinite for none."""

@@ -30,7 +30,13 @@ from arm_canopen import (
 from arm_canopen.master.emergency_log import EmergencyLog
 from arm_canopen.master.life_signs import Guarding
 from arm_canopen.master.network import Network, NEVER, UPDATE_SHARE
-from arm_canopen.master.other_master import describe, listen, LISTENING_TIME, refuse_other_master
+from arm_canopen.master.other_master import (
+    CATCH_UP_MAX,
+    describe,
+    listen,
+    LISTENING_TIME,
+    refuse_other_master,
+)
 from arm_canopen.master.remote_node import RESET_TIME
 from arm_canopen.master.status import node_status
 from canopen_core.can import Frame, VirtualBus, VirtualWire
@@ -1141,6 +1147,39 @@ def test_the_last_words_of_a_master_that_ended_do_not_count() -> None:
         for _ in range(20):
             ended.send(Frame(0x080))
         assert not listen(bus, BUS, monotonic)
+
+
+def test_a_master_is_heard_behind_all_that_waits_to_be_read() -> None:
+    """A bus that was opened long before is read to its end, however long that takes."""
+    now = [10.0]
+    batches = [[Frame(0x182, bytes(3), timestamp=5.0 + number)] for number in range(4)]
+    batches += [[Frame(0x080, timestamp=10.1)], []]
+
+    class SlowBus(VirtualBus):
+        def receive(self, timeout: float) -> list[Frame]:
+            """Return what comes next, after longer than the listening takes."""
+            assert timeout >= 0.0
+            now[0] += 1.5 * LISTENING_TIME
+            return batches.pop(0)
+
+    with SlowBus('here', VirtualWire()) as bus:
+        assert sum(listen(bus, BUS, lambda: now[0]).values()) == 1
+    assert not batches
+
+
+def test_a_bus_without_time_does_not_hold_up_the_start() -> None:
+    """Frames that do not tell when they came are read for a limited time."""
+    now = [10.0]
+
+    class TimelessBus(VirtualBus):
+        def receive(self, timeout: float) -> list[Frame]:
+            """Return a frame of unknown age."""
+            now[0] += max(timeout, 0.01)
+            return [Frame(0x080)]
+
+    with TimelessBus('here', VirtualWire()) as bus:
+        assert not listen(bus, BUS, lambda: now[0])
+    assert now[0] < 10.0 + LISTENING_TIME + CATCH_UP_MAX + 0.1
 
 
 def test_a_sync_of_somebody_else_is_no_sign_where_the_master_sends_none() -> None:

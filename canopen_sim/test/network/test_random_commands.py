@@ -598,6 +598,18 @@ FOUND: tuple[Scenario, ...] = (
     Scenario(  # the words of a quick stop keep the halt up, by RPDO and by SDO
         Kind((Fault.QUICK_STOP_IGNORED,)), (), OperationMode.PROFILE_TORQUE
     ),
+    Scenario(  # a motor that all but stands gets no torque of its last braking with its power
+        Kind((Fault.MODE_REQUIRED,), velocity=False),
+        (
+            ('enable', None),
+            ('mode', OperationMode.PROFILE_TORQUE, None),
+            ('target', 0.44, None),
+            ('quick_stop', 0.03),
+            ('nmt', NmtCommand.RESET_COMMUNICATION, 0.2),
+            ('recover', 0.0),
+        ),
+        OperationMode.INTERPOLATED_POSITION,
+    ),
 )
 """Scenarios that have failed."""
 

@@ -50,7 +50,7 @@ class TorqueMode(Mode):
         return 0.0
 
     def start(self, word: int, now: float) -> None:
-        """Hold the axis; the torque begins with the one that holds the load."""
+        """Hold the axis; the torque begins with the one that keeps its velocity."""
         super().start(word, now)
         self._acting = False
 
@@ -63,7 +63,8 @@ class TorqueMode(Mode):
         """Apply the torque from now on."""
         if not self._acting:
             self._acting = True
-            self._torque = self.objects.held_torque(self.axis.torque)
+            # without that of a ramp, which would turn back a motor that has all but run out
+            self._torque = self.objects.held_torque(self.axis.steady_torque)
         if self.due == NEVER:
             self.axis.advance(now)
             self.due = now
