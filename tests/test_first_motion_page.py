@@ -131,7 +131,7 @@ def prepare(page: Page, distance: str) -> None:
     page.get_by_label('Distance [deg]').fill(distance)
     page.get_by_label('Speed [deg/s]').fill('2')
     page.keyboard.press('Tab')  # the number counts when it is left
-    page.get_by_role('button', name=PREPARE).click(force=True)
+    chromium.press(page.get_by_role('button', name=PREPARE))
     moves = JointKind.TURNS.shown(math.radians(float(distance)))
     page.get_by_text(f'It will move {moves},').wait_for()
 
@@ -174,33 +174,31 @@ def test_a_wrong_sign_and_scale_are_found_on_the_page(
         bringup.wait_for('are enabled', STARTING)
         joint = Joint(runner)
 
-        others = chromium.processes()
-        page = chromium.open_page(chromium.launch(browser.browser_type), url)
+        launched, first = chromium.launch_to_kill(browser.browser_type)
+        page = chromium.open_page(launched, url)
         prepare(page, '20')
         assert joint.angle == 0.0
         joint.move(page)
-        for process in chromium.processes():
-            if process not in others:
-                process.kill()
+        chromium.kill(first)
         joint.wait_for_rest()
         assert abs(joint.angle) < 4.0, '20 deg of the wrong scale are 5'
 
         page = chromium.open_page(browser, url)
         open_first_motion(page)
         page.get_by_text('at rest').wait_for()
-        page.get_by_role('button', name='That is enough').click(force=True)
+        chromium.press(page.get_by_role('button', name='That is enough'))
         page.get_by_text('ended by you before the target').wait_for()
         chromium.choose(page, 'What you saw', Saw.OTHER_WAY.value)
         page.get_by_label('How far [deg]').fill(f'{abs(joint.angle):.2f}')
         page.keyboard.press('Tab')
-        page.get_by_role('button', name='Conclude').click(force=True)
+        chromium.press(page.get_by_role('button', name='Conclude'))
         page.get_by_text('wrong sign and wrong scale').wait_for()
         page.get_by_text('encoder lines in the place of their four edges').first.wait_for()
         lines = page.locator('body').filter(has_text='scale_pos_to_dev: 5729.57795131')
         lines.wait_for()  # the parts of a line have colours of their own
         chromium.picture(page, 'first-motion')
 
-        page.get_by_role('button', name='Write it into bus.yml').click(force=True)
+        chromium.press(page.get_by_role('button', name='Write it into bus.yml'))
         page.get_by_text('is written; restart the robot').wait_for()
         shoulder, elbow = (node.drive for node in load_bus(bus_yml).nodes)
         assert shoulder.scale_pos_to_dev == pytest.approx(PER_TURN / math.tau)

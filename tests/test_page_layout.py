@@ -39,6 +39,7 @@ pytestmark = [
 SIZES = {'desk': (1440, 900), 'tablet': (1024, 768), 'phone': (390, 844), 'short': (390, 664)}
 PHONES = {'phone', 'short'}
 GROUPS = ['Drive', 'Plan', 'See', 'Diagnose']
+JOG_BUTTONS = 14
 READY = RobotState('READY', Level.WELL, 'Hold a button to move.')
 STATES = (
     READY,
@@ -49,9 +50,9 @@ STATES = (
 )
 LONG = 'all drives: ' + 'panda_joint3: 0x2310 continuous over current at output; ' * 11
 TOUCHED = '#robot-stop, #rv-view button, .rv-hold, .mantine-Button-root, [role=tab]'
-BOXES = """selector => Object.fromEntries([...document.querySelectorAll(selector)].map((e, n) => {
-  const b = e.getBoundingClientRect(); return [n + e.innerText, [b.left, b.top, b.width, b.height]]
-}).filter(([, b]) => b[2] > 0))"""
+BOXES = """selector => Object.fromEntries([...document.querySelectorAll(selector)].map(e =>
+  [e.innerText, e.getBoundingClientRect()]).filter(([, b]) => b.width > 0).map(([text, b], n) =>
+  [n + text, [b.left, b.top, b.width, b.height]]))"""
 CONTRASTS = """() => {
   const part = v => (v /= 255) <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
   const light = c => 0.2126 * part(c[0]) + 0.7152 * part(c[1]) + 0.0722 * part(c[2]);
@@ -198,8 +199,9 @@ def test_stop_is_in_reach_and_nothing_overlaps_or_moves(
                 == 'CANVAS'
             )
     chromium.show(page, 'Drive')
+    page.locator('.rv-hold:visible').nth(JOG_BUTTONS - 1).wait_for()
     before = boxes(page, '#robot-stop, .rv-hold, [role=tab], #rv-view button')
-    assert len([name for name in before if name.endswith(('−', '+'))]) >= 14
+    assert len([name for name in before if name.endswith(('−', '+'))]) >= JOG_BUTTONS
     for state in STATES:
         shown.page.say(LONG, failed=True)
         see(page, shown, state)

@@ -117,6 +117,8 @@ VIEWS: Mapping[str, tuple[str, Velocity]] = {
     'Top': ('T', (0.001, 0.0, 1.3)),
 }
 """Hotkey and place of the camera of each view, by the size of the robot."""
+STATUS_BOX = 'margin:0 12px 0.5em 2.2em;height:2.5em;line-height:1.25em;overflow:auto'
+"""Style of what a status says: no button below moves with its length."""
 LOW_PICTURE = 420
 """Height of a picture in [px] below which the camera is nearer."""
 NOTHING: Mapping[str, str] = {
@@ -366,7 +368,7 @@ class RobotPage:
         ordered = sorted(statuses, key=lambda status: (WORST.index(status.level), status.name))
         html = ''.join(
             f'{status_line(status.name, status.level)}'
-            f'<div style="margin:0 12px 0.5em 2.2em">{escape(status.message)}</div>'
+            f'<div style="{STATUS_BOX}">{escape(status.message)}</div>'
             for status in ordered
         )
         if self._statuses.content != html:
