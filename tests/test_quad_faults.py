@@ -20,11 +20,18 @@ from quad_msgs.msg import JointCommand
 
 pytestmark = pytest.mark.scenario
 
-LARGEST_STEP = 23.0
-"""Degrees between two commands to a servo; the trot needs half of it, a jump would be more."""
+LARGEST_STEP = 29.0
+"""Degrees between two commands to a servo. The controller lets set-points go at 10 rad/s: 11.5 in
+a period, 17.2 in one that is late, and two commands may come out as one. A trot needs that speed:
+its set-points are ahead of soft servos, at 13 a period where those of firm ones have 10."""
 RESUMED = 6.0
 """Degrees between two commands when a new controller takes over where the joints are: the bridge
 begins at 2 rad/s."""
+UPRIGHT = math.radians(15.0)
+"""Tilt of a robot that stands."""
+LEANING = math.radians(20.0)
+"""Tilt of one that was stopped in mid-trot, with two feet in the air, and holds: in physics up to
+17 degrees, as soft servos give way under its weight, and 13 with firm ones."""
 TRIES = 20
 """How often a trot is stopped until a foot is in the air; it is in two of three."""
 
@@ -78,9 +85,9 @@ def kill(quad: SimulatedQuad, name: str) -> float:
     return time.monotonic()
 
 
-def check_upright(quad: SimulatedQuad) -> None:
+def check_upright(quad: SimulatedQuad, most: float = UPRIGHT) -> None:
     """The robot stands, and no servo ever got a target that jumps."""
-    assert tilt(quad) < math.radians(15.0)
+    assert tilt(quad) < most
     assert quad.tap.largest_step() < LARGEST_STEP
 
 
@@ -140,7 +147,7 @@ def test_a_killed_bridge_is_reported_and_its_successor_goes_on_smoothly(
     quad.processes['controller'].wait_for('fault, .*joint states')
     quad.start('hardware')
     quad.spin(1.0)
-    check_upright(quad)
+    check_upright(quad, LEANING)
     quad.clear_fault()
     quad.stand()
     assert quad.tap.largest_step(since=killed) < LARGEST_STEP

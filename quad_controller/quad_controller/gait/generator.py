@@ -14,7 +14,7 @@ from quad_description.rotations import Vector
 from .body import BodyPose, feet_in_body, Leveller, UPRIGHT
 from .parameters import GaitParameters
 from .schedule import Gait, Schedule
-from .servo_compensation import ServoCompensation
+from .servo_compensation import LOOK, ServoCompensation
 from .stepping import Stepper, SwingLift
 from .velocity import REST, Velocity
 
@@ -116,6 +116,7 @@ class GaitGenerator:
         self._compensation = (
             ServoCompensation(robot, parameters.servo) if parameters.servo is not None else None
         )
+        self._unsettled = 0  # steps in which the compensation still sees the end of the gait
         self.velocity = self.goal = REST
         self.clamped = False
         self.pose = UPRIGHT
@@ -123,8 +124,7 @@ class GaitGenerator:
     @property
     def standing(self) -> bool:
         """Whether all feet are at their places and the robot is at rest."""
-        late = self._compensation is not None and not self._compensation.standing
-        return not self._stepper.walking and self.velocity.at_rest and not late
+        return not self._stepper.walking and self.velocity.at_rest and not self._unsettled
 
     @property
     def stand_targets(self) -> Targets:
@@ -144,7 +144,7 @@ class GaitGenerator:
     def reset(self) -> None:
         """Stand, at once; for when something else has moved the joints."""
         self._stepper.reset()
-        self.velocity, self.pose = REST, UPRIGHT
+        self.velocity, self.pose, self._unsettled = REST, UPRIGHT, 0
         if self._compensation is not None:
             self._compensation.reset()
 
@@ -169,6 +169,7 @@ class GaitGenerator:
         heading = attitude[2] - self.pose.yaw if attitude is not None else None
         course = self._heading.step(self.velocity, heading, dt)
         # back to the course no faster than the gait and its limits allow, slower ahead if need be
+        walked = self._stepper.walking
         feet = self._stepper.step(self._within_schedule(self.limits.bound(course)), dt)
         moved = self._leveller.step(attitude, self.pose, dt)
         sway = self._stepper.sway
@@ -179,6 +180,8 @@ class GaitGenerator:
         contacts = self._stepper.contacts
         if self._compensation is not None:
             targets = self._compensation.step(targets, contacts, dt)
+            # the body sways until the gait ends, also after the last foot has come down
+            self._unsettled = LOOK if walked else max(self._unsettled - 1, 0)
         return GaitStep(targets, contacts, all(solution.reachable for solution in solutions))
 
     def _advance_velocity(self, velocity: Velocity, dt: float) -> None:

@@ -19,6 +19,7 @@ from quad_description import jacobian, Quadruped, Targets
 from ..settings import setting
 
 GRAVITY = 9.81  # [m/s^2]
+LOOK = 2  # steps of the motion, after the newest one, that it looks at
 STEP_LOAD = 1.25  # of its share of the weight: what each of two legs carries; found in physics
 
 
@@ -50,11 +51,6 @@ class ServoCompensation:
         """Forget the motion so far."""
         self._window.clear()
 
-    @property
-    def standing(self) -> bool:
-        """Whether all legs stand, in what it looks back and ahead to, too."""
-        return all(all(stand) for _, stand in self._window)
-
     def at_rest(self, targets: Targets) -> Targets:
         """Return the set-points for standing still on all legs at some targets [rad]."""
         moved = list(targets)
@@ -69,9 +65,9 @@ class ServoCompensation:
         """
         window = self._window
         window.append((targets, contacts))
-        while len(window) < 3:
+        while len(window) <= LOOK:
             window.append((targets, contacts))
-        if len(window) > 3:
+        if len(window) > LOOK + 1:
             del window[0]
         before, (now, stand), after = window[0][0], window[1], window[2][0]
         step = max(dt, 1e-3)
