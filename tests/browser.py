@@ -170,15 +170,15 @@ def asleep() -> Iterator[None]:
             process.send_signal(signal.SIGCONT)
 
 
-def open_page(browser: Browser, url: str, **options: object) -> Page:
-    """Open a page and wait until it shows the robot's controls."""
+def open_page(browser: Browser, url: str, *, robot: str = '.', **options: object) -> Page:
+    """Open a page and wait until it shows its groups, and the name of a robot that matches."""
     page = browser.new_page(**({'viewport': SIZE} | options))  # type: ignore[arg-type]
     page.set_default_timeout(PAGE_TIMEOUT)
     page.add_init_script(FEW_PICTURES)
     page.goto(url)
     # viser's own warning of a software renderer covers the scene
     page.add_style_tag(content='.mantine-Notifications-root { display: none }')
-    page.locator('#rv-robot b').filter(has_text=re.compile('.')).wait_for(state='attached')
+    page.locator('#rv-robot b').filter(has_text=re.compile(robot)).wait_for(state='attached')
     page.locator('[role=tab]').nth(GROUPS - 1).wait_for()  # by another connection, maybe later
     return page
 

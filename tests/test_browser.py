@@ -10,14 +10,14 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field
 import re
 import threading
 import time
 from types import SimpleNamespace
-from typing import cast, TYPE_CHECKING
+from typing import Any, cast, TYPE_CHECKING
 
 import browser as chromium
 from geometry_msgs.msg import Point, Pose
@@ -38,7 +38,7 @@ from robot_viewer.page.overlay import StopAnswer
 from robot_viewer.page.plan_panel import HOLD_EXECUTE
 from robot_viewer.page.robot_page import Actions, RobotPage
 from robot_viewer.page.target_panel import HOLD_TARGET
-from robot_viewer.robot_state import ALLOW
+from robot_viewer.robot_state import ALLOW, Level, RobotState
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page
@@ -461,7 +461,8 @@ def test_a_page_that_is_killed_moves_nothing(seen: Seen) -> None:
 
 def test_a_finger_on_a_phone(seen: Seen) -> None:
     """A swipe moves no joint; a slip does not let go; letting go stops; STOP is below."""
-    options = {'viewport': {'width': 390, 'height': 844}, 'has_touch': True, 'is_mobile': True}
+    size = {'width': 390, 'height': 844}
+    options: dict[str, Any] = {'viewport': size, 'has_touch': True, 'is_mobile': True}
     page = chromium.open_page(seen.browser, seen.url, **options)
     seen.allow(page)
     button = page.get_by_role('button', name='7 +', exact=True)
@@ -539,24 +540,35 @@ def test_a_robot_that_stops_late(seen: Seen) -> None:
             answers[-1].set_result(answer)
         return answers[-1]
 
-    with closing(
-        RobotPage('127.0.0.1', 8600, cast(Actions, SimpleNamespace(stop=stop)))
-    ) as served:
-        page = seen.browser.new_page()
-        page.goto(served.url)
-        words_of_stop(page, 'Space').wait_for()
-        for _ in range(9):  # more than a browser sends at once
+    def show() -> None:
+        while not over.wait(0.2):  # of a page that says nothing the overlay says NO CONTACT
+            stage = 'stopped' if stands.is_set() else 'braking' if answers else ''
+            state = RobotState('READY', Level.WELL, '')
+            served.show_state(state, {}, stop=stage, simulated=True, program='', listens='')
+
+    over = threading.Event()
+    with (
+        closing(RobotPage('127.0.0.1', 8600, cast(Actions, SimpleNamespace(stop=stop)))) as served,
+        ThreadPoolExecutor() as threads,
+    ):
+        threads.submit(show)
+        try:
+            page = chromium.open_page(seen.browser, served.url, robot='')
+            words_of_stop(page, 'Space').wait_for()
+            for _ in range(9):  # more than a browser sends at once
+                page.keyboard.press('Space')
+            words_of_stop(page, 'NOT confirmed: use the emergency stop').wait_for()
+            count = len(answers)
             page.keyboard.press('Space')
-        words_of_stop(page, 'NOT confirmed: use the emergency stop').wait_for()
-        count = len(answers)
-        page.keyboard.press('Space')
-        seen.wait(lambda: len(answers) > count, 'a STOP behind those that are not answered')
-        stands.set()
-        for each in answers:
-            if not each.done():
-                each.set_result(answer)
-        words_of_stop(page, '^stopped$').wait_for()
-        page.close()
+            seen.wait(lambda: len(answers) > count, 'a STOP behind those that are not answered')
+            stands.set()
+            for each in answers:
+                if not each.done():
+                    each.set_result(answer)
+            words_of_stop(page, '^stopped$').wait_for()
+            page.close()
+        finally:
+            over.set()
 
 
 def test_a_robot_that_does_not_answer_has_not_stopped(seen: Seen) -> None:
