@@ -1149,7 +1149,7 @@ def test_the_last_words_of_a_master_that_ended_do_not_count() -> None:
         assert not listen(bus, BUS, monotonic)
 
 
-def test_a_master_is_heard_behind_all_that_waits_to_be_read() -> None:
+def test_a_master_is_found_behind_all_that_waits_to_be_read() -> None:
     """A bus that was opened long before is read to its end, however long that takes."""
     now = [10.0]
     batches = [[Frame(0x182, bytes(3), timestamp=5.0 + number)] for number in range(4)]
@@ -1168,7 +1168,7 @@ def test_a_master_is_heard_behind_all_that_waits_to_be_read() -> None:
 
 
 def test_a_bus_without_time_does_not_hold_up_the_start() -> None:
-    """Frames that do not tell when they came are read for a limited time."""
+    """Frames without a time stamp are read for a limited time."""
     now = [10.0]
 
     class TimelessBus(VirtualBus):
