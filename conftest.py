@@ -42,13 +42,13 @@ settings.load_profile('workspace')
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """Take a worker a core and one more: robots wait for deadlines, and starve beside more."""
+    """Use one worker more than cores: robots wait for deadlines, and starve beside more."""
     return len(os.sched_getaffinity(0)) + 1
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Let two workers have the scenarios with whole robots: more would share two cores too often.
+    """Give the scenarios with whole robots to two workers: more would share two cores too often.
 
     One of them has all pages, as browsers that draw without a graphics card take much of a core;
     every third file of the others makes both take about as long. Large groups begin first, so that
@@ -64,7 +64,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Let robots and what they start come before tests that compute.
+    """Raise the priority of robots and what they start over that of tests that compute.
 
     Where this user may say so, and the kernel does not share the processor among sessions first.
     """

@@ -85,7 +85,7 @@ class ArmWatch:
         self._positions = {tpdo_default(2, node): axis for node, axis in self._axes.items()}
 
     def allow(self, positions: Sequence[float]) -> None:
-        """Let each drive be anywhere from where it is to a position in [rad]."""
+        """Allow each drive any position from where it is to another one in [rad]."""
         with self._lock:
             for axis, position in zip(self._axes.values(), positions, strict=True):
                 places = [position * INCREMENTS]
@@ -93,7 +93,7 @@ class ArmWatch:
                 axis.allowed = (min(places) - TOLERANCE, max(places) + TOLERANCE)
 
     def forbid(self) -> None:
-        """Let no drive move from where it is."""
+        """Forbid every drive to move from where it is."""
         with self._lock:
             for axis in self._axes.values():
                 if axis.position is not None:

@@ -141,7 +141,7 @@ class SimulatedQuad:
         return str(self.states[-1].data) if self.states else ''
 
     def stand(self) -> None:
-        """Let it stand up, and wait until it does.
+        """Make it stand up, and wait until it does.
 
         Raises:
             AssertionError: It does not, or a fault stops it on its way.

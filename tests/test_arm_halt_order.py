@@ -95,7 +95,7 @@ class Arm:
         return self.gateway.request(goal, self._get_ready)
 
     def take(self, steps: list[str]) -> None:
-        """Let worker and cycle take their steps."""
+        """Step the worker and the cycle."""
         for step in steps:
             if step == 'work':
                 self._worker.run()
@@ -103,7 +103,7 @@ class Arm:
                 self.net.run(PERIOD)
 
     def settle(self) -> None:
-        """Let everything that is under way come to its end."""
+        """Run until everything under way has ended."""
         self.take(['work', 'cycle'] * 200)
 
     def _get_ready(self) -> None:

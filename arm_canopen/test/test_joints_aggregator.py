@@ -27,12 +27,12 @@ class Publisher:
         self.sets: list[JointSet] = []
 
     def receive(self, name: str, cycle: int, value: float = 0.0) -> None:
-        """Take the state of a joint at a cycle of 10 ms."""
+        """Receive the state of a joint at a cycle of 10 ms."""
         stamp, now = cycle * PERIOD_NS, cycle * PERIOD_NS * 1e-9
         self.sets += self.aggregator.update(name, stamp, sample(value), now)
 
     def settle(self) -> None:
-        """Let it learn who takes part, in two cycles."""
+        """Run two cycles, in which it learns which joints take part."""
         for cycle in (1, 2):
             for name in NAMES:
                 self.receive(name, cycle)

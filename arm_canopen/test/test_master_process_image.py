@@ -137,7 +137,7 @@ def test_short_pdos_are_counted_and_long_ones_read(length: int, taken: bool) -> 
 
 
 def answered(entry: ReceivedTpdo) -> None:
-    """Let a TPDO come."""
+    """Deliver a TPDO."""
     entry.receive(Frame(entry.config.cob_id, bytes(8)))
 
 

@@ -124,7 +124,7 @@ class SlowBus(VirtualBus):
         self.look = look
 
     def receive(self, timeout: float) -> list[Frame]:
-        """Let the time pass."""
+        """Advance the time."""
         self.now += timeout + self.look
         return super().receive(0.0)
 

@@ -35,7 +35,7 @@ CONFIG = BusConfig(Path('bus.yml'), MasterConfig(1, cycle_period=0.005), ())
 
 
 def end_by_defect(thread: NetworkThread) -> None:
-    """Have the cycle fail in a way that nobody expects."""
+    """Make the cycle fail by a defect."""
 
     def record(late: float, skipped: int) -> None:
         raise ZeroDivisionError('injected')

@@ -94,7 +94,7 @@ def off(curve: Curve, link: LinkKinematics, positions: Array) -> tuple[float, fl
 
 
 def check_limits(model: RobotModel, path: Path, factor: float = 1.0) -> None:
-    """Look at position, velocity, acceleration and jerk at and between all places."""
+    """Check position, velocity, acceleration and jerk at and between all places."""
     limits = model.limits
     numbers = np.repeat(np.arange(len(path.durations)), 7)
     times = path.durations[numbers] * np.tile(np.linspace(0.0, 1.0, 7), len(path.durations))
@@ -115,7 +115,7 @@ def check_limits(model: RobotModel, path: Path, factor: float = 1.0) -> None:
 
 
 def check_on(curve: Curve, name: str, path: Path, count: int) -> None:
-    """Look at how far the tip is off a curve, and at the limits of the joints."""
+    """Check the distance of the tip from a curve, and the limits of the joints."""
     for positions in places(path, count):
         way, turn = off(curve, tip(name), positions)
         assert way < STRAIGHT

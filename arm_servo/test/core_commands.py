@@ -32,7 +32,7 @@ TIMEOUT = 0.1  # time for which a jog counts in [s]
 def command(
     core: MotionCore, request: MotionRequest | ImmediateRequest, now: float = 0.0
 ) -> Execution | None:
-    """Let a request count from now on; return the execution of a trajectory."""
+    """Put a request into effect; return the execution of a trajectory."""
     prepared = core.prepare(request, core.basis)
     core.commit(prepared, now)
     return prepared.motion if isinstance(prepared.motion, Execution) else None

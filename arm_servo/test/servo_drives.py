@@ -53,7 +53,7 @@ class Drives:
         self.attachments: list[MotionSource] = []
 
     def place(self, positions: Sequence[float]) -> None:
-        """Let the drives stand elsewhere."""
+        """Move the drives to another place."""
         self.axes = [
             replace(axis, position=at, setpoint=at)
             for axis, at in zip(self.axes, positions, strict=True)

@@ -45,11 +45,11 @@ class Listener:
         self.made = SceneListener(node, gateways, worker=self._worker, clock=lambda: self._now)
 
     def take(self, message: PlanningScene) -> None:
-        """Let a message come; nothing is built yet."""
+        """Deliver a message; nothing is built yet."""
         self.made._take(message)
 
     def run(self, seconds: float = 0.1) -> None:
-        """Let time pass, and build what can be."""
+        """Advance the time, and build what can be built."""
         self._now += seconds
         self.made._look()
         while self._worker.run():

@@ -106,7 +106,7 @@ class Bench:
         return point.state.position
 
     def take(self, steps: list[str]) -> None:
-        """Let cycle and worker take their steps."""
+        """Step the cycle and the worker."""
         for step in steps:
             if step == 'cycle':
                 self.arm.run()

@@ -52,7 +52,7 @@ class Jogger:
         return float((self.model.jacobian(state.position) @ state.velocity)[:3] @ self.line)
 
     def rest(self) -> None:
-        """Let go until the arm rests."""
+        """Release the keys until the arm rests."""
         for _ in range(round(1.0 / self.period)):
             self.core.step(self.now, self.period)
             self.now += self.period

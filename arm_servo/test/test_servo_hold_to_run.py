@@ -51,19 +51,19 @@ class Stick:
 
 
 def halt(stick: Stick) -> None:
-    """Let somebody halt a drive."""
+    """Halt a drive from outside."""
     stick.drives.source.released('panda_joint1', Refusal(RefusalCause.COMMANDED, 'halted'))
 
 
 def is_enabled(stick: Stick) -> None:
-    """Let somebody select the mode in which the drives follow, as ``--enable`` does."""
+    """Select the mode in which the drives follow, as ``--enable`` does."""
     for name in stick.drives.source.axes:
         selected = Refusal(RefusalCause.MODE_SELECTED, 'Cyclic synchronous position')
         stick.drives.source.released(name, selected)
 
 
 def faults(stick: Stick) -> None:
-    """Let a drive fault, and somebody reset it."""
+    """Fault a drive, and reset it from outside."""
     axis = stick.drives.axes[1]
     faulted = Refusal(RefusalCause.FAULT)
     stick.drives.axes[1] = replace(axis, followable=False, refusal=faulted)

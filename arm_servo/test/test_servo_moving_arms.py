@@ -114,7 +114,7 @@ class Pair:
         core.commit(core.prepare(JogRequest(command, self.now + 60.0)), self.now)
 
     def go(self, side: str, positions: Sequence[float], seconds: float) -> None:
-        """Let an arm follow a trajectory."""
+        """Make an arm follow a trajectory."""
         core = self.cores[side]
         goal = TrajectoryGoal(core.model.joints, [GoalPoint(seconds, positions)])
         core.commit(core.prepare(goal, core.basis), self.now)
@@ -128,7 +128,7 @@ class Pair:
         return self._whole.clearance(np.concatenate([self.at('left'), self.at('right')]))
 
     def run(self, seconds: float) -> None:
-        """Let time pass."""
+        """Advance the time."""
         for _ in range(round(seconds / PERIOD)):
             for side, core in self.cores.items():
                 self.points[side] = core.step(self.now, PERIOD)

@@ -34,7 +34,7 @@ class Commands:
         self.servo = servo
 
     def send(self, numbers: list[float], frame: str = '') -> None:
-        """Let a twist come; the cycle of the test has its own time."""
+        """Deliver a twist; the cycle of the test has its own time."""
         expires = self.drives.now + 0.1
 
         def convert(_message: object, _sent: float) -> JogRequest:

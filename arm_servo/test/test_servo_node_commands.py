@@ -64,7 +64,7 @@ class Topics:
         return Future()
 
     def send(self, topic: str, message: Any, age: float = 0.0) -> None:
-        """Let a message arrive that was sent some time ago in [s]."""
+        """Deliver a message that was sent some time ago in [s]."""
         sent = self.node.get_clock().now() - Duration(nanoseconds=round(age * 1e9))
         message.header.stamp = sent.to_msg()
         (taken,) = (each for each in self.node.subscriptions if each.topic_name.endswith(topic))

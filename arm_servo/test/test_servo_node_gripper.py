@@ -94,7 +94,7 @@ class Gripper:
         self._made._cancel(handle)
 
     def run(self, duration: float, *, blocked: bool = False) -> None:
-        """Let time pass in [s]."""
+        """Advance the time by a duration in [s]."""
         before = list(self.drives.axes)
         for _ in range(round(duration / PERIOD)):
             self.drives.run()
@@ -108,7 +108,7 @@ class Gripper:
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """Let the controller have the time of the drives."""
+    """Give the controller the clock of the drives."""
     made = SimpleNamespace(monotonic=lambda: 0.0)
     monkeypatch.setattr(controller, 'time', made)
     return made

@@ -74,11 +74,11 @@ class Robot:
         self.run(0.3)
 
     def place_gate(self, position: float) -> None:
-        """Let a joint state of the gate come."""
+        """Deliver a joint state of the gate."""
         self.listener.made._take_joints(JointState(name=['gate'], position=[position]))
 
     def run(self, seconds: float) -> None:
-        """Let time pass: ten cycles of both between two looks."""
+        """Advance the time: ten cycles of both between two looks."""
         for cycle in range(round(seconds / PERIOD)):
             for drives in self.arms.values():
                 drives.run()

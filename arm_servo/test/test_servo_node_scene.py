@@ -33,7 +33,7 @@ def arm() -> Drives:
 
 
 def started(drives: Drives) -> Drives:
-    """Let an arm follow."""
+    """Make an arm follow."""
     drives.attach()
     drives.run(2)
     return drives

@@ -48,7 +48,7 @@ def box(turned: float, name: str = 'box') -> CollisionObject:
 
 
 def use(drives: Drives, *things: CollisionObject) -> PlanningScene:
-    """Have a scene with some objects count now."""
+    """Use a scene with some objects at once."""
     scene = use_later(drives, *things)
     drives.run()
     assert drives.gateway.model.scene is scene
@@ -56,7 +56,7 @@ def use(drives: Drives, *things: CollisionObject) -> PlanningScene:
 
 
 def use_later(drives: Drives, *things: CollisionObject) -> PlanningScene:
-    """Have a scene with some objects count from the next cycle on."""
+    """Use a scene with some objects from the next cycle on."""
     scene = drives.gateway.model.scene.with_contents(
         objects={thing.name: thing for thing in things}, attached_bodies={}
     )

@@ -203,7 +203,7 @@ POSTED = {
 
 @pytest.fixture
 def utc() -> Iterator[None]:
-    """Let local time be that of Greenwich."""
+    """Set local time to UTC."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv('TZ', 'UTC')
         time.tzset()

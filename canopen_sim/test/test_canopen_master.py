@@ -134,7 +134,7 @@ def master(drives: object, bus_yml: Path, bus: str) -> Iterator[CanopenMaster]:
 
 @contextmanager
 def independent_client(bus: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[canopen.Network]:
-    """Look at the bus with python-canopen."""
+    """Observe the bus with python-canopen."""
     place = (ArmCanopenBus.__module__, 'ArmCanopenBus')
     monkeypatch.setitem(sys.modules['can.interfaces'].BACKENDS, 'arm_canopen', place)
     network = canopen.Network()

@@ -165,7 +165,7 @@ def test_wrong_usage(name: str, arguments: list[str], message: str, capsys: Outp
 
 @pytest.fixture(autouse=True)
 def own_domain(isolation: Isolation, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the processes have a ROS domain of their own."""
+    """Give the processes a ROS domain of their own."""
     for name, value in isolation.env.items():
         monkeypatch.setenv(name, value)
 

@@ -33,7 +33,7 @@ TO_LIE = ON_THE_WAY + LYING
 def leave(
     report: Callable[[str], None], given_up: Callable[[], bool], *, namespace: str, hold: bool
 ) -> None:
-    """Let the robot lie down, if it is on its feet; a controller that does not help is left.
+    """Make the robot lie down if it is on its feet; give up on a controller that does not answer.
 
     Args:
         report: Takes what happens, in words.

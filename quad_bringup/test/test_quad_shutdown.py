@@ -34,7 +34,7 @@ class Controller:
         return mode
 
     def wait_until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
-        """Let the time-out pass at once."""
+        """Make the time-out pass at once."""
         if self.given_up():
             raise GivenUpError(what)
         if not condition():

@@ -52,7 +52,7 @@ def pose(stamp: float, x: float, y: float, yaw: float) -> Odometry:
 def drive(
     track: Track, velocity: Velocity, start: tuple[float, float, float], time: float
 ) -> None:
-    """Let a body move at a constant velocity of its own frame: along a circle."""
+    """Move a body at a constant velocity of its own frame: along a circle."""
     x, y, yaw = start
     for index in range(round(time / PERIOD) + 1):
         elapsed = index * PERIOD

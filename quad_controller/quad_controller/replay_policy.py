@@ -62,7 +62,7 @@ class Answered:
 
 
 def feed(runner: PolicyRunner, steps: Iterable[Step]) -> Iterator[Answered]:
-    """Let a policy see what was recorded; yield its answers.
+    """Feed a policy what was recorded; yield its answers.
 
     It begins anew where it did in the recording. One that was not asked there sees all steps.
 

@@ -55,7 +55,7 @@ def joints_of(stage: Stage) -> list[float]:
 
 
 def gives_up(rig: Rig) -> str:
-    """Let a robot try until it gives up; return the fault."""
+    """Run a robot until it gives up; return the fault."""
     for _ in range(round(MAX_DURATION / PERIOD)):
         rig.step()
         if rig.is_in(State.FAULT):

@@ -61,7 +61,7 @@ def compare(
     grounds: Mapping[str, Conditions] = GROUNDS,
     commands: tuple[Velocity, ...] = COMMANDS,
 ) -> dict[str, dict[str, CourseFigures]]:
-    """Let walkers walk each way for some time [s] on all grounds, on all cores.
+    """Run walkers in each direction for a time in [s] on all grounds, on all cores.
 
     Where nobody is pushed, the first of the seeds is enough.
 

@@ -93,7 +93,7 @@ class Normaliser:
 
 
 def explore(actor: Actor, deviation: float) -> None:
-    """Let an actor try actions that deviate so far from its mean."""
+    """Sample actions of an actor with this deviation from its mean."""
     params = actor.state_dict.params
     tried = jnp.full((actor.num_actions,), math.log(deviation))
     actor.state_dict = actor.state_dict.replace(

@@ -154,7 +154,7 @@ class Rig(ABC):
         return self.status(name)
 
     def watch_steps(self) -> Callable[[], list[float]]:
-        """Look at the largest step of a target in every diagnostic from now on [rad]."""
+        """Watch the largest step of a target in every diagnostic from now on [rad]."""
         first = len(self.received['/diagnostics'])
 
         def steps() -> list[float]:

@@ -322,7 +322,7 @@ def test_a_robot_that_is_lost_is_not_brought_down_later(cut: str) -> None:
 
 
 def laid_down(line: Line, now: float, descended: float) -> tuple[Mapping[str, float], float]:
-    """Let commands break off in a trot; return the legs [rad] after a time [s], and when it is."""
+    """Break commands off in a trot; return the legs [rad] after a time [s], and when it is."""
     line.commander.miss(STAND, 0.0, now)
     place, end = STAND, now + descended
     while now < end and line.commander.goes_down:

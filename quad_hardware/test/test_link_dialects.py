@@ -68,7 +68,7 @@ class OldRig:
         return not self.lose_each or self._requested % self.lose_each > 0
 
     def run(self, duration: float) -> None:
-        """Let time pass."""
+        """Advance the time."""
         end = self.now + duration
         while self.now < end:
             step = self.dialect.step(self.now)

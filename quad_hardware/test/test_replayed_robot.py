@@ -60,7 +60,7 @@ class Seen(NamedTuple):
 
 
 def session(peer: PtyPeer, log: Path) -> Seen:
-    """Have a robot swing its legs in turn, while its body turns."""
+    """Record a robot that swings its legs in turn, while its body turns."""
     states: list[RobotState] = []
     arrived = threading.Condition()
 

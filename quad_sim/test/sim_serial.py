@@ -33,7 +33,7 @@ class Served:
 
 @contextmanager
 def serve(link: Path, *arguments: str) -> Iterator[Served]:
-    """Let a robot live that the arguments of fake_xgo describe."""
+    """Simulate a robot that the arguments of fake_xgo describe."""
     simulation = build(parse_arguments(['--link', str(link), *arguments]))
     with PseudoTerminal(link) as terminal:
         server = Server(simulation.plant, simulation.line, terminal)

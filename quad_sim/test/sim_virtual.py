@@ -28,7 +28,7 @@ class VirtualRobot:
         self.line.receive(frame.encode(self.protocol), self.now)
 
     def run(self, duration: float) -> list[Frame]:
-        """Let time pass; return the frames that arrived."""
+        """Advance the time; return the frames that arrived."""
         frames = []
         for _ in range(round(duration / TICK)):
             self.now += TICK

@@ -24,7 +24,7 @@ STAND = pose_positions(Pose.STAND)
 
 
 def settled(robot: Robot) -> Robot:
-    """Let the robot come to rest."""
+    """Run until the robot has come to rest."""
     robot.step(1.0)
     return robot
 

@@ -141,7 +141,7 @@ class FoxgloveClient:
     # -- what comes
 
     def until(self, condition: Callable[[], bool], what: str) -> None:
-        """Take what comes until something is true."""
+        """Receive until a condition holds."""
         deadline = time.monotonic() + TIMEOUT
         while not condition():
             left = deadline - time.monotonic()

@@ -140,7 +140,7 @@ class Robot:
     # -- what happens
 
     def look(self, seconds: float = PERIOD, **at: float) -> None:
-        """Let time pass; positions and statuses come all the while."""
+        """Advance the time; positions and statuses come all the while."""
         until = self.now + seconds - 1e-9
         while self.now < until:
             self.now += PERIOD

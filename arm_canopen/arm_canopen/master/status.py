@@ -32,7 +32,7 @@ class NodeStatus:
 
 
 def node_status(node: RemoteNode, now: float) -> NodeStatus:
-    """Take a snapshot of a device."""
+    """Return a snapshot of a device."""
     seen = node.config.heartbeat_timeout > 0 and node.life.last > 0
     return NodeStatus(
         name=node.name,

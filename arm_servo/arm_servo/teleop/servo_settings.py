@@ -45,7 +45,7 @@ class ServoSettings:
         self._asked = -math.inf
 
     def serve(self, now: float) -> None:
-        """Ask if there is something to ask, and it is time [s] to."""
+        """Send a pending request when its time in [s] has come."""
         is_due = self._unanswered and now >= self._asked + RETRY_PERIOD
         if not is_due or not self._client.service_is_ready():
             return

@@ -78,7 +78,7 @@ class Station(Protocol):
     """What is connected to the bus beside the master."""
 
     def receive(self, frame: Frame, now: float) -> None:
-        """Take a frame from the bus."""
+        """Receive a frame from the bus."""
 
     def advance(self, now: float) -> None:
         """Do what is due at this time in [s]."""
@@ -170,7 +170,7 @@ class _Result(Future[Any]):
         self._net = net
 
     def result(self, timeout: float | None = None) -> Any:
-        """Let time pass until it is there."""
+        """Advance the time until it is there."""
         self._net.run_until(self.done, 60.0 if timeout is None else timeout)
         return super().result(0.0)
 
@@ -245,7 +245,7 @@ class VirtualNetwork:
                 self.power_on(node.name)
 
     def replace_master(self) -> None:
-        """Let the master vanish without a word, and another one take its place."""
+        """Replace the master, which vanishes without a word, by another one."""
         self._running = False
         self.master = CanopenMaster(
             self._config,
@@ -295,14 +295,14 @@ class VirtualNetwork:
         self.master.thread.begin()
 
     def run(self, duration: float) -> None:
-        """Let time pass in [s]."""
+        """Advance the time by a duration in [s]."""
         end = self.now + duration
         self._look(*self.stations)
         while self._step(end):
             pass
 
     def run_until(self, condition: Callable[[], bool], timeout: float = BOOT_TIME_MAX) -> float:
-        """Let time pass until a condition holds; returns how long that took in [s]."""
+        """Advance the time until a condition holds; return how long that took in [s]."""
         begin = self.now
         self._look(*self.stations)
         while not condition():
@@ -389,7 +389,7 @@ class VirtualNetwork:
         return str(self.result(commands.run('select', commands.select_mode(mode)), timeout))
 
     def result(self, promise: Promise[Any], timeout: float = 20.0) -> Any:
-        """Let time pass until a promise is done, and return its result."""
+        """Advance the time until a promise is done, and return its result."""
         self.run_until(lambda: promise.done, timeout)
         return promise.result()
 
@@ -421,7 +421,7 @@ class VirtualNetwork:
         return [str(event) for event in self.events if event.severity >= severity]
 
     def story(self) -> str:
-        """Say what was reported so far, for messages of failed tests."""
+        """Return what was reported so far, for messages of failed tests."""
         return '; '.join(self.reported()) or 'nothing was reported'
 
     def go_on(self, end: float) -> list[Frame]:

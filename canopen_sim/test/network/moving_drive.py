@@ -71,7 +71,7 @@ class MovingDrive:
         return self.net.simulated()
 
     def run(self, duration: float) -> None:
-        """Let time pass in [s], and look at the drive in each cycle."""
+        """Advance the time by a duration in [s], and observe the drive in each cycle."""
         for _ in range(round(duration / PERIOD)):
             self.net.run(PERIOD)
             if self.device.state is not self.states[-1]:

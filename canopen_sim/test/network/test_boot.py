@@ -147,7 +147,7 @@ class Scene:
         return [event.text for event in self.net.events if event.kind is kind]
 
     def run(self, duration: float) -> None:
-        """Let time pass in [s]."""
+        """Advance the time by a duration in [s]."""
         self.net.run(duration)
 
     def start(self, duration: float) -> None:

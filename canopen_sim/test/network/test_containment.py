@@ -196,7 +196,7 @@ def pair(mode: OperationMode, **scales: float) -> VirtualNetwork:
 
 
 def report_actual(net: VirtualNetwork, position: int | None, velocity: int | None) -> None:
-    """Have the second drive say another position or velocity than it has, in device units."""
+    """Make the second drive report another position or velocity than it has, in device units."""
 
     def alters(sender: str, frame: Frame) -> Frame:
         if frame.can_id != 0x280 + NODE_IDS[ODD]:

@@ -159,7 +159,7 @@ class Arm:
         assert self.net.motor(WITNESS) > 0.05
 
     def stop(self, name: str, mode: OperationMode) -> None:
-        """Have a drive stand that is enabled."""
+        """Stop a drive, which stays enabled."""
         if mode not in POSITION_MODES:
             self.net.do(name, 'halt', preempt=True)
         self.net.run(SETTLING)

@@ -59,7 +59,7 @@ def running_in(mode: OperationMode, **changes: object) -> VirtualNetwork:
 
 
 def go(net: VirtualNetwork, duration: float) -> float:
-    """Let the drive move until it has rested for a while; return its highest place in [rad].
+    """Run until the drive has rested for a while; return its highest position in [rad].
 
     Args:
         net: The network.
@@ -143,7 +143,7 @@ def test_a_halt_right_after_a_target_holds(
 
 
 def full(net: VirtualNetwork) -> None:
-    """Have the drive move, with its buffer full."""
+    """Move the drive with its buffer full."""
     for target in (0.5, 1.0, 1.5):
         net.commands[JOINT].move(Move(target, immediate=False))
     net.run(0.3)

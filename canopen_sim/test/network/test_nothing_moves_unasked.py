@@ -90,7 +90,7 @@ class Loaded:
         self.net.enable(mode)
 
     def move(self, mode: OperationMode) -> None:
-        """Let it move in a mode."""
+        """Move it in a mode."""
         self.enable(mode)
         self.net.target(0.8)
         self.net.run(0.4)
@@ -333,7 +333,7 @@ def go(net: VirtualNetwork, *targets: float) -> list[float]:
 
 
 def rest(net: VirtualNetwork) -> None:
-    """Let the drive go wherever it goes, until it has stood for a while."""
+    """Run until the drive has stood for a while, wherever it goes."""
     end, before = net.now + 3.0, math.nan
     while net.now < end and before != (before := net.motor()):
         net.run(STANDS_AFTER)

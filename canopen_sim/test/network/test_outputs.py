@@ -149,7 +149,7 @@ def speeds(net: VirtualNetwork, since: float) -> list[int]:
 
 
 def inject(net: VirtualNetwork, fault: Fault, **settings: float) -> None:
-    """Let the drive answer the SDO for its profile velocity so."""
+    """Make the drive answer the SDO for its profile velocity like this."""
     injection = FaultInjection(fault, object=(0x6081, 0), **settings)  # type: ignore[arg-type]
     net.devices[JOINT].faults.inject(injection, net.now)
 

@@ -382,7 +382,7 @@ class Run:
         return bool(passing) or self.net.now < max(self._lossy_until.values())
 
     def run(self, duration: float) -> None:
-        """Let time pass in [s], and check the laws in each cycle."""
+        """Advance the time by a duration in [s], and check the laws in each cycle."""
         for _ in range(round(duration / CYCLE)):
             if self.net.wire.refuses and self.net.now >= self._lossy_until[BUS_DOWN]:
                 self.net.wire.refuses = ''
@@ -395,7 +395,7 @@ class Run:
             self._judge_state()
 
     def _finish(self) -> None:
-        """Let time pass until every command is answered."""
+        """Advance the time until every command is answered."""
         while self._promises:
             self.run(CYCLE)
 
@@ -636,7 +636,7 @@ def as_code(value: object) -> str:
 
 
 def shortened(scenario: Scenario) -> Scenario:
-    """Leave out every step and oddity that is not needed for the failure."""
+    """Remove every step and deviation that the failure does not need."""
     tries = [replace(scenario, kind=Kind())]
     tries += [replace(scenario, kind=replace(scenario.kind, deviations=()))]
     tries += [replace(scenario, kind=replace(scenario.kind, options=()))]

@@ -64,7 +64,7 @@ class Line:
         return self.refusal
 
     def receive(self, answer: bytes | str) -> None:
-        """Let the client receive a frame, given as bytes or as hexadecimal text."""
+        """Deliver a frame to the client, given as bytes or as hexadecimal text."""
         data = bytes.fromhex(answer) if isinstance(answer, str) else answer
         self.client.receive(Frame(RESPONSE, data))
 
@@ -74,7 +74,7 @@ class Line:
         self.sent.clear()
 
     def pass_time(self, duration: float) -> None:
-        """Let time pass in [s]."""
+        """Advance the time by a duration in [s]."""
         self.scheduler.advance(self.scheduler.now + duration)
 
     def serve(self, answer: Callable[[bytes], bytes | None]) -> None:

@@ -69,19 +69,19 @@ def running_in(mode: OperationMode) -> VirtualNetwork:
 
 
 def leave_behind(net: VirtualNetwork, index: int, value: int) -> None:
-    """Let another client have written an object of the drive."""
+    """Write an object of the drive as another client would."""
     data = value.to_bytes(SIZES[index], 'little', signed=True)
     net.devices[JOINT].store.write(index, 0, data, net.now)
 
 
 def refuse(net: VirtualNetwork, index: int) -> None:
-    """Let the drive abort all transfers of an object."""
+    """Make the drive abort all transfers of an object."""
     fault = FaultInjection(Fault.SDO_ABORT, object=(index, 0), abort=0x08000022)
     net.devices[JOINT].faults.inject(fault, net.now)
 
 
 def accept(net: VirtualNetwork) -> None:
-    """Let the drive take everything again."""
+    """Make the drive accept everything again."""
     net.devices[JOINT].faults.end(net.now)
 
 

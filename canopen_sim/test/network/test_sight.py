@@ -72,7 +72,7 @@ class Led:
         self.net.wire.loses = lambda sender, frame: frame.can_id in cob_ids
 
     def velocities(self, duration: float = 2.0) -> list[float]:
-        """Let time pass in [s]; return the velocities meanwhile in [rad/s]."""
+        """Advance the time by a duration in [s]; return the velocities meanwhile in [rad/s]."""
         found = []
         for _ in range(round(duration / PERIOD)):
             self.net.run(PERIOD)

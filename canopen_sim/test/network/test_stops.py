@@ -128,7 +128,7 @@ def inject(
     *,
     times: float = float('inf'),
 ) -> None:
-    """Let something fail from now on, with another text each time."""
+    """Make something fail from now on, with another text each time."""
     original, number = getattr(owner, attribute), count()
 
     def broken(*args: object, **settings: object) -> object:

@@ -109,7 +109,7 @@ class Track:
         self._recent: deque[tuple[float, Velocity]] = deque()
 
     def take(self, message: Odometry) -> None:
-        """Take in a pose; one that is not newer than the last is passed over."""
+        """Record a pose; one that is not newer than the last is ignored."""
         stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
         if stamp <= self.stamp:
             return
@@ -327,7 +327,7 @@ class Walk(Demo[ModeClient]):
         return f'joint commands {self.rate:.1f} Hz, jitter p50/p99 {jitter}'
 
     def _conclude(self) -> None:
-        """Leave summary and problems, where something was measured."""
+        """Write summary and problems, where something was measured."""
         if not self.segments:
             return
         head = f'{"[m/s, rad/s]":<14}  {"commanded":^19}  {"in physics":^19}  {"by /odom":^19}'

@@ -41,7 +41,7 @@ class SwingLift:
     def __init__(
         self, robot: Quadruped, neutral: Feet, schedule: Schedule, swing_height: float
     ) -> None:
-        """Look for the height at some speeds, ahead and to the side.
+        """Search for the height at some speeds, ahead and to the side.
 
         Args:
             robot: Whose joints have limits of their speed.

@@ -375,7 +375,7 @@ class ControllerNode(Node):
         return Answer(True, f'{answer.message}; sha256 {loaded.digest}')
 
     def _tune(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Take another tuning of the gait, or return why not."""
+        """Apply another tuning of the gait, or return why it is refused."""
         values = {parameter.name: parameter.value for parameter in parameters}
         try:
             gait = changed_gait(self._gait, values)

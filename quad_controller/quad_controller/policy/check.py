@@ -98,7 +98,7 @@ def check_answers(
     stand: Floats,
     period: float,
 ) -> Iterator[Row]:
-    """Ask a policy for actions as it will be asked, and look at them.
+    """Request actions of a policy as the controller will, and check them.
 
     Args:
         standing: The observation of a robot that stands.

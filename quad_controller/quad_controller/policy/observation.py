@@ -164,7 +164,7 @@ class ObservationBuilder:
         self._time = 0.0
 
     def advance(self, dt: float) -> None:
-        """Let the clocks go on by some [s]."""
+        """Advance the clocks by a duration in [s]."""
         self._time += dt
 
     def build(self, observed: Observed) -> Floats:

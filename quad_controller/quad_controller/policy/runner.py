@@ -158,7 +158,7 @@ class PolicyRunner:
         return PolicyStep(self.act(action, dt), observation=observation, action=action)
 
     def advance(self, dt: float) -> None:
-        """Let the clock of the phase go on by some [s]."""
+        """Advance the clock of the phase by a duration in [s]."""
         self._builder.advance(dt)
 
     def act(self, action: Floats, dt: float) -> Targets:

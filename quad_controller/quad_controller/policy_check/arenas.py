@@ -250,7 +250,7 @@ class SerialArena(Backend):
 
 @contextmanager
 def serial_arena(choice: RobotChoice, *, noise: bool = True) -> Iterator[SerialArena]:
-    """Let a robot live behind a serial port, and open it.
+    """Simulate a robot behind a serial port, and open the port.
 
     Args:
         noise: Its sensors are as noisy as those of a board.

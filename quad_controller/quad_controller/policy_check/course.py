@@ -312,7 +312,7 @@ class CourseWalker:
         return _passage_of(command, parts, falls, bends)
 
     def _settle(self, command: Velocity) -> bool:
-        """Take up speed; return whether it did not fall."""
+        """Accelerate; return whether it did not fall."""
         for _ in range(round(SETTLE_TIME / self._arena.backend.period)):
             self._step(command)
             if self._walker.is_down:

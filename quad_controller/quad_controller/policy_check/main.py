@@ -131,7 +131,7 @@ def _policy_options(options: argparse.Namespace) -> PolicyOptions:
 
 
 def _try_out(options: argparse.Namespace, loaded: LoadedPolicy, found: Findings) -> None:
-    """Let a policy walk in all ways that the command line asks for."""
+    """Make a policy walk in all ways that the command line names."""
     compare = options.compare or (options.report and not (options.walk or options.chain))
     if not (options.walk or compare or options.chain or options.sweep):
         return
@@ -175,7 +175,7 @@ def _try_out(options: argparse.Namespace, loaded: LoadedPolicy, found: Findings)
 
 
 def _add_course(found: Findings, compared: Compared) -> None:
-    """Take and print what policy and gait came to on a course."""
+    """Record and print the results of policy and gait on a course."""
     found.courses.append(compared)
     reasons = list(against_gait(compared.policy, compared.gait))
     late = list(timing_notes(compared.policy))
@@ -309,7 +309,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _report_file(text: str) -> Path:
-    """Take a path that can be written, before a walk takes its time."""
+    """Return a path that can be written; checked before a walk takes its time."""
     path = Path(text)
     try:
         with path.open('a', encoding='utf-8'):

@@ -102,7 +102,7 @@ def run_trials(trials: Sequence[Trial]) -> list[CourseFigures]:
 def run_chain(
     walkers: Sequence[Candidate], commands: Sequence[Velocity], duration: float
 ) -> list[CourseFigures]:
-    """Have several walk a course in real time, one after the other, each on a line of its own.
+    """Walk a course with several in real time, one after the other, each on a line of its own.
 
     Raises:
         CheckError: The simulation or the line failed.

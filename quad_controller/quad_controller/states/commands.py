@@ -27,7 +27,7 @@ class Commands:
         self.refused = 0  # how many commands were not finite
 
     def set_velocity(self, velocity: Velocity) -> Answer:
-        """Take a velocity; one that is not finite stops the robot."""
+        """Set the velocity; one that is not finite stops the robot."""
         if not velocity.finite:
             self.refused += 1
             self._velocity = REST
@@ -36,7 +36,7 @@ class Commands:
         return Answer(True, '')
 
     def set_pose(self, pose: BodyPose) -> Answer:
-        """Take a pose of the body; it stays until the next one."""
+        """Set the pose of the body; it stays until the next one."""
         if not pose.finite:
             self.refused += 1
             return Answer(False, f'rejected {pose}: it is not finite; the pose stays')
@@ -44,7 +44,7 @@ class Commands:
         return Answer(True, '')
 
     def pass_time(self, dt: float) -> None:
-        """Let the velocity grow older by some [s]."""
+        """Increase the age of the velocity by a duration in [s]."""
         self._age += dt
 
     def velocity(self, state: State) -> Velocity:
@@ -56,7 +56,7 @@ class Commands:
         return self._velocity
 
     def warning(self, state: State) -> str:
-        """Say that a stream of velocities broke off instead of ending with zero, or nothing."""
+        """Return a warning of a stream of velocities that broke off without a zero, or nothing."""
         if state in MOVING_STATES and not self._velocity.at_rest and self._age > self._timeout:
             return f'the last velocity came {self._age:.1f} s ago; it counts as zero'
         return ''

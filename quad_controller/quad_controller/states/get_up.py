@@ -66,7 +66,7 @@ class StillnessWatch:
         self._reference, self.time = None, 0.0
 
     def step(self, down: Vector, dt: float) -> None:
-        """Take the direction of gravity in the body after some [s]."""
+        """Process the direction of gravity in the body after a duration in [s]."""
         if self._reference is None or _angle(self._reference, down) > STILL_ANGLE:
             self._reference, self.time = down, 0.0
         else:

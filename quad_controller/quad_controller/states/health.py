@@ -54,7 +54,7 @@ class Health:
         self._low_for: float | None = None
 
     def take(self, measurement: RobotState, dt: float) -> list[str]:
-        """Take what is new.
+        """Record new values.
 
         Returns:
             What was refused and why.

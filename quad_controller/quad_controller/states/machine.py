@@ -267,7 +267,7 @@ class StateMachine:
             self._stand_after_blend()
 
     def _stand_after_blend(self) -> None:
-        """Let the gait take over when the robot has stood up."""
+        """Hand over to the gait when the robot has stood up."""
         up = self.state is State.STAND or self._reaction is Reaction.STAND
         if up and isinstance(self.motion, Blend) and self.motion.finished:
             self._generator.reset()

@@ -95,7 +95,7 @@ class PolicyChoice:
         return ''
 
     def choose(self, policy: PolicyRunner | None) -> str:
-        """Take another policy; return what becomes of it as long as nothing moves."""
+        """Choose another policy; return what becomes of it as long as nothing moves."""
         self.policy, self._watched_steps, self._asked = policy, 0, None
         if policy is None:
             self._refusal = NO_POLICY

@@ -90,7 +90,7 @@ class TrackingMonitor:
         self.text = ''  # which joints did not follow in the last window; empty when all did
 
     def step(self, targets: Sequence[float], measured: Sequence[float], dt: float) -> None:
-        """Take what was sent and measured in a step.
+        """Record what was sent and measured in a step.
 
         Args:
             targets: Of all joints in [rad].

@@ -185,7 +185,7 @@ class JointCommander(CommandLoss):
         self._moved_by = ''  # what took the legs from where the commands of before left them
 
     def limit_to(self, joints: JointMap) -> None:
-        """Take targets to the limits of these joints from now on; any thread may call it."""
+        """Limit targets to the limits of these joints from now on; any thread may call it."""
         self._limiter.joints = joints
 
     def lose(self) -> None:

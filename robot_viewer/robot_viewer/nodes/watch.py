@@ -59,13 +59,13 @@ class Watch:
         self._since, self._joints_at = time.monotonic() if begins else None, None
 
     def take_joints(self, message: JointState) -> None:
-        """Take a message of the robot."""
+        """Record a message of the robot."""
         self._joints_at = time.monotonic()
         if any(abs(velocity) > MOVES for velocity in message.velocity):
             self._moved_at = self._joints_at
 
     def take_statuses(self, message: DiagnosticArray) -> None:
-        """Take a message of any node of the robot."""
+        """Record a message of any node of the robot."""
         for status in message.status:
             level = min(status.level[0], STALE)  # others than those of diagnostic_msgs: unknown
             values = {each.key: each.value for each in status.values}

@@ -84,7 +84,7 @@ class Live:
         )
 
     def remove(self, number: int) -> None:
-        """Have a button act no more."""
+        """Disconnect a button."""
         self._holds.pop(number, None)
         self.off.discard(number)
 
@@ -104,7 +104,7 @@ class Live:
         return int(self._deadman.holder or NO_PAGE)  # type: ignore[call-overload, no-any-return]
 
     def stop(self) -> None:
-        """Have what is held let go first, and nothing move until it is allowed."""
+        """Release what is held, and bar motion until it is allowed."""
         self.stopped = True
         self._deadman.stop()
 

@@ -559,7 +559,7 @@ class RobotPage:
         return self._actions.stop()
 
     def allow(self) -> None:
-        """Let the page move the robot again after STOP; nothing moves by that."""
+        """Allow the page to move the robot again after STOP; nothing moves by that."""
         self.live.stopped = False
 
     def _walk(self, velocity: Velocity) -> None:
