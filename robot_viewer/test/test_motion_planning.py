@@ -127,6 +127,8 @@ class Planner(ViewerRig):
         """Do it as a button of the page does."""
         panel = self.panel
         actor = panel._scene if hasattr(panel._scene, action) else panel._plan
+        if action in {'execute', 'go_on'} and not arguments:
+            arguments = (time.monotonic(),)
         panel._order(partial(getattr(actor, action), *arguments, **options))
         if action == 'execute':  # its button is held until the test lets it go
             panel._order(lambda: setattr(self.viewer._planning, '_held_at', math.inf))
@@ -276,6 +278,16 @@ def test_an_execution_goes_on_as_long_as_its_button_is_held(planner: Planner, ho
     assert not planner.execute.canceled
     planner.do('let_go' if how == 'let go' else 'go_on')
     planner.spin_until(lambda: bool(planner.execute.canceled), 'a cancel')
+
+
+def test_a_press_that_waited_too_long_executes_nothing(planner: Planner) -> None:
+    """A node that was held up learns of it when the button may be up already."""
+    planner.plan()
+    planner.do('execute', time.monotonic() - 1.0)
+    planner.spin_times(20)
+    assert not planner.execute.goals
+    planner.do('execute')
+    planner.spin_until(lambda: bool(planner.execute.goals), 'an execution')
 
 
 def test_a_goal_is_dragged(planner: Planner) -> None:

@@ -29,12 +29,13 @@ def test_what_was_held_up_counts_once(count: int, delay: float) -> None:
 def test_one_page_at_a_time(steps: list[tuple[int, float, bool]]) -> None:
     """The first that holds has control; another takes it, while nothing is held."""
     deadman, now, holder, last = Deadman(), 10.0, 0, -1.0
-    for page, gap, takes in steps:
+    for number, (page, gap, takes) in enumerate(steps):
         now += gap
+        button = 'hold' if page == holder else number  # one that was refused is pressed anew
         if takes:
             holder = page if now - last >= RELEASED_AFTER else holder
             assert deadman.take(page, now) is (holder == page)
-        elif deadman.beat(page, 'hold', now):
+        elif deadman.beat(page, button, now):
             assert page == (holder or page)
             holder = page
         if not takes and page == holder:
@@ -48,7 +49,18 @@ def test_a_page_that_is_closed_has_no_control() -> None:
     assert deadman.beat(1, 'hold', 10.0)
     assert not deadman.beat(2, 'hold', 20.0)
     deadman.leave(1)
-    assert deadman.beat(2, 'hold', 20.1)
+    assert not deadman.beat(2, 'hold', 20.1)  # it was refused: under a finger that waits
+    deadman.release(2, 'hold', 20.2)
+    assert deadman.beat(2, 'hold', 20.3)
+
+
+def test_a_press_that_may_not_move_anything_has_to_be_made_anew() -> None:
+    """What it was refused for may end while it is held."""
+    deadman = Deadman()
+    deadman.bar(1, 'hold')
+    assert not deadman.beat(1, 'hold', 10.0)
+    deadman.release(1, 'hold', 10.1)
+    assert deadman.beat(1, 'hold', 10.2)
 
 
 @given(

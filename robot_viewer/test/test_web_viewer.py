@@ -13,6 +13,7 @@ import math
 import socket
 import sys
 import threading
+import time
 from typing import Any
 
 from canopen_interfaces.srv import CONmtID
@@ -642,6 +643,11 @@ def test_a_motion_to_a_target_ends_when_its_button_is_let_go(
     monkeypatch.setattr(controllers_module, 'motion_time', lambda *_: 60.0)
     monkeypatch.setattr(controllers_module, 'RELEASED_AFTER', math.inf)
     sent, controller, _ = targets_of(robot)
+    monkeypatch.setattr(controllers_module, 'RELEASED_AFTER', 0.1)
+    robot.viewer._controllers.aim({'a': 1.0}, 1.0, time.monotonic() - 0.2)  # it was held up
+    robot.spin_times(20)
+    assert not sent
+    monkeypatch.setattr(controllers_module, 'RELEASED_AFTER', math.inf)
     robot.viewer.aim({'a': 1.0}, 1.0)
     robot.spin_until(lambda: bool(sent), 'a trajectory')
     robot.spin_times(20)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy.action.server import ActionServer, CancelResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -22,7 +23,8 @@ ANSWER_DELAY = 0.02
 
 Clients of rclpy 7.1 note a request after it was sent, and drop an answer that another thread gets
 before: 1 of 40 motions of pymoveit2 waited for ever. Python switches threads every 5 ms, and with
-several of them, or on a busy computer, it takes some switches.
+several of them, or on a busy computer, it takes some switches. An answer to a cancel is not held
+back: with it the goal itself would be.
 """
 
 
@@ -41,7 +43,10 @@ class _Server(ActionServer):
         elapsed = Future()
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # simulated time may stand still
         timer = self._node.create_timer(
-            ANSWER_DELAY, lambda: elapsed.set_result(None), clock=steady
+            ANSWER_DELAY,
+            lambda: elapsed.set_result(None),
+            callback_group=self.callback_group,
+            clock=steady,
         )
         await elapsed
         self._node.destroy_timer(timer)
@@ -81,4 +86,6 @@ def serve_goals(
         handle_accepted_callback=begin,
         cancel_callback=cancel,
         result_timeout=RESULT_TIMEOUT,
+        # an executor that heeds groups would wait in one for the timer of the same
+        callback_group=ReentrantCallbackGroup(),
     )

@@ -13,7 +13,9 @@ from typing import Any
 from action_msgs.msg import GoalStatus
 from isolation import Isolation
 import pytest
+import rclpy
 from rclpy.action.server import CancelResponse
+from rclpy.executors import SingleThreadedExecutor
 from ros_client import RosClient
 from std_srvs.srv import Trigger
 from tf2_msgs.action import LookupTransform
@@ -63,6 +65,37 @@ def test_a_goal_goes_on_after_its_callback_and_is_forgotten_after_its_end(
             lambda: result_of(goal).status == GoalStatus.STATUS_UNKNOWN, TIMEOUT, 'its end'
         )
         server.destroy()  # type: ignore[no-untyped-call]
+
+
+@pytest.mark.slow
+def test_a_goal_is_answered_by_an_executor_that_heeds_groups(isolation: Isolation) -> None:
+    """As that of ROS where there is no events executor."""
+    with RosClient(isolation.domain_id) as client:
+        context = client.node.context
+        node = rclpy.create_node('server', context=context)
+        executor = SingleThreadedExecutor(context=context)
+        executor.add_node(node)
+        server = action_goals.serve_goals(
+            node,
+            LookupTransform,
+            'look_up',
+            start=lambda _: None,
+            conclude=lambda _: LookupTransform.Result(),
+            cancel=lambda _: CancelResponse.REJECT,
+        )
+        caller = client.action(LookupTransform, 'look_up')
+        assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
+        sent = caller.send_goal_async(LookupTransform.Goal())  # type: ignore[no-untyped-call]
+
+        def answered() -> bool:
+            executor.spin_once(0.01)
+            return bool(sent.done())
+
+        client.spin_until(answered, TIMEOUT, 'acceptance')
+        assert sent.result().accepted
+        server.destroy()  # type: ignore[no-untyped-call]
+        executor.shutdown()
+        node.destroy_node()
 
 
 class _SlowClient:

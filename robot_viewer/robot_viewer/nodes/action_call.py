@@ -25,6 +25,8 @@ class ActionCall:
 
     def cancel(self) -> None:
         """Cancel it."""
+        if self._is_canceled:
+            return
         self._is_canceled = True
         if self._handle is not None:
             self._handle.cancel_goal_async()

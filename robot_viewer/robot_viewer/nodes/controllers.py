@@ -144,17 +144,20 @@ class Controllers:
         controller.positions, controller.references = positions, targets
         self.history.add(targets, positions, time.monotonic())
 
-    def aim(self, targets: Mapping[str, float], share: float) -> None:
+    def aim(self, targets: Mapping[str, float], share: float, at: float) -> None:
         """Send joints to targets, and no other joint, as long as this is called again.
 
         Args:
             targets: By joint in [rad] or [m].
             share: Of the greatest velocity, above 0 to 1.
+            at: Steady time in [s] at which the button was seen to be held.
         """
+        if time.monotonic() - at > RELEASED_AFTER:
+            return  # this node was held up; the button may be let go
         for controller in self.found.values():
             own = {name: at for name, at in targets.items() if name in controller.joints}
             if own:
-                controller.held_at = time.monotonic()
+                controller.held_at = at
                 if (own, share) != controller.aimed:
                     controller.wanted = controller.aimed = (own, share)
 

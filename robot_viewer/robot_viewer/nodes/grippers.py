@@ -43,11 +43,6 @@ class Grippers:
         """Full names of their controllers, each with its joint."""
         return tuple((name, each.joint) for name, each in self._found.items())
 
-    @property
-    def joints(self) -> frozenset[str]:
-        """The joints that they move."""
-        return frozenset(each.joint for each in self._found.values())
-
     def describe(self, tree: KinematicTree) -> None:
         """Use another robot."""
         self._ends = {joint.name: travel(joint) for joint in tree.movable()}

@@ -16,13 +16,15 @@ from rclpy.node import Node
 from ..page.overlay import StopAnswer
 from ..page.robot_page import RobotPage
 from ..robot_state import ALLOW, Level, robot_state, RobotState, SILENCE, Stop
-from .trigger_calls import TriggerCalls
+from .trigger_calls import TRIGGER, TriggerCalls
 from .watch import OWN, Watch
 
 REPORT_PERIOD = 1.0
 """Time between two statuses of the robot on /diagnostics in [s], where it does not change."""
 PUSH_PERIOD = 0.5
 """The same of what is shown on pages that are open: without it they have lost their server."""
+SIMULATIONS = ('arm_msgs/srv/InjectFault', 'quad_msgs/srv/InjectFault')
+"""Types of services that only a simulation offers."""
 STAGES = {None: 'braking', True: 'stopped', False: 'failed'}
 """How far a STOP has come, by whether the robot has confirmed that it stands."""
 
@@ -32,21 +34,31 @@ class Judge:
 
     Attributes:
         robot: Its name; empty for none.
-        services: Full names of the Trigger services that may be called.
-        simulated: A simulation runs beside the page.
     """
 
     def __init__(self, node: Node, page: RobotPage, watch: Watch, calls: TriggerCalls) -> None:
         self._node, self._page, self._watch, self._calls = node, page, watch, calls
-        self.robot, self.simulated = '', False
-        self.services: frozenset[str] = frozenset()
+        self.robot = ''
+        self._simulated = False
+        self._services: frozenset[str] = frozenset()
         self._stop: Stop | None = None
-        self._acting = ''
+        self._acting = ''  # the action that runs, and the services that it has called
+        self._group: tuple[str, ...] = ()
         self._state = RobotState('', Level.UNKNOWN, '')
         self._reported_at = self._pushed_at = 0.0
         self._reported: object = None
         self._pushed: object = None
         self._publisher = node.create_publisher(DiagnosticArray, 'diagnostics', 10)
+
+    def look(self, services: Mapping[str, Iterable[str]]) -> None:
+        """Record the services of the robot, by name and types.
+
+        An action whose services have gone is over: their answer may never come.
+        """
+        self._services = frozenset(name for name, kinds in services.items() if TRIGGER in kinds)
+        self._simulated = any(kind in SIMULATIONS for each in services.values() for kind in each)
+        if not self._services.issuperset(self._group):
+            self._acting, self._group = '', ()
 
     def judge(
         self,
@@ -69,7 +81,7 @@ class Judge:
             controllers: Of trajectories, by their full names.
         """
         now, live = time.monotonic(), self._page.live
-        seen = self._watch.seen(self.robot, self.services, publishes=publishes)
+        seen = self._watch.seen(self.robot, self._services, publishes=publishes)
         seen.stop, seen.acting = self._stop, self._acting
         seen.limit, seen.battery = limit, battery
         program = ''
@@ -82,7 +94,7 @@ class Judge:
             program = f'a program ({names})' if names else 'a program'
             seen.mover = f'A{program[1:]} moves it.'
         self._state = state = robot_state(seen)
-        shown = state, self._stop, self.simulated, program, live.holder
+        shown = state, self._stop, self._simulated, program, live.holder
         if shown != self._reported or now - self._reported_at > REPORT_PERIOD:
             self._reported, self._reported_at = shown, now
             self._publish(state)
@@ -94,7 +106,7 @@ class Judge:
                 state,
                 known,
                 stop='' if self._stop is None else STAGES[self._stop.stands],
-                simulated=self.simulated,
+                simulated=self._simulated,
                 program=program,
                 listens=f'It listens in ROS domain {os.environ.get("ROS_DOMAIN_ID") or 0}.',
             )
@@ -122,6 +134,8 @@ class Judge:
         self, answer: Future[StopAnswer], order: Callable[[Callable[[], None]], None]
     ) -> None:
         """Record a STOP, and what the robot answers to it."""
+        self._page.live.stop()  # what was allowed just before does not count
+        self._acting, self._group = '', ()
         self._stop = stop = Stop()
         answer.add_done_callback(lambda done: order(partial(self._has_stopped, stop, done)))
 
@@ -143,10 +157,14 @@ class Judge:
             self._call(action, [group for group in state.calls if group])
 
     def _call(self, action: str, groups: list[tuple[str, ...]]) -> None:
-        """Call the next group of services, while each of those before succeeds."""
-        if not groups:
+        """Call the next group of services, while each before succeeds and no STOP comes."""
+        self._group = group = groups[0] if groups else ()
+        if not group:
             self._acting = ''
             return
-        self._calls.call_all(
-            action, groups[0], lambda well: self._call(action, groups[1:] if well else [])
-        )
+
+        def go_on(well: bool) -> None:
+            if self._group is group:
+                self._call(action, groups[1:] if well else [])
+
+        self._calls.call_all(action, group, go_on)

@@ -181,9 +181,9 @@ class MotionPlanning:
             self._execution.cancel()
         self._drop()
 
-    def go_on(self) -> None:
-        """Go on with the execution: its button is held."""
-        self._held_at = time.monotonic()
+    def go_on(self, at: float) -> None:
+        """Go on with the execution: its button was seen to be held at a steady time in [s]."""
+        self._held_at = at
 
     def let_go(self) -> None:
         """Cancel the execution: its button was let go."""
@@ -329,8 +329,10 @@ class MotionPlanning:
             failed=False,
         )
 
-    def execute(self) -> None:
-        """Execute what was planned."""
+    def execute(self, at: float) -> None:
+        """Execute what was planned; the button was seen to be held at a steady time in [s]."""
+        if time.monotonic() - at > RELEASED_AFTER:
+            return  # this node was held up; the button may be let go
         links = self._links
         if links is None or self._panel is None:
             return
@@ -342,7 +344,7 @@ class MotionPlanning:
             return
         goal = import_module('moveit_msgs.action').ExecuteTrajectory.Goal()
         goal.trajectory = self._trajectory
-        self._trajectory, self._shown_since, self._held_at = None, None, time.monotonic()
+        self._trajectory, self._shown_since, self._held_at = None, None, at
         self._executed_goal = self._goal, self._joints
         self._panel.allow(execute=False)
         if self._motion is not None:

@@ -13,6 +13,8 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
+TRIGGER = 'std_srvs/srv/Trigger'
+
 
 class Report(Protocol):
     """Reports what became of a request."""

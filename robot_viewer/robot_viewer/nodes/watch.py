@@ -41,7 +41,6 @@ class Watch:
         self._times: dict[str, float] = {}
         self._joints_at: float | None = None
         self._since: float | None = None  # when it began to listen to joint states
-        self._started = time.monotonic()
         self._moved_at = -math.inf
 
     def forget(self) -> None:

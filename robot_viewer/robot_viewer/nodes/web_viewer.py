@@ -51,7 +51,7 @@ from .judge import Judge
 from .listening import Listening
 from .motion_planning import MotionPlanning
 from .serving import Border, serve
-from .trigger_calls import TriggerCalls
+from .trigger_calls import TRIGGER, TriggerCalls
 from .watch import Watch
 
 NAME = 'web_viewer'
@@ -63,8 +63,6 @@ LIST_PERIOD = 0.2
 LIMIT_AGE = 1.0
 """Time in [s] for which a limit that the servo names is shown."""
 SERVO_STATUS_TYPE = 'moveit_msgs/msg/ServoStatus'
-SIMULATIONS = ('arm_msgs/srv/InjectFault', 'quad_msgs/srv/InjectFault')
-"""Types of services that only a simulation offers."""
 GRAPH_PERIOD = 1.0
 """Time between two looks at what the robot offers in [s]."""
 DRIVE_SERVICES = (
@@ -85,7 +83,6 @@ WARN = 30
 """Level of warnings in rcl_interfaces/Log."""
 ROSOUT = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """It gets what was said in the seconds before the page was opened."""
-TRIGGER = 'std_srvs/srv/Trigger'
 STOP = 'stop'
 """Service of a robot that stops all of it."""
 
@@ -270,11 +267,8 @@ class WebViewer(Node):
         around = self.border.around
         with around('drives are not offered'):
             triggers = {name for name, kinds in services.items() if TRIGGER in kinds}
-            self._judge.services = frozenset(triggers)
             self._find_drives(triggers)
-        self._judge.simulated = any(
-            kind in SIMULATIONS for kinds in services.values() for kind in kinds
-        )
+        self._judge.look(self._of_this_robot(services))
         with around('the first motion is not offered'):
             self._first_motion.look(services, self._drives)
         with around('targets are not offered'):
@@ -301,6 +295,13 @@ class WebViewer(Node):
             self.destroy_publisher(self._joint_states)
             self._joint_states = None
         self.page.offer_sliders(offered=self._own)
+
+    def _of_this_robot(self, services: Mapping[str, list[str]]) -> dict[str, list[str]]:
+        """Return the services of nodes of the robot of this page, and of no other one."""
+        topics = (name for name, _ in self.get_topic_names_and_types())
+        nodes = {name.rpartition('/')[0] for name in services}
+        own = set(of_robot(self.resolve_topic_name('robot_description'), topics, nodes))
+        return {name: kinds for name, kinds in services.items() if name.rpartition('/')[0] in own}
 
     def _find_drives(self, triggers: Collection[str]) -> None:
         topics = (name for name, _ in self.get_topic_names_and_types())
@@ -419,7 +420,7 @@ class WebViewer(Node):
 
     def aim(self, targets: Mapping[str, float], share: float) -> None:
         """Move joints to targets as long as this comes."""
-        self._order(partial(self._controllers.aim, targets, share))
+        self._order(partial(self._controllers.aim, targets, share, time.monotonic()))
 
     def let_go(self) -> None:
         """Stop a motion to targets."""

@@ -21,10 +21,11 @@ _Press: TypeAlias = tuple[Hashable, Hashable]  # a page and its button
 class Deadman:
     """Distinguishes a heartbeat that counts from one that does not.
 
-    Whoever moves something by it sends one command for each heartbeat that counts, and nothing
+    A caller that moves something sends one command for each heartbeat that counts, and nothing
     else: a page that is gone sends none, and the robot's own time-out stops the motion. Of what a
     slow connection has held up and delivers at once, one counts. After a stop a button that was
-    held has to be let go, however its heartbeats pause; one that was taken off the page is over.
+    held has to be let go, however its heartbeats pause; so has one that was refused, as it would
+    move the robot when that ends, under a finger that waits.
 
     One page has control: the first that holds a button, until it is closed or another takes it.
 
@@ -43,6 +44,11 @@ class Deadman:
     def stop(self) -> None:
         """Ignore heartbeats of a button that is held now, until it is released."""
         self._barred |= self._pressed
+
+    def bar(self, page: Hashable, button: Hashable) -> None:
+        """Ignore a press that may not move anything now, until it is released."""
+        self._pressed.add((page, button))
+        self._barred.add((page, button))
 
     def held(self, now: float) -> bool:
         """Whether a button is held."""
@@ -83,6 +89,7 @@ class Deadman:
         if self.holder is None:
             self.holder = page
         if page != self.holder:
+            self._barred.add(press)
             return False
         gap, self._last = now - self._last, now
         return gap >= LEAST_GAP

@@ -88,6 +88,11 @@ class Live:
         self._holds.pop(number, None)
         self.off.discard(number)
 
+    def clear(self) -> None:
+        """Disconnect all buttons."""
+        self._holds.clear()
+        self.off.clear()
+
     @property
     def open(self) -> bool:
         """Whether a page is open."""
@@ -110,7 +115,10 @@ class Live:
 
     def _beat(self, page: int, number: int) -> None:
         hold = self._holds.get(number)
-        if hold is None or self.stopped or not (self.movable or hold.always):
+        if hold is None:
+            return
+        if self.stopped or not (self.movable or hold.always):
+            self._deadman.bar(page, number)
             return
         if not self._deadman.beat(page, number, time.monotonic()):
             return

@@ -181,11 +181,11 @@ class PlanActions(Protocol):
     def plan(self, share: float) -> None:
         """Plan, at a share of the greatest velocity and acceleration."""
 
-    def execute(self) -> None:
-        """Execute what was planned."""
+    def execute(self, at: float) -> None:
+        """Execute what was planned; the button was seen to be held at a steady time in [s]."""
 
-    def go_on(self) -> None:
-        """Go on with the execution: its button is held."""
+    def go_on(self, at: float) -> None:
+        """Go on with the execution: its button was seen to be held at a steady time in [s]."""
 
     def let_go(self) -> None:
         """Cancel the execution: its button was let go."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Coroutine, Mapping, Sequence
 from functools import partial
 from itertools import pairwise
+import time
 from typing import Any
 
 import numpy as np
@@ -83,9 +84,9 @@ class PlanPanel:
             self._hold, html = live.button(
                 Hold(
                     HOLD_EXECUTE,
-                    lambda: self._order(plan.go_on),
+                    lambda: self._order(partial(plan.go_on, time.monotonic())),
                     lambda: self._order(plan.let_go),
-                    lambda: self._order(plan.execute),
+                    lambda: self._order(partial(plan.execute, time.monotonic())),
                 )
             )
             gui.add_html(f'<div class="rv-one">{html}</div>')

@@ -10,6 +10,7 @@ from contextlib import redirect_stdout
 from functools import partial
 from html import escape
 import io
+import math
 import time
 from typing import Any, Protocol, TypeAlias
 
@@ -33,6 +34,7 @@ from ..loopback import shown_host
 from ..robot_state import ALLOW, FOLLOWS, Level, RobotState, Status
 from .aim import History
 from .body_panel import BodyPanel
+from .deadman import RELEASED_AFTER
 from .drive_table import drive_html
 from .first_motion_panel import FirstMotionActions, FirstMotionPanel
 from .gate import Gate
@@ -199,6 +201,7 @@ class RobotPage:
         """Make the groups anew; what was in them is offered again."""
         if self._tabs is not None:
             self._tabs.remove()
+        self.live.clear()
         gui = self._server.gui
         self._tabs = gui.add_tab_group()
         self._groups: dict[str, GuiTabHandle] = {}
@@ -445,14 +448,20 @@ class RobotPage:
                         self._add_disable(drive)
 
     def _add_disable(self, drive: GuiDropdownHandle[str]) -> None:
-        pressed = [0.0]
+        pressed, last = math.inf, -math.inf
 
         def start() -> None:
-            pressed[0] = time.monotonic()
+            nonlocal pressed
+            pressed = time.monotonic()
 
         def act() -> None:
-            if pressed[0] and time.monotonic() - pressed[0] >= DISABLE_AFTER:
-                pressed[0] = 0.0
+            nonlocal pressed, last
+            now = time.monotonic()
+            if now - last > RELEASED_AFTER and pressed < math.inf:
+                pressed = now  # a link that was held up: the finger may have left
+            last = now
+            if now - pressed >= DISABLE_AFTER:
+                pressed = math.inf
                 self._call(drive, 'Disable', DISABLE)
 
         hold = Hold(SINKS, act, lambda: None, start, always=True)

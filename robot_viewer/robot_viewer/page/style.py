@@ -22,8 +22,8 @@ CAUTION: Color = (255, 212, 59)
 PRESENT: Color = (52, 58, 64)
 """Of the mode that the robot is in."""
 
-GOOD, WARNING, BAD, PLAIN = '#237032', '#ffd43b', '#c92a2a', '#495057'
-LEVEL_MARKS = (('✓', GOOD), ('⚠', '#8a6100'), ('⛔', BAD), ('?', PLAIN))
+GOOD, WARNING, BAD, PLAIN = '#237032', '#8a6100', '#c92a2a', '#495057'
+LEVEL_MARKS = (('✓', GOOD), ('⚠', WARNING), ('⛔', BAD), ('?', PLAIN))
 """Of the levels of a status, good, warning, error and stale: an icon and its color."""
 THREE_COLUMNS = '<b class="rv-pad3"></b>'
 """Marks a panel whose buttons stand in three columns."""
