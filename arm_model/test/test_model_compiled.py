@@ -5,8 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 import logging
 from pathlib import Path
+import tempfile
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -153,3 +155,37 @@ def test_what_is_built_is_kept(tmp_path: Path) -> None:
     assert compiled_scene(robot('panda').scene) is not None
     (folder,) = (tmp_path / 'arm_model').iterdir()
     assert [each.suffix for each in folder.iterdir()] == ['.so']
+
+
+@pytest.mark.usefixtures('anew')
+def test_what_is_damaged_in_the_cache_is_built_again(tmp_path: Path) -> None:
+    """As after a power failure."""
+    assert compiled_scene(robot('panda').scene) is not None
+    (kept,) = (tmp_path / 'arm_model' / 'compiled').iterdir()
+    kept.unlink()  # it is loaded, and may not change
+    kept.write_bytes(b'no library')
+    compiled.library.cache_clear()
+    assert compiled_scene(robot('panda').scene) is not None
+    assert kept.stat().st_size > 1000
+
+
+@pytest.mark.usefixtures('anew')
+def test_a_cache_that_cannot_be_written_costs_no_speed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The core is built for this process alone, and nothing of it stays."""
+    (tmp_path / 'arm_model').write_text('no folder', encoding='ascii')
+    elsewhere = tmp_path / 'elsewhere'
+    elsewhere.mkdir()
+    monkeypatch.setattr(tempfile, 'tempdir', str(elsewhere))
+    assert compiled_scene(robot('panda').scene) is not None
+    assert not list(elsewhere.iterdir())
+
+
+@pytest.mark.usefixtures('anew')
+def test_threads_that_need_it_first_build_it_once() -> None:
+    """As plans of several groups."""
+    with ThreadPoolExecutor(4) as threads:
+        found = list(threads.map(lambda _: compiled_scene(robot('panda').scene), range(4)))
+    assert len({id(scene.library) for scene in found if scene is not None}) == 1
+    assert None not in found

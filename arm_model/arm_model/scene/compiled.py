@@ -10,7 +10,7 @@ slower. ``ARM_MODEL_COMPILED=0`` asks for that.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 import contextlib
 import ctypes
 from functools import lru_cache
@@ -22,6 +22,7 @@ import shlex
 import shutil
 import subprocess
 import tempfile
+import threading
 import weakref
 
 import coal
@@ -47,6 +48,7 @@ FLAGS = (
 )
 MUCH = 1e30  # what stands for infinity in [m]
 BUILD_TIME = 60.0  # time that the compiler is given in [s]
+LOADING = threading.Lock()  # several threads may need it first
 
 KINDS = {
     coal.Box: 0,
@@ -201,7 +203,8 @@ class CompiledSearch:
 
 def compiled_scene(scene: PlanningScene) -> CompiledScene | None:
     """Return a scene for the compiled core; None without a core, or for octrees."""
-    loaded = library()
+    with LOADING:
+        loaded = library()
     if loaded is None or scene.of_cells.any() or not scene.pairs:
         return None
     return CompiledScene(loaded, scene)
@@ -213,13 +216,11 @@ def library() -> Native | None:
     if os.environ.get('ARM_MODEL_COMPILED') == '0':
         return None
     try:
-        loaded = ctypes.CDLL(str(_built()))
+        loaded = _load()
     except (OSError, ValueError, subprocess.SubprocessError) as error:
-        reason = getattr(error, 'stderr', None) or error
         logging.getLogger(__name__).warning(
-            'motions are checked in Python, several times slower: the C core was not built: %s;'
-            ' install a C compiler (apt install gcc)',
-            str(reason).strip(),
+            'motions are checked in Python, several times slower: no C core: %s',
+            str(getattr(error, 'stderr', None) or error).strip(),
         )
         return None
     for name in ('world_new', 'search_new'):
@@ -243,28 +244,45 @@ def library() -> Native | None:
     return loaded
 
 
-def _built() -> Path:
-    """Return the shared library, which is built where it is not in the cache.
+def _load() -> Native:
+    """Load the shared library, which is built where it is not in the cache, or damaged there.
 
     Raises:
-        OSError, ValueError, SubprocessError: It cannot be built.
+        OSError, ValueError, SubprocessError: It cannot be built, or not be loaded.
     """
     compiler = shlex.split(os.environ.get('CC', ''))
     compiler = compiler or [each for each in ('cc', 'gcc') if shutil.which(each)][:1]
     if not compiler:
-        raise OSError('there is no C compiler')
-    key = (SOURCE.read_bytes(), *map(str.encode, (*compiler, *FLAGS, _processor())))
+        raise OSError('there is no C compiler; install one (apt install gcc)')
+    command = [*compiler, *FLAGS]
+    key = (SOURCE.read_bytes(), *map(str.encode, (*command, _processor())))
     digest = hashlib.sha256(b'\0'.join(key)).hexdigest()
     hulls = cache_folder()
-    folder = Path(tempfile.mkdtemp(prefix='arm_model-')) if hulls is None else hulls.parent
-    target = folder / 'compiled' / f'{digest}.so'
-    if not target.is_file():
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with _beside(target) as made:
-            command = [*compiler, *FLAGS, '-o', str(made), str(SOURCE), '-lm']
-            subprocess.run(command, check=True, capture_output=True, text=True, timeout=BUILD_TIME)
-            made.replace(target)  # in one step: other processes build it, too
-    return target
+    if hulls is None:
+        return _build(command)
+    kept = hulls.parent / 'compiled' / f'{digest}.so'
+    with contextlib.suppress(OSError):
+        return ctypes.CDLL(str(kept))
+    try:
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        return _build(command, kept)
+    except OSError:  # no room or no right there
+        return _build(command)
+
+
+def _build(command: Sequence[str], kept: Path | None = None) -> Native:
+    """Build the library and load it; keep it as a file, written whole or not at all."""
+    place = None if kept is None else kept.parent
+    with tempfile.TemporaryDirectory(prefix='arm_model-', dir=place) as folder:
+        made = Path(folder) / 'motions.so'
+        arguments = [*command, '-o', str(made), str(SOURCE), '-lm']
+        subprocess.run(arguments, check=True, capture_output=True, text=True, timeout=BUILD_TIME)
+        loaded = ctypes.CDLL(str(made))
+        if kept is not None:
+            with made.open('rb') as file:
+                os.fsync(file.fileno())
+            made.replace(kept)
+        return loaded
 
 
 def _processor() -> str:
@@ -275,15 +293,6 @@ def _processor() -> str:
         lines = []
     features = next((line for line in lines if line.startswith(('flags', 'Features'))), '')
     return f'{os.uname().machine} {features}'
-
-
-@contextlib.contextmanager
-def _beside(target: Path) -> Iterator[Path]:
-    made = target.with_suffix(f'.{os.getpid()}')
-    try:
-        yield made
-    finally:
-        made.unlink(missing_ok=True)
 
 
 def _joints(scene: PlanningScene) -> Sequence[Array | Integers]:

@@ -117,7 +117,7 @@ class FreeMotion:
         """
         lower = np.where(self._limits.continuous, start - MAX_TURN, self._limits.lower)
         upper = np.where(self._limits.continuous, start + MAX_TURN, self._limits.upper)
-        drawn, most = 0, RESTART
+        drawn, most, known = 0, RESTART, list(goals)
 
         def sample(count: int) -> Array:
             nonlocal drawn
@@ -130,7 +130,7 @@ class FreeMotion:
                 yield np.array((start, goal)), drawn
         while not expired():
             places = rrt_connect(
-                start, goals, sample, motions, expired, further=further, most=most
+                start, known, sample, motions, expired, further=further, most=most
             )
             if places is None:
                 most *= 2

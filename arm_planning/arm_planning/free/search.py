@@ -13,7 +13,7 @@ one. Straight motions between places on a path replace what lies between them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 import math
 
 import numpy as np
@@ -103,7 +103,7 @@ class Search:
 
 def rrt_connect(
     start: Array,
-    goals: Sequence[Array],
+    goals: list[Array],
     sample: Callable[[int], Array],
     check: MotionCheck,
     expired: Callable[[], bool],
@@ -114,7 +114,7 @@ def rrt_connect(
     """Return the places of a path that looks free (m, n); None where none was found.
 
     Args:
-        goals: Joint positions in [rad] (n), free; one of them is reached.
+        goals: Joint positions in [rad] (n), free; one of them is reached. Further ones join them.
         sample: Draws a number of states (m, n).
         further: Goals that are looked for meanwhile: each is one, or a try that found none.
         most: Samples after which the search ends.
@@ -132,6 +132,7 @@ def rrt_connect(
         another = next(further, None)
         if another is not None and check.admits(another):
             search.add_goal(another)
+            goals.append(another)
         places = search.grow(sample(BLOCK))
         if places is not None:
             return places

@@ -13,7 +13,7 @@ from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 from std_msgs.msg import String
 
-from arm_model import ArmError, LimitsError
+from arm_model import ArmError, compiled_scene, LimitsError
 from arm_model.ros import Description
 from node_runner import (
     destroyed_when_refused,
@@ -118,6 +118,8 @@ class MoveGroup(Node):
         PathWatch(monitor, execution, self._watch)
         ExecuteAction(self, execution)
         self._planning = Background(self, 'planning')
+        # the core may have to be compiled, which would cost the first plan its time
+        self._planning.submit(lambda: compiled_scene(robot.scene), lambda _: None, 'core')
         planning = PlanningThreads(
             self,
             monitor,
