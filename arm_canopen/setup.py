@@ -19,7 +19,4 @@ runpy.run_path(str(SHARED))['setup_package'](
     ],
     package_data=['config/resolve/default_drive.eds'],
     folders=['eds'],
-    entry_points={
-        'can.interface': ['arm_canopen = canopen_core.can.plugin:ArmCanopenBus'],
-    },
 )

@@ -157,7 +157,8 @@ class AxisCommands:
         except DriveError as error:  # a target that was reported as failed must not move it later
             if delivery.done and not isinstance(delivery.error, SdoTimeoutError):
                 raise
-            if isinstance(mode, ProfilePosition) and mode.withdraw(delivery, error):
+            if isinstance(mode, ProfilePosition):
+                mode.withdraw(delivery, error)
                 raise DriveError(f'{error}; it is withdrawn') from error
             if axis.accepts_targets and axis.motions == motion:
                 axis.hold()
@@ -286,7 +287,7 @@ class AxisCommands:
         self.axis.halt.leave(self._scheduler.now, delivery)  # so that no old one revives
         self.axis.released(Refusal(RefusalCause.SINGLE_TARGET))
 
-    # The commands, beside those of ``stop.py``.
+    # The commands, beside those of ``stop_commands.py``.
 
     async def init(self) -> str:
         """Reset a fault, enable, home where bus.yml has a method, and select no mode.

@@ -201,7 +201,7 @@ class ProfilePosition(Mode):
         self._queue.append(waiting)
         return waiting.delivery
 
-    def withdraw(self, delivery: Promise[None], error: DriveError) -> bool:
+    def withdraw(self, delivery: Promise[None], error: DriveError) -> None:
         """Forget a move that has not been offered, and those behind it, which count from it."""
         delivery.reject(error)  # where its value is on its way, it is not offered any more
         if self.offered and self._offered is not None and self._offered.delivery is delivery:
@@ -212,7 +212,6 @@ class ProfilePosition(Mode):
             if behind := len(deliveries) - place - 1:
                 self._warn(f'a move was withdrawn, and {behind} behind it, too')
             self._drop_waiting(f'the move before it was withdrawn: {error}', keep=place)
-        return True
 
     def step(self, now: float, period: float, statusword: int) -> int:
         """Advance the handshake."""
