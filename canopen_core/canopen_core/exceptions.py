@@ -7,7 +7,7 @@
     CanopenError
     ├── ConfigError (ValueError)     a bus.yml or EDS is wrong; lists every problem
     ├── BusError (OSError)           a CAN interface cannot be opened, or refuses a frame
-    ├── OtherMasterError             another master leads this bus already
+    ├── OtherMasterError             another master leads this bus, or may
     ├── CodecError (ValueError)      a value does not fit its type, or bytes are no message
     ├── ObjectError (LookupError)    a device has no object of that name or number
     ├── SdoError                     a device did not do what an SDO requested
@@ -69,7 +69,7 @@ class BusError(CanopenError, OSError):
 
 
 class OtherMasterError(CanopenError):
-    """Another master leads this bus already; the message names its frames."""
+    """Another master leads this bus already, or that is not known; the message says which."""
 
 
 class CodecError(CanopenError, ValueError):

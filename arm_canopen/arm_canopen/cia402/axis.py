@@ -516,7 +516,7 @@ class Axis:
             await self.stop.ended()
             seen = self.stop.disabled and self.stop.rests
         else:
-            seen = state is not DriveState.UNKNOWN
+            seen = self.view.stands  # without power it may coast
         if not self.node.operational:
             self.view.lose_sight()
         return seen
@@ -538,6 +538,7 @@ class Axis:
     def _begin(self) -> None:
         """Read the parameters of a device that has come into operation."""
         self.phase = Phase.UNSEEN
+        self._mode_sent = None  # the boot has put into the RPDO what the device holds
         self.view.cache.begin()
         if self.config is self.node.config.drive:  # one axis polls for all
             poll = self.node.objects.poll(self.node.config.poll_period)

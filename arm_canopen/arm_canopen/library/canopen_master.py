@@ -18,7 +18,7 @@ from types import MappingProxyType, TracebackType
 from typing import TYPE_CHECKING
 
 from black_box import BlackBox, BlackBoxSettings
-from canopen_core import BootError, BusError, CanopenError, DriveError
+from canopen_core import BootError, BusError, CanopenError, DriveError, OtherMasterError
 from canopen_core.can import Bus, BusLoad, Frame, open_bus
 from canopen_core.standard import CobId, Index, sdo
 from realtime_loop import raise_priority
@@ -228,7 +228,7 @@ class CanopenMaster:
         they come. The ``timeout`` is in [s], by default ten boot time-outs of the slowest device.
 
         Raises:
-            OtherMasterError: Another master leads this bus.
+            OtherMasterError: Another master leads this bus, or that is not known.
             BootError: Devices are missing; the message has the phase of each.
             BusError: The master has ended, or ends by a defect meanwhile.
         """
@@ -350,15 +350,19 @@ class CanopenMaster:
         """Listen for another master before the first frame; call it right before :meth:`start`.
 
         Returns:
-            The other master, where the bus is led beside it; else empty.
+            The other master, or why none could be heard, where the bus is led beside it; else
+            empty.
 
         Raises:
-            OtherMasterError: There is one, and beside_master is not set.
+            OtherMasterError: There is one, or that is not known, and beside_master is not set.
         """
         if not self._beside_master:
             refuse_other_master(self.can, self.bus, self._clock.now)
             return ''
-        found = listen(self.can, self.bus, self._clock.now)
+        try:
+            found = listen(self.can, self.bus, self._clock.now)
+        except OtherMasterError as error:
+            return str(error)
         return describe(found) if found else ''
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:

@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 from canopen_core import BusError
 from canopen_core.can import Frame
-from canopen_core.standard import ALL_NODES, CobId, nmt_frame, NmtCommand
+from canopen_core.standard import CobId, nmt_addressee, nmt_frame, NmtCommand
 
 from .events import Event, EventKind, Report, Severity
 from .scheduler import Promise, Scheduler
@@ -125,7 +125,7 @@ class NmtSender:
                     self._waiting.appendleft((command, node_id, sent))
                     await self._scheduler.timer(REPEAT_AFTER)
                     continue
-                where = 'all nodes' if node_id == ALL_NODES else f'node {node_id}'
-                sent.reject(BusError(f'NMT {command.name} to {where} was not sent: {refusal}'))
+                whom = nmt_addressee(node_id)
+                sent.reject(BusError(f'NMT {command.name} to {whom} was not sent: {refusal}'))
         finally:
             self._busy = False

@@ -22,6 +22,7 @@ from canopen_core.standard import (
     CobId,
     COMMANDED_STATES,
     encode_time_of_day,
+    nmt_addressee,
     NmtCommand,
     NmtState,
     Number,
@@ -273,7 +274,8 @@ class Network:
     async def command_nmt(self, command: NmtCommand, node_id: int) -> str:
         """Send a command of a client, as :meth:`send_nmt`; return what was done, in words.
 
-        Axes that it would take from the master while they move are brought to rest before.
+        Axes that it would take from the master while they move are brought to rest before; those
+        that were not seen to stand are reported, too.
 
         Raises:
             BusError: The bus has not taken the command.
@@ -291,8 +293,11 @@ class Network:
             ends = zip(led, await self.scheduler.gather(list(led.values())), strict=True)
             unseen = [name for name, seen in ends if not all(seen)]
         await self.send_nmt(command, node_id)
-        warning = f'; not seen to stand before: {", ".join(unseen)}' if unseen else ''
-        return f'NMT {command.name} sent to node {node_id}{warning}'
+        answer = f'NMT {command.name} sent to {nmt_addressee(node_id)}'
+        if unseen:
+            answer += f'; not seen to stand before: {", ".join(unseen)}'
+            self._report(Event(EventKind.BUS, Severity.WARNING, '', answer))
+        return answer
 
     async def _all(self, sent: Sequence[Promise[None]]) -> None:
         await self.scheduler.gather(sent)

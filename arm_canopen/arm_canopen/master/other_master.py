@@ -15,7 +15,7 @@ from enum import IntEnum
 
 from canopen_core import BusError, OtherMasterError
 from canopen_core.can import Bus, Frame
-from canopen_core.standard import ALL_NODES, CobId, parse_nmt
+from canopen_core.standard import CobId, nmt_addressee, parse_nmt
 
 from ..config.model import BusConfig
 from .events import Event, EventKind, Report, Severity
@@ -109,12 +109,16 @@ def listen(bus: Bus, config: BusConfig, clock: Callable[[], float]) -> Counter[M
 
     Returns:
         Its frames by kind, and how many of each; empty when there is none.
+
+    Raises:
+        OtherMasterError: None was found, but what came meanwhile could not all be read in time.
     """
     known, found = MasterFrames(config), Counter[MasterFrame]()
     begin = clock()
     end = begin + LISTENING_TIME
     # thousands may wait from before, whose reading takes longer than the listening
-    while (left := end - clock()) > -CATCH_UP_MAX:
+    while True:
+        left = end - clock()
         try:
             frames = bus.receive(max(0.0, left))
         except BusError:  # nothing can be received now; it raises again when it is used
@@ -124,6 +128,13 @@ def listen(bus: Bus, config: BusConfig, clock: Callable[[], float]) -> Counter[M
         found.update(kind for kind in fresh if kind is not None)
         if left <= 0.0 and (not frames or frames[-1].timestamp >= end):
             break
+        if left <= -CATCH_UP_MAX:
+            if found:
+                break
+            raise OtherMasterError(
+                f'whether another master is on {bus.name} is not known: what came there in '
+                f'{LISTENING_TIME:g} s could not be read to its end in {CATCH_UP_MAX:g} s more'
+            )
     return found
 
 
@@ -138,9 +149,16 @@ def refuse_other_master(bus: Bus, config: BusConfig, clock: Callable[[], float])
     """Listen, and refuse a bus that another master leads.
 
     Raises:
-        OtherMasterError: There is one; the message names its frames.
+        OtherMasterError: There is one; the message names its frames. Or that is not known.
     """
-    found = listen(bus, config, clock)
+    try:
+        found = listen(bus, config, clock)
+    except OtherMasterError as error:
+        raise OtherMasterError(
+            f'{error}. Nothing was sent, as a start resets the devices that another one leads. '
+            'Start again when this computer, or the bus, has less to do, or, if no other master '
+            'leads these devices, go on with -p beside_master:=true'
+        ) from error
     if found:
         raise OtherMasterError(
             f'another master is on {bus.name}: it sent {describe(found)} in '
@@ -155,5 +173,5 @@ def _command(frame: Frame) -> MasterFrame | None:
     if parsed is None:
         return None
     command, node_id = parsed
-    whom = 'all nodes' if node_id == ALL_NODES else f'node {node_id}'
-    return MasterFrame(Evidence.COMMAND, f'the NMT command {command.name} to {whom}')
+    text = f'the NMT command {command.name} to {nmt_addressee(node_id)}'
+    return MasterFrame(Evidence.COMMAND, text)

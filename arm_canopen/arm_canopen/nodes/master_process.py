@@ -102,7 +102,7 @@ class MasterProcess:
         """Listen for another master before the first frame; call it right before :meth:`start`.
 
         Raises:
-            OtherMasterError: There is one, and beside_master is not set.
+            OtherMasterError: There is one, or that is not known, and beside_master is not set.
         """
         if other := self._master.listen():
             self._node.get_logger().warning(

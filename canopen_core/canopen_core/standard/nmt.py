@@ -79,6 +79,11 @@ def parse_nmt(data: bytes) -> tuple[NmtCommand, int] | None:
         return None
 
 
+def nmt_addressee(node_id: int) -> str:
+    """Say whom an NMT command with this node id is for."""
+    return 'all nodes' if node_id == ALL_NODES else f'node {node_id}'
+
+
 def parse_heartbeat(data: bytes) -> NmtState | None:
     """Return the state in a heartbeat or boot-up frame, None when it is none.
 

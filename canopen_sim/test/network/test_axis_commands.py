@@ -389,6 +389,35 @@ def test_a_drive_that_refuses_mode_zero_is_never_sent_it(reported: int, mapped: 
     assert modes_sent(net, mapped=mapped, since=begin) == ({1} if mapped else set())
 
 
+@pytest.mark.parametrize('held', [3, 8], ids='0x6060 is {}'.format)
+def test_a_mode_that_the_device_had_before_is_not_sent_on(held: int) -> None:
+    """After each boot the RPDO has what the master commands: no mode, until one is selected."""
+    has = with_defaults(drive_dictionary(), {(0x6060, 0): held, (0x6061, 0): held})
+    config = full_drive()
+    net = VirtualNetwork(bus_config(config), dictionaries={JOINT: has.for_node(NODE_ID)})
+    net.boot()
+    net.run(0.2)
+    assert modes_sent(net, mapped=True) == {0}
+    net.do(JOINT, 'init')
+    net.do(JOINT, 'halt')
+    assert modes_sent(net, mapped=True) == {0}
+    net.select(JOINT, OperationMode.PROFILE_POSITION)
+    net.target(0.5)
+    net.run(2.0)
+    assert net.motor() == pytest.approx(0.5, abs=0.01)
+    net.power_off(JOINT)
+    net.run(1.0)
+    begin = net.now
+    net.power_on(JOINT)
+    net.run_until(net.all_ready)
+    net.run(0.2)
+    assert modes_sent(net, mapped=True, since=begin) == {0}
+    net.enable(OperationMode.PROFILE_VELOCITY)
+    net.do(JOINT, 'halt')
+    assert net.simulated().state is DriveState.OPERATION_ENABLED
+    assert modes_sent(net, mapped=True, since=begin) == {0, 3}
+
+
 def modes_sent(net: VirtualNetwork, *, mapped: bool, since: float = 0.0) -> set[int]:
     """Return the values of 0x6060 that the drive was sent, by RPDO or by SDO."""
     if mapped:

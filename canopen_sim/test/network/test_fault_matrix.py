@@ -55,7 +55,7 @@ from arm_canopen.nodes.diagnostics import drive_diagnostic
 from canopen_core.can import Frame
 from canopen_core.standard import DataType, NmtCommand, ObjectDictionary, ObjectEntry
 from canopen_core.standard.nmt import COMMANDED_STATES
-from canopen_sim import Device, FaultInjection
+from canopen_sim import Device, FaultInjection, ServoModel
 from canopen_sim import Drive as SimulatedDrive
 from canopen_sim import Fault as Deviation
 
@@ -800,6 +800,39 @@ def test_an_nmt_command_says_which_axis_was_not_seen_to_stand() -> None:
     sent = arm.net.network.command_nmt(NmtCommand.RESET_NODE, node_id)
     said = arm.net.result(arm.net.network.scheduler.spawn(sent), 30.0)
     assert said == f'NMT RESET_NODE sent to node {node_id}; not seen to stand before: {FAULTY}'
+    assert arm.net.reported(Severity.WARNING).count(said) == 1
+
+
+@pytest.mark.parametrize('node_id', [NODE_ID, 0])
+def test_an_axis_that_coasts_without_power_is_not_seen_to_stand(node_id: int) -> None:
+    """The answer names it, and a warning does for those who get none; once it rests, neither."""
+    net = VirtualNetwork(
+        bus_config(every_mode(drive_config(FAULTY, NODE_ID))), servo=ServoModel(coasting=0.5)
+    )
+    net.boot()
+    net.enable(OperationMode.PROFILE_VELOCITY, FAULTY)
+    net.target(SPEED, FAULTY)
+    net.run(SETTLING)
+    net.send_as('tool', Frame(0x200 + NODE_ID, b'\0\0\3'))  # disable voltage
+    net.run(0.1)
+    assert net.simulated(FAULTY).state is SWITCHED_OFF
+    assert net.speed(FAULTY) > STANDING
+    everyone = {0: 'all nodes', NODE_ID: f'node {NODE_ID}'}
+    answer = f'NMT ENTER_PRE_OPERATIONAL sent to {everyone[node_id]}'
+    unseen = f'{answer}; not seen to stand before: {FAULTY}'
+    assert commanded(net, PRE_OPERATIONAL, node_id) == unseen
+    assert net.reported(Severity.WARNING).count(unseen) == 1
+    net.run(5.0)
+    net.master.device(FAULTY).send_nmt(NmtCommand.START)
+    net.run(SETTLING)
+    assert commanded(net, PRE_OPERATIONAL, node_id) == answer
+    assert sum('not seen to stand' in text for text in net.reported(Severity.WARNING)) == 1
+
+
+def commanded(net: VirtualNetwork, command: NmtCommand, node_id: int) -> str:
+    """Return the answer to an NMT command of a client."""
+    sent = net.network.command_nmt(command, node_id)
+    return str(net.result(net.network.scheduler.spawn(sent)))
 
 
 def move_far(arm: Arm, mode: OperationMode) -> None:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from concurrent.futures import Future
 from dataclasses import replace
 from datetime import datetime, timezone
 import itertools
@@ -18,6 +19,7 @@ import pytest
 
 from arm_canopen import (
     BusError,
+    CanopenMaster,
     CodecError,
     EventKind,
     MasterFrames,
@@ -38,6 +40,7 @@ from arm_canopen.master.other_master import (
     refuse_other_master,
 )
 from arm_canopen.master.remote_node import RESET_TIME
+from arm_canopen.master.runner import Clock
 from arm_canopen.master.status import node_status
 from canopen_core.can import Frame, VirtualBus, VirtualWire
 from canopen_core.standard import (
@@ -1167,19 +1170,52 @@ def test_a_master_is_found_behind_all_that_waits_to_be_read() -> None:
     assert not batches
 
 
-def test_a_bus_without_time_does_not_hold_up_the_start() -> None:
-    """Frames without a time stamp are read for a limited time."""
-    now = [10.0]
+class EndlessBus(VirtualBus):
+    """A bus on which there is always more to read, and that takes time."""
 
-    class TimelessBus(VirtualBus):
-        def receive(self, timeout: float) -> list[Frame]:
-            """Return a frame of unknown age."""
-            now[0] += max(timeout, 0.01)
-            return [Frame(0x080)]
+    def __init__(self, *frames: Frame, step: float = 0.01) -> None:
+        """Give these frames, and then the last one again and again, each after ``step`` in [s]."""
+        super().__init__('here', VirtualWire())
+        self.now = 10.0
+        self._frames, self._step = list(frames), step
 
-    with TimelessBus('here', VirtualWire()) as bus:
-        assert not listen(bus, BUS, lambda: now[0])
-    assert now[0] < 10.0 + LISTENING_TIME + CATCH_UP_MAX + 0.1
+    def receive(self, timeout: float) -> list[Frame]:
+        """Return the next frame."""
+        self.now += max(timeout, self._step)
+        return [self._frames.pop(0) if self._frames[1:] else self._frames[0]]
+
+
+UNREAD = Frame(0x182, bytes(3), timestamp=9.0)
+
+
+@pytest.mark.parametrize('frame', [Frame(0x080), UNREAD], ids=['no time stamp', 'old'])
+@pytest.mark.parametrize('step', [0.01, 2.0 * CATCH_UP_MAX])
+def test_a_bus_that_is_not_read_to_its_end_is_refused_in_words(frame: Frame, step: float) -> None:
+    """A limited time is given to it; whether there is a master is not known then."""
+    bus = EndlessBus(frame, step=step)
+    with bus:
+        with pytest.raises(OtherMasterError, match='another master is on here is not known') as no:
+            refuse_other_master(bus, BUS, lambda: bus.now)
+        assert bus.counters.sent == 0
+        assert bus.now < 10.0 + LISTENING_TIME + CATCH_UP_MAX + 2.0 * step + 0.1
+    assert 'Nothing was sent' in str(no.value)
+    assert 'beside_master:=true' in str(no.value)
+
+
+def test_a_master_that_is_heard_counts_where_the_rest_stays_unread() -> None:
+    """It is named, as in any other case."""
+    bus = EndlessBus(Frame(0x080, timestamp=10.1), UNREAD)
+    with bus:
+        assert listen(bus, BUS, lambda: bus.now).total() == 1
+
+
+def test_beside_another_master_a_bus_that_is_not_read_to_its_end_is_reported() -> None:
+    """It is led all the same, and the owner is told what is not known."""
+    bus = EndlessBus(UNREAD)
+    with bus:
+        clock = Clock(lambda: bus.now, Future)
+        master = CanopenMaster(BUS, bus, beside_master=True, clock=clock)
+        assert 'another master is on here is not known' in master.listen()
 
 
 def test_a_sync_of_somebody_else_is_no_sign_where_the_master_sends_none() -> None:
