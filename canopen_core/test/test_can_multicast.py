@@ -9,7 +9,7 @@ import os
 import re
 import socket
 from threading import current_thread, Thread
-from time import monotonic, time_ns
+from time import monotonic, sleep, time_ns
 
 import can
 from can.interfaces.udp_multicast.utils import pack_message
@@ -162,13 +162,30 @@ def test_stamps_do_not_go_back_when_the_wall_clock_is_set(
     with open_bus(name) as sender:
         for shift in (0, 3600, -7200):  # [s]
             monkeypatch.setattr(
-                'canopen_core.can.socket_bus.time_ns', lambda s=shift: time_ns() + s * 10**9
+                'canopen_core.can.bus.time_ns', lambda s=shift: time_ns() + s * 10**9
             )
             sender.send(Frame(1))
             stamps += [frame.timestamp for frame in receive_count(bus, 1)]
     assert len(stamps) == 3
     assert stamps == sorted(stamps)
     assert stamps[-1] <= monotonic()
+
+
+def test_a_pause_while_clocks_are_compared_moves_no_stamp(
+    bus: Bus, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A busy computer takes the processor away between the readings of two clocks."""
+
+    def pause(seconds: float) -> int:
+        sleep(seconds)
+        return time_ns()
+
+    with open_bus(name) as sender:
+        monkeypatch.setattr('canopen_core.can.bus.time_ns', lambda: pause(0.05))
+        before = monotonic()
+        sender.send(Frame(1))
+        (frame,) = receive_count(bus, 1)
+    assert before - 1e-3 <= frame.timestamp <= before + 0.04
 
 
 @pytest.mark.parametrize(

@@ -9,15 +9,14 @@ import contextlib
 import errno
 from functools import partial
 import logging
-import math
 from threading import Event, Lock, Thread
-from time import monotonic, time
+from time import monotonic
 from typing import Any
 
 import can
 
 from ..exceptions import BusError
-from .bus import Bus
+from .bus import Bus, WallClock
 from .frame import checked, Frame, PAYLOAD_MAX
 
 _POLL = 0.02  # [s] longest time until wake() is noticed; python-can has no way to end a recv
@@ -47,6 +46,7 @@ class AdapterBus(Bus):
         self._send_lock = Lock()
         self._closed = self._gone = False
         self._reopening: Future[can.BusABC] | None = None
+        self._clock = WallClock()
         self._last = 0.0
         self._damaged = 0
 
@@ -175,8 +175,14 @@ class AdapterBus(Bus):
         ):
             self.counters.malformed += 1
             return None
-        self._last = max(self._last, _steady_stamp(message.timestamp))
+        self._last = max(self._last, self._steady(message.timestamp))
         return from_message(message, self._last)
+
+    def _steady(self, stamp: float) -> float:
+        """Move a driver's stamp to the steady clock; those that are no wall clock become now."""
+        now = self._clock.update() * 1e-9
+        steady = stamp - self._clock.offset * 1e-9
+        return steady if now - _WALL_CLOCK_SPAN < steady <= now else now
 
     def wake(self) -> None:
         """Wake a waiting :meth:`receive` within 20 ms."""
@@ -219,15 +225,6 @@ def from_message(message: can.Message, timestamp: float) -> Frame:
         message.is_error_frame,
         min(message.dlc, PAYLOAD_MAX) if message.is_remote_frame else 0,
     )
-
-
-def _steady_stamp(stamp: float) -> float:
-    """Move a driver's stamp to the steady clock; those that are no wall clock become now."""
-    age = time() - stamp
-    now = monotonic()
-    if math.isfinite(age) and 0.0 <= age < _WALL_CLOCK_SPAN:
-        return now - age
-    return now
 
 
 def _open_driver(name: str, interface: str, channel: str, bitrate: int | None) -> can.BusABC:

@@ -7,7 +7,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from time import monotonic, time
+from time import monotonic, monotonic_ns, time, time_ns
 
 from .frame import Frame
 
@@ -79,3 +79,23 @@ def wall_clock_offset() -> float:
         before, wall, after = monotonic(), time(), monotonic()
         readings.append((after - before, wall - before))
     return min(readings)[1]
+
+
+class WallClock:
+    """How far the wall clock is ahead of the steady clock, also while somebody sets it.
+
+    Both run at one rate, so what is known of the difference is kept within what is read anew. A
+    thread that loses the processor between two readings learns little, and nothing wrong.
+    """
+
+    def __init__(self) -> None:
+        self.offset = round(wall_clock_offset() * 1e9)  # [ns] wall clock minus steady clock
+
+    def update(self) -> int:
+        """Compare the clocks, and return the steady time in [ns]."""
+        before, wall, now = monotonic_ns(), time_ns(), monotonic_ns()
+        if self.offset > wall - before:
+            self.offset = wall - before
+        elif self.offset < wall - now:
+            self.offset = wall - now
+        return now

@@ -13,10 +13,10 @@ import select
 import socket
 import struct
 from threading import Lock
-from time import monotonic, monotonic_ns, time_ns
+from time import monotonic
 
 from ..exceptions import BusError
-from .bus import Bus
+from .bus import Bus, WallClock
 from .frame import Frame
 
 # of asm-generic/socket.h; Python's socket module does not name them
@@ -64,18 +64,15 @@ class TimestampReader:
         self._drops = 0
         self._last = 0.0
         self._limit = 0.0
-        self._base_seconds = 0
-        self._base_nanoseconds = 0
+        self._clock = WallClock()
 
     def reopened(self) -> None:
         """The datagrams come from another socket now, which counts its losses anew."""
         self._drops = 0
 
     def begin_batch(self) -> None:
-        """Measure how far wall clock and steady clock are apart."""
-        now = monotonic_ns()
-        self._base_seconds, self._base_nanoseconds = divmod(time_ns() - now, 1_000_000_000)
-        self._limit = now * 1e-9 + _READ_AHEAD
+        """Compare the wall clock with the steady clock."""
+        self._limit = self._clock.update() * 1e-9 + _READ_AHEAD
 
     def read(self, ancillary: list[tuple[int, int, bytes]]) -> float:
         """Return the time of arrival on the steady clock in [s], and count losses."""
@@ -83,9 +80,7 @@ class TimestampReader:
         for _, kind, content in ancillary:
             if kind == SO_TIMESTAMPNS:
                 seconds, nanoseconds = _TIMESPEC.unpack(content)
-                stamp = (seconds - self._base_seconds) + (
-                    nanoseconds - self._base_nanoseconds
-                ) * 1e-9
+                stamp = (seconds * 1_000_000_000 + nanoseconds - self._clock.offset) * 1e-9
             elif kind == SO_RXQ_OVFL:
                 (drops,) = _UINT32.unpack(content)
                 self.lost += (drops - self._drops) & 0xFFFF_FFFF
