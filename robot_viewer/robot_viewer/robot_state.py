@@ -4,16 +4,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 SILENCE = 1.0
 """Without joint states after which the robot counts as out of reach in [s]."""
 STALE = 3
 """Level of a status that is unknown, as in diagnostic_msgs."""
-DRIVE, LEGS = ': drive', ': state'
-"""Ends of the names of the statuses of a drive, and of the controller of a walking robot."""
+DRIVE, LEGS, BUS = ': drive', ': state', ': bus'
+"""Ends of the names of the statuses of a drive, of the controller of a walking robot, of a bus."""
 FAULTY = frozenset({'Fault', 'Fault reaction active'})
 ENABLED = 'Operation enabled'
 BOOTING = (
@@ -154,14 +154,28 @@ def robot_state(seen: Seen) -> RobotState:
     if seen.silence > SILENCE:
         text = f'Nothing for {seen.silence:.0f} s. {EMERGENCY}'
         return RobotState('NO CONTACT WITH THE ROBOT', Level.UNKNOWN, text)
-    drives = {s.name.removesuffix(DRIVE): s for s in seen.statuses if s.name.endswith(DRIVE)}
-    legs = [s for s in seen.statuses if s.name.endswith(LEGS) and 'goal' in s.values]
-    return (
+    drives, legs = drives_of(seen.statuses), legs_of(seen.statuses)
+    state = (
         _fault(seen, drives, legs)
         or (seen.stop and _stopped(seen, seen.stop))
         or _not_enabled(seen, drives)
         or (_legs_state(seen, legs[0]) if legs else _arm_state(seen, drives))
     )
+    for status in seen.statuses:
+        if status.level == 2 and not status.name.endswith((DRIVE, LEGS, BUS)) and state.movable:
+            text = f'{state.sentence} {status.name} reports an error: {status.message}.'
+            return replace(state, level=Level.WARNING, sentence=text)
+    return state
+
+
+def drives_of(statuses: Iterable[Status]) -> dict[str, Status]:
+    """Return the statuses of drives, by the name of the drive."""
+    return {s.name.removesuffix(DRIVE): s for s in statuses if s.name.endswith(DRIVE)}
+
+
+def legs_of(statuses: Iterable[Status]) -> list[Status]:
+    """Return the statuses of controllers of walking robots."""
+    return [s for s in statuses if s.name.endswith(LEGS) and 'goal' in s.values]
 
 
 def _fault(seen: Seen, drives: Mapping[str, Status], legs: Sequence[Status]) -> RobotState | None:
@@ -199,8 +213,9 @@ def _fault(seen: Seen, drives: Mapping[str, Status], legs: Sequence[Status]) -> 
             text = f'The controller is {status.message}. {EMERGENCY}'
             return RobotState('NO CONTACT WITH THE ROBOT', Level.UNKNOWN, text)
     for status in seen.statuses:
-        if status.level == 2 and not status.name.endswith(DRIVE):
-            return RobotState('FAULT', Level.FAULT, f'{status.name}: {status.message}')
+        if status.level == 2 and status.name.endswith(BUS):
+            text = f'{status.name}: {status.message}. Check power, cable and bit rate.'
+            return RobotState('FAULT', Level.FAULT, text)
     return None
 
 
@@ -304,4 +319,4 @@ def _acting(seen: Seen, state: RobotState) -> RobotState:
     """Return the state while its action goes on: it is not offered again."""
     if not seen.acting:
         return state
-    return RobotState(state.word, state.level, f'{seen.acting} ...')
+    return replace(state, sentence=f'{seen.acting} ...', action='', calls=())

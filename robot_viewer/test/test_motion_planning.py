@@ -276,8 +276,14 @@ def test_an_execution_goes_on_as_long_as_its_button_is_held(planner: Planner, ho
     planner.spin_until(lambda: bool(planner.execute.goals), 'an execution')
     planner.spin_times(20)
     assert not planner.execute.canceled
+    live, hold = planner.viewer.page.live, planner.panel._hold
+    assert live._deadman.beat(1, hold, time.monotonic())
     planner.do('let_go' if how == 'let go' else 'go_on')
     planner.spin_until(lambda: bool(planner.execute.canceled), 'a cancel')
+    why = 'its button was let go' if how == 'let go' else 'heartbeats of its held button came late'
+    planner.spin_until(lambda: f'ended, as {why} (PREEMPTED' in planner.said, 'the reason')
+    assert not live._deadman.beat(1, hold, time.monotonic()), 'it has to be let go'
+    assert not live.held
 
 
 def test_a_press_that_waited_too_long_executes_nothing(planner: Planner) -> None:

@@ -103,3 +103,16 @@ def test_a_button_that_was_taken_off_the_page_bars_no_other() -> None:
     deadman.stop()
     assert not deadman.beat(1, 'hold', 11.0)
     assert deadman.beat(1, 'its successor', 11.0)
+
+
+def test_a_press_whose_work_has_ended_is_held_no_more() -> None:
+    """Its heartbeats go on under a finger that has not seen it; it has to be pressed anew."""
+    deadman = Deadman()
+    assert deadman.beat(1, 'hold', 10.0)
+    deadman.end('another')
+    assert deadman.held(10.0)
+    deadman.end('hold')
+    assert not deadman.held(10.0)
+    assert not deadman.beat(1, 'hold', 10.1)
+    deadman.release(1, 'hold', 10.2)
+    assert deadman.beat(1, 'hold', 10.3)

@@ -62,6 +62,13 @@ def legs(level: int, state: str, message: str = '') -> Status:
             '',
             0,
         ),
+        (
+            replace(ROBOT, statuses=[GOOD, Status('camera: frames', 2, 'no frames')]),
+            'READY',
+            'Hold a button to move. camera: frames reports an error: no frames.',
+            '',
+            0,
+        ),
         (replace(ROBOT, stop=Stop()), 'STOPPING', 'not confirmed yet', ALLOW, 0),
         (
             replace(ROBOT, stop=Stop('no', stands=False)),
@@ -138,6 +145,15 @@ def test_motion_is_possible_only_where_nothing_speaks_against_it(
     assert state.movable is not wrong
     assert (state.level is Level.WELL) is not wrong
     assert state.level.exit_code == 0 or wrong
+
+
+def test_an_error_of_another_node_bars_no_motion() -> None:
+    """It is shown, in amber; a fault is what keeps the robot itself from moving."""
+    camera = Status('camera: frames', 2, 'no frames')
+    for robot in (ROBOT, replace(ROBOT, statuses=[legs(0, 'walk')])):
+        state = robot_state(replace(robot, statuses=[*robot.statuses, camera]))
+        assert state.movable
+        assert state.level is Level.WARNING
 
 
 @pytest.mark.parametrize(

@@ -420,8 +420,15 @@ def test_a_gripper_is_opened_closed_and_stopped(robot: Robot, said: list[str]) -
         assert goals[-1].request.command.position == end
     robot.viewer.grip('/hand', 2.0)
     robot.spin_until(lambda: len(goals) == 4, 'a goal')
+    robot.spin_until(lambda: robot.viewer._grippers.busy, 'a motion of it')
     robot.viewer.stop()
     robot.spin_until(lambda: bool(canceled), 'its end')
+    assert not robot.viewer._grippers.busy
+    panel = robot.viewer.page._jog
+    assert panel is not None
+    panel._grip('Open gripper', '/hand', 2.0)
+    assert said[-1] == f'Open gripper: stopped; press {ALLOW} first'
+    assert len(goals) == 4
 
 
 def test_the_page_keeps_what_the_robot_warns_of(robot: Robot) -> None:
@@ -447,6 +454,8 @@ def test_the_page_keeps_what_the_robot_warns_of(robot: Robot) -> None:
     assert 'a note' not in page._log.html
     page.say('target: reached')
     robot.spin_until(lambda: 'target: reached' in page._log_html.content, 'it')
+    for icon in '✓⚠⛔':  # not by color alone
+        assert icon in page._log.html
 
 
 def test_sliders_publish_where_nobody_else_does(robot: Robot) -> None:

@@ -15,12 +15,16 @@ Done = Callable[[Any, str], None]
 
 
 class ActionCall:
-    """A goal that may be canceled at any time, also before the server has answered."""
+    """A goal that may be canceled at any time, also before the server has answered.
+
+    Attributes:
+        ended: There is a result, or will be none.
+    """
 
     def __init__(self, client: ActionClient, goal: Any, done: Done) -> None:  # noqa: ANN401
         """Send it."""
         self._done, self._handle = done, None
-        self._is_canceled = False
+        self._is_canceled = self.ended = False
         client.send_goal_async(goal).add_done_callback(self._answered)
 
     def cancel(self) -> None:
@@ -33,11 +37,11 @@ class ActionCall:
 
     def _answered(self, future: Future) -> None:
         if future.exception() is not None:
-            self._done(None, f'no answer: {future.exception()}')
+            self._end(None, f'no answer: {future.exception()}')
             return
         handle = future.result()
         if not handle.accepted:
-            self._done(None, 'the goal was not accepted')
+            self._end(None, 'the goal was not accepted')
             return
         self._handle = handle
         if self._is_canceled:
@@ -45,7 +49,12 @@ class ActionCall:
         handle.get_result_async().add_done_callback(self._ended)
 
     def _ended(self, future: Future) -> None:
-        if future.exception() is not None:
-            self._done(None, f'no result: {future.exception()}')
-            return
-        self._done(future.result().result, '')
+        error = future.exception()
+        if error is not None:
+            self._end(None, f'no result: {error}')
+        else:
+            self._end(future.result().result, '')
+
+    def _end(self, result: Any, why: str) -> None:  # noqa: ANN401
+        self.ended = True
+        self._done(result, why)

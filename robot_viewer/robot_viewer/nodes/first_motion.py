@@ -51,7 +51,7 @@ from ..page.first_motion import (
     Saw,
 )
 from ..page.first_motion_panel import FirstMotionActions, FirstMotionPanel
-from ..robot_state import Status
+from ..robot_state import DRIVE, Status
 
 READ_UNITS = 'read_units'
 READ_UNITS_TYPE = 'arm_msgs/srv/ReadUnits'
@@ -299,7 +299,7 @@ class FirstMotion:
         self._enabled = time.monotonic(), self._status()
 
     def _status(self) -> Status | None:
-        return self._statuses.get(f'{self._request.joint}: drive')
+        return self._statuses.get(f'{self._request.joint}{DRIVE}')
 
     def _problem(self) -> str:
         status = self._status()

@@ -43,6 +43,11 @@ class Grippers:
         """Full names of their controllers, each with its joint."""
         return tuple((name, each.joint) for name, each in self._found.items())
 
+    @property
+    def busy(self) -> bool:
+        """Whether one is opened or closed by the page."""
+        return any(not call.ended for call in self._calls.values())
+
     def describe(self, tree: KinematicTree) -> None:
         """Use another robot."""
         self._ends = {joint.name: travel(joint) for joint in tree.movable()}

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from functools import partial
+import math
 import os
 import time
 
@@ -17,7 +18,7 @@ from ..page.overlay import StopAnswer
 from ..page.robot_page import RobotPage
 from ..robot_state import ALLOW, Level, robot_state, RobotState, SILENCE, Stop
 from .trigger_calls import TRIGGER, TriggerCalls
-from .watch import OWN, Watch
+from .watch import OWN, STILL_AFTER, Watch
 
 REPORT_PERIOD = 1.0
 """Time between two statuses of the robot on /diagnostics in [s], where it does not change."""
@@ -27,6 +28,8 @@ SIMULATIONS = ('arm_msgs/srv/InjectFault', 'quad_msgs/srv/InjectFault')
 """Types of services that only a simulation offers."""
 STAGES = {None: 'braking', True: 'stopped', False: 'failed'}
 """How far a STOP has come, by whether the robot has confirmed that it stands."""
+BEGIN_TIME, COAST_TIME = 0.5, 3.0
+"""Times in [s] after the page has driven: in which a motion of it may begin, and come to rest."""
 
 
 class Judge:
@@ -42,6 +45,8 @@ class Judge:
         self._simulated = False
         self._services: frozenset[str] = frozenset()
         self._stop: Stop | None = None
+        self._stood_at = math.inf  # when the robot has confirmed that
+        self._drove_at = -math.inf  # when the page moved it, as long as that motion goes on
         self._acting = ''  # the action that runs, and the services that it has called
         self._group: tuple[str, ...] = ()
         self._state = RobotState('', Level.UNKNOWN, '')
@@ -57,6 +62,7 @@ class Judge:
         """
         self._services = frozenset(name for name, kinds in services.items() if TRIGGER in kinds)
         self._simulated = any(kind in SIMULATIONS for each in services.values() for kind in each)
+        self._calls.forget(self._services)
         if not self._services.issuperset(self._group):
             self._acting, self._group = '', ()
 
@@ -67,7 +73,7 @@ class Judge:
         publishes: bool,
         limit: str,
         battery: str,
-        executes: bool,
+        drives: str,
         controllers: Iterable[str],
     ) -> None:
         """Find out how the robot is; show it, and report it.
@@ -77,7 +83,7 @@ class Judge:
             publishes: It was seen to publish joint states.
             limit: What limits its motion, in words of the servo.
             battery: In words.
-            executes: A plan of the page is executed.
+            drives: What of the page moves it now, in words; empty for nothing that is known.
             controllers: Of trajectories, by their full names.
         """
         now, live = time.monotonic(), self._page.live
@@ -85,14 +91,22 @@ class Judge:
         seen.stop, seen.acting = self._stop, self._acting
         seen.limit, seen.battery = limit, battery
         program = ''
-        if live.held:
-            seen.mover = f'{live.held} is held on a page.'
-        elif executes:
-            seen.mover = 'The plan is executed while its button is held.'
+        if self._stop is not None and self._stop.stands:
+            seen.moving = self._watch.moves(self._stood_at + STILL_AFTER)
+        elif live.held or drives:
+            self._drove_at = now
+            seen.mover = f'{live.held} is held on a page.' if live.held else drives
+        elif seen.moving and (pressed := self._calls.running):
+            self._drove_at = now
+            seen.mover = f'{pressed} was pressed on a page.'
+        elif seen.moving and now - self._drove_at < COAST_TIME:
+            seen.mover = 'It comes to rest.'
         elif seen.moving:
             names = ', '.join(name.rpartition('/')[2] for name in controllers)
             program = f'a program ({names})' if names else 'a program'
             seen.mover = f'A{program[1:]} moves it.'
+        elif now - self._drove_at > BEGIN_TIME:
+            self._drove_at = -math.inf
         self._state = state = robot_state(seen)
         shown = state, self._stop, self._simulated, program, live.holder
         if shown != self._reported or now - self._reported_at > REPORT_PERIOD:
@@ -142,6 +156,7 @@ class Judge:
     def _has_stopped(self, stop: Stop, answer: Future[StopAnswer]) -> None:
         if self._stop is stop:  # the last one counts, and none that was allowed after
             self._stop = Stop(answer.result().text, answer.result().stands)
+            self._stood_at = time.monotonic()
 
     def act(self, action: str) -> None:
         """Do the action that is wanted now, if it is still this one."""

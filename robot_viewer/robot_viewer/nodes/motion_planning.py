@@ -103,6 +103,7 @@ class MotionPlanning:
         self._motion: PlannedMotion | None = None
         self._shown_since: float | None = None
         self._execution: ActionCall | None = None
+        self._canceled_as = ''  # why the page has canceled it
         self._held_at = 0.0  # when the button of the execution was seen to be held
         self._executed_goal: tuple[str, dict[str, float]] = (NO_GOAL, {})
         self._scene = SceneEditor(node)
@@ -187,7 +188,11 @@ class MotionPlanning:
 
     def let_go(self) -> None:
         """Cancel the execution: its button was let go."""
+        self._cancel('its button was let go')
+
+    def _cancel(self, why: str) -> None:
         if self._execution is not None:
+            self._canceled_as = self._canceled_as or why
             self._execution.cancel()
 
     @property
@@ -198,7 +203,7 @@ class MotionPlanning:
     def advance(self) -> None:
         """Cancel the execution when nothing holds its button any more."""
         if self.busy and time.monotonic() - self._held_at > RELEASED_AFTER:
-            self.let_go()
+            self._cancel('heartbeats of its held button came late')
 
     def draw(self) -> None:
         """Show the next picture of a plan, if it is being shown."""
@@ -360,6 +365,11 @@ class MotionPlanning:
             return
         self._execution = None
         reason = why or refusal(result.error_code)
+        if reason and self._canceled_as:
+            reason = f'ended, as {self._canceled_as} ({reason})'
+        self._canceled_as = ''
+        if self._panel is not None:
+            self._panel.end_hold()
         if not reason and self._executed_goal == (self._goal, self._joints):
             self.choose_goal(NO_GOAL)  # unless another one was chosen meanwhile
         self._say(reason or 'executed', failed=bool(reason))

@@ -29,6 +29,16 @@ class TriggerCalls:
     def __init__(self, node: Node, report: Report) -> None:
         self._node, self._report = node, report
         self._clients: dict[str, Client] = {}
+        self._running: dict[str, Sequence[str]] = {}
+
+    @property
+    def running(self) -> str:
+        """What was requested last and is not answered yet, in words; empty for nothing."""
+        return next(reversed(self._running), '')
+
+    def forget(self, services: frozenset[str]) -> None:
+        """Wait for no answer of services that are none of these."""
+        self._running = {w: each for w, each in self._running.items() if services >= set(each)}
 
     def client(self, service: str) -> Client:
         """Return the client of a service, which finds its server in time when made early."""
@@ -67,6 +77,7 @@ class TriggerCalls:
             answers[service] = call is not None and succeeded(call), text
             if len(answers) < len(services):
                 return
+            self._running.pop(what, None)
             bad = [f'{_node_of(each)}: {said}' for each, (ok, said) in answers.items() if not ok]
             texts = bad or list(dict.fromkeys(said for _, said in answers.values() if said))
             count = f'{len(services) - len(bad)} of {len(services)} done'
@@ -74,6 +85,7 @@ class TriggerCalls:
             if done is not None:
                 done(not bad)
 
+        self._running[what] = services
         for service in services:
             client = self.client(service)
             if client.service_is_ready():

@@ -12,7 +12,7 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 
-from ..robot_state import LEGS, Seen, STALE, Status, walks
+from ..robot_state import legs_of, Seen, STALE, Status, walks
 
 STATUS_AGE = 5.0
 """Time in [s] after which a status that does not come again is unknown."""
@@ -78,11 +78,7 @@ class Watch:
     @property
     def legs(self) -> list[Status]:
         """What the controller of a walking robot says."""
-        return [
-            status
-            for name, status in self.statuses.items()
-            if name.endswith(LEGS) and 'goal' in status.values
-        ]
+        return legs_of(self.statuses.values())
 
     def aged(self, now: float) -> list[Status]:
         """Return the statuses as they are known now; one that does not come again is unknown."""
@@ -107,6 +103,17 @@ class Watch:
         last = max(self._times.values(), default=now)
         return now - last if now - last > STATUS_SILENCE else 0.0
 
+    def moves(self, since: float = -math.inf) -> bool:
+        """Whether the robot moves: a walking one follows a velocity, of others a joint moves.
+
+        Args:
+            since: Steady time in [s]; what was seen before does not count.
+        """
+        legs = self.legs
+        if legs:  # they move while it stands, too
+            return any(walks(each) and self._times[each.name] > since for each in legs)
+        return self._moved_at > max(since, time.monotonic() - STILL_AFTER)
+
     def seen(self, robot: str, services: Iterable[str], *, publishes: bool) -> Seen:
         """Return what is known now.
 
@@ -115,12 +122,11 @@ class Watch:
             services: Full names of Trigger services.
             publishes: It was seen to publish joint states.
         """
-        now, legs = time.monotonic(), self.legs
-        moved = now - self._moved_at < STILL_AFTER
+        now = time.monotonic()
         return Seen(
             robot=robot,
             silence=self.silence(now, publishes=publishes),
             statuses=self.aged(now),
             services=frozenset(services),
-            moving=any(map(walks, legs)) if legs else moved,  # legs move while it stands, too
+            moving=self.moves(),
         )

@@ -256,9 +256,14 @@ class WebViewer(Node):
             publishes=self._robot_publishes,
             limit=limit if time.monotonic() - at < LIMIT_AGE else '',
             battery=self._body.battery,
-            executes=self._planning.busy,
+            drives=self._drives_it(),
             controllers=self._controllers.found,
         )
+
+    def _drives_it(self) -> str:
+        if self._planning.busy:
+            return 'The plan is executed while its button is held.'
+        return 'Its gripper was pressed on a page.' if self._grippers.busy else ''
 
     # -- what the robot offers
 

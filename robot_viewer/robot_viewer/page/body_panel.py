@@ -19,12 +19,14 @@ from viser import (
     ViserServer,
 )
 
+from .live import Live
 from .sliders import value_of
 from .standing import Contacts, Support
 from .style import NEUTRAL
 
 RANGES: Mapping[str, float] = {'Roll [deg]': 20.0, 'Pitch [deg]': 17.0, 'Height [mm]': 30.0}
 """Of the sliders to either side; the controller has limits of its own."""
+LEVEL = 'Level the body'
 DOWN_COLOR, UP_COLOR, LINE_COLOR = (35, 112, 50), (134, 142, 150), (24, 100, 171)
 MASS_COLOR, OUTSIDE_COLOR = (24, 100, 171), (255, 212, 59)
 """Of the place below the centre of mass: over the support, or outside."""
@@ -42,8 +44,8 @@ Pose: TypeAlias = tuple[float, float, float]
 class BodyPanel:
     """Sliders of the body's pose, a horizon, and marks at the feet."""
 
-    def __init__(self, server: ViserServer, path: str, allowed: Callable[[], bool]) -> None:
-        self._server, self._path, self._allowed = server, path, allowed
+    def __init__(self, server: ViserServer, path: str, live: Live) -> None:
+        self._server, self._path, self._live = server, path, live
         gui = server.gui
         self._folder = gui.add_folder(None)
         with self._folder:
@@ -59,12 +61,14 @@ class BodyPanel:
             return
 
         def moved(event: GuiEvent[GuiSliderHandle[float]]) -> None:
-            if event.client_id is not None and self._allowed():
+            if event.client_id is None:  # it was set here
+                return
+            if not self._live.refuses(event.target.label, always=False):
                 roll, pitch, height = map(value_of, self._sliders)
                 send((math.radians(roll), math.radians(pitch), height / 1000.0))
 
         def level() -> None:
-            if not self._allowed():
+            if self._live.refuses(LEVEL, always=False):
                 return
             for slider in self._sliders:
                 slider.value = 0.0  # type: ignore[misc]  # it has a setter
@@ -76,7 +80,7 @@ class BodyPanel:
                 slider = gui.add_slider(label, -most, most, most / 100.0, 0.0)
                 slider.on_update(moved)
                 self._sliders.append(slider)
-            gui.add_button('Level the body', color=NEUTRAL).on_click(lambda _: level())
+            gui.add_button(LEVEL, color=NEUTRAL).on_click(lambda _: level())
 
     def remove(self) -> None:
         """Remove all of it from the page."""

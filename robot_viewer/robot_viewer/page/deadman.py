@@ -45,6 +45,13 @@ class Deadman:
         """Ignore heartbeats of a button that is held now, until it is released."""
         self._barred |= self._pressed
 
+    def end(self, button: Hashable) -> None:
+        """Ignore a button that is held until it is released: what it did has ended."""
+        ended = {press for press in self._pressed if press[1] == button}
+        self._barred |= ended
+        if ended:
+            self._last = -math.inf
+
     def bar(self, page: Hashable, button: Hashable) -> None:
         """Ignore a press that may not move anything now, until it is released."""
         self._pressed.add((page, button))

@@ -35,6 +35,8 @@ from first_motion import (
     yaml_text,
 )
 
+from ..robot_state import ENABLED
+
 RELEASED_AFTER = 0.15
 """Time in [s] without a heartbeat after which the button counts as let go."""
 MAX_STEP_TIME = 0.1
@@ -43,8 +45,6 @@ farther."""
 FRESHNESS = 0.5
 """Age in [s] from which a position is too old to go on."""
 NO_POSITION = 'its position does not arrive on joint_states'
-ENABLED = 'Operation enabled'
-"""State of a drive that takes targets, as /diagnostics has it."""
 MODES = frozenset({'Cyclic position', 'Interpolated position'})
 """Modes in which targets are positions, and the master halts the axis when they pause."""
 LEAD_TIME = 0.3

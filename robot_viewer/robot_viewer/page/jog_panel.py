@@ -176,18 +176,18 @@ class JogPanel:
                 f'Width [{unit}]', size * low, size * high, size * (high - low) / 100.0, size * low
             )
 
-            def move(position: Callable[[], float]) -> Callable[[object], None]:
-                return lambda _: self._grip(gripper, position())
+            def move(label: str, position: Callable[[], float]) -> Callable[[object], None]:
+                return lambda _: self._grip(label, gripper, position())
 
             for label, position in (
                 ('Open gripper', lambda: high),
                 ('Close gripper', lambda: low),
                 ('Move to width', lambda: value_of(width) / size),
             ):
-                self._gui.add_button(label, color=NEUTRAL).on_click(move(position))
+                self._gui.add_button(label, color=NEUTRAL).on_click(move(label, position))
 
-    def _grip(self, gripper: str, position: float) -> None:
-        if not self._live.stopped:
+    def _grip(self, label: str, gripper: str, position: float) -> None:
+        if not self._live.refuses(label):
             self._actions.grip(gripper, position)
 
     def _jog(self, axes: GuiDropdownHandle[str], twist: Twist) -> None:

@@ -20,6 +20,7 @@ import time
 from websockets.asyncio.server import broadcast, ServerConnection
 from websockets.exceptions import ConnectionClosed
 
+from ..robot_state import ALLOW
 from .deadman import Deadman
 
 LIVE_PATH = '/live'
@@ -107,6 +108,25 @@ class Live:
     def holder(self) -> int:
         """The page that has control."""
         return int(self._deadman.holder or NO_PAGE)  # type: ignore[call-overload, no-any-return]
+
+    def end(self, number: int) -> None:
+        """End the press of a button: what it did has ended, and it moves nothing more."""
+        self._deadman.end(number)
+
+    def refuses(self, what: str, *, always: bool = True) -> bool:
+        """Whether something may not be done now; if so the page says why.
+
+        Args:
+            what: It is requested by one press.
+            always: It counts whatever state the robot is in, but not after STOP.
+        """
+        if self.stopped:
+            self._command('say', f'{what}: stopped; press {ALLOW} first')
+        elif not always and not self.movable:
+            self._command('say', f'{what}: the state of the robot does not let it be moved')
+        else:
+            return False
+        return True
 
     def stop(self) -> None:
         """Release what is held, and bar motion until it is allowed."""

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from html import escape
 import time
 
+from .style import Mark
+
 KEPT = 200
 """Number of entries that are kept."""
 
@@ -18,7 +20,7 @@ class _Entry:
     at: float
     who: str
     text: str
-    color: str
+    mark: Mark
     count: int = 1
 
 
@@ -34,14 +36,14 @@ class Log:
         self._entries: deque[_Entry] = deque(maxlen=KEPT)
         self._html: str | None = ''
 
-    def add(self, at: float, who: str, text: str, color: str) -> None:
+    def add(self, at: float, who: str, text: str, mark: Mark) -> None:
         """Keep an entry."""
         self._html = None
         last = self._entries[-1] if self._entries else None
         if last is not None and (last.who, last.text) == (who, text):
             last.at, last.count = at, last.count + 1
         else:
-            self._entries.append(_Entry(at, who, text, color))
+            self._entries.append(_Entry(at, who, text, mark))
 
     @property
     def html(self) -> str:
@@ -54,8 +56,9 @@ class Log:
 def _line(entry: _Entry) -> str:
     clock = time.strftime('%H:%M:%S', time.localtime(entry.at))
     again = f' ({entry.count} times)' if entry.count > 1 else ''
+    icon, color = entry.mark
     return (
         '<div style="margin:0 1em 0.4em;overflow-wrap:anywhere"><span style="color:'
-        f'{entry.color}">&#9679;</span> {clock} <b>{escape(entry.who)}</b>{again}<br>'
+        f'{color}">{icon}</span> {clock} <b>{escape(entry.who)}</b>{again}<br>'
         f'{escape(entry.text)}</div>'
     )

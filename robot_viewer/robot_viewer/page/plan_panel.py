@@ -163,13 +163,17 @@ class PlanPanel:
 
     def say(self, text: str, *, failed: bool | None = None) -> None:
         """Show what became of the last request."""
-        color = PLAIN if failed is None else BAD if failed else GOOD
-        self._outcome.content = line(text, color) if text else ''
+        mark = PLAIN if failed is None else BAD if failed else GOOD
+        self._outcome.content = line(text, mark) if text else ''
 
     def allow(self, *, execute: bool) -> None:
         """Enable the buttons that need a plan."""
         self._again.disabled = not execute
         (self._live.off.discard if execute else self._live.off.add)(self._hold)
+
+    def end_hold(self) -> None:
+        """Show that the execution has ended: its button has to be let go."""
+        self._live.end(self._hold)
 
     def show_objects(self, objects: Sequence[SceneObject]) -> None:
         """Show what is in the planning scene."""

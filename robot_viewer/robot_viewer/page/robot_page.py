@@ -31,7 +31,7 @@ from viser import (
 from first_motion import JointKind as MotionKind
 
 from ..loopback import shown_host
-from ..robot_state import ALLOW, FOLLOWS, Level, RobotState, Status
+from ..robot_state import BUS, drives_of, FOLLOWS, Level, RobotState, Status
 from .aim import History
 from .body_panel import BodyPanel
 from .deadman import RELEASED_AFTER
@@ -381,9 +381,8 @@ class RobotPage:
         """Show what the chosen drive reports."""
         if self._drive is None or self._drive_state is None:
             return
-        drives = {status.name: status for status in statuses if status.name.endswith(': drive')}
-        buses = [status for status in statuses if status.name.endswith(': bus')]
-        chosen = drives.get(f'{self._drive.value.rpartition("/")[2]}: drive')
+        buses = [status for status in statuses if status.name.endswith(BUS)]
+        chosen = drives_of(statuses).get(self._drive.value.rpartition('/')[2])
         bus = buses[0].values if len(buses) == 1 else {}
         html = '' if chosen is None else drive_html(chosen.message, chosen.values, bus)
         if self._drive_state.content != html:
@@ -510,11 +509,8 @@ class RobotPage:
             return None
         self._notes['Body'].visible = False
         with self._groups['Body']:
-            self._body = BodyPanel(
-                self._server,
-                self._scene.path_of(self._tree.root),
-                lambda: self.live.movable and not self.live.stopped,
-            )
+            path = self._scene.path_of(self._tree.root)
+            self._body = BodyPanel(self._server, path, self.live)
         return self._body
 
     def offer_first_motion(
@@ -581,17 +577,13 @@ class RobotPage:
     def _call(self, drive: GuiDropdownHandle[str], label: str, verb: str) -> None:
         if drive.value == NO_DRIVE:
             self.say(f'{label}: choose a drive first', failed=True)
-        elif self.live.stopped and verb in MOTIONS:
-            self.say(f'{label}: stopped; press {ALLOW} first', failed=True)
-        else:
+        elif verb not in MOTIONS or not self.live.refuses(label):
             chosen = self._drives if drive.value == ALL_DRIVES else [drive.value]
             services = [f'{name}/{verb}' for name in chosen if verb in self._drives[name]]
             self._actions.call(f'{label} {drive.value.rpartition("/")[2]}', services)
 
     def _request(self, mode: str, _: object) -> None:
-        if self.live.stopped:
-            self.say(f'mode {mode}: stopped; press {ALLOW} first', failed=True)
-        else:
+        if not self.live.refuses(f'mode {mode}'):
             self._actions.set_mode(mode)
 
     def _publish_sliders(self) -> None:

@@ -22,26 +22,33 @@ CAUTION: Color = (255, 212, 59)
 PRESENT: Color = (52, 58, 64)
 """Of the mode that the robot is in."""
 
-GOOD, WARNING, BAD, PLAIN = '#237032', '#8a6100', '#c92a2a', '#495057'
-LEVEL_MARKS = (('✓', GOOD), ('⚠', WARNING), ('⛔', BAD), ('?', PLAIN))
-"""Of the levels of a status, good, warning, error and stale: an icon and its color."""
+Mark: TypeAlias = tuple[str, str]
+
+GOOD: Mark = ('✓', '#237032')
+WARNING: Mark = ('⚠', '#8a6100')
+BAD: Mark = ('⛔', '#c92a2a')
+UNKNOWN: Mark = ('?', '#495057')
+PLAIN: Mark = ('·', '#495057')
+"""What a line means: an icon and its color, as a color alone is not seen by everyone."""
+LEVEL_MARKS = (GOOD, WARNING, BAD, UNKNOWN)
+"""Of the levels of a status: good, warning, error and stale."""
 THREE_COLUMNS = '<b class="rv-pad3"></b>'
 """Marks a panel whose buttons stand in three columns."""
 
 
-def line(text: str, color: str = PLAIN, *, strong: bool = False, mark: str = '&#9679;') -> str:
+def line(text: str, mark: Mark = PLAIN, *, strong: bool = False) -> str:
     """Return a line behind a mark."""
+    icon, color = mark
     weight = 'bold' if strong else 'normal'
     return (
         f'<div style="font-weight:{weight};margin:0.2em 12px;overflow-wrap:anywhere">'
-        f'<span style="color:{color}">{mark}</span> {escape(text)}</div>'
+        f'<span style="color:{color}">{icon}</span> {escape(text)}</div>'
     )
 
 
 def status_line(text: str, level: int) -> str:
     """Return a line with the icon of a level."""
-    mark, color = LEVEL_MARKS[level]
-    return line(text, color, strong=level not in {0, 3}, mark=mark)
+    return line(text, LEVEL_MARKS[level], strong=level not in {0, 3})
 
 
 def pad(buttons: Iterable[str], kind: str = 'rv-pad') -> str:
