@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 import math
+import re
 import subprocess
 import sys
 from typing import Any
@@ -42,9 +43,16 @@ from quad_hardware.estimation.filters import (
     JointRate,
     MedianFilter,
 )
-from quad_hardware.estimation.plausibility import MAX_REFUSALS, Plausibility, SampleClock
+from quad_hardware.estimation.plausibility import (
+    CONFIRMATIONS,
+    FAULT_TEXTS,
+    MAX_REFUSALS,
+    Plausibility,
+    SampleClock,
+    ServoWatch,
+)
 from quad_hardware.joints import JointMap, servo_of
-from quad_hardware.protocol import LEG_MOTORS
+from quad_hardware.protocol import Fault, LEG_MOTORS
 from quad_hardware.report import DEVICE_TIME_WRAP, Report
 
 ANGLES = st.floats(-3.1, 3.1)
@@ -325,6 +333,60 @@ def test_servos_that_carry_no_longer_are_a_problem_of_the_robot(
     assert words in str(said[3])
     assert bool(said[3]) is bool(said[6]) is bool(words)
     assert said[7:] == ['', '']
+
+
+SERVO_FAULTS = (Fault.OVERLOAD, Fault.OVERHEATED, Fault.SERVO_SILENT)
+TEMPERATURES = st.dictionaries(st.sampled_from(LEG_MOTORS), st.floats(20.0, 90.0))
+SERVO_REPORTS = st.builds(
+    lambda faults, felt: replace(STATE, faults=faults, temperatures=felt),
+    st.integers(0, 31),
+    TEMPERATURES,
+)
+
+
+@given(
+    st.sampled_from(SERVO_FAULTS),
+    st.lists(SERVO_REPORTS, max_size=6),
+    st.lists(SERVO_REPORTS, min_size=CONFIRMATIONS, max_size=CONFIRMATIONS),
+)
+def test_a_servo_fault_is_confirmed_whatever_the_others_do(
+    fault: Fault, before: list[Report], during: list[Report]
+) -> None:
+    """A bit in each of some reports in a row is a problem; out of each of them, it is none."""
+    watch = ServoWatch(LEG_MOTORS)
+    for report in before:
+        watch.check(report)
+    said = [watch.check(replace(report, faults=report.faults | fault)) for report in during]
+    assert FAULT_TEXTS[fault] in said[-1]
+    said = [watch.check(replace(report, faults=report.faults & ~fault)) for report in during]
+    assert FAULT_TEXTS[fault] not in said[-1]
+
+
+@given(
+    st.sampled_from(LEG_MOTORS),
+    st.lists(SERVO_REPORTS, min_size=CONFIRMATIONS, max_size=CONFIRMATIONS),
+)
+def test_a_hot_servo_is_confirmed_whatever_the_others_do(motor: int, others: list[Report]) -> None:
+    """It stays hot until it is cool, though it is below what made it so."""
+    watch, said = ServoWatch(LEG_MOTORS), ''
+
+    def felt(report: Report, temperature: float) -> Report:
+        return replace(report, temperatures={**(report.temperatures or {}), motor: temperature})
+
+    for temperature, hot in ((65.0, False), (71.0, True), (61.0, True), (60.0, False)):
+        for report in others:
+            said = watch.check(felt(report, temperature))
+        assert (re.search(rf'servo of motor [\d, ]*\b{motor}\b', said) is not None) is hot
+
+
+def test_a_servo_problem_counts_only_reports_in_a_row() -> None:
+    """A bit that comes and goes is not confirmed, and one that stays is, in the same words."""
+    watch, both = ServoWatch(LEG_MOTORS), Fault.SERVO_SILENT | Fault.OVERLOAD
+    said = [
+        watch.check(replace(STATE, faults=Fault.SERVO_SILENT if tick % 2 else both))
+        for tick in range(9)
+    ]
+    assert said == [''] * 2 + [FAULT_TEXTS[Fault.SERVO_SILENT]] * 7
 
 
 def test_a_joint_that_is_not_reported_is_where_it_was_sent() -> None:

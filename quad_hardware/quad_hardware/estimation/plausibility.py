@@ -192,8 +192,15 @@ COOL_TEMPERATURE = 60.0  # [°C] below which they may carry the robot again
 _SERVO_FAULTS = Fault.OVERLOAD | Fault.OVERHEATED | Fault.SERVO_SILENT
 
 
+_Problem = tuple[Fault, int | None]  # what is wrong, and with which motor where that is known
+
+
 class ServoWatch:
-    """Finds servos that will not carry the robot any longer: silent, overloaded or too hot."""
+    """Finds servos that will not carry the robot any longer: silent, overloaded or too hot.
+
+    Each fault of each motor is confirmed, and ends, by itself: what others do meanwhile delays
+    neither.
+    """
 
     def __init__(self, motors: Collection[int]) -> None:
         """Begin without a report.
@@ -202,25 +209,36 @@ class ServoWatch:
             motors: Ids of those that a joint uses.
         """
         self._motors = motors
-        self._problem = self._next = ''
-        self._count = 0  # reports in a row that say the next
+        self._confirmed: set[_Problem] = set()
+        # reports in a row that say otherwise than what is confirmed
+        self._doubts: dict[_Problem, int] = {}
 
     def check(self, state: Report) -> str:
-        """Add a report; return what is wrong, as soon as several reports in a row agree."""
-        said = self._read(state)
-        self._count = self._count + 1 if said == self._next else 1
-        self._next = said
-        if self._count >= CONFIRMATIONS:
-            self._problem = said
-        return self._problem
+        """Add a report; return what is wrong, as soon as several reports in a row say so."""
+        doubted = self._read(state) ^ self._confirmed
+        self._doubts = {problem: self._doubts.get(problem, 0) + 1 for problem in doubted}
+        for problem in doubted:
+            if self._doubts[problem] >= CONFIRMATIONS:
+                self._confirmed ^= {problem}
+                del self._doubts[problem]
+        return self._text()
 
-    def _read(self, state: Report) -> str:
-        bits = Fault(state.faults & _SERVO_FAULTS)
-        texts = [FAULT_TEXTS[each] for each in Fault if each in bits]
-        most = COOL_TEMPERATURE if 'servo of motor' in self._problem else MAX_TEMPERATURE
-        felt = state.temperatures or {}
-        if hot := [motor for motor in self._motors if felt.get(motor, 0.0) > most]:
+    def _read(self, state: Report) -> set[_Problem]:
+        bits, felt = Fault(state.faults & _SERVO_FAULTS), state.temperatures or {}
+        problems: set[_Problem] = {(each, None) for each in Fault if each in bits}
+        for motor in self._motors:
+            hot = (Fault.OVERHEATED, motor)
+            most = COOL_TEMPERATURE if hot in self._confirmed else MAX_TEMPERATURE
+            if felt.get(motor, 0.0) > most:
+                problems.add(hot)
+        return problems
+
+    def _text(self) -> str:
+        texts = [FAULT_TEXTS[each] for each in Fault if (each, None) in self._confirmed]
+        hot = [motor for motor in self._motors if (Fault.OVERHEATED, motor) in self._confirmed]
+        if hot:
             texts.append(
-                f'servo of motor {", ".join(map(str, hot))} above {most:g} degrees: let it cool'
+                f'servo of motor {", ".join(map(str, hot))} above {MAX_TEMPERATURE:g} degrees: '
+                f'let it cool below {COOL_TEMPERATURE:g}'
             )
         return '; '.join(texts)
