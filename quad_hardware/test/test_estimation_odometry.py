@@ -89,6 +89,22 @@ def test_legs_that_carry_nothing_move_no_body(attitude: Quaternion, lying_height
     assert (math.sqrt(state.position_variance) > 0.09) is (lying_height == 0.0)
 
 
+@pytest.mark.parametrize(
+    ('attitude', 'lying_height'), [(from_rpy(2.5, 0.0, 0.0), 0.0), (IDENTITY, 0.2)]
+)
+def test_a_gap_counts_of_a_body_that_lies_or_fell_too(
+    attitude: Quaternion, lying_height: float
+) -> None:
+    """Somebody may have carried it elsewhere; without another gap nothing is added."""
+    odometry = LegOdometry(OdometrySettings(), 0.01, lying_height)
+    before = stand(odometry, 0.0, 1.0, attitude)
+    after = stand(odometry, 3.0, 3.1, attitude)
+    assert (after.x, after.y) == (before.x, before.y)
+    assert after.position_variance - before.position_variance == pytest.approx(0.6**2, rel=0.03)
+    again = stand(odometry, 3.1, 4.0, attitude)
+    assert again.position_variance == after.position_variance
+
+
 @pytest.mark.parametrize('yaw', [0.0, 1.0, 3.1])
 def test_a_rolling_foot_counts(yaw: float) -> None:
     """A wheel that turns by an angle goes by angle times radius, in the heading of the start."""

@@ -131,10 +131,13 @@ class LegOdometry:
         if fallen and not self._fallen:
             self._gaps += FALL_DEVIATION**2
         self._fallen = fallen
-        if fallen or height <= self._lying_height:
+        elapsed = 0.0 if self._last is None else time - self._last[0]
+        if elapsed > MAX_GAP:  # lying or not, it may have been carried, or have gone on
+            self._gaps += (GAP_SPEED * elapsed) ** 2
+        if fallen or height <= self._lying_height or not 0.0 < elapsed <= MAX_GAP:
             self._held = self._smooth = REST  # the feet may move, and carry nothing
         else:
-            self._integrate(time, turned, standing, self._heading)
+            self._integrate(time, elapsed, turned, standing)
         self._last = time, turned, standing
         return OdometryState(
             *self._place,
@@ -172,17 +175,12 @@ class LegOdometry:
         return standing, source
 
     def _integrate(
-        self, time: float, feet: Sequence[FootPose], standing: Flags, heading: float
+        self, time: float, elapsed: float, feet: Sequence[FootPose], standing: Flags
     ) -> None:
         if self._last is None:
             return
-        last_time, last_feet, stood = self._last
-        elapsed = time - last_time
-        if not 0.0 < elapsed <= MAX_GAP:
-            self._held = self._smooth = REST
-            self._gaps += (GAP_SPEED * max(elapsed, 0.0)) ** 2
-            return
-        cosine, sine = math.cos(heading), math.sin(heading)
+        _, last_feet, stood = self._last
+        cosine, sine = math.cos(self._heading), math.sin(self._heading)
         pairs = zip(last_feet, feet, standing, stood, strict=True)
         ways = [self._way(last, foot) for last, foot, *both in pairs if all(both)]
         if ways:
