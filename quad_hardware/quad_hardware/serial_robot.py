@@ -17,6 +17,7 @@ from .estimation import Estimator, EstimatorSettings
 from .exceptions import CommandError
 from .joints import JointCommander, JointMap, LimiterSettings, LossReaction
 from .joints.command import NOMINAL_PERIOD
+from .letting_go import judge, Letting
 from .link import Driver, LinkOptions, LinkState, LinkStatus, Session, STALE_TIME
 from .recording import (
     FaultWatch,
@@ -30,8 +31,6 @@ from .report import Report
 
 LINK, ROBOT, COMMANDS = 'serial link', 'robot', 'joint commands'
 """What a fault is of; diagnostics have the same names."""
-LIMP_TIMEOUT = 0.5  # [s] for servos to let go, and for a report that shows it
-NO_LOAD = 1.0  # [%] of the stall torque
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +130,8 @@ class SerialRobot(ObservedRobot):
         )
         self.counters = self._commander.counters  # what became of joint commands
         self._last_note = ''
-        self._loads: Mapping[int, float] = {}  # of the newest report [%]
+        self._seen: Report | None = None  # the newest that can be
+        self._let_go_at = -math.inf  # [s] when that was last requested
         self._recorders: list[SerialMemory | SerialLogFile] = []
         self._log_file: SerialLogFile | None = None
         # writes the last bytes when a fault happens; None without
@@ -233,17 +233,15 @@ class SerialRobot(ObservedRobot):
             self._driver.command(self._joints.angles_at(positions))
         sent = self._driver.torque(on=on)
         if sent:
+            self._let_go_at = time.monotonic()
             self._commander.let_go()
         return sent
 
-    def wait_until_limp(self) -> bool | None:
-        """Wait until the servos report no load; return whether they do, None if they never do."""
-        until = time.monotonic() + LIMP_TIMEOUT
-        while (loads := self._loads) and time.monotonic() < until:
-            if max(abs(loads.get(servo.motor, 0.0)) for servo in self._joints.servos) <= NO_LOAD:
-                return True
-            time.sleep(NOMINAL_PERIOD)
-        return None if not loads else False
+    def look_at_loads(self) -> Letting | None:
+        """Return whether the servos have let go since they were asked to; None for look again."""
+        motors = [servo.motor for servo in self._joints.servos]
+        sent_at, now = self._driver.released_at, time.monotonic()
+        return judge(self._seen, motors, self._let_go_at, sent_at, now)
 
     # -- for the black box
 
@@ -276,12 +274,13 @@ class SerialRobot(ObservedRobot):
 
     def _report(self, report: Report) -> str:
         arrived, self._arrived_at = self._arrived_at, report.arrival
-        self._loads = report.loads or {}
         refusal = super()._report(report)
         if refusal:
             self._arrived_at = arrived
             self._note(LINK, f'report refused: {refusal}')
-        elif self.black_box is not None and self.latest is not None:
+            return refusal
+        self._seen = report
+        if self.black_box is not None and self.latest is not None:
             for fault in self._faults.check(report, self.latest):
                 self.black_box.fault(ROBOT, fault)
         return refusal

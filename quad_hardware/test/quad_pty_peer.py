@@ -59,6 +59,7 @@ class Behaviour:
         gyro: Signs of the gyro of protocol v1.
         latency: Latency timer of the adapter between robot and host [s]; 0 for none.
         load: Of each servo, share of its stall torque [%].
+        limp_load: The same after torque off.
     """
 
     silent: bool = False
@@ -68,6 +69,7 @@ class Behaviour:
     gyro: tuple[float, float, float] = (1.0, 1.0, 1.0)
     latency: float = 0.0
     load: float = 0.0
+    limp_load: float = 0.0
 
 
 @dataclass
@@ -186,13 +188,14 @@ class PtyPeer:
         (self._new if self.protocol is V2 else self._old)(frame)
 
     def _state(self) -> Frame:
+        load = self.behaviour.load if self.torque else self.behaviour.limp_load
         return state_frame(
             euler2=self.behaviour.attitude,
             acceleration=self.behaviour.acceleration,
             battery=80,
             battery_voltage=7.4,
             position=tuple(self.angles[motor] for motor in MOTOR_ORDER),
-            load=(self.behaviour.load,) * len(MOTOR_ORDER),
+            load=(load,) * len(MOTOR_ORDER),
             sequence=self._sequence % 65536,
             device_time=round(time.monotonic() * 1e3) % 2**32,
         )

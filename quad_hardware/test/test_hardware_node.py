@@ -202,14 +202,33 @@ def test_a_timer_that_waited_behind_a_command_counts_nothing(*, commanded: bool)
     assert said == ([] if commanded else ['ended', 'lies down', 'begun'])
 
 
-def test_servos_that_still_pull_are_not_said_to_be_without_torque(rig: NodeRig) -> None:
-    """The answer comes of what they report, and not of what was sent."""
-    rig.peer.behaviour.load = 12.0
+@pytest.mark.parametrize('load', [0.0, 12.0])
+def test_servos_that_still_pull_are_not_said_to_be_without_torque(
+    rig: NodeRig, load: float
+) -> None:
+    """The answer comes of what they report then, and not of what was sent, or of before."""
+    rig.peer.behaviour.load, rig.peer.behaviour.limp_load = load, 12.0
     rig.receive('/joint_states', 5)
     answer = rig.client.call(SetBool, '/hardware_node/torque', SetBool.Request(data=False))
     assert not answer.success
     assert 'still report load' in answer.message
     assert rig.client.call(SetBool, '/hardware_node/torque', SetBool.Request(data=True)).success
+
+
+def test_the_node_serves_others_while_it_waits_for_servos_to_let_go(rig: NodeRig) -> None:
+    """Of two that ask for torque off, and one that wants it back, none waits for another."""
+    name, off = '/hardware_node/torque', SetBool.Request(data=False)
+    rig.peer.behaviour.limp_load = 12.0
+    rig.client.client_of(SetBool, name)
+    answers = [rig.client.call_async(SetBool, name, off) for _ in range(2)]
+    assert rig.client.call(SetBool, name, SetBool.Request(data=True)).success
+    rig.client.spin_until(lambda: all(a.done() for a in answers), TIMEOUT, 'answers')
+    found = [(a.result().success, a.result().message) for a in answers]
+    assert found == [(False, 'torque was switched on again meanwhile')] * 2
+    rig.client.spin_until(lambda: rig.peer.torque, TIMEOUT, 'torque on')
+    rig.peer.behaviour.limp_load = 0.0
+    assert rig.client.call(SetBool, name, off).success
+    assert rig.client.call(SetBool, name, SetBool.Request(data=True)).success
 
 
 def test_torque_is_taken_and_given_by_service(rig: NodeRig) -> None:

@@ -141,9 +141,11 @@ def test_servos_let_go_and_hold_again(rig: Rig) -> None:
     assert rig.driver.torque(on=False)
     assert rig.driver.limp, 'from here on no target may follow'
     wait_for(lambda: not rig.peer.torque, 'torque off')
+    wait_for(lambda: rig.driver.released_at is not None, 'time of torque off')
     assert rig.driver.torque(on=True)
     wait_for(lambda: rig.peer.torque, 'torque on')
     wait_for(lambda: not rig.driver.limp, 'servos that hold')
+    assert rig.driver.released_at is None
     assert rig.peer.commands == []
     rig.peer.unplug()
     rig.reach(LinkState.CONNECTING)

@@ -37,6 +37,9 @@ class Driver:
 
     ``command`` and ``torque`` are for one other thread. An order that was accepted is sent,
     replaced by a newer one of its kind, or the change of the link's state says that it was not.
+
+    Attributes:
+        released_at: When the last order to let go was given to the line [s], None before.
     """
 
     def __init__(
@@ -66,6 +69,7 @@ class Driver:
         self._torque_unsent: bool | None = None  # taken over, and not written yet
         self._released = False  # by the last change of torque that was accepted
         self._limp = False  # from the first byte of an order to let go to the last of one to hold
+        self.released_at: float | None = None
         self._status = LinkStatus(detail='not started')
         self._session: Session | None = None
         self._received_at = self._reported_at = -float('inf')
@@ -118,7 +122,7 @@ class Driver:
         able = session is not None and session.dialect.can_release
         with self._lock:
             if accepted := able and self._accepts:
-                self._torque = on
+                self._torque, self.released_at = on, None
         if accepted:
             self._released = not on
             self._wake()
@@ -222,6 +226,7 @@ class Driver:
                 port.write(step.send)
             if self._torque_unsent is not None and not dialect.torque_pending:
                 self._limp, self._torque_unsent = not self._torque_unsent, None
+                self.released_at = time.monotonic() if self._limp else None
             timeout = min(step.wake, self._deadline(now)) - now
             if session.parser.pending:
                 timeout = min(timeout, QUIET_TIME)

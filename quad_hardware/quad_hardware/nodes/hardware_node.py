@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Future
 import math
 import sys
 import threading
@@ -17,6 +18,7 @@ from std_srvs.srv import SetBool
 
 from message_templates import FastReader
 from node_runner import (
+    create_deferred_service,
     destroyed_when_refused,
     log_as,
     notify_ready,
@@ -38,11 +40,6 @@ from .robot_topics import log_link, RobotTopics, WARN_PERIOD
 COMMAND_QOS = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST, depth=1
 )
-_LIMP = {
-    True: 'the servos are without torque',
-    False: 'torque off was sent, and the servos still report load: keep clear, switch it off',
-    None: 'torque off was sent; this protocol reports no load that would confirm it',
-}
 SWITCH_INTERVAL = 0.0005  # [s] how long one thread may keep another one from the interpreter
 
 
@@ -70,13 +67,15 @@ class HardwareNode(Node):
         self._damage = ''
         self._reader = FastReader(JointCommand, 'position', 'velocity', 'effort')
         self.create_subscription(JointCommand, 'joint_command', self._take, COMMAND_QOS, raw=True)
-        self.create_service(SetBool, '~/torque', self._set_torque)
+        create_deferred_service(self, SetBool, '~/torque', self._set_torque)
+        self._letting_go: list[Future[SetBool.Response]] = []  # to be answered
         self.create_timer(settings.diagnostics_period, self._diagnose)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         timeout = self._robot.timeout
         self._silence = self.create_timer(timeout, self._miss_commands, clock=steady)
         self._descent = self.create_timer(NOMINAL_PERIOD, self._go_down, clock=steady)
-        for timer in (self._silence, self._descent):
+        self._looks = self.create_timer(NOMINAL_PERIOD, self._look_at_loads, clock=steady)
+        for timer in (self._silence, self._descent, self._looks):
             timer.cancel()
         count, path = len(self._robot.names), settings.robot.link.path
         self.get_logger().info(f'{count} joints; looking for the robot on {path}')
@@ -88,6 +87,8 @@ class HardwareNode(Node):
 
     def end(self) -> None:
         """Close the port; the servos hold their last target, at rest."""
+        for future in self._letting_go:
+            future.cancel()
         self._robot.end(self.get_logger().error)
 
     def _report_refused(self, reason: str) -> None:
@@ -127,20 +128,37 @@ class HardwareNode(Node):
     def _warn(self, reason: str) -> None:
         self.get_logger().warning(reason, throttle_duration_sec=WARN_PERIOD)
 
-    def _set_torque(
-        self, request: SetBool.Request, response: SetBool.Response
-    ) -> SetBool.Response:
-        """Switch the torque of the servos off, or on where they are."""
-        on = bool(request.data)
-        response.success = self._robot.set_torque(on=on)
-        if not response.success:
-            response.message = self._robot.status().detail
-            return response
-        limp = None if on else self._robot.wait_until_limp()
-        response.success = limp is not False
-        response.message = 'the servos hold' if on else _LIMP[limp]
-        self.get_logger().info(response.message)
-        return response
+    def _set_torque(self, request: SetBool.Request) -> Future[SetBool.Response]:
+        """Switch the torque of the servos off, or on where they are.
+
+        Torque off is answered when the servos report after it whether they let go.
+        """
+        on, future = bool(request.data), Future[SetBool.Response]()
+        if not self._robot.set_torque(on=on):
+            detail = self._robot.status().detail
+            future.set_result(SetBool.Response(success=False, message=detail))
+        elif on:
+            self._answer_letting_go(False, 'torque was switched on again meanwhile')
+            self.get_logger().info('the servos hold')
+            future.set_result(SetBool.Response(success=True, message='the servos hold'))
+        else:
+            self._letting_go.append(future)
+            self._looks.reset()
+        return future
+
+    def _look_at_loads(self) -> None:
+        """Answer requests for torque off as soon as reports show what became of it."""
+        found = self._robot.look_at_loads()
+        if found is not None:
+            self._answer_letting_go(found.succeeded, found.value)
+
+    def _answer_letting_go(self, success: bool, message: str) -> None:
+        self._looks.cancel()
+        futures, self._letting_go = self._letting_go, []
+        if futures:
+            self.get_logger().info(f'torque off: {message}')
+        for future in futures:
+            future.set_result(SetBool.Response(success=success, message=message))
 
     def _diagnose(self) -> None:
         name, port = self.get_name(), self._settings.robot.link.path
