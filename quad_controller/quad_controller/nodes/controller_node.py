@@ -71,6 +71,7 @@ ESTIMATE_WAIT = 1.0  # [s] for the first message, when a policy that needs it is
 ESTIMATES = {'odom': Odometry, 'foot_contacts': FootContacts}
 TYPE_PERIOD = 1.0  # [s] between two looks for another type on cmd_vel
 STAMPED = 'geometry_msgs/msg/TwistStamped'  # what Nav2 and ros2_control publish
+STAMPED_WARN_PERIOD = 60.0  # [s] between two errors that it cannot be received
 GAIT_WORDS = {'', 'gait'}  # instead of a policy's path
 WARN_PERIOD = 2.0  # [s] between two warnings of the same kind
 
@@ -157,7 +158,7 @@ class ControllerNode(Node):
         self._gait = settings.gait
         self.add_on_set_parameters_callback(self._tune)
         self.create_timer(settings.diagnostics_period, self._diagnose)
-        self.create_timer(TYPE_PERIOD, self._serve_stamped)
+        self._types = self.create_timer(TYPE_PERIOD, self._look_for_stamped)
         robot = settings.robot
         self.get_logger().info(
             f'{len(robot.names)} joints, {robot.mass:.2f} kg; waiting for joint_states'
@@ -173,9 +174,9 @@ class ControllerNode(Node):
 
     def end(self) -> None:
         """Stop sending; the servos hold their last targets."""
+        self._loader.shutdown(cancel_futures=True)
         if self._stamped is not None:
             self._stamped.close()
-        self._loader.shutdown(cancel_futures=True)
         self._loop.stop()
         if (recorder := self._recorder) is not None:
             recorder.close()
@@ -316,14 +317,28 @@ class ControllerNode(Node):
         # its age counts from its arrival: clocks of two machines need not agree
         self._take_twist(message.twist)
 
-    def _serve_stamped(self) -> None:
-        """Subscribe to TwistStamped on cmd_vel, too, as soon as something publishes it."""
+    def _look_for_stamped(self) -> None:
+        """Receive TwistStamped on cmd_vel, too, as soon as something publishes it."""
         topic = self.resolve_topic_name('cmd_vel')
         kinds = {info.topic_type for info in self.get_publishers_info_by_topic(topic)}
-        if self._stamped is None and STAMPED in kinds:
+        if STAMPED in kinds:
+            self._types.cancel()
+            self._loader.submit(self._receive_stamped, topic)
+
+    def _receive_stamped(self, topic: str) -> None:
+        """Subscribe to TwistStamped, in the thread of the loader: a new participant takes time."""
+        try:
             self._stamped = OtherTypeSubscription(
                 self, TwistStamped, topic, self._take_stamped_twist, REQUEST_QOS
             )
+        except Exception as error:  # noqa: BLE001  whatever it is, Twist is served
+            self.get_logger().error(
+                f'{topic} comes as TwistStamped, which cannot be received: '
+                f'{type(error).__name__}: {error}; trying again',
+                throttle_duration_sec=STAMPED_WARN_PERIOD,
+            )
+            self._types.reset()
+        else:
             self.get_logger().info(f'{topic} comes as TwistStamped, too')
 
     def _take_pose(self, message: Pose) -> None:

@@ -26,9 +26,20 @@ class OtherTypeSubscription:
     def __init__(
         self, node: Node, kind: type, topic: str, take: Callable[[Any], None], qos: int
     ) -> None:
-        """Subscribe to an absolute topic."""
+        """Subscribe to an absolute topic; what DDS raises leaves nothing behind."""
         self._context = Context()
         init_ros([], self._context)
+        try:
+            self._subscribe(node, kind, topic, take, qos)
+        except BaseException:
+            rclpy.shutdown(context=self._context)
+            raise
+        self._thread = threading.Thread(target=self._spin, name=topic, daemon=True)
+        self._thread.start()
+
+    def _subscribe(
+        self, node: Node, kind: type, topic: str, take: Callable[[Any], None], qos: int
+    ) -> None:
         self._node = Node(
             f'{node.get_name()}_{topic.rpartition("/")[2]}',
             context=self._context,
@@ -40,8 +51,6 @@ class OtherTypeSubscription:
         self._node.create_subscription(kind, topic, take, qos)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
-        self._thread = threading.Thread(target=self._spin, name=topic, daemon=True)
-        self._thread.start()
 
     def close(self) -> None:
         """End it."""
