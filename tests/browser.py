@@ -20,6 +20,7 @@ import time
 from typing import TYPE_CHECKING
 
 import numpy as np
+from processes import find_children
 import psutil
 
 if TYPE_CHECKING:
@@ -73,11 +74,7 @@ def url_of(robot: RunningProcess, timeout: float) -> str:
 
 def viewers_below(robot: RunningProcess) -> list[psutil.Process]:
     """Return the processes that serve the page of a bring-up or demo."""
-    return [
-        child
-        for child in psutil.Process(robot.pid).children(recursive=True)
-        if any(word.endswith('/web_viewer') for word in child.cmdline())
-    ]
+    return find_children(robot.pid, '/web_viewer')
 
 
 def lacking() -> str:

@@ -37,6 +37,22 @@ def executable(package: str, name: str) -> str:
     return f'{get_package_prefix(package)}/lib/{package}/{name}'
 
 
+def find_children(pid: int, *programs: str) -> list[psutil.Process]:
+    """Return the descendants of a process that run one of the programs.
+
+    Args:
+        pid: Id of the process; it is looked at too.
+        programs: Ends of a word of the command line, such as "/web_viewer".
+    """
+    parent = psutil.Process(pid)
+    found = []
+    for process in [parent, *parent.children(recursive=True)]:
+        with suppress(psutil.NoSuchProcess):  # it has ended meanwhile, or is a zombie
+            if any(word.endswith(programs) for word in process.cmdline()):
+                found.append(process)
+    return found
+
+
 _started: list[RunningProcess] = []
 
 

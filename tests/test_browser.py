@@ -24,7 +24,7 @@ from geometry_msgs.msg import Point, Pose
 from isolation import reserve
 from moveit_msgs.msg import CollisionObject, PlanningScene
 from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene
-from processes import executable, RunningProcess
+from processes import executable, find_children, RunningProcess
 import psutil
 import pytest
 from ros_client import RosClient
@@ -575,7 +575,7 @@ def test_a_robot_that_does_not_answer_has_not_stopped(seen: Seen) -> None:
     """Its process hangs, is killed, and the page's own end: the page says what to do."""
     page = seen.show('Diagnose')
     page.get_by_label('Drive', exact=True).click(force=True)  # with a dropdown open
-    (robot,) = processes_of(seen, '/motion_node')
+    (robot,) = find_children(seen.bringup.pid, '/motion_node')
     robot.suspend()
     try:
         page.keyboard.press('Space')
@@ -598,12 +598,3 @@ def test_a_robot_that_does_not_answer_has_not_stopped(seen: Seen) -> None:
     finally:
         with suppress(psutil.NoSuchProcess):
             viewer.resume()
-
-
-def processes_of(seen: Seen, program: str) -> list[psutil.Process]:
-    """Return the processes of the arm that run a program."""
-    return [
-        child
-        for child in psutil.Process(seen.bringup.pid).children(recursive=True)
-        if any(word.endswith(program) for word in child.cmdline())
-    ]
