@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack, suppress
+import math
 from pathlib import Path
 import time
 from typing import TYPE_CHECKING
@@ -23,6 +24,7 @@ from process_supervisor import find_executable, write_parameters
 from quad_bringup.examples.walk import GROUND_TRUTH, Velocity
 from quad_bringup.stack import quad_processes, Stack
 from quad_description import movable_joints, robot_urdf
+from quad_description.rotations import tilt_of
 from quad_msgs.srv import SetMode
 
 if TYPE_CHECKING:
@@ -39,6 +41,11 @@ ANSWER = 1.0
 """Longest time in [s] for one answer."""
 STARTING = 60.0
 """Longest time in [s] for a process to be ready on a busy machine."""
+UPRIGHT = math.radians(15.0)
+"""Tilt in [rad] of a robot that stands or walks."""
+LEANING = math.radians(20.0)
+"""The same of one whose legs were stopped anywhere in a trot and hold: it leans on the feet in the
+air, by 0 to 19 degrees (tests of quad_controller try all phases), with firm servos by 13."""
 
 
 class SimulatedQuad:
@@ -139,6 +146,12 @@ class SimulatedQuad:
     def state(self) -> str:
         """State of the controller, as it says it."""
         return str(self.states[-1].data) if self.states else ''
+
+    @property
+    def tilt(self) -> float:
+        """How far the body is from upright in [rad]."""
+        turn = self.truth[-1].pose.pose.orientation
+        return tilt_of((turn.x, turn.y, turn.z, turn.w))
 
     def stand(self) -> None:
         """Make it stand up, and wait until it does.

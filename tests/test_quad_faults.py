@@ -11,11 +11,10 @@ import time
 
 from isolation import reserve
 import pytest
-from simulated_quad import SimulatedQuad
+from simulated_quad import LEANING, SimulatedQuad, UPRIGHT
 from std_srvs.srv import SetBool
 
 from quad_description import Pose, pose_positions, quadruped, raised_feet, robot_urdf
-from quad_description.rotations import tilt_of
 from quad_msgs.msg import JointCommand
 
 pytestmark = pytest.mark.scenario
@@ -27,11 +26,6 @@ its set-points are ahead of soft servos, at 13 a period where those of firm ones
 RESUMED = 6.0
 """Degrees between two commands when a new controller takes over where the joints are: the bridge
 begins at 2 rad/s."""
-UPRIGHT = math.radians(15.0)
-"""Tilt of a robot that stands."""
-LEANING = math.radians(20.0)
-"""Tilt of one that was stopped in mid-trot, with two feet in the air, and holds: in physics up to
-17 degrees, as soft servos give way under its weight, and 13 with firm ones."""
 TRIES = 20
 """How often a trot is stopped until a foot is in the air; it is in two of three."""
 
@@ -51,12 +45,6 @@ def quad(processes: SimulatedQuad) -> SimulatedQuad:
     processes.stand()
     processes.tap.forget()
     return processes
-
-
-def tilt(quad: SimulatedQuad) -> float:
-    """Return how far the body is from upright in [rad]."""
-    rotation = quad.truth[-1].pose.pose.orientation
-    return tilt_of((rotation.x, rotation.y, rotation.z, rotation.w))
 
 
 def freeze_in_mid_trot(quad: SimulatedQuad) -> None:
@@ -87,7 +75,7 @@ def kill(quad: SimulatedQuad, name: str) -> float:
 
 def check_upright(quad: SimulatedQuad, most: float = UPRIGHT) -> None:
     """The robot stands, and no servo ever got a target that jumps."""
-    assert tilt(quad) < most
+    assert quad.tilt < most
     assert quad.tap.largest_step() < LARGEST_STEP
 
 
@@ -181,7 +169,7 @@ def test_a_robot_that_was_let_go_does_not_rise_when_its_servos_hold_again(
     quad.spin(0.5)
     quad.stand()
     quad.spin(0.5)
-    assert tilt(quad) < math.radians(15.0)
+    assert quad.tilt < UPRIGHT
     assert quad.truth[-1].pose.pose.position.z > sunk + 0.02
     assert quad.tap.largest_step(since=given) < LARGEST_STEP
 

@@ -9,19 +9,15 @@ import math
 import re
 import signal
 import time
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from isolation import reserve
 import pytest
-from simulated_quad import SimulatedQuad
+from simulated_quad import LEANING, SimulatedQuad
 
 from quad_description import Pose, pose_positions
-from quad_description.rotations import tilt_of
 from quad_msgs.srv import InjectFault
-
-if TYPE_CHECKING:
-    pass
 
 pytestmark = pytest.mark.scenario
 
@@ -73,12 +69,6 @@ def largest_step(messages: list[Any]) -> float:
     return max(float(value.value) for value in values if value.key == 'largest_step')
 
 
-def tilt(quad: SimulatedQuad) -> float:
-    """Return how far the body is from upright in [rad]."""
-    turn = quad.truth[-1].pose.pose.orientation
-    return tilt_of((turn.x, turn.y, turn.z, turn.w))
-
-
 STOPPED = ('controller', 'fault, .*joint states')
 """The controller stops the robot by itself, and says why."""
 
@@ -110,7 +100,7 @@ def test_a_broken_line_is_reported_and_survived(
     for count, (speaker, reason) in zip(counts, reasons, strict=True):
         quad.processes[speaker].wait_for(reason, count=count + 1)
     if fault != 'brown_out':  # servos without torque do not hold the body
-        assert tilt(quad) < math.radians(15.0)
+        assert quad.tilt < LEANING
     walk_again(quad)
     assert largest_step(diagnostics) < LARGEST_STEP
 

@@ -85,9 +85,14 @@ class PhysicsRig:
         self.controller.set_velocity(velocity)
         state = self._sense(self._backend.observe())
         targets = self.controller.step(state, PERIOD).targets
-        self._backend.step(targets)
-        self.tilt = max(self.tilt, self.robot.base_pose.tilt)
+        self.hold(PERIOD, targets)
         return targets or ()
+
+    def hold(self, duration: float, targets: Targets | None) -> None:
+        """Pass some seconds with targets, without the controller."""
+        for _ in range(round(duration / PERIOD)):
+            self._backend.step(targets)
+            self.tilt = max(self.tilt, self.robot.base_pose.tilt)
 
     def run(self, duration: float, velocity: Velocity = REST) -> None:
         """Pass some seconds with a velocity."""

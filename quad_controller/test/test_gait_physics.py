@@ -22,7 +22,7 @@ from quad_controller import (
 from quad_controller.gait.parameters import AS_TUNED, LOW_AND_WIDE
 from quad_description import Backend, RecordedBackend, robot_urdf, RobotState, Targets
 from quad_description.rotations import about_z, multiply, roll_pitch_yaw
-from quad_gait_physics import FIRM, firm, MODEL, PhysicsRig
+from quad_gait_physics import FIRM, firm, MODEL, PERIOD, PhysicsRig
 from quad_hardware.estimation import ImuMounting, OdometrySettings
 from quad_hardware.estimation.imu_mounting import UNCHECKED_DEVIATION
 from quad_hardware.estimation.odometry import LegOdometry
@@ -179,6 +179,21 @@ def test_the_body_takes_its_pose_while_it_walks() -> None:
     assert pitch == pytest.approx(0.08, abs=0.03)
     assert rig.robot.base_pose.position[2] < height - 0.008
     assert travel.x == pytest.approx(0.1, abs=0.03)
+
+
+def test_a_trot_that_is_stopped_anywhere_leans_and_does_not_fall() -> None:
+    """When reports vanish, the servos hold their targets, with two feet in the air."""
+    tilts = []
+    for phase in range(7):  # steps of half a period; the other half is its mirror image
+        rig = PhysicsRig()
+        rig.mode('walk')
+        rig.run(1.0 + phase * PERIOD, Velocity(0.1))
+        held = rig.step(Velocity(0.1))
+        rig.tilt = 0.0
+        rig.hold(1.5, held)
+        tilts.append(math.degrees(rig.tilt))
+    assert min(tilts) < 2.0
+    assert 15.0 < max(tilts) < 20.0  # of 20: LEANING of tests/simulated_quad.py
 
 
 def test_levelling_turns_the_body_towards_level_on_a_slope() -> None:
