@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 from types import SimpleNamespace
 from typing import Any
 
@@ -81,3 +82,20 @@ def test_an_arm_that_coasts_moves_until_it_stands(monkeypatch: pytest.MonkeyPatc
         moves.append((step, monitor.is_moving('panda_arm')))
     assert [moving for _, moving in moves] == [False, False, True, True, False, False, False]
     assert not monitor.is_moving('no group')
+
+
+def test_a_joint_of_which_nothing_comes_any_more_does_not_move(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its last speed is old; a position that is no number is none."""
+    node, now = TickingNode(), [100.0]
+    monkeypatch.setattr('arm_planning.ros.scene_monitor.time.monotonic', lambda: now[0])
+    monitor = SceneMonitor(node, panda())  # type: ignore[arg-type]
+    for place in (0.0, math.inf, 0.1, 0.2):
+        now[0] += 0.06
+        node.at(place)
+    assert monitor.is_moving('panda_arm')
+    assert monitor.received([JOINT]) == {JOINT: 0.2}
+    now[0] += 2.0
+    node.receive['joint_states'](JointState(name=['panda_joint2'], position=[0.0]))
+    assert not monitor.is_moving('panda_arm')

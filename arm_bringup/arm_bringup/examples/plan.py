@@ -12,7 +12,7 @@ import argparse
 from collections.abc import Callable, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass
-from itertools import permutations, product
+from itertools import product
 import json
 import math
 import os
@@ -45,7 +45,7 @@ from urdf_reader import JointRange, read_urdf
 
 import arm_model
 from arm_model import ArmError, Array, Clearances, load_limits, RobotModel, start_pose
-from arm_planning import JointGoal, MotionRequest, Planner, PlanningCode, PlanningError
+from arm_planning import PlanningCode
 from node_runner import LATCHED
 from process_supervisor import CallError, namespaced_parameters, RosOptions
 
@@ -59,10 +59,9 @@ from ..session import locate, Session
 from ..stack import MOTION_NODE
 from .arm import ActionRun, ANSWER_TIMEOUT, ArmDemo, EndRequested, parse, run
 
-SLOW, CAREFUL, USUAL, FREE = 0.1, 0.2, 0.4, 0.5
-"""Shares of the limits at which the arm meets a box, follows lines, goes around, moves freely."""
+SLOW, CAREFUL, FREE = 0.1, 0.2, 0.5
+"""Shares of the limits at which the arm meets a box, follows lines, moves freely."""
 PLANNING_TIME, IK_TIMEOUT = 5.0, 0.5
-SEARCH_TIME = 5.0  # of a motion of an arm without a table, by the clock in [s]
 """Longest time for planning, as MoveGroupInterface asks for, and for inverse kinematics in [s]."""
 JOINT_TOLERANCE, POSITION_TOLERANCE, TURN_TOLERANCE = 1e-4, 1e-4, 1e-3
 """Tolerances of goals as MoveGroupInterface has them in [rad], [m] and [rad]."""
@@ -82,9 +81,9 @@ is planned anew while a motion goes on may follow the rest within a tenth of a s
 EDGES, SHARES, ROOM = (0.08, 0.06, 0.04, 0.03, 0.02), (0.6, 0.5, 0.7, 0.45), 0.06
 """Edges of a box in the way as shares of the arm's reach, the largest that is possible is taken;
 where on a path it appears; and its least distance from both ends, as a share of the reach."""
-LEAST_REACH, LEAST_SWING, FAR = 0.05, 0.25, 1.0
-"""Reach of an arm that is shorter in [m]; least way of the tip around a box as a share of it; and
-the distance beyond which all count as this in [m]."""
+LEAST_REACH, LEAST_WAY, FAR = 0.05, 0.3, 1.0
+"""Reach of an arm that is shorter in [m]; least way of a joint to a pose in [rad] or [m]; and the
+distance beyond which all count as this in [m]."""
 GAP, APPROACH = 0.003, 0.1
 """Room below the part in [m]; straight approach and retreat as a share of the reach."""
 PART, PILLAR, VISITOR = 'part', 'pillar', 'visitor'
@@ -189,25 +188,8 @@ CELLS = {
 """Cells of the robots here, by their folder."""
 
 
-@dataclass(frozen=True)
-class Swing:
-    """A motion around a box, for an arm without a cell: from one pose of the SRDF to another.
-
-    Attributes:
-        begin: Joint positions at its begin in [rad] or [m].
-        end: Joint positions at its end.
-        inside: Joint positions at which the arm touches the box.
-        box: The box.
-    """
-
-    begin: Array
-    end: Array
-    inside: Array
-    box: CollisionObject
-
-
 class Plan(ArmDemo):
-    """Pick, place, a box in the way, a blocked goal; without a cell a motion around a box."""
+    """Pick, place, a box in the way, a blocked goal; without a cell the box alone."""
 
     beside = ', and move_group'
     label = 'plan'
@@ -239,10 +221,7 @@ class Plan(ArmDemo):
         cell = CELLS.get(robot.name)
         self.cell = cell if cell is not None and cell.group == self.group else None
         self.home = start_pose(self.model)
-        self.swing: Swing | None = None
-        if self.cell is None:
-            self.swing = find_swing(self.model, self.home)
-        elif self.cell.gripper:
+        if self.cell is not None and self.cell.gripper:
             group, joint, opened, _ = self.cell.gripper
             self.model = self.model.with_others({joint: opened})
             self.gripper_action = f'{controller_names(robot, groups)[group]}/gripper_cmd'
@@ -299,11 +278,7 @@ class Plan(ArmDemo):
         if self.cell is not None:
             part = box(PART, self.cell.part, self.cell.part_at(0))
             self._add(*self.cell.obstacles(), part)
-            home = self._joints(self.home)
-        elif self.swing is not None:
-            home = self._joints(self.swing.begin)
-        else:
-            return
+        home = self._joints(self.home)
         self.enter('home, by free motion')
         deadline = time.monotonic() + START_TIMEOUT
         goal = self._attempt(home)
@@ -315,7 +290,7 @@ class Plan(ArmDemo):
         first, motions = len(self.paths), len(self.planning_times)
         if self.cell is None:
             self.add('pick and place', 'left out: no place for it is known for this arm')
-            self._go_around()
+            self._go_there_and_back()
         else:
             self._pick_and_place(self.cell)
         self._judge_viewer(len(self.paths) - first, len(self.planning_times) - motions)
@@ -424,22 +399,16 @@ class Plan(ArmDemo):
         self.add(name, f'{stop}, planned anew in {_ms(planning_time)} ({plans} plans)')
         self._change(CollisionObject(id=VISITOR, operation=CollisionObject.REMOVE))
 
-    def _go_around(self) -> None:
-        """Move around a box, be refused inside of it, and come back around another one."""
-        name = f'{self.group} around a box'
-        self.enter(f'{self.group}: around a box, by free motion')
-        swing = self.swing
-        if swing is None:
-            self.add(name, 'left out: no motion was found for it')
+    def _go_there_and_back(self) -> None:
+        """Move to the farthest pose of the SRDF, and back around a box."""
+        poses = [pose for pose in self.model.poses.values() if self.model.clearance(pose) > GAP]
+        far = max(poses, key=lambda pose: float(np.abs(pose - self.home).max()), default=self.home)
+        if np.abs(far - self.home).max() < LEAST_WAY:
+            self.add('box in the way', 'left out: the SRDF has no pose far from home')
             return
-        begin = self._joints(swing.begin)
-        self._go(name, begin, FREE)
-        self._add(swing.box)
-        there = self._go(name, self._joints(swing.end), USUAL)
-        self._refused(f'{self.group}: blocked goal', self._joints(swing.inside), swing.box.id)
-        self._meet(begin)
-        self.add(name, f'planned in {_ms(there)}')
-        self._change(CollisionObject(id=swing.box.id, operation=CollisionObject.REMOVE))
+        self.enter('to a pose of the SRDF, by free motion')
+        self._go('there', self._joints(far), FREE)
+        self._meet(self._joints(self.home))
 
     def _refused(self, name: str, target: Mapping[str, float], obstacle: str) -> None:
         """Judge a goal that is in contact: it is refused, the obstacle is named, nothing moves."""
@@ -769,29 +738,6 @@ def box_ahead(model: RobotModel, rows: Sequence[Array]) -> CollisionObject | Non
         room = min(distance_of(model, thing, each) for each in (rows[0], rows[-1]))
         if distance_of(model, thing, at) < 0.0 and room > ROOM * reach:
             return thing
-    return None
-
-
-def find_swing(model: RobotModel, home: Array) -> Swing | None:
-    """Return a motion between poses that a box makes worth planning; None where none is found."""
-    planner, reach = Planner(model), max(model.reach, LEAST_REACH)
-    poses, until = [home, *model.poses.values()], time.monotonic() + SEARCH_TIME
-    for begin, end in permutations(poses, 2):
-        if time.monotonic() > until:
-            break  # an SRDF with many poses
-        tips = (model.pose(each).position for each in (begin, end))
-        if math.dist(*tips) < LEAST_SWING * reach:
-            continue
-        for edge in EDGES:
-            inside = 0.5 * (begin + end)
-            thing = cube_at(model, f'{model.group}_box', edge * reach, inside)
-            room = min(distance_of(model, thing, each) for each in (begin, end))
-            if distance_of(model, thing, inside) >= 0.0 or room <= ROOM * reach:
-                continue
-            request = MotionRequest(begin, [JointGoal(end)], timeout=2.0)
-            with contextlib.suppress(PlanningError):
-                planner.plan(request, with_box(model, thing))
-                return Swing(begin, end, inside, thing)
     return None
 
 

@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Whether motions of a search are free: straight ones quickly, paths with the last word.
-
-Most that are not free are found by a few looks far apart, which pinocchio's broad phase answers
-with yes or no. What passes them is measured by :class:`arm_planning.validity.ValidityCheck`.
-"""
+"""Whether motions of a search are free of contact, and heed what holds on the path."""
 
 from __future__ import annotations
 
@@ -13,16 +9,12 @@ from functools import lru_cache
 import math
 
 import numpy as np
-import pinocchio as pin
 
 from arm_model import Array
 from arm_trajectory import Path
 
 from ..constraints import ConstraintCheck
-from ..validity import MARGIN, ValidityCheck, Violation
-
-PROBE = 0.25
-"""Greatest motion of a shape against another between two looks of the broad phase in [m]."""
+from ..validity import ValidityCheck, Violation
 
 STRIDE = 0.15  # length of a motion between two states that heed constraints in [rad]
 MIN_PROGRESS = 0.01  # by how much such a motion comes nearer to its target at least in [rad]
@@ -46,19 +38,6 @@ class MotionCheck:
         """
         self.constraints, self._check = constraints, check
         self.required, self.compiled = check.required(*ends), check.compiled
-        if self.compiled is not None:
-            return
-        scene = check.scene
-        self._kinematics = scene.kinematics
-        self._model, self._data = scene.kinematics.native, scene.kinematics.native.createData()
-        self._rates = scene.distance_rate_bounds
-        results = scene.geometry.createData()
-        for request in results.collisionRequests:
-            request.security_margin = float(self.required.min(initial=MARGIN))
-        self._scene, self._results = scene, results  # the broad phase refers to them
-        self._broad_phase = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(
-            self._model, scene.geometry, results
-        )
 
     def admits(self, goal: Array) -> bool:
         """Whether a state that was no end when the search began may be one.
@@ -68,31 +47,13 @@ class MotionCheck:
         """
         return bool((self._check.required(goal) >= self.required).all())
 
-    def free(self, positions: Array) -> bool:
-        """Whether no pair touches, as far as the broad phase sees.
-
-        It passes over pairs which are nearer than they may be while their boxes do not touch.
-        """
-        if self.compiled is not None:
-            return self.compiled.clear(positions, float(self.required.min(initial=MARGIN)))
-        expanded = self._kinematics.expanded(positions)
-        return not pin.computeCollisions(
-            self._model, self._data, self._broad_phase, expanded, True
-        )
-
     def clear(self, begin: Array, end: Array) -> bool:
         """Whether a straight motion is free everywhere.
 
         Args:
             begin: Joint positions in [rad] (n), known to be free.
         """
-        way = end - begin
-        if self.compiled is None:
-            motion = float((self._rates @ np.abs(way)).max(initial=0.0))
-            places = begin + _coarse_first(math.ceil(motion / PROBE) + 1)[:, None] * way
-            if not all(map(self.free, places)):
-                return False
-        if self.constraints is not None and not _heeded(self.constraints, begin, way):
+        if self.constraints is not None and not _heeded(self.constraints, begin, end - begin):
             return False
         return self._check.near(begin, end, self.required) is None
 
@@ -139,7 +100,7 @@ def _heeded(constraints: ConstraintCheck, begin: Array, way: Array) -> bool:
 
 @lru_cache(maxsize=1024)
 def _coarse_first(count: int) -> Array:
-    """Return the shares 1/count .. 1 so that early ones are far apart: a contact is found soon."""
+    """Return the shares 1/count .. 1, of which early ones are far apart."""
     bits = max(count - 1, 1).bit_length()
     numbers = np.arange(1 << bits)
     reversed_bits = np.zeros_like(numbers)

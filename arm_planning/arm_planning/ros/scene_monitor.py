@@ -25,6 +25,7 @@ from std_srvs.srv import Empty
 from arm_model import Array, combined, Pose
 from arm_model.ros import scene_change, TfListener
 from node_runner import LATCHED
+from robot_primitives import JointStateStore
 
 from ..exceptions import coded, PlanningCode, PlanningError
 from .robot_groups import RobotGroups
@@ -66,10 +67,9 @@ class SceneMonitor:
             outer_frames=self._outer_frame,
         )
         self._node = node
-        self._places: dict[str, float] = {}
-        self._arrivals: dict[str, float] = {}
-        self._marks: dict[str, tuple[float, float]] = {}  # places of a while ago, and when
-        self._speeds: dict[str, float] = {}
+        self._states = JointStateStore(robot.all_joints)
+        self._before = self._mark = self._states.samples()  # from which speeds are measured
+        self._marked = -math.inf
         self._listeners: list[Callable[[], None]] = []
         # first: a controller that has found it does not read the meshes of the other one
         self._collisions = node.create_publisher(PlanningScene, 'collision_scene', LATCHED)
@@ -106,12 +106,19 @@ class SceneMonitor:
                     PlanningCode.CONTROL_FAILED, f'no joint {joint!r}; joints: {known}'
                 )
         self._check_received(joints)
-        return {joint: self._places[joint] for joint in joints}
+        places = self._places()
+        return {joint: places[joint] for joint in joints}
 
     def is_moving(self, group: str) -> bool:
         """Whether a joint of a group moves, such as after a jog; not where it is unknown."""
         joints = self.robot.group_joints().get(group, ())
-        return any(self._speeds.get(joint, 0.0) > REST_SPEED for joint in joints)
+        fresh = self._states.samples(time.monotonic() - STATE_TIMEOUT)
+        known = [each for each in joints if each in fresh and each in self._before]
+        return any(
+            abs(fresh[each].position - self._before[each].position)
+            > REST_SPEED * (fresh[each].time - self._before[each].time)
+            for each in known
+        )
 
     def positions(self, message: Any = None) -> Array:  # noqa: ANN401  # messages have no type
         """Return the positions of all joints of the robot in [rad].
@@ -123,7 +130,7 @@ class SceneMonitor:
             PlanningError: It is refused.
         """
         given = {} if message is None else joints_of(message, self.robot.all_joints)
-        return self.robot.positions({**self._places, **given})
+        return self.robot.positions({**self._places(), **given})
 
     def start(self, state: Any, group: str = '') -> tuple[SceneSnapshot, Array]:  # noqa: ANN401
         """Return the scene in which a request begins, and the positions of all joints in [rad].
@@ -154,10 +161,10 @@ class SceneMonitor:
 
     def _check_received(self, joints: Sequence[str], given: Sequence[str] | None = None) -> None:
         """Refuse joints that were never received or are too old, and are not given."""
-        now = time.monotonic()
+        now, samples = time.monotonic(), self._states.samples()
         other = '' if given is None else ', or give the start state'
         for joint in joints:
-            age = now - self._arrivals.get(joint, -math.inf)
+            age = now - samples[joint].time if joint in samples else math.inf
             if joint not in (given or ()) and age > STATE_TIMEOUT:
                 topic = self._node.resolve_topic_name('joint_states')
                 since = f'{age:.1f} s old' if math.isfinite(age) else 'not received yet'
@@ -183,15 +190,15 @@ class SceneMonitor:
         self._change('clear_octomap', scene)
         return response
 
+    def _places(self) -> dict[str, float]:
+        return {name: each.position for name, each in self._states.samples().items()}
+
     def _take_joints(self, message: JointState) -> None:
         now = time.monotonic()
-        for name, position in zip(message.name, message.position, strict=False):
-            if position == position:  # noqa: PLR0124  # not NaN
-                self._places[name], self._arrivals[name] = position, now
-                place, since = self._marks.setdefault(name, (position, now))
-                if now - since >= SPEED_PERIOD:
-                    self._speeds[name] = abs(position - place) / (now - since)
-                    self._marks[name] = position, now
+        self._states.receive(message.name, message.position, [], now)
+        if now - self._marked >= SPEED_PERIOD:
+            self._before, self._mark = self._mark, self._states.samples()
+            self._marked = now
 
     def _change_by(self, topic: str, as_scene: Any) -> Callable[[Any], None]:  # noqa: ANN401
         def receive(message: Any) -> None:  # noqa: ANN401
