@@ -267,6 +267,9 @@ def test_a_displacement_goes_at_its_own_speed() -> None:
         assert points[-1].state.position[0] - ready('prbt')[0] == pytest.approx(0.5, abs=1e-9)
     with pytest.raises(CommandError, match='above 0'):
         core_commands.move_by(core, {'prbt_joint_1': 0.5}, 0.0)
+    core_commands.override(core, 0.0)
+    with pytest.raises(CommandError, match='override is 0'):
+        core_commands.move_by(core, {'prbt_joint_1': 0.5})
 
 
 def test_a_pause_holds_everything() -> None:
@@ -278,6 +281,8 @@ def test_a_pause_holds_everything() -> None:
     assert not stream(core, 1.0)[-1].state.moving
     with pytest.raises(CommandError, match='resume first'):
         core_commands.jog(core, {'prbt_joint_1': 0.1}, 1.3)
+    with pytest.raises(CommandError, match='resume first'):
+        core_commands.move_by(core, {'prbt_joint_1': 0.1})
     core_commands.resume(core)
     assert stream(core, 3.0)[-1].state.position[0] == pytest.approx(1.0)
 

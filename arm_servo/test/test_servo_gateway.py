@@ -10,7 +10,7 @@ from dataclasses import replace
 import threading
 from typing import Any
 
-from hypothesis import example, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
@@ -27,7 +27,6 @@ from arm_servo import (
     NotReadyError,
     PauseRequest,
     Source,
-    SpeedRequest,
     StopRequest,
 )
 from arm_servo.controllers.target import SingleTarget
@@ -35,7 +34,6 @@ from arm_servo.core.gateway import start_worker
 from arm_servo.core.motion_queue import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand
 from arm_servo.core.preparation import CommandBasis, Prepared
 from arm_servo.core.requests import by_joint
-from arm_servo.core.safety_filter import SafetyFilter
 from arm_servo.core.snapshot import MAX_CYCLE_AGE
 from arm_trajectory import GoalCode, GoalError, GoalPoint, StateMovedError, TrajectoryGoal
 
@@ -71,15 +69,6 @@ def begun(drives: Drives, command: MotionCommand, most: int = 200) -> None:
             return
         drives.run()
     raise AssertionError(f'it has not begun after {most} cycles')
-
-
-def rates(drives: Drives, first: int) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Return the greatest change of speed of each joint in [rad/s2]."""
-    path = np.array(drives.path)[first:]
-    most: np.ndarray[tuple[int], np.dtype[np.float64]] = (
-        np.abs(np.diff(path, 2, axis=0)).max(axis=0) / PERIOD**2
-    )
-    return most
 
 
 def test_a_jog_that_ends_while_a_long_goal_is_planned_does_no_harm() -> None:
@@ -126,37 +115,6 @@ def test_an_arm_that_was_moved_meanwhile_is_planned_for_again(always: bool) -> N
     assert plans >= 2
     drives.run(5)
     assert drives.path[-1] == pytest.approx(execution.feedback.desired.position, abs=0.02)
-
-
-def test_refusals_reach_whoever_asked() -> None:
-    """What is wrong with the goal, and with the drives; attached again, a goal at once counts."""
-    drives = ready()
-    wrong = drives.gateway.request(TrajectoryGoal(['elbow'], []))
-    begun(drives, wrong)
-    assert isinstance(wrong.future.exception(), GoalError)
-    drives.source.released(JOINT, Refusal(RefusalCause.SINGLE_TARGET))
-    drives.run(3)
-    blocked = drives.gateway.request(wave(drives, 40))
-    begun(drives, blocked)
-    with pytest.raises(NotReadyError, match=JOINT):
-        blocked.future.result()
-    drives.attach()  # and at once a goal, before the next cycle
-    accepted = drives.gateway.request(wave(drives, 40))
-    begun(drives, accepted)
-    assert accepted.future.result() is not None
-
-
-def test_displacements_add_up_and_are_reached() -> None:
-    """Ten at once, of which each waits for the one before."""
-    drives = ready()
-    begin = drives.path[-1]
-    commands = [move_by(drives.gateway, {JOINT: 0.02}) for _ in range(10)]
-    begun(drives, commands[-1])
-    drives.run(100)
-    assert [command.future.exception() for command in commands] == [None] * 10
-    assert drives.gateway.snapshot.source is Source.NONE
-    assert drives.path[-1][0] - begin[0] == pytest.approx(0.2, abs=1e-6)
-    assert np.array(drives.path)[-1, 1:] == pytest.approx(begin[1:], abs=1e-6)
 
 
 def test_no_thread_is_started_in_a_cycle(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -252,19 +210,6 @@ def test_a_jog_that_is_refused_ends_nothing() -> None:
     assert drives.path[-1][0] - begin[0] == pytest.approx(0.1, abs=1e-6)
 
 
-def test_a_jog_that_has_expired_is_refused_and_does_not_end_a_trajectory() -> None:
-    """A command that is older than its time-out is none."""
-    drives = ready()
-    command = drives.gateway.request(wave(drives, 20))
-    begun(drives, command)
-    drives.run(30)
-    late = jog(drives.gateway, {JOINT: 0.4}, drives.now, -0.05)
-    drives.run(2)
-    with pytest.raises(NotReadyError, match=r'expired 0\.06 s'):
-        late.result(0.0)
-    assert drives.gateway.snapshot.source is Source.TRAJECTORY
-
-
 @pytest.mark.parametrize(
     'stops', [[StopRequest()], [PauseRequest(), PauseRequest(is_paused=False)]]
 )
@@ -314,68 +259,6 @@ def test_a_zero_stops_its_jog_however_late_the_cycle_carries_it_out() -> None:
     assert drives.path[-1].tolist() == drives.path[-2].tolist()
 
 
-@pytest.mark.parametrize('is_overridden', [False, True])
-def test_displacements_in_a_pause_are_refused_and_do_not_pile_up(is_overridden: bool) -> None:
-    """None of them moves the arm at the resume, when nobody expects it any more."""
-    drives = ready()
-    if is_overridden:
-        drives.gateway.command(SpeedRequest(0.0))
-    else:
-        drives.gateway.command(PauseRequest())
-    drives.run()
-    commands = [move_by(drives.gateway, {JOINT: 0.02}) for _ in range(10)]
-    drives.run(30)
-    for command in commands:
-        with pytest.raises(CommandError, match='override is 0' if is_overridden else 'paused'):
-            command.future.result(0.0)
-    begin = drives.path[-1].tolist()
-    drives.gateway.command(PauseRequest(is_paused=False))
-    drives.gateway.command(SpeedRequest(1.0))
-    drives.run(50)
-    assert drives.path[-1].tolist() == begin
-    move_by(drives.gateway, {JOINT: 0.02})
-    drives.run(50)
-    assert drives.path[-1][0] - begin[0] == pytest.approx(0.02, abs=1e-6)
-
-
-@pytest.mark.parametrize('worked', [0, 1, 2])
-def test_when_the_core_raises_every_command_ends_with_words(
-    worked: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """No further cycle comes: what moves, is prepared or waits ends once, and says why."""
-    worker = SteppedWorker()
-    drives = ready(worker)
-    commands = [drives.gateway.request(wave(drives, 20)) for _ in range(3)]
-    for _ in range(worked):
-        drives.run(4)
-        worker.run()
-    drives.run(5)
-    jogged = jog(drives.gateway, {JOINT: 0.0}, drives.now)
-    ends: list[str] = []
-    for command in commands:
-        command.ended.add_done_callback(lambda future: ends.append(future.result().reason))
-
-    def fail(*_: object, **_kwargs: object) -> None:
-        raise ArithmeticError('no number')
-
-    monkeypatch.setattr(SafetyFilter, 'step', fail)
-    with pytest.raises(ArithmeticError):
-        drives.run()
-    while worker.run():  # what was planned meanwhile has no cycle to begin in
-        pass
-    assert len(ends) == len(commands)
-    began = max(worked - 1, 0)
-    assert all('ArithmeticError: no number' in reason for reason in ends[began:])
-    assert jogged.done()
-    assert drives.gateway.snapshot.set_point is None
-    assert 'ArithmeticError' in drives.gateway.snapshot.blocked
-    monkeypatch.undo()
-    drives.attach()
-    drives.run(20)
-    assert len(ends) == len(commands)
-    assert drives.gateway.snapshot.source is Source.NONE
-
-
 def test_a_displacement_that_the_safety_filter_stops_ends_with_words() -> None:
     """The target state ends, and with it the command, where links would come too near."""
     drives = ready()
@@ -421,43 +304,6 @@ def test_a_stamped_trajectory_keeps_its_times(
     assert execution is not None
     due = drives.now - requested + age
     assert execution.feedback.time == pytest.approx(due, abs=1.6 * PERIOD)
-
-
-@pytest.mark.parametrize('points', [20, 60])
-@given(
-    st.integers(0, 40),
-    st.sampled_from([(1.0, 0.5), (0.4, 1.0), (1.0, 0.1), (0.5, 0.0)]),
-    st.integers(0, 12),
-)
-@example(14, (0.4, 1.0), 9)
-@settings(max_examples=15, deadline=None)
-def test_a_trajectory_takes_over_while_the_speed_override_changes(
-    points: int, since: int, speeds: tuple[float, float], worked: int
-) -> None:
-    """Where the first one will be is foreseen with the change of its speed."""
-    worker = SteppedWorker()
-    drives = ready(worker)
-    drives.gateway.command(SpeedRequest(speeds[0]))
-    far = drives.path[-1] + np.array([2.0, 0, 0, 0, 0, 0, 0])
-    swing = TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(2.5, far.tolist())])
-    drives.gateway.request(swing)
-    drives.run(2)
-    worker.run()
-    drives.run(120)
-    drives.gateway.command(SpeedRequest(speeds[1]))
-    drives.run(since)
-    begin = len(drives.path) - 2
-    there = GoalPoint(6.0, (drives.path[-1] + 0.1).tolist())
-    steps = [GoalPoint(4.0 + 0.02 * n, (drives.path[-1] + 0.1).tolist()) for n in range(points)]
-    goal = TrajectoryGoal(drives.gateway.model.joints, [*steps, there])
-    command = drives.gateway.request(goal)
-    for cycle in range(60):
-        if cycle >= worked:
-            worker.run()
-        drives.run()
-    assert command.execution is not None, command.future.exception(0.0)
-    drives.run(60)
-    assert (rates(drives, begin) <= 1.02 * drives.gateway.model.limits.acceleration).all()
 
 
 def test_a_long_goal_that_is_refused_at_rest_does_not_end_a_jog(

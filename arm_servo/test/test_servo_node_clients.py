@@ -12,8 +12,8 @@ import numpy as np
 from servo_drives import Drives
 
 from arm_servo import JogRequest, Source, TwistCommand
+from arm_servo.core.requests import CommandType
 from arm_servo.ros.refusals import Refusals
-from arm_servo.ros.servo.modes import CommandKind
 from arm_servo.ros.servo.node import Servo
 
 
@@ -42,7 +42,7 @@ class Commands:
 
         message = TwistStamped()
         message.header.frame_id = frame
-        self.servo._take(CommandKind.TWIST, convert, message)
+        self.servo._take(CommandType.TWIST, convert, message)
 
 
 def test_zeros_in_another_frame_do_not_touch_a_jog() -> None:
@@ -69,7 +69,7 @@ def test_whatever_a_command_raises_ends_that_command_only() -> None:
     def fail(_message: object, _sent: float) -> JogRequest:
         raise ZeroDivisionError('no such luck')
 
-    commands.servo._take(CommandKind.TWIST, fail, TwistStamped())
+    commands.servo._take(CommandType.TWIST, fail, TwistStamped())
     assert 'ZeroDivisionError: no such luck' in commands.servo._refusals.fresh(0.0)
     assert 'Traceback' in commands.logged[0]
     commands.servo._prepare = lambda: 1 // 0

@@ -26,210 +26,13 @@ from arm_servo.ros.topics_backend import build_motion
 
 pytestmark = pytest.mark.slow
 
-JOINTS = list(robot('panda').joints)
 GROUP = 'panda_arm'
 CONTROLLER = f'{GROUP}_controller'
 
-SERVO: dict[str, Any] = {
-    'moveit_servo': {
-        'thread_priority': 40,
-        'publish_period': 0.01,
-        'max_expected_latency': 0.1,
-        'move_group_name': GROUP,
-        'active_subgroup': '',
-        'pose_command_in_topic': '~/pose_target_cmds',
-        'cartesian_command_in_topic': '~/delta_twist_cmds',
-        'joint_command_in_topic': '~/delta_joint_cmds',
-        'command_in_type': 'unitless',
-        'scale': {'linear': 0.4, 'rotational': 0.8, 'joint': 0.5},
-        'incoming_command_timeout': 0.1,
-        'apply_twist_commands_about_ee_frame': True,
-        'pose_tracking': {'linear_tolerance': 0.001, 'angular_tolerance': 0.01},
-        'status_topic': '~/status',
-        'command_out_topic': '/panda_arm_controller/joint_trajectory',
-        'command_out_type': 'trajectory_msgs/JointTrajectory',
-        'publish_joint_positions': True,
-        'publish_joint_velocities': True,
-        'publish_joint_accelerations': False,
-        'monitored_planning_scene_topic': '/planning_scene',
-        'joint_topic': '/joint_states',
-        'check_octomap_collisions': False,
-        'is_primary_planning_scene_monitor': True,
-        'use_smoothing': True,
-        'smoothing_filter_plugin_name': 'online_signal_smoothing::ButterworthFilterPlugin',
-        'check_collisions': True,
-        'self_collision_proximity_threshold': 0.01,
-        'scene_collision_proximity_threshold': 0.02,
-        'collision_check_rate': 10.0,
-        'lower_singularity_threshold': 17.0,
-        'hard_stop_singularity_threshold': 30.0,
-        'leaving_singularity_threshold_multiplier': 2.0,
-        'singularity_step_scale': 0.01,
-        'halt_all_joints_in_joint_mode': True,
-        'halt_all_joints_in_cartesian_mode': True,
-        'joint_limit_margins': [0.1],
-        'override_velocity_scaling_factor': 0.0,
-    },
-    'update_period': 0.01,
-    'planning_group_name': GROUP,
-    'butterworth_filter_coeff': 1.5,
-}
-"""moveit_servo of Jazzy with its defaults."""
-
-SERVO_HUMBLE: dict[str, Any] = {
-    'moveit_servo': {
-        'use_gazebo': False,
-        'planning_frame': 'panda_link0',
-        'ee_frame_name': 'panda_link8',
-        'robot_link_command_frame': 'panda_link0',
-        'publish_period': 0.034,
-        'low_latency_mode': False,
-        'num_outgoing_halt_msgs_to_publish': 4,
-        'joint_limit_margin': 0.1,
-    }
-}
-
-CONTROL: dict[str, Any] = {
-    'joints': JOINTS,
-    'command_joints': JOINTS,
-    'command_interfaces': ['position'],
-    'state_interfaces': ['position', 'velocity'],
-    'speed_scaling': {
-        'initial_scaling_factor': 1.0,
-        'state_interface': '',
-        'command_interface': '',
-    },
-    'allow_partial_joints_goal': False,
-    'open_loop_control': False,
-    'interpolate_from_desired_state': False,
-    'allow_integration_in_goal_trajectories': False,
-    'set_last_command_interface_value_as_state_on_activation': True,
-    'action_monitor_rate': 20.0,
-    'interpolation_method': 'splines',
-    'allow_nonzero_velocity_at_trajectory_end': False,
-    'cmd_timeout': 0.0,
-    'gains': {
-        joint: {
-            'p': 0.0,
-            'i': 0.0,
-            'd': 0.0,
-            'i_clamp': 0.0,
-            'i_clamp_max': float('inf'),
-            'i_clamp_min': float('-inf'),
-            'ff_velocity_scale': 0.0,
-            'u_clamp_max': float('inf'),
-            'u_clamp_min': float('-inf'),
-            'antiwindup_strategy': 'legacy',
-            'tracking_time_constant': 0.0,
-            'error_deadband': 0.0,
-        }
-        for joint in JOINTS
-    },
-    'constraints': {
-        'stopped_velocity_tolerance': 0.01,
-        'goal_time': 0.0,
-        'decelerate_on_cancel': False,
-        **{
-            joint: {'trajectory': 0.0, 'goal': 0.0, 'max_deceleration_on_cancel': 0.0}
-            for joint in JOINTS
-        },
-    },
-}
-"""joint_trajectory_controller of Jazzy with its defaults."""
-
-BROADCASTER: dict[str, Any] = {
-    'use_local_topics': False,
-    'use_urdf_to_filter': True,
-    'frame_id': 'base_link',
-    'map_interface_to_joint_state': {
-        'position': 'position',
-        'velocity': 'velocity',
-        'effort': 'effort',
-    },
-    'publish_dynamic_joint_states': True,
-}
-
-MANAGER: dict[str, Any] = {
-    'update_rate': 100,
-    CONTROLLER: {'type': 'joint_trajectory_controller/JointTrajectoryController'},
-    'joint_state_broadcaster': {'type': 'joint_state_broadcaster/JointStateBroadcaster'},
-}
-
-MOVE_GROUP: dict[str, Any] = {
-    'robot_description_name': 'robot_description',
-    'robot_description_kinematics': {
-        GROUP: {
-            'kinematics_solver': 'kdl_kinematics_plugin/KDLKinematicsPlugin',
-            'kinematics_solver_search_resolution': 0.005,
-            'kinematics_solver_timeout': 0.005,
-            'kinematics_solver_attempts': 3,
-            'kinematics_solver_ik_links': ['panda_link8'],
-            'position_only_ik': False,
-        }
-    },
-    'robot_description_planning': {
-        'default_velocity_scaling_factor': 0.1,
-        'default_acceleration_scaling_factor': 0.1,
-        'joint_limits': {
-            joint: {
-                'has_velocity_limits': True,
-                'max_velocity': 2.0,
-                'has_acceleration_limits': True,
-                'max_acceleration': 3.0,
-                'has_jerk_limits': False,
-            }
-            for joint in JOINTS
-        },
-        'cartesian_limits': {
-            'max_trans_vel': 1.0,
-            'max_trans_acc': 2.25,
-            'max_trans_dec': -5.0,
-            'max_rot_vel': 1.57,
-        },
-    },
-    'planning_pipelines': ['ompl', 'pilz_industrial_motion_planner'],
-    'default_planning_pipeline': 'ompl',
-    'ompl': {
-        'planning_plugins': ['ompl_interface/OMPLPlanner'],
-        'request_adapters': ['default_planning_request_adapters/ResolveConstraintFrames'],
-        'response_adapters': ['default_planning_response_adapters/ValidateSolution'],
-        'start_state_max_bounds_error': 0.1,
-        'planner_configs': {
-            'RRTConnectkConfigDefault': {'type': 'geometric::RRTConnect', 'range': 0.0},
-            'PRMkConfigDefault': {'type': 'geometric::PRM', 'max_nearest_neighbors': 10},
-        },
-        GROUP: {
-            'planner_configs': ['RRTConnectkConfigDefault', 'PRMkConfigDefault'],
-            'projection_evaluator': 'joints(panda_joint1,panda_joint2)',
-            'longest_valid_segment_fraction': 0.005,
-        },
-    },
-    'pilz_industrial_motion_planner': {
-        'planning_plugins': ['pilz_industrial_motion_planner/CommandPlanner'],
-        'default_planner_config': 'PTP',
-        'capabilities': 'pilz_industrial_motion_planner/MoveGroupSequenceAction',
-    },
-    'moveit_controller_manager': 'moveit_simple_controller_manager/MoveItSimpleControllerManager',
-    'moveit_simple_controller_manager': {
-        'controller_names': [CONTROLLER],
-        CONTROLLER: {
-            'action_ns': 'follow_joint_trajectory',
-            'type': 'FollowJointTrajectory',
-            'default': True,
-            'joints': JOINTS,
-        },
-    },
-    'trajectory_execution': {
-        'allowed_execution_duration_scaling': 1.2,
-        'allowed_goal_duration_margin': 0.5,
-        'allowed_start_tolerance': 0.01,
-    },
-    'publish_planning_scene': True,
-    'publish_geometry_updates': True,
-    'publish_state_updates': True,
-    'publish_transforms_updates': True,
-}
-"""Of move_group and its planners; launch files hand them to the servo, too."""
+UPSTREAM: dict[str, dict[str, Any]] = yaml.safe_load(
+    (Path(__file__).parent / 'upstream_parameters.yaml').read_text(encoding='utf-8')
+)
+SERVO, MOVE_GROUP, CONTROL = (UPSTREAM[name] for name in ('servo', 'move_group', 'control'))
 
 
 class NoAliases(yaml.SafeDumper):
@@ -250,11 +53,11 @@ def document(**nodes: dict[str, Any]) -> dict[str, Any]:
     [
         {'servo_node': SERVO},
         {'servo_node': SERVO | MOVE_GROUP},
-        {'servo_node': SERVO_HUMBLE | MOVE_GROUP},
+        {'servo_node': UPSTREAM['servo_humble'] | MOVE_GROUP},
         {
             CONTROLLER: CONTROL,
-            'joint_state_broadcaster': BROADCASTER,
-            'controller_manager': MANAGER,
+            'joint_state_broadcaster': UPSTREAM['broadcaster'],
+            'controller_manager': UPSTREAM['manager'],
         },
         {'/**': MOVE_GROUP},
     ],
@@ -281,7 +84,7 @@ def test_nodes_begin_with_upstream_parameters(
         '/**': arm | MOVE_GROUP,
         'servo_node': SERVO,
         CONTROLLER: CONTROL,
-        'controller_manager': MANAGER,
+        'controller_manager': UPSTREAM['manager'],
     }
     file.write_text(yaml.dump(document(**nodes), Dumper=NoAliases), encoding='utf-8')
     rclpy.init(args=['--ros-args', '--params-file', str(file)], domain_id=isolation.domain_id)

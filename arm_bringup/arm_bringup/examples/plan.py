@@ -81,8 +81,8 @@ is planned anew while a motion goes on may follow the rest within a tenth of a s
 EDGES, SHARES, ROOM = (0.08, 0.06, 0.04, 0.03, 0.02), (0.6, 0.5, 0.7, 0.45), 0.06
 """Edges of a box in the way as shares of the arm's reach, the largest that is possible is taken;
 where on a path it appears; and its least distance from both ends, as a share of the reach."""
-LEAST_REACH, LEAST_WAY, FAR = 0.05, 0.3, 1.0
-"""Reach of an arm that is shorter in [m]; least way of a joint to a pose in [rad] or [m]; and the
+LEAST_REACH, LEAST_WAY, FAR = 0.05, 0.25, 1.0
+"""Reach of an arm that is shorter in [m]; least way of the tip to a pose as a share of it; and the
 distance beyond which all count as this in [m]."""
 GAP, APPROACH = 0.003, 0.1
 """Room below the part in [m]; straight approach and retreat as a share of the reach."""
@@ -383,7 +383,8 @@ class Plan(ArmDemo):
         visitor = box_ahead(self.model, rows) if rows else None
         if visitor is None:
             self._finish(name, goal, target)
-            self.problem(name, 'no place was found for a box in its way')
+            report = self.add if self.cell is None else self.problem
+            report(name, 'no place was found for a box in its way')
             return
         self.enter('a box is in the way: stop before it, plan anew, go around')
         appeared = time.monotonic()
@@ -402,8 +403,13 @@ class Plan(ArmDemo):
     def _go_there_and_back(self) -> None:
         """Move to the farthest pose of the SRDF, and back around a box."""
         poses = [pose for pose in self.model.poses.values() if self.model.clearance(pose) > GAP]
-        far = max(poses, key=lambda pose: float(np.abs(pose - self.home).max()), default=self.home)
-        if np.abs(far - self.home).max() < LEAST_WAY:
+        tip = self.model.pose(self.home).position
+
+        def way(pose: Array) -> float:
+            return math.dist(self.model.pose(pose).position, tip)
+
+        far = max(poses, key=way, default=self.home)
+        if way(far) < LEAST_WAY * max(self.model.reach, LEAST_REACH):
             self.add('box in the way', 'left out: the SRDF has no pose far from home')
             return
         self.enter('to a pose of the SRDF, by free motion')

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
+from enum import IntEnum
 import math
 
 import numpy as np
@@ -20,6 +21,14 @@ from ..controllers.controller import Controller, Source
 from ..controllers.jog import Command, JointCommand, PoseCommand, TwistCommand
 
 ROTATION_TOLERANCE = 1e-3  # how far a rotation may be from one, for rounding of quaternions
+
+
+class CommandType(IntEnum):
+    """Kinds of commands, numbered as in moveit_msgs/srv/ServoCommandType."""
+
+    JOINT_JOG = 0
+    TWIST = 1
+    POSE = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)

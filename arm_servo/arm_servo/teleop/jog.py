@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from enum import auto, Enum, IntEnum
+from enum import auto, Enum
 import math
 
 Vector = tuple[float, float, float]
@@ -15,18 +15,15 @@ UNITLESS = 'unitless'
 """command_in_type of a servo that multiplies by its scales itself."""
 
 
+ServoReport = tuple[int, str]
+"""Code of a servo's status, where 0 is well and a negative one refuses; and the same in words."""
+
+
 class Frame(Enum):
     """Along whose axes the tool is jogged."""
 
     BASE = 'base'
     TOOL = 'tool'
-
-
-class CommandType(IntEnum):
-    """Kinds of commands that a servo is switched to; as in moveit_msgs/srv/ServoCommandType."""
-
-    JOINT_JOG = 0
-    TWIST = 1
 
 
 class ServoRequest(Enum):

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from operator_input import ProgramRequest
 
-from .jog import CartesianJog, CommandType, Frame, ServoRequest
+from ..core.requests import CommandType
+from .jog import CartesianJog, Frame, ServoRequest
 
 TOOL = {
     'up': CartesianJog(linear=(1.0, 0.0, 0.0)),

@@ -5,21 +5,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Protocol
+from typing import TYPE_CHECKING
 
-from arm_model import ArmNames
 from operator_input import (
     CommandStream,
     HeldKeys,
     KeyAction,
     KeyEvent,
     KeyMapping,
-    Robot,
     StatusPart,
     Style,
 )
 
-from .jog import CartesianJog, Frame, Jog, JointJog, Scales, Steps, Vector
+from .jog import CartesianJog, Frame, Jog, JointJog, ServoReport, Steps, Vector
 from .key_map import (
     FRAMES,
     HELP,
@@ -34,34 +32,13 @@ from .key_map import (
     TOOL,
 )
 
+if TYPE_CHECKING:
+    from .servo_link import ServoLink
+
 SPEED_STEP_FACTOR = 1.25  # of a speed key
 MIN_SPEED = 0.01  # share of full speed
 TAP_SPEED_FACTOR = 0.2  # while a key may be up already: without releases that takes 0.5 s
 NOTE_PERIOD = 1.0  # in which a stroke that moves nothing is not reported again
-
-ServoReport = tuple[int, str]
-"""Code of a servo's status, where 0 is well and a negative one refuses; and the same in words."""
-
-
-class WatchedServo(Robot, Protocol):
-    """The servo as keys and the status line need it.
-
-    Attributes:
-        names: Names of the arm's parts, as far as they are known.
-        scales: Its full speeds.
-        paused: Whether the person paused it.
-    """
-
-    names: ArmNames
-    scales: Scales
-    paused: bool
-
-    @property
-    def has_subscriber(self) -> bool:
-        """Whether anything subscribes to the commands."""
-
-    def report(self, now: float) -> ServoReport | None:
-        """Return what the servo reported lately."""
 
 
 class KeyboardTeleop(KeyMapping):
@@ -75,11 +52,11 @@ class KeyboardTeleop(KeyMapping):
     """
 
     introduction = HELP
-    robot: WatchedServo
+    robot: ServoLink
 
     def __init__(
         self,
-        robot: WatchedServo,
+        robot: ServoLink,
         held: HeldKeys,
         stream: CommandStream[Jog],
         speed: float,

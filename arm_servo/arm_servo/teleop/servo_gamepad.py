@@ -15,7 +15,6 @@ from operator_input.gamepad import Axis, Button, Deadman, GamepadState, Grip
 from operator_input.ros import declare_gamepad, run_teleop, TeleopNode
 
 from .jog import CartesianJog, Frame, Jog, JointJog
-from .keyboard_teleop import WatchedServo
 from .servo_link import ServoLink
 
 FRAME_BUTTONS = {Button.SELECT: Frame.BASE, Button.START: Frame.TOOL}
@@ -35,11 +34,11 @@ class GamepadTeleop(DeadmanMapping):
         joint: Place of the joint that the d-pad moves.
     """
 
-    robot: WatchedServo
+    robot: ServoLink
 
     def __init__(
         self,
-        robot: WatchedServo,
+        robot: ServoLink,
         deadman: Deadman,
         stream: CommandStream[Jog],
         speeds: tuple[float, float],

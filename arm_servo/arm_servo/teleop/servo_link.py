@@ -22,8 +22,17 @@ from arm_model import ArmNames, ModelError
 from node_runner import LATCHED, ParameterReader
 from operator_input import CommandStream
 
-from .jog import CommandType, Frame, Jog, JointJog, rest_of, Scales, ServoRequest, Vector
-from .keyboard_teleop import ServoReport
+from ..core.requests import CommandType
+from .jog import (
+    Frame,
+    Jog,
+    JointJog,
+    rest_of,
+    Scales,
+    ServoReport,
+    ServoRequest,
+    Vector,
+)
 from .servo_settings import ServoSettings
 
 FLUSH_TIMEOUT = Duration(nanoseconds=300_000_000)

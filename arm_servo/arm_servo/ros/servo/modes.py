@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from enum import IntEnum
 
 from moveit_msgs.srv import ServoCommandType
 from rclpy.node import Node
@@ -13,13 +12,7 @@ from std_srvs.srv import Empty, SetBool, Trigger
 
 from arm_model import CommandError
 
-
-class CommandKind(IntEnum):
-    """Kinds of commands, numbered as in moveit_msgs/srv/ServoCommandType."""
-
-    JOINT_JOG = 0
-    TWIST = 1
-    POSE = 2
+from ...core.requests import CommandType
 
 
 class ServoModes:
@@ -40,7 +33,7 @@ class ServoModes:
         """
         self.paused = ''
         self._stop_jogging, self._renew = stop, renew
-        self._kind: CommandKind | None = None
+        self._kind: CommandType | None = None
         node.create_service(ServoCommandType, '~/switch_command_type', self._switch)
         node.create_service(SetBool, '~/pause_servo', self._pause)
         node.create_service(Trigger, '~/start_servo', self._start)
@@ -48,7 +41,7 @@ class ServoModes:
         node.create_service(Trigger, '~/unpause_servo', self._start)
         node.create_service(Empty, '~/reset_servo_status', self._reset)
 
-    def admit(self, kind: CommandKind) -> None:
+    def admit(self, kind: CommandType) -> None:
         """Check whether a command is taken.
 
         Raises:
@@ -67,7 +60,7 @@ class ServoModes:
         self, request: ServoCommandType.Request, response: ServoCommandType.Response
     ) -> ServoCommandType.Response:
         try:
-            self._kind = CommandKind(request.command_type)
+            self._kind = CommandType(request.command_type)
         except ValueError:
             return response  # success is false
         self._renew()

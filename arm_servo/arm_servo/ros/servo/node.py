@@ -25,11 +25,11 @@ from arm_trajectory import GoalCode
 
 from ...controllers.controller import JOGGING, Outcome, Source
 from ...core.gateway import CommandGateway
-from ...core.requests import DisplacementRequest, JogRequest, StopRequest
+from ...core.requests import CommandType, DisplacementRequest, JogRequest, StopRequest
 from ...exceptions import NotReadyError
 from ..refusals import Refusals
 from .command_converter import CommandConverter
-from .modes import CommandKind, ServoModes
+from .modes import ServoModes
 from .parameters import PREFIX, read_scales, Scales, ServoParameters
 from .status import status_of
 
@@ -57,16 +57,16 @@ class Servo:
         self._refusals = Refusals()
         self._status = node.create_publisher(ServoStatus, parameters.status_topic, 10)
         for kind, message, topic, convert in (
-            (CommandKind.TWIST, TwistStamped, parameters.twist_topic, self.converter.twist),
-            (CommandKind.JOINT_JOG, JointJog, parameters.joint_topic, self.converter.jog),
-            (CommandKind.POSE, PoseStamped, parameters.pose_topic, self.converter.pose),
+            (CommandType.TWIST, TwistStamped, parameters.twist_topic, self.converter.twist),
+            (CommandType.JOINT_JOG, JointJog, parameters.joint_topic, self.converter.jog),
+            (CommandType.POSE, PoseStamped, parameters.pose_topic, self.converter.pose),
         ):
             node.create_subscription(message, topic, partial(self._take, kind, convert), 10)
         node.add_on_set_parameters_callback(self._check_scales)
         node.add_post_set_parameters_callback(self._rescale)
         node.create_timer(1.0 / parameters.status_rate, self._publish_status)
 
-    def _take(self, kind: CommandKind, convert: Convert, message: Any) -> None:  # noqa: ANN401  # messages have no type
+    def _take(self, kind: CommandType, convert: Convert, message: Any) -> None:  # noqa: ANN401  # messages have no type
         begin = time.monotonic()
         try:
             age = self._checked_age(message)
@@ -82,7 +82,7 @@ class Servo:
             )
 
     def _send(
-        self, request: JogRequest | DisplacementRequest, client: tuple[CommandKind, str]
+        self, request: JogRequest | DisplacementRequest, client: tuple[CommandType, str]
     ) -> None:
         """Command a motion, which gets back drives that others have."""
         # the events executor hands out no publisher, so topic and frame stand for the client
