@@ -5,14 +5,12 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
-import io
 import math
 import os
 from pathlib import Path
 import subprocess
 import sys
 
-from comparison import best, table
 from contract_env import (
     contract_of,
     metadata_of,
@@ -23,7 +21,6 @@ from contract_env import (
 )
 import numpy as np
 from policy_export import export
-from progress import Progress
 import pytest
 
 from quad_controller import (
@@ -39,7 +36,6 @@ from quad_controller.policy.contract.mjlab import read_metadata
 from quad_controller.policy.contract.model import build_contract
 from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy.runner import PolicyRunner
-from quad_controller.policy_check.course import CourseFigures, Passage
 from quad_gait_physics import MODEL
 from quad_gait_policies import FakeNetwork, random_layers
 from quad_sim.env import NO_RANDOMIZATION, WalkingEnv
@@ -127,54 +123,6 @@ def test_the_contract_is_in_the_file(tmp_path: Path) -> None:
         assert row.verdict.value == 'ok', row
 
 
-def test_the_better_one_falls_less_often_and_then_is_less_off() -> None:
-    """A fall in a minute, or a quarter of them, more or less is chance."""
-    near, far, clumsy = figures(0.01, 15), figures(0.03, 12), figures(0.0, 24)
-    compared = {'clumsy': {'a': clumsy}, 'far': {'a': far}, 'near': {'a': near}}
-    assert f'{clumsy.falls_per_minute:.1f}' in table(compared)
-    assert best(compared) == 'near'
-    assert best({name: compared[name] for name in ('clumsy', 'far')}) == 'far'
-
-
-def figures(off: float, falls: int) -> CourseFigures:
-    """What somebody came to in two minutes."""
-    passage = Passage(Velocity(0.2), Velocity(0.2 + off), 120.0, falls, 0.1, 0.0, 0.0, 0.0, 1.0)
-    return CourseFigures((passage,))
-
-
-def test_progress_is_seen_in_a_log_and_in_a_terminal() -> None:
-    """Lines in a log are few; in a terminal one line is written over, and texts stay."""
-    times = [0.0]
-    for terminal in (False, True):
-        stream = Stream(terminal)
-        progress = Progress(2.0, lambda: times[0], stream)
-        for _ in range(60):
-            times[0] += 1.0
-            progress.figures('falls 3')
-        progress.say('done')
-        assert progress.share == pytest.approx(0.5)
-        lines = stream.getvalue().split('\n')
-        assert lines[-2:] == ['done', '']
-        assert 'falls 3' in lines[0]
-        if terminal:
-            assert lines[0].count('\r') == 60
-        else:
-            assert 3 <= len(lines) - 2 <= 6
-            assert '=' in lines[-3]
-
-
-class Stream(io.StringIO):
-    """A terminal, or a file."""
-
-    def __init__(self, terminal: bool) -> None:
-        super().__init__()
-        self._terminal = terminal
-
-    def isatty(self) -> bool:
-        """Say which."""
-        return self._terminal
-
-
 @pytest.mark.skipif(
     find_spec('skrl') is None, reason='`make train` installs what a training needs'
 )
@@ -193,8 +141,7 @@ def test_a_short_training_ends_with_a_policy_that_is_checked(tmp_path: Path) -> 
         assert contract == contract_of(walking_contract(MODEL, contract.kind))
         assert 'imitation' in contract.kind
     assert list((tmp_path / 'curves').glob('events.out.tfevents.*'))
-    figures = (tmp_path / 'figures.txt').read_text()
-    assert {'gait', 'imitation', 'practice'} <= {line.split()[0] for line in figures.splitlines()}
+    assert ',policy,forward,' in (tmp_path / 'figures.csv').read_text()
 
 
 def test_without_the_library_it_is_said_what_installs_it(tmp_path: Path) -> None:

@@ -9,7 +9,6 @@ from all of that (Ross, Gordon and Bagnell, 2011).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -25,33 +24,16 @@ from quad_sim.env import ProcessVectorEnv
 
 BATCH = 1024
 RATE = 2e-3
+STEPS = 250  # of each environment in each round
+EPOCHS = 15  # how often all examples are seen in each round; the last has 3 times as many
 TRIED = 0.2  # deviation of what the walker tries beside its answer, so that it errs
-
-
-@dataclass(frozen=True, slots=True)
-class Lessons:
-    """How much is learned."""
-
-    rounds: int = 6  # of walking and learning
-    steps: int = 250  # of each environment in each round
-    epochs: int = 15  # how often all examples are seen in each round; the last has 3 times
-
-
-@dataclass(frozen=True, slots=True)
-class Round:
-    """What came of a round."""
-
-    number: int  # which one, from 1
-    examples: int  # how many there are
-    error: float  # of the targets in [rad], root mean square
-    falls: int  # of all environments in the round
 
 
 class Imitation:
     """Learns from the teacher."""
 
     def __init__(
-        self, actor: Actor, envs: ProcessVectorEnv, lessons: Lessons, *, scale: float, seed: int
+        self, actor: Actor, envs: ProcessVectorEnv, rounds: int, *, scale: float, seed: int
     ) -> None:
         """Prepare it.
 
@@ -61,20 +43,20 @@ class Imitation:
         """
         # of the observations; there is none before the first round
         self.normaliser: Normaliser | None = None
-        self._actor, self._envs, self._lessons, self._scale = actor, envs, lessons, scale
+        self._actor, self._envs, self._rounds, self._scale = actor, envs, rounds, scale
         self._random = np.random.default_rng(seed)
         self._count = actor.num_actions
         self._rows: list[Floats] = []
         self._seen, _ = envs.reset(seed=seed)
         self._answer = jax.jit(partial(answer, actor))
 
-    def rounds(self) -> Iterator[Round]:
-        """Walk and learn; yield what came of each round."""
-        for number in range(1, self._lessons.rounds + 1):
+    def rounds(self) -> Iterator[str]:
+        """Walk and learn; yield what came of each round, for people."""
+        for number in range(1, self._rounds + 1):
             falls = self._walk(taught=number == 1)
-            last = number == self._lessons.rounds
-            error = self._learn(self._lessons.epochs * (3 if last else 1))
-            yield Round(number, len(self._rows) * self._envs.num_envs, error, falls)
+            error = self._learn(EPOCHS * (3 if number == self._rounds else 1))
+            examples = len(self._rows) * self._envs.num_envs
+            yield f'round {number}: {examples} examples, error {error:.4f} rad, {falls} falls'
 
     @property
     def observed(self) -> ObservationStatistics:
@@ -83,7 +65,7 @@ class Imitation:
 
     def _walk(self, *, taught: bool) -> int:
         falls = 0
-        for _ in range(self._lessons.steps):
+        for _ in range(STEPS):
             self._rows.append(self._seen)
             observed, wanted = self._seen[:, : -self._count], self._seen[:, -self._count :]
             action = wanted

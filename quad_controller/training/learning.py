@@ -16,12 +16,12 @@ from contract_env import (
     walking_contract,
     walking_env,
 )
-from imitation import Imitation, Lessons
+from imitation import Imitation
 import jax
 from networks import Actor, answer, explore, layers_of, Normaliser
 import numpy as np
 from policy_export import export
-from practice import Practice, Practised
+from practice import Practice
 from progress import Progress
 import skrl
 
@@ -65,12 +65,9 @@ def train(
         ProcessVectorEnv(partial(taught_walking_env, RANDOMIZATION.scaled(0.5)), environments)
     ) as envs:
         scale = example.contract.action.scale[0]
-        imitation = Imitation(actor, envs, Lessons(rounds), scale=scale, seed=seed)
+        imitation = Imitation(actor, envs, rounds, scale=scale, seed=seed)
         for each in imitation.rounds():
-            progress.say(
-                f'imitation, round {each.number}: {each.examples} examples, '
-                f'error {each.error:.4f} rad, {each.falls} falls, {progress.minutes:.1f} min'
-            )
+            progress.say(f'imitation, {each}, {progress.minutes:.1f} min')
     normaliser = imitation.normaliser
     if normaliser is None:
         raise ValueError('an imitation has one round at least')
@@ -91,7 +88,7 @@ def train(
         for practised in practice.until(
             lambda: (progress.share - before) / max(1.0 - before, 1e-6)
         ):
-            progress.figures(_text_of(practised))
+            progress.figures(practised)
         practice.close()
         observed = _observe(actor, normaliser, envs, seed)
     _write(policies[PRACTICE], actor, normaliser, observed, walking_contract(robot, PRACTISED))
@@ -109,14 +106,6 @@ def _observe(
         rows.append(seen)
         seen = envs.step(np.asarray(act(actor.state_dict.params, normaliser(seen))))[0]
     return ObservationStatistics.of(np.concatenate(rows))
-
-
-def _text_of(practised: Practised) -> str:
-    """Return what came of an update, for people."""
-    return (
-        f'reward {practised.reward:5.2f}/s  falls {practised.falls:5.2f}/min  '
-        f'{practised.steps / 1e6:.2f} M steps  randomized {practised.share:.0%}'
-    )
 
 
 def _write(

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,16 +24,6 @@ FIRST_SHARE, FULL_AT = 0.3, 0.5  # of the randomization; of the time at which it
 SHARE_STEP = 0.1  # the randomization grows by
 RATE = 2e-4
 STEPS_UNKNOWN = 1_000_000_000  # skrl wants to know how many; here the clock ends it
-
-
-@dataclass(frozen=True, slots=True)
-class Practised:
-    """What an update came of."""
-
-    steps: int  # of all environments so far
-    reward: float  # mean reward of a second
-    falls: float  # in a minute of an environment
-    share: float  # of the randomization
 
 
 class Practice:
@@ -74,8 +63,8 @@ class Practice:
         self._envs.reset(seed=seed)
         self._observed, _ = self._wrapped.reset()
 
-    def until(self, progress: Callable[[], float]) -> Iterator[Practised]:
-        """Practise until progress is 1; yield what came of each update."""
+    def until(self, progress: Callable[[], float]) -> Iterator[str]:
+        """Practise until progress is 1; yield what came of each update, for people."""
         while (passed := progress()) < 1.0:
             self._vary(passed)
             before = self._actor.state_dict
@@ -97,7 +86,7 @@ class Practice:
             self._share = share
             self._envs.call('vary', self._randomization.scaled(share))
 
-    def _rollout(self) -> Practised:
+    def _rollout(self) -> str:
         agent, envs = self._agent, self._wrapped
         rewards, falls = 0.0, 0
         ended: list[Mapping[str, float]] = []
@@ -125,20 +114,19 @@ class Practice:
             self._step += 1
             agent.post_interaction(**step)
         time = ROLLOUT * self._period
-        practised = Practised(
-            steps=self._step * self._envs.num_envs,
-            reward=rewards / time,
-            falls=60.0 * falls / (time * self._envs.num_envs),
-            share=self._share,
-        )
+        per_second, per_minute = rewards / time, 60.0 * falls / (time * self._envs.num_envs)
         track = self._agent.track_data
-        track('Practice / Reward of a second', practised.reward)
-        track('Practice / Falls in a minute', practised.falls)
-        track('Practice / Share of the randomization', practised.share)
+        track('Practice / Reward of a second', per_second)
+        track('Practice / Falls in a minute', per_minute)
+        track('Practice / Share of the randomization', self._share)
         for name in ended[0] if ended else ():
             worth = float(np.mean([terms[name] for terms in ended]))
             track(f'Reward of an episode / {name}', worth)
-        return practised
+        steps = self._step * self._envs.num_envs
+        return (
+            f'reward {per_second:5.2f}/s  falls {per_minute:5.2f}/min  '
+            f'{steps / 1e6:.2f} M steps  randomized {self._share:.0%}'
+        )
 
 
 def _terms(infos: Mapping[str, Any]) -> list[Mapping[str, float]]:

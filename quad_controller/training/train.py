@@ -2,23 +2,29 @@
 # SPDX-License-Identifier: Apache-2.0
 """Trains a policy that walks, checks it and compares it: ``make train`` calls it.
 
-It begins with an imitation of a teacher and goes on with PPO. The folder that it prints has the
-policy with its contract, the curves for TensorBoard, and the figures.
+It begins with an imitation of a teacher and goes on with PPO. The folder that it prints has both
+policies with their contracts, the better one as walk.onnx, curves for TensorBoard, and figures.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import math
 import os
 from pathlib import Path
+import shutil
 import signal
 import sys
 import time
 
-from comparison import judge
 from progress import Progress
+
+from quad_controller.policy_check.main import run as check_policy
+
+SERVO = 'firm'  # what it is trained with
+WALKS = ((0.2, 0.0, 0.3), (0.0, 0.1, 0.0), (-0.15, 0.0, -0.5))
+"""Velocities that a policy has to walk: x, y in [m/s], yaw in [rad/s]."""
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -33,7 +39,7 @@ def run(arguments: Sequence[str]) -> int:
         return 1
     folder: Path = options.output or Path('trained') / time.strftime('walk-%Y%m%d-%H%M%S')
     folder.mkdir(parents=True, exist_ok=True)
-    progress = Progress(options.minutes, time.monotonic)
+    progress = Progress(options.minutes)
     progress.say(f'{options.minutes:g} min, seed {options.seed}: {folder}')
     progress.say(f'curves: tensorboard --logdir {folder}')
     policies = train(
@@ -43,7 +49,35 @@ def run(arguments: Sequence[str]) -> int:
         environments=options.environments,
         rounds=options.rounds,
     )
-    return judge(folder, policies, progress, options.way)
+    return _judge(folder, policies, progress, options.way)
+
+
+def _judge(folder: Path, policies: Mapping[str, Path], progress: Progress, duration: float) -> int:
+    """Check the policies, and compare the better one with the gait.
+
+    Args:
+        policies: Their files by name; the last that is accepted is the best.
+        duration: Of each command of the comparison [s].
+
+    Returns:
+        The exit code of check_policy for the one that is chosen.
+    """
+    codes = {name: max(_check(path, progress, walk) for walk in WALKS)
+             for name, path in policies.items()}  # fmt: skip
+    chosen = [name for name in codes if codes[name] == min(codes.values())][-1]
+    path = folder / 'walk.onnx'
+    shutil.copyfile(policies[chosen], path)
+    figures = ['--duration', f'{duration:g}', '--report', str(folder / 'figures.csv')]
+    check_policy([str(path), '--servo', SERVO, '--compare', *figures])
+    verdict = 'accepted' if codes[chosen] == 0 else 'refused'
+    progress.say(f'{path} is what {chosen} made; check_policy: {verdict}')
+    return codes[chosen]
+
+
+def _check(path: Path, progress: Progress, walk: Sequence[float]) -> int:
+    words = [str(path), '--servo', SERVO, '--walk', *map(str, walk)]
+    progress.say(f'check_policy {" ".join(words)}')
+    return check_policy(words)
 
 
 def main() -> None:
@@ -64,7 +98,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--environments', type=int, default=64, help='at once')
     parser.add_argument('--rounds', type=int, default=6, help='of the imitation')
-    parser.add_argument('--way', type=_positive, default=15.0, help='of the comparison [s]')
+    parser.add_argument('--way', type=_positive, default=4.0, help='of each command compared [s]')
     parser.add_argument('--output', type=Path, metavar='FOLDER', help='for policy and curves')
     return parser
 
