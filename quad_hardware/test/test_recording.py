@@ -219,7 +219,10 @@ def test_a_fault_is_found_once_and_again_after_it_has_ended() -> None:
     assert looks(watch, clock=(0.12, 0.12), count=5) == []
     (found,) = looks(watch, bits=Fault.SERVO_SILENT, clock=(0.3, 0.3), count=20)
     assert 'servo silent' in found
+    assert looks(watch, bits=Fault.SERVO_SILENT | Fault.IMU, clock=(0.7, 0.7)) == []
     both = Fault.SERVO_SILENT | Fault.OVERHEATED
+    assert looks(watch, bits=both, clock=(0.72, 0.72), count=2) == []
+    assert looks(watch, clock=(0.76, 0.76), count=2) == []
     (found,) = looks(watch, bits=both, clock=(0.8, 0.8), count=20)
     assert 'overheated' in found
     assert looks(watch, clock=(1.3, 1.3), count=5) == []

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 import math
+from typing import Generic, TypeVar
 
 from quad_description.rotations import conjugate, from_rpy, multiply, rotation_vector, Vector
 
@@ -192,15 +193,33 @@ COOL_TEMPERATURE = 60.0  # [°C] below which they may carry the robot again
 _SERVO_FAULTS = Fault.OVERLOAD | Fault.OVERHEATED | Fault.SERVO_SILENT
 
 
+Problem = TypeVar('Problem')
 _Problem = tuple[Fault, int | None]  # what is wrong, and with which motor where that is known
 
 
-class ServoWatch:
-    """Finds servos that will not carry the robot any longer: silent, overloaded or too hot.
+class Confirmed(Generic[Problem]):
+    """Problems that as many reports in a row had as :data:`CONFIRMATIONS`, until as many had not.
 
-    Each fault of each motor is confirmed, and ends, by itself: what others do meanwhile delays
-    neither.
+    Each is confirmed, and ends, by itself: what others do meanwhile delays neither.
     """
+
+    def __init__(self) -> None:
+        self.problems: set[Problem] = set()
+        # reports in a row that say otherwise than what is confirmed
+        self._doubts: dict[Problem, int] = {}
+
+    def take(self, seen: set[Problem]) -> set[Problem]:
+        """Add the problems of a report; return those that are confirmed now."""
+        doubted = seen ^ self.problems
+        self._doubts = {problem: self._doubts.get(problem, 0) + 1 for problem in doubted}
+        changed = {each for each in doubted if self._doubts[each] >= CONFIRMATIONS}
+        self.problems = self.problems ^ changed
+        self._doubts = {each: n for each, n in self._doubts.items() if each not in changed}
+        return self.problems
+
+
+class ServoWatch:
+    """Finds servos that will not carry the robot any longer: silent, overloaded or too hot."""
 
     def __init__(self, motors: Collection[int]) -> None:
         """Begin without a report.
@@ -208,37 +227,26 @@ class ServoWatch:
         Args:
             motors: Ids of those that a joint uses.
         """
-        self._motors = motors
-        self._confirmed: set[_Problem] = set()
-        # reports in a row that say otherwise than what is confirmed
-        self._doubts: dict[_Problem, int] = {}
+        self._motors, self._confirmed = motors, Confirmed[_Problem]()
 
     def check(self, state: Report) -> str:
         """Add a report; return what is wrong, as soon as several reports in a row say so."""
-        doubted = self._read(state) ^ self._confirmed
-        self._doubts = {problem: self._doubts.get(problem, 0) + 1 for problem in doubted}
-        for problem in doubted:
-            if self._doubts[problem] >= CONFIRMATIONS:
-                self._confirmed ^= {problem}
-                del self._doubts[problem]
-        return self._text()
-
-    def _read(self, state: Report) -> set[_Problem]:
-        bits, felt = Fault(state.faults & _SERVO_FAULTS), state.temperatures or {}
-        problems: set[_Problem] = {(each, None) for each in Fault if each in bits}
-        for motor in self._motors:
-            hot = (Fault.OVERHEATED, motor)
-            most = COOL_TEMPERATURE if hot in self._confirmed else MAX_TEMPERATURE
-            if felt.get(motor, 0.0) > most:
-                problems.add(hot)
-        return problems
-
-    def _text(self) -> str:
-        texts = [FAULT_TEXTS[each] for each in Fault if (each, None) in self._confirmed]
-        hot = [motor for motor in self._motors if (Fault.OVERHEATED, motor) in self._confirmed]
+        found = self._confirmed.take(self._read(state))
+        texts = [FAULT_TEXTS[each] for each in Fault if (each, None) in found]
+        hot = [motor for motor in self._motors if (Fault.OVERHEATED, motor) in found]
         if hot:
             texts.append(
                 f'servo of motor {", ".join(map(str, hot))} above {MAX_TEMPERATURE:g} degrees: '
                 f'let it cool below {COOL_TEMPERATURE:g}'
             )
         return '; '.join(texts)
+
+    def _read(self, state: Report) -> set[_Problem]:
+        bits, felt = Fault(state.faults & _SERVO_FAULTS), state.temperatures or {}
+        problems: set[_Problem] = {(each, None) for each in Fault if each in bits}
+        for motor in self._motors:
+            hot = (Fault.OVERHEATED, motor)
+            most = COOL_TEMPERATURE if hot in self._confirmed.problems else MAX_TEMPERATURE
+            if felt.get(motor, 0.0) > most:
+                problems.add(hot)
+        return problems

@@ -9,28 +9,22 @@ import math
 from quad_description import MAX_TILT, RobotState
 
 from ..estimation import BoardWatch
-from ..estimation.plausibility import CONFIRMATIONS, FAULT_TEXTS
+from ..estimation.plausibility import Confirmed, FAULT_TEXTS
 from ..link import LinkState
 from ..protocol import Fault
 from ..report import Report
 
 UPRIGHT = 0.8 * MAX_TILT  # [rad] below which a body that fell stands again
-_ALL_FAULTS = sum(Fault)
 _LOST = {LinkState.STALE, LinkState.REFUSED, LinkState.FAILED}
 _FOUND = {LinkState.WAITING, LinkState.RUNNING}
 
 
 class FaultWatch:
-    """Finds what begins to be wrong from one report to the next.
-
-    A fault counts when as many reports have it as :data:`CONFIRMATIONS`, and again after as many
-    without it.
-    """
+    """Finds what begins to be wrong from one report to the next."""
 
     def __init__(self) -> None:
         self._boards = BoardWatch()
-        self._bits = 0  # that count
-        self._differs = 0  # reports in a row with other bits
+        self._bits = Confirmed[Fault]()
         self._imu_problem = ''
         self._fallen = False
 
@@ -40,11 +34,9 @@ class FaultWatch:
         # without its clock a restart is a silence, which is a fault already
         if self._boards.restarted(report) and report.device_time is not None:
             begun.append('the board has begun anew; is the battery empty, or a plug loose?')
-        bits = report.faults & _ALL_FAULTS
-        self._differs = 0 if bits == self._bits else self._differs + 1
-        if self._differs >= CONFIRMATIONS:
-            new, self._bits, self._differs = bits & ~self._bits, bits, 0
-            begun += [f'the robot reports {FAULT_TEXTS[bit]}' for bit in Fault if bit & new]
+        before = self._bits.problems
+        new = self._bits.take({bit for bit in Fault if bit & report.faults}) - before
+        begun += [f'the robot reports {FAULT_TEXTS[bit]}' for bit in Fault if bit in new]
         if state.imu_problem and not self._imu_problem:
             begun.append(state.imu_problem)
         self._imu_problem = state.imu_problem
