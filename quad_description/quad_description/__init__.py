@@ -18,7 +18,7 @@ Public, besides the names below: the module :mod:`.rotations`.
 
 from urdf_reader import DescriptionError
 
-from .backend import Backend, RecordedBackend
+from .backend import Backend
 from .kinematics.leg import FEET, foot_position, jacobian, LegGeometry, LEGS, LegSolution, solve
 from .kinematics.quadruped import Feet, FootPose, Quadruped, quadruped, raised_feet, Targets
 from .presets import Pose, pose_positions, PresetError, PRESETS, robot_urdf, STREAM_TIMEOUT
@@ -57,7 +57,6 @@ __all__ = [
     'Pose',
     'PresetError',
     'Quadruped',
-    'RecordedBackend',
     'RobotState',
     'Targets',
     'foot_position',

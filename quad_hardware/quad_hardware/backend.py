@@ -10,7 +10,7 @@ from pathlib import Path
 import threading
 import time
 
-from quad_description import Backend, movable_joints, RecordedBackend, RobotState
+from quad_description import Backend, movable_joints, RobotState
 
 from .estimation import EstimatorSettings, ImuMounting
 from .exceptions import CommandError, NoAnswerError, RecordingError
@@ -43,8 +43,8 @@ def robot_at(
     return SerialBackend(_settings_of(link, urdf, imu_checked=imu_checked))
 
 
-def recorded_in(log: Path, urdf: str, *, imu_checked: bool = False) -> RecordedBackend:
-    """Return the states of a serial log, in real order and without ROS.
+def recorded_in(log: Path, urdf: str, *, imu_checked: bool = False) -> list[RobotState]:
+    """Return the states of a serial log, in their order and without ROS.
 
     Args:
         log: Of a black box, or of the parameter ``serial_log`` of hardware_node.
@@ -62,8 +62,7 @@ def recorded_in(log: Path, urdf: str, *, imu_checked: bool = False) -> RecordedB
         robot.take(entry, entry.time)
     if not states:
         raise RecordingError(f'{log} has no report of a robot')
-    period = (states[-1].time - states[0].time) / max(len(states) - 1, 1)
-    return RecordedBackend(robot.names, states, period)
+    return states
 
 
 class SerialBackend(Backend):

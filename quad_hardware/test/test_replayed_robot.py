@@ -114,11 +114,7 @@ def test_the_states_of_a_log_are_those_of_the_robot(
 ) -> None:
     """Measured values are the same; what needs times is as near as the times are."""
     _, log, live = recorded
-    with recorded_in(log, URDF, imu_checked=True) as backend:
-        replayed = [backend.reset()]
-        while not backend.finished:
-            replayed.append(backend.step(None))
-        assert backend.names == tuple(joint.name for joint in movable_joints(URDF))
+    replayed = recorded_in(log, URDF, imu_checked=True)
     by_measured = {comparable(state): state for state in reversed(replayed)}
     first_live = {comparable(state): state for state in reversed(live.states)}
     assert len(first_live) > 20
