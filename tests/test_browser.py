@@ -32,10 +32,9 @@ from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 
 from arm_msgs.srv import InjectFault
+from robot_viewer.nodes.motion_planning import DRAGGED, HOLD_EXECUTE
 from robot_viewer.page.jog_panel import BASE
-from robot_viewer.page.motion_plan import DRAGGED
 from robot_viewer.page.overlay import StopAnswer
-from robot_viewer.page.plan_panel import HOLD_EXECUTE
 from robot_viewer.page.robot_page import Actions, RobotPage
 from robot_viewer.page.target_panel import HOLD_TARGET
 from robot_viewer.robot_state import ALLOW, Level, RobotState

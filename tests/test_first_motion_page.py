@@ -18,8 +18,8 @@ from arm_canopen import DriveState, load_bus
 from canopen_sim import DeviceRunner, simulated_devices
 from canopen_tools.cli.main import main as canopen
 from first_motion import JointKind
+from robot_viewer.nodes.first_motion import HOLD, PRESS_ANEW
 from robot_viewer.page.first_motion import Saw
-from robot_viewer.page.first_motion_panel import HOLD, PRESS_ANEW
 
 if TYPE_CHECKING:
     from isolation import Isolation

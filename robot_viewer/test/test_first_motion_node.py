@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 import math
 import sys
 from types import SimpleNamespace
@@ -17,7 +17,6 @@ from urdf_reader import read_urdf
 from urdf_robots import ARM
 
 from arm_msgs.srv import ReadUnits
-from first_motion import JointKind
 from robot_viewer.nodes import first_motion
 from robot_viewer.nodes.first_motion import (
     ANSWER_TIMEOUT,
@@ -72,7 +71,7 @@ class Robot:
         self.statuses: dict[str, Status] = {}
         self.motion = FirstMotion(
             self,  # type: ignore[arg-type]  # a node without DDS
-            self,  # its own page
+            None,  # type: ignore[arg-type]  # there is no page; this is its panel, too
             self.positions,
             self.statuses,
             lambda order: order(),
@@ -108,12 +107,7 @@ class Robot:
         """Return one that is silent."""
         return SimpleNamespace(info=lambda _: None, warning=lambda _: None, error=lambda _: None)
 
-    # -- the page
-
-    def offer_first_motion(self, joints: Mapping[str, JointKind], _actions: object) -> Any:
-        """Take the joints; the panel is this, too."""
-        assert list(joints) == JOINTS
-        return self
+    # -- the panel
 
     def begin(self, text: str, *, failed: bool) -> None:
         """Show it."""
@@ -184,7 +178,7 @@ class Robot:
         """Hold the button; the joint goes where it is sent, times a factor."""
         start = self.positions[REQUEST.joint]
         for _ in range(round(seconds / PERIOD)):
-            self.motion.beat()
+            self.motion.beat(self.now)
             count = len(self.targets)
             self.look()
             if len(self.targets) > count:
@@ -193,7 +187,10 @@ class Robot:
 
 @pytest.fixture
 def robot(monkeypatch: pytest.MonkeyPatch) -> Robot:
-    """Make one, whose clock the test has."""
+    """Make one, whose clock the test has; it is its own panel."""
+    monkeypatch.setattr(
+        first_motion, 'FirstMotionPanel', lambda _page, _joints, motion: motion._node
+    )
     made = Robot()
     monkeypatch.setattr(first_motion, 'time', SimpleNamespace(monotonic=lambda: made.now))
     return made

@@ -4,7 +4,10 @@
 
 from __future__ import annotations
 
-from geometry_msgs.msg import Point
+from types import SimpleNamespace
+from typing import Any
+
+from geometry_msgs.msg import Point, Pose
 from hypothesis import given
 from hypothesis import strategies as st
 from moveit_msgs.msg import (
@@ -21,6 +24,14 @@ from urdf_reader import about, DescriptionError, read_urdf, Transform
 from urdf_robots import ARM, POSITIONS, random_urdfs
 
 from robot_viewer.link_poses import link_pose, links_beyond, moved
+from robot_viewer.nodes.motion_plan import (
+    LINE_POINTS,
+    PAUSE,
+    plan_groups,
+    PlannedMotion,
+    SHOWINGS,
+    tip_line,
+)
 from robot_viewer.nodes.planning_messages import (
     box_message,
     changed,
@@ -28,17 +39,9 @@ from robot_viewer.nodes.planning_messages import (
     pose_message,
     refusal,
     removed_message,
-)
-from robot_viewer.page.motion_plan import (
-    free_name,
-    LINE_POINTS,
-    PAUSE,
-    plan_groups,
-    PlannedMotion,
     SceneObject,
-    SHOWINGS,
-    tip_line,
 )
+from robot_viewer.nodes.planning_scene import draw_object
 
 TREE = read_urdf(ARM)
 SRDF = """
@@ -53,6 +56,26 @@ SRDF = """
 </robot>
 """
 TURNED = Transform((0.1, 0.2, 0.3), about((0.0, 0.0, 1.0), 0.5))
+
+
+class Drawn:
+    """A scene of the page that keeps what is drawn in it.
+
+    Attributes:
+        nodes: Kind of each, and what it is made of.
+    """
+
+    def __init__(self) -> None:
+        self.nodes: list[tuple[str, Any]] = []
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what adds a node of a kind."""
+
+        def add(_path: str, *shape: object, **_options: object) -> Any:
+            self.nodes.append((name.removeprefix('add_'), SimpleNamespace(shape=shape)))
+            return self.nodes[-1][1]
+
+        return add
 
 
 @given(random_urdfs(), st.floats(-3.0, 3.0))
@@ -129,13 +152,13 @@ def test_a_box_comes_moves_and_goes() -> None:
     """By changes that name no other object; a whole scene replaces everything."""
     objects = changed({}, box_message('box1', (0.1, 0.2, 0.3), TURNED, 'base'))
     objects = changed(objects, box_message('box2', (1.0, 1.0, 1.0), Transform(), 'base'))
-    (box,) = objects['box1'].parts
-    assert (box.shape, box.size) == ('box', (0.1, 0.2, 0.3))
+    (box,) = objects['box1'].message.primitives
+    assert (box.type, list(box.dimensions)) == (SolidPrimitive.BOX, [0.1, 0.2, 0.3])
     assert objects['box1'].pose == TURNED
-    moved = changed(objects, moved_message(objects['box1'], Transform((1.0, 0.0, 0.0))))
+    moved = changed(objects, moved_message(objects['box1'].message, Transform((1.0, 0.0, 0.0))))
     assert moved['box1'].pose.translation == (1.0, 0.0, 0.0)
-    assert moved['box1'].parts == (box,)
-    assert set(changed(moved, removed_message(moved['box1']))) == {'box2'}
+    assert moved['box1'].message.primitives == [box]
+    assert set(changed(moved, removed_message(moved['box1'].message))) == {'box2'}
     assert changed(moved, PlanningScene(is_diff=False)) == {}
     everything = CollisionObject(operation=CollisionObject.REMOVE)
     change = PlanningScene(is_diff=True)
@@ -158,10 +181,12 @@ def test_what_is_held_and_all_shapes_are_read() -> None:
         thing.primitive_poses.append(pose_message(TURNED))
     scene = PlanningScene(is_diff=True)
     scene.robot_state.attached_collision_objects.append(AttachedCollisionObject(object=thing))
-    objects = changed({'kept': SceneObject('kept', 'base', Transform(), ())}, scene)
+    objects = changed({'kept': SceneObject(CollisionObject(id='kept'))}, scene)
     assert objects['part'].attached
-    assert [part.shape for part in objects['part'].parts] == ['sphere', 'cylinder', 'cone']
-    assert objects['part'].parts[0].pose == TURNED
+    drawn = Drawn()
+    draw_object(drawn, 'part', objects['part'])  # type: ignore[arg-type]
+    assert [kind for kind, _ in drawn.nodes] == ['frame', 'icosphere', 'cylinder', 'mesh_simple']
+    assert drawn.nodes[1][1].position == TURNED.translation
     scene.robot_state.attached_collision_objects.clear()
     assert set(changed(objects, scene)) == {'kept'}
     mesh = CollisionObject(id='mesh', operation=CollisionObject.ADD)
@@ -170,9 +195,17 @@ def test_what_is_held_and_all_shapes_are_read() -> None:
     mesh.meshes.append(Mesh(vertices=corners, triangles=[triangle]))
     mesh.mesh_poses.append(pose_message(Transform()))
     scene.world.collision_objects.append(mesh)
-    (part,) = changed({}, scene)['mesh'].parts
-    assert part.triangles == ((0, 1, 2),)
-    assert part.vertices[1] == (1.0, 0.0, 0.0)
+    more = CollisionObject(id='mesh', operation=CollisionObject.APPEND)
+    for shape in (99, kind.BOX):
+        more.primitives.append(kind(type=shape, dimensions=[1.0, 1.0, 1.0]))
+        more.primitive_poses.append(Pose())
+    scene.world.collision_objects.append(more)
+    drawn = Drawn()
+    draw_object(drawn, 'mesh', changed({}, scene)['mesh'])  # type: ignore[arg-type]
+    assert [kind for kind, _ in drawn.nodes] == ['frame', 'box', 'mesh_simple']
+    vertices, faces = drawn.nodes[2][1].shape
+    assert vertices[1].tolist() == [1.0, 0.0, 0.0]
+    assert faces.tolist() == [[0, 1, 2]]
 
 
 def test_refusals_have_the_words_of_move_group() -> None:
@@ -182,4 +215,3 @@ def test_refusals_have_the_words_of_move_group() -> None:
     assert refusal(MoveItErrorCodes(val=MoveItErrorCodes.PREEMPTED)) == 'PREEMPTED'
     assert refusal(MoveItErrorCodes(val=-4711)) == 'code -4711'
     assert not refusal(MoveItErrorCodes(val=MoveItErrorCodes.SUCCESS))
-    assert free_name(['box1', 'box3']) == 'box2'

@@ -29,10 +29,8 @@ from viewer_rig import in_domain, ViewerRig
 
 from node_runner import LATCHED
 from node_runner.action_goals import serve_goals
-from robot_viewer.nodes.motion_planning import ANSWER_TIME
-from robot_viewer.nodes.planning_messages import box_message, changed
-from robot_viewer.page.motion_plan import DRAGGED, NO_GOAL, SceneObject
-from robot_viewer.page.plan_panel import PlanPanel
+from robot_viewer.nodes.motion_planning import ANSWER_TIME, DRAGGED, NO_GOAL, PlanPanel
+from robot_viewer.nodes.planning_messages import changed, SceneObject
 from robot_viewer.page.robot_page import RobotPage
 
 pytestmark = pytest.mark.scenario
@@ -113,31 +111,31 @@ class Planner(ViewerRig):
     @property
     def panel(self) -> PlanPanel:
         """That of the page."""
-        panel = self.viewer.page._plan
+        panel = self.viewer._planning.panel
         assert panel is not None
         return panel
 
     @property
     def said(self) -> str:
         """What the panel says."""
-        panel = self.viewer.page._plan
+        panel = self.viewer._planning.panel
         return panel._outcome.content if panel else ''
 
     def do(self, action: str, *arguments: Any, **options: Any) -> None:
         """Do it as a button of the page does."""
-        panel = self.panel
-        actor = panel._scene if hasattr(panel._scene, action) else panel._plan
+        plan = self.viewer._planning
+        actor = plan if hasattr(plan, action) else plan.scene
         if action in {'execute', 'go_on'} and not arguments:
             arguments = (time.monotonic(),)
-        panel._order(partial(getattr(actor, action), *arguments, **options))
+        plan.order(partial(getattr(actor, action), *arguments, **options))
         if action == 'execute':  # its button is held until the test lets it go
-            panel._order(lambda: setattr(self.viewer._planning, '_held_at', math.inf))
+            plan.order(lambda: setattr(plan, '_held_at', math.inf))
 
     def plan(self) -> None:
         """Have a motion to the state 'up' planned."""
         count = len(self.move.goals)
         self.do('choose_goal', 'up')
-        self.do('plan', 0.5)
+        self.do('plan')
         self.spin_until(lambda: len(self.move.goals) > count, 'a goal')
         self.move.answer(MoveItErrorCodes.SUCCESS, planned_trajectory=_trajectory())
         self.spin_until(lambda: 'takes 2.0 s' in self.said, 'a plan')
@@ -155,10 +153,7 @@ class Planner(ViewerRig):
         return answer
 
     def _whole(self, _: Any, answer: Any) -> Any:
-        for each in self.objects.values():
-            x, y, z = each.parts[0].size
-            scene = box_message(each.name, (x, y, z), each.pose, each.frame)
-            answer.scene.world.collision_objects += scene.world.collision_objects
+        answer.scene.world.collision_objects = [each.message for each in self.objects.values()]
         return answer
 
 
@@ -178,7 +173,7 @@ def planner(isolation: Isolation, monkeypatch: pytest.MonkeyPatch) -> Iterator[P
     """Start the page beside a move_group, as if it were open, and wait for the panel."""
     monkeypatch.setattr(RobotPage, 'watched', True)
     with in_domain(isolation, 'port:=8600'), closing(Planner()) as made:
-        made.spin_until(lambda: made.viewer.page._plan is not None, 'the panel')
+        made.spin_until(lambda: made.viewer._planning.panel is not None, 'the panel')
         made.spin_until(lambda: made.node.count_subscribers('joint_states') > 0, 'the page')
         made.spin_until(lambda: len(made.viewer._positions) > 2, 'joint states')
         yield made
@@ -190,7 +185,7 @@ def test_what_is_planned_is_executed_once(planner: Planner) -> None:
     goal = planner.move.goals[-1].request
     assert goal.planning_options.plan_only
     assert goal.request.group_name == 'whole'
-    assert goal.request.max_velocity_scaling_factor == 0.5
+    assert goal.request.max_velocity_scaling_factor == 0.2
     (constraints,) = goal.request.goal_constraints
     wanted = {each.joint_name: each.position for each in constraints.joint_constraints}
     assert wanted == {'shoulder': 0.5, 'lift': 0.2, 'roll': 0.3}
@@ -199,7 +194,7 @@ def test_what_is_planned_is_executed_once(planner: Planner) -> None:
     planner.do('execute')
     planner.spin_until(lambda: bool(planner.execute.goals), 'an execution')
     assert planner.execute.goals[-1].request.trajectory == _trajectory()
-    planner.do('plan', 1.0)
+    planner.do('plan')
     planner.spin_until(lambda: 'still executing' in planner.said, 'a refusal')
     planner.execute.answer(MoveItErrorCodes.SUCCESS)
     planner.spin_until(lambda: 'executed' in planner.said, 'the end')
@@ -227,10 +222,10 @@ def test_a_goal_that_is_chosen_meanwhile_stays(planner: Planner) -> None:
 
 def test_a_refusal_is_shown_in_its_words(planner: Planner) -> None:
     """And nothing can be executed."""
-    planner.do('plan', 1.0)
+    planner.do('plan')
     planner.spin_until(lambda: 'choose a goal' in planner.said, 'a refusal')
     planner.do('choose_goal', 'up')
-    planner.do('plan', 1.0)
+    planner.do('plan')
     planner.spin_until(lambda: bool(planner.move.goals), 'a goal')
     planner.move.answer(MoveItErrorCodes.GOAL_IN_COLLISION, 'wheel touches <box>')
     words = 'GOAL_IN_COLLISION: wheel touches &lt;box&gt;'
@@ -259,12 +254,12 @@ def test_stop_cancels_and_forgets(planner: Planner) -> None:
     planner.do('execute')  # it came late
     planner.spin_until(lambda: 'nothing is planned' in planner.said, 'a refusal')
     planner.do('choose_goal', 'up')
-    planner.do('plan', 1.0)
+    planner.do('plan')
     planner.spin_until(lambda: len(planner.move.goals) == 4, 'a goal')
     planner.viewer.stop()
     planner.spin_until(lambda: bool(planner.move.canceled), 'a cancel')
     planner.spin_until(lambda: not planner.viewer._orders, 'the end')
-    assert planner.panel._hold in planner.viewer.page.live.off
+    assert planner.panel.hold in planner.viewer.page.live.off
     assert len(planner.execute.goals) == 2
 
 
@@ -276,7 +271,7 @@ def test_an_execution_goes_on_as_long_as_its_button_is_held(planner: Planner, ho
     planner.spin_until(lambda: bool(planner.execute.goals), 'an execution')
     planner.spin_times(20)
     assert not planner.execute.canceled
-    live, hold = planner.viewer.page.live, planner.panel._hold
+    live, hold = planner.viewer.page.live, planner.panel.hold
     assert live._deadman.beat(1, hold, time.monotonic())
     planner.do('let_go' if how == 'let go' else 'go_on')
     planner.spin_until(lambda: bool(planner.execute.canceled), 'a cancel')
@@ -308,7 +303,7 @@ def test_a_goal_is_dragged(planner: Planner) -> None:
     assert last.pose_stamped.pose.position.x == 0.5
     planning = planner.viewer._planning
     planner.spin_until(lambda: planning._pose is None, 'a solution')
-    planner.do('plan', 1.0)
+    planner.do('plan')
     planner.spin_until(lambda: len(planner.move.goals) == 1, 'a goal')
     (joints,) = planner.move.goals[-1].request.request.goal_constraints
     places = {each.joint_name: each.position for each in joints.joint_constraints}
@@ -317,7 +312,7 @@ def test_a_goal_is_dragged(planner: Planner) -> None:
     planner.ik_code = MoveItErrorCodes.NO_IK_SOLUTION
     planner.do('drag_goal', Transform((9.0, 0.0, 0.5)))
     planner.spin_until(lambda: 'NO_IK_SOLUTION: out of reach' in planner.said, 'the words')
-    planner.do('plan', 1.0)
+    planner.do('plan')
     planner.spin_until(lambda: len(planner.move.goals) == 2, 'a goal')
     (pose,) = planner.move.goals[-1].request.request.goal_constraints
     assert not pose.joint_constraints
@@ -331,16 +326,18 @@ def test_boxes_come_move_and_go(planner: Planner) -> None:
     planner.do('add_box', (0.1, 0.2, 0.4))
     planner.spin_until(lambda: 'box1' in planner.objects, 'a box')
     assert planner.objects['box1'].pose.translation[2] == pytest.approx(0.2), 'on the ground'
-    planner.spin_until(lambda: planner.panel._object.value == 'box1', 'the choice')
-    assert planner.panel._object_gizmo is not None
-    planner.do('drag_object', Transform((1.0, 0.0, 0.0)), is_last=False)
-    planner.do('drag_object', Transform((2.0, 0.0, 0.0)), is_last=True)
+    planner.spin_until(lambda: planner.viewer._planning.scene.chosen.value == 'box1', 'the choice')
+    assert planner.viewer._planning.scene.gizmo is not None
+    planner.do('drag', Transform((1.0, 0.0, 0.0)), is_last=False)
+    planner.do('drag', Transform((2.0, 0.0, 0.0)), is_last=True)
     planner.spin_until(lambda: 'is moved' in planner.said, 'a move')
     assert planner.objects['box1'].pose.translation[0] == 2.0
     planner.do('add_box', (0.1, 0.2, 0.4))
-    planner.spin_until(lambda: planner.panel._object.value == 'box2', 'the choice')
-    planner.do('choose_object', 'box1')
-    planner.do('remove_object')
+    planner.spin_until(lambda: planner.viewer._planning.scene.chosen.value == 'box2', 'the choice')
+    planner.do('choose', 'box1')
+    planner.do('remove_chosen')
     planner.spin_until(lambda: set(planner.objects) == {'box2'}, 'the end of it')
-    planner.spin_until(lambda: planner.panel._object.options == ('none', 'box2'), 'the list')
-    assert planner.panel._object_gizmo is None
+    planner.spin_until(
+        lambda: planner.viewer._planning.scene.chosen.options == ('none', 'box2'), 'the list'
+    )
+    assert planner.viewer._planning.scene.gizmo is None

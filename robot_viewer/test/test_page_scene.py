@@ -13,9 +13,15 @@ import trimesh
 from urdf_reader import read_urdf, Transform
 from viser import ViserServer
 
-from robot_viewer.page.robot_scene import Ground, RobotScene, start_position, travel
-from robot_viewer.page.sliders import add_speed
-from robot_viewer.shapes import Meshes, shapes_of
+from robot_viewer.page.robot_scene import (
+    Ground,
+    Meshes,
+    RobotScene,
+    shapes_of,
+    start_position,
+    travel,
+)
+from robot_viewer.page.style import add_speed
 
 URDF = """
 <robot name="small">

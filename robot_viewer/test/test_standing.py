@@ -24,8 +24,7 @@ from viewer_rig import in_domain, ViewerRig
 
 from node_runner import LATCHED
 from quad_msgs.msg import FootContacts
-from robot_viewer.nodes.body import Body
-from robot_viewer.page.body_panel import BodyPanel, DOWN_COLOR
+from robot_viewer.nodes.body import Body, BodyPanel, DOWN_COLOR
 from robot_viewer.page.robot_page import RobotPage
 from robot_viewer.page.standing import (
     battery_text,
@@ -157,7 +156,7 @@ class Watched:
             get_publishers_info_by_topic=lambda topic: [publisher],
         )
         listening: Any = SimpleNamespace(add=lambda kind, topic, *_: self.topics.append(topic))
-        page: Any = SimpleNamespace(offer_body=lambda: None)
+        page: Any = SimpleNamespace(robot=None)
         self.body = Body(node, page, listening, {})
 
 
@@ -207,7 +206,7 @@ class Dog(ViewerRig):
     @property
     def panel(self) -> BodyPanel:
         """That of the page."""
-        panel = self.viewer.page._body
+        panel = self.viewer._body.panel
         assert panel is not None
         return panel
 
@@ -226,7 +225,7 @@ class Dog(ViewerRig):
 
 def test_the_page_shows_how_it_stands(dog: Dog) -> None:
     """Attitude, battery and feet; its sliders move the body until STOP."""
-    dog.spin_until(lambda: dog.viewer.page._body is not None, 'the panel')
+    dog.spin_until(lambda: dog.viewer._body.panel is not None, 'the panel')
     dog.spin_until(lambda: 'roll +5.7' in dog.panel._html.content, 'the attitude')
     dog.spin_until(lambda: 'battery 75 %, 7.4 V' in dog.panel._html.content, 'the battery')
     dog.spin_until(lambda: 'fr, rl, rr' in dog.panel._html.content, 'contacts')
@@ -254,7 +253,7 @@ def test_a_machine_without_the_messages_shows_the_rest(
     said: list[str] = []
     monkeypatch.setattr(dog.viewer.page, 'say', lambda text, **_: said.append(text))
     monkeypatch.setitem(sys.modules, 'quad_msgs.msg', None)
-    dog.spin_until(lambda: dog.viewer.page._body is not None, 'the panel')
+    dog.spin_until(lambda: dog.viewer._body.panel is not None, 'the panel')
     dog.spin_until(lambda: 'roll +5.7' in dog.panel._html.content, 'the attitude')
     dog.spin_until(lambda: len(dog.panel._sliders) == 3, 'sliders')
     (text,) = (text for text in said if 'quad_msgs' in text)

@@ -1,3 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a bridge to Foxglove decides: who may connect, which names are shown, which files sent."""
+"""The bridge to Foxglove: foxglove-sdk on one side, rclpy on the other."""
+
+
+class BridgeError(Exception):
+    """A bridge that cannot begin; the message has the remedy."""

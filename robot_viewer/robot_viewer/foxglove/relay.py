@@ -7,21 +7,36 @@ guessed, and stands behind this. It limits the number of messages that wait for 
 their bytes: a thousand images are gigabytes. So messages of topics are dropped here while more
 than a number of bytes waits for their client. Clients that know only the former sub-protocol are
 served too, as its messages have the same form; all of them get the distribution of ROS.
+
+Programs and pages of this host may connect, known pages, and from elsewhere who has the token. A
+browser lets any page connect to a loopback port, and names the page's site in the header Origin,
+which the page cannot change. Programs send none.
 """
 
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Iterable
 from contextlib import suppress
+from dataclasses import dataclass
+import hmac
 from http import HTTPStatus
+from http.client import HTTPException, parse_headers
+from io import BytesIO
 import json
 import os
 import secrets
 import ssl
 import threading
+from urllib.parse import parse_qs, urlsplit
 
-from .admission import Admission, FORMER, SUBPROTOCOL
+from ..loopback import is_loopback
 
+FOXGLOVE_ORIGINS = ('https://app.foxglove.dev', 'file://')
+"""Foxglove in a browser, and desktop programs, whose pages are files of their own."""
+ANY_ORIGIN = '*'
+SUBPROTOCOL, FORMER = 'foxglove.sdk.v1', 'foxglove.websocket.v1'
+"""Sub-protocols of clients of foxglove-sdk, and of those from before it."""
 HEAD_TIMEOUT = 5.0
 """Time for the head of a request in [s]."""
 SEND_BUFFER_LIMIT = 10_000_000
@@ -33,6 +48,55 @@ TEXT, BINARY = 0x81, 0x82
 """First byte of a whole text frame and of a whole binary frame (RFC 6455, section 5.2)."""
 MESSAGE_DATA = 0x01
 """First byte of a message of a topic (Foxglove WebSocket protocol, Message Data)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Admission:
+    """Looks at the head of each request.
+
+    Attributes:
+        origins: Sites whose pages may connect, besides those of this host; `*` for all.
+        token: What a client has to have in its URL; empty where none is needed.
+    """
+
+    origins: frozenset[str]
+    token: str
+
+    @classmethod
+    def to(cls, address: str, origins: Iterable[str]) -> Admission:
+        """Make a token where one is needed."""
+        token = '' if is_loopback(address) else secrets.token_urlsafe(24)
+        return cls(frozenset(origins), token)
+
+    def refusal(self, head: bytes) -> str | None:
+        """Return why a request is refused; None when it is not."""
+        line, _, rest = head.partition(b'\r\n')
+        words = line.decode('latin-1').split(' ')
+        try:
+            headers = parse_headers(BytesIO(rest))
+        except HTTPException as error:
+            return f'not understood: {error}'
+        if len(words) != 3 or headers.get('Upgrade', '').lower() != 'websocket':
+            return 'this is a WebSocket of Foxglove; open it in Foxglove or Lichtblick'
+        offered = ','.join(headers.get_all('Sec-WebSocket-Protocol', []))
+        if not {SUBPROTOCOL, FORMER} & {each.strip() for each in offered.split(',')}:
+            return (
+                f'the client offers the sub-protocol {offered!r}; this bridge speaks {SUBPROTOCOL}'
+                f' and {FORMER}'
+            )
+        origins = headers.get_all('Origin', [])
+        if not all(self._is_known(origin) for origin in origins):
+            return f'{origins[0]} is not in allowed_origins; add it, if you trust that site'
+        given = parse_qs(urlsplit(words[1]).query).get('token', [''])[0]
+        if not hmac.compare_digest(given.encode(), self.token.encode()) and self.token:
+            return 'open it by the URL that was printed at its start, with its token'
+        return None
+
+    def _is_known(self, origin: str) -> bool:
+        if origin in self.origins or ANY_ORIGIN in self.origins:
+            return True
+        host = urlsplit(origin).hostname
+        return host is not None and is_loopback(host)
 
 
 def hidden_address() -> str:

@@ -4,14 +4,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib import import_module
+import math
 import time
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 from geometry_msgs.msg import Point
 from geometry_msgs.msg import Pose as PoseMessage
 from geometry_msgs.msg import Quaternion as QuaternionMessage
+import numpy as np
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import qos_profile_sensor_data, QoSProfile
@@ -24,9 +26,18 @@ from urdf_reader import (
     link_poses,
     PointMass,
     Quaternion,
+    Vector,
+)
+from viser import (
+    GuiEvent,
+    GuiHtmlHandle,
+    GuiSliderHandle,
+    IcosphereHandle,
+    LineSegmentsHandle,
 )
 
-from ..page.body_panel import BodyPanel, Pose
+from ..page.robot_page import RobotPage
+from ..page.robot_scene import RobotScene
 from ..page.standing import (
     battery_text,
     Contacts,
@@ -36,6 +47,7 @@ from ..page.standing import (
     Support,
     support,
 )
+from ..page.style import NEUTRAL, value_of
 from .listening import Listening
 
 NOT_MEASURED = -1.0
@@ -44,13 +56,21 @@ CONTACTS, CONTACTS_TYPE = 'foot_contacts', 'quad_msgs/msg/FootContacts'
 CONTACTS_AGE = 1.0
 """After which contacts of feet are not shown any more in [s]."""
 LEVEL: Quaternion = (0.0, 0.0, 0.0, 1.0)
+RANGES: Mapping[str, float] = {'Roll [deg]': 20.0, 'Pitch [deg]': 17.0, 'Height [mm]': 30.0}
+"""Of the sliders to either side; the controller has limits of its own."""
+LEVEL_LABEL = 'Level the body'
+DOWN_COLOR, UP_COLOR, LINE_COLOR = (35, 112, 50), (134, 142, 150), (24, 100, 171)
+MASS_COLOR, OUTSIDE_COLOR = (24, 100, 171), (255, 212, 59)
+"""Of the place below the centre of mass: over the support, or outside."""
+FOOT_RADIUS = 0.012
+"""Of the mark of a foot in [m]."""
+MASS_RADIUS = 0.008
+"""Of the mark below the centre of mass in [m]."""
+LINE_WIDTH = 3.0
+"""In [px]."""
 
-
-class Page(Protocol):
-    """Where it is shown."""
-
-    def offer_body(self) -> BodyPanel | None:
-        """Offer what is known of the body; None as long as there is no robot."""
+Pose: TypeAlias = tuple[float, float, float]
+"""Roll and pitch in [rad], height in [m], relative to the normal pose."""
 
 
 class Body:
@@ -58,16 +78,17 @@ class Body:
 
     Attributes:
         battery: Its charge in words; empty where nothing measures it.
+        panel: Where it is shown; None before something of it is known.
     """
 
     def __init__(
-        self, node: Node, page: Page, listening: Listening, positions: Mapping[str, float]
+        self, node: Node, page: RobotPage, listening: Listening, positions: Mapping[str, float]
     ) -> None:
         self._node, self._page = node, page
         self._listening, self._positions = listening, positions
         self._tree: KinematicTree | None = None
         self._feet: tuple[str, ...] = ()
-        self._panel: BodyPanel | None = None
+        self.panel: BodyPanel | None = None
         self._attitude: Quaternion | None = None
         self.battery = ''
         self._masses: tuple[PointMass, ...] = ()
@@ -80,7 +101,7 @@ class Body:
 
     def describe(self, tree: KinematicTree) -> None:
         """Use another robot; the page has removed the panel."""
-        self._tree, self._feet, self._panel = tree, feet_of(tree), None
+        self._tree, self._feet, self.panel = tree, feet_of(tree), None
         self._masses, self._radius = (), 0.0
         self._contacts = self._support = None
         if not self._feet:
@@ -115,10 +136,11 @@ class Body:
             self._poses = self._node.create_publisher(
                 PoseMessage, 'body_pose', QoSProfile(depth=1)
             )
-        if self._panel is None and (self._found or self._poses is not None):
-            self._panel = self._page.offer_body()
-        if self._panel is not None and self._poses is not None:
-            self._panel.offer_pose(self.send)
+        if self.panel is None and (self._found or self._poses is not None):
+            robot = self._page.robot
+            self.panel = None if robot is None else BodyPanel(self._page, robot)
+        if self.panel is not None and self._poses is not None:
+            self.panel.offer_pose(self.send)
 
     def send(self, pose: Pose) -> None:
         """Publish a pose of the body once, at once; the controller moves there slowly."""
@@ -130,7 +152,7 @@ class Body:
 
     def draw(self) -> None:
         """Show how the feet are now."""
-        if self._panel is None or self._tree is None:
+        if self.panel is None or self._tree is None:
             return
         if time.monotonic() - self._contacts_at > CONTACTS_AGE:
             self._contacts = None
@@ -143,16 +165,16 @@ class Body:
             centre_of_mass(self._masses, poses),
             self._radius,
         )
-        self._panel.show_feet(places, self._contacts)
-        self._panel.show_support(found)
+        self.panel.show_feet(places, self._contacts)
+        self.panel.show_support(found)
 
     def list(self) -> None:
         """Show attitude and battery."""
-        if self._panel is not None:
+        if self.panel is not None:
             feet = ''
             if self._contacts is not None and self._support is not None:
                 feet = self._contacts.html(self._support)
-            self._panel.show(horizon_html(self._attitude, self.battery) + feet)
+            self.panel.show(horizon_html(self._attitude, self.battery) + feet)
 
     def _take_imu(self, message: Imu) -> None:
         turn = message.orientation
@@ -166,3 +188,104 @@ class Body:
 
     def _take_battery(self, message: BatteryState) -> None:
         self.battery = battery_text(message.percentage, message.voltage)
+
+
+class BodyPanel:
+    """Sliders of the body's pose, a horizon, and marks at the feet."""
+
+    def __init__(self, page: RobotPage, robot: RobotScene) -> None:
+        self._gui, self._scene, self._live = page.server.gui, page.server.scene, page.live
+        self._path = robot.path_of(robot.tree.root)
+        with page.place('Body', self):
+            self._folder = self._gui.add_folder(None)
+        with self._folder:
+            self._html: GuiHtmlHandle = self._gui.add_html('')
+        self._sliders: list[GuiSliderHandle[float]] = []
+        self._feet: dict[str, IcosphereHandle] = {}
+        self._mass: IcosphereHandle | None = None
+        self._line: LineSegmentsHandle | None = None
+
+    def offer_pose(self, send: Callable[[Pose], None]) -> None:
+        """Enable the controls of the body."""
+        if self._sliders:
+            return
+
+        def moved(event: GuiEvent[GuiSliderHandle[float]]) -> None:
+            if event.client_id is None:  # it was set here
+                return
+            if not self._live.refuses(event.target.label, always=False):
+                roll, pitch, height = map(value_of, self._sliders)
+                send((math.radians(roll), math.radians(pitch), height / 1000.0))
+
+        def level() -> None:
+            if self._live.refuses(LEVEL_LABEL, always=False):
+                return
+            for slider in self._sliders:
+                slider.value = 0.0  # type: ignore[misc]  # it has a setter
+            send((0.0, 0.0, 0.0))
+
+        with self._folder:
+            for label, most in RANGES.items():
+                slider = self._gui.add_slider(label, -most, most, most / 100.0, 0.0)
+                slider.on_update(moved)
+                self._sliders.append(slider)
+            self._gui.add_button(LEVEL_LABEL, color=NEUTRAL).on_click(lambda _: level())
+
+    def remove(self) -> None:
+        """Remove its marks from the view."""
+        for node in (*self._feet.values(), self._mass, self._line):
+            if node is not None:
+                node.remove()
+
+    def show(self, html: str) -> None:
+        """Show attitude and battery."""
+        if self._html.content != html:
+            self._html.content = html
+
+    def show_feet(self, places: Mapping[str, Vector], contacts: Contacts | None) -> None:
+        """Mark the feet."""
+        down = frozenset() if contacts is None else contacts.feet
+        for foot, place in places.items():
+            mark = self._feet.get(foot)
+            if mark is None:
+                mark = self._feet[foot] = self._mark(f'contact_{foot}', FOOT_RADIUS)
+            mark.position = place
+            _paint(mark, DOWN_COLOR if foot in down else UP_COLOR)
+
+    def show_support(self, support: Support) -> None:
+        """Draw on the ground what the feet span, and the place below the centre of mass."""
+        corners = np.array(support.corners, float).reshape(-1, 3)
+        ends = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+        below, centre = support.below, support.centre
+        if below is not None and centre is not None:
+            ends = np.concatenate([ends, np.array([[centre, below]])])
+            if self._mass is None:
+                self._mass = self._mark('centre_of_mass', MASS_RADIUS)
+            self._mass.position = below
+            outside = support.margin is not None and support.margin < 0.0
+            _paint(self._mass, OUTSIDE_COLOR if outside else MASS_COLOR)
+        if self._mass is not None:
+            self._mass.visible = below is not None
+        if self._line is not None and len(self._line.points) == len(ends):
+            self._line.points = ends.astype(np.float32)
+            return
+        if self._line is not None:
+            self._line.remove()
+            self._line = None
+        if len(ends):
+            self._line = self._scene.add_line_segments(
+                f'{self._path}/support',
+                ends,
+                LINE_COLOR,
+                thickness=LINE_WIDTH,
+                thickness_units='screen',
+            )
+
+    def _mark(self, name: str, radius: float) -> IcosphereHandle:
+        path = f'{self._path}/{name}'
+        return self._scene.add_icosphere(path, radius, UP_COLOR, opacity=0.8)
+
+
+def _paint(mark: IcosphereHandle, color: tuple[int, int, int]) -> None:
+    if tuple(mark.color) != color:
+        mark.color = color

@@ -11,7 +11,7 @@ from importlib import import_module
 import math
 from pathlib import Path
 import time
-from typing import Any, Protocol
+from typing import Any
 
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -20,15 +20,19 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 from urdf_reader import JointKind as UrdfKind
 from urdf_reader import KinematicTree
+from viser import GuiDropdownHandle, GuiHtmlHandle, GuiNumberHandle
 
 from first_motion import (
     AxisScales,
     Cause,
     Correction,
     DriveFacts,
+    FASTEST,
+    FURTHEST,
     JointKind,
     judge,
     Judgement,
+    MotionGuard,
     Order,
     Outcome,
     Sample,
@@ -50,7 +54,9 @@ from ..page.first_motion import (
     problem_of,
     Saw,
 )
-from ..page.first_motion_panel import FirstMotionActions, FirstMotionPanel
+from ..page.live import Hold
+from ..page.robot_page import RobotPage
+from ..page.style import BAD, CAUTION, GOOD, line, NEUTRAL, PLAIN, WANTED
 from ..robot_state import DRIVE, Status
 
 READ_UNITS = 'read_units'
@@ -62,15 +68,13 @@ ANSWER_TIMEOUT, DISABLE_TIMEOUT = 20.0, 5.0
 SETTLE_TIME = 0.7
 """Time in [s] after the last target, until the position is read: the robot's own time-out and its
 ramp are in it."""
-
-
-class Page(Protocol):
-    """Where it is shown."""
-
-    def offer_first_motion(
-        self, joints: Mapping[str, JointKind], actions: FirstMotionActions
-    ) -> FirstMotionPanel:
-        """Offer it for these joints, in the place of those before."""
+DISTANCE = 1.0
+"""In the unit of people, degrees or millimetres."""
+SPEEDS = {JointKind.TURNS: 0.5, JointKind.SLIDES: 1.0}
+"""In the same unit per second: slow enough to let go in time, whatever the scale is by ten."""
+HOLD = 'Hold to move'
+PRESS_ANEW = 'let go of the button, and press it anew'
+CHOOSE = 'choose'
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,12 +102,12 @@ class FirstMotion:
     def __init__(
         self,
         node: Node,
-        page: Page,
+        page: RobotPage,
         positions: Mapping[str, float],
         statuses: Mapping[str, Status],
         order: Callable[[Callable[[], None]], None],
     ) -> None:
-        self._node, self._page, self._order = node, page, order
+        self._node, self._page, self.order = node, page, order
         self._positions, self._statuses = positions, statuses
         self._kinds: Mapping[str, JointKind] = {}
         self._drives: Mapping[str, str] = {}
@@ -154,46 +158,12 @@ class FirstMotion:
         self._end()
         self._drives = found
         kinds = {joint: self._kinds[joint] for joint in found}
-        self._panel = self._page.offer_first_motion(kinds, self)
+        self._panel = FirstMotionPanel(self._page, kinds, self)
 
     def take(self, positions: Mapping[str, float]) -> None:
         """Store new positions."""
         if math.isfinite(positions.get(self._request.joint, math.nan)):
             self._seen_at = time.monotonic()
-
-    # -- what people do, in any thread
-
-    def prepare(self, request: MotionRequest) -> None:
-        """Enable the drive, and say what will happen."""
-        self._order(partial(self._prepare, request))
-
-    def forget(self) -> None:
-        """Another joint was chosen: what was prepared counts no more."""
-        self._order(self._forget)
-
-    def beat(self) -> None:
-        """Process a valid heartbeat of the held button."""
-        self._order(partial(self._beat, time.monotonic()))
-
-    def release(self) -> None:
-        """The button was let go."""
-        self._order(self._release)
-
-    def finish(self) -> None:
-        """It is enough: end the motion before its target."""
-        self._order(self._finish)
-
-    def conclude(self, saw: Saw, distance: float) -> None:
-        """Conclude from what was seen."""
-        self._order(partial(self._conclude, saw, distance))
-
-    def choose(self, cause: Cause) -> None:
-        """Choose one of several causes."""
-        self._order(partial(self._propose, cause))
-
-    def write(self) -> None:
-        """Change bus.yml."""
-        self._order(self._write)
 
     # -- before the motion
 
@@ -209,7 +179,8 @@ class FirstMotion:
         self._asking = self._enabled = self._targets = self._rests_at = self._reported = None
         self._judgement = self._correction = self._unconfirmed = None
 
-    def _forget(self) -> None:
+    def forget(self) -> None:
+        """Another joint was chosen: what was prepared counts no more."""
         self._end()
         self._begin('')
 
@@ -223,7 +194,8 @@ class FirstMotion:
         self._begin(f'{self._request.joint}: {why}', failed=True)
         self._node.get_logger().warning(f'first motion of {self._request.joint}: {why}')
 
-    def _prepare(self, request: MotionRequest) -> None:
+    def prepare(self, request: MotionRequest) -> None:
+        """Enable the drive, and say what will happen."""
         if self._panel is None or request.joint not in self._drives or self._disabling is not None:
             return
         self._end()
@@ -335,15 +307,18 @@ class FirstMotion:
 
     # -- the motion
 
-    def _beat(self, at: float) -> None:
+    def beat(self, at: float) -> None:
+        """Process a heartbeat of the held button that came at a steady time in [s]."""
         if self._targets is not None:
             self._targets.beat(at)
 
-    def _release(self) -> None:
+    def release(self) -> None:
+        """The button was let go."""
         if self._targets is not None:
             self._targets.release()
 
-    def _finish(self) -> None:
+    def finish(self) -> None:
+        """It is enough: end the motion before its target."""
         if self._targets is not None and self._targets.guard.finish() is Order.END:
             self._targets.release()
 
@@ -437,7 +412,8 @@ class FirstMotion:
         self._targets = self._rests_at = None
         self._panel.ask(guard.detail, self._reported)
 
-    def _conclude(self, saw: Saw, distance: float) -> None:
+    def conclude(self, saw: Saw, distance: float) -> None:
+        """Conclude from what was seen, and how far about it was in [rad] or [m]."""
         axis, reported = self._axis, self._reported
         if axis is None or reported is None or self._panel is None:
             return
@@ -448,9 +424,10 @@ class FirstMotion:
         self._node.get_logger().info(text)
         self._panel.show_judgement(judgement, right=judgement.verdict is Verdict.RIGHT)
         causes = judgement.causes
-        self._propose(causes[0] if len(causes) == 1 else None)
+        self.propose(causes[0] if len(causes) == 1 else None)
 
-    def _propose(self, cause: Cause | None) -> None:
+    def propose(self, cause: Cause | None) -> None:
+        """Propose what corrects a cause; None where it is not chosen yet."""
         axis, judgement = self._axis, self._judgement
         if axis is None or judgement is None or self._panel is None:
             return
@@ -461,7 +438,8 @@ class FirstMotion:
         here = axis.place.is_here
         self._panel.show_correction(lines, self._correction.notes, writable=here)
 
-    def _write(self) -> None:
+    def write(self) -> None:
+        """Change bus.yml."""
         if self._axis is None or self._correction is None or self._panel is None:
             return
         try:
@@ -472,3 +450,179 @@ class FirstMotion:
         text = f'{path} is written; restart the robot, which has the old scales'
         self._node.get_logger().info(text)
         self._panel.show_written(text, failed=False)
+
+
+class FirstMotionPanel:
+    """Asks for what people do, and shows what it is given; it decides nothing."""
+
+    def __init__(
+        self, page: RobotPage, joints: Mapping[str, JointKind], motion: FirstMotion
+    ) -> None:
+        self._joints, self._motion, self._live = joints, motion, page.live
+        self._hold: int | None = None  # while a motion is prepared
+        self._kind = next(iter(joints.values()))
+        self._causes: Mapping[str, Cause] = {}
+        gui = page.server.gui
+        with page.place('Diagnose', self):
+            self._folder = gui.add_folder(
+                'First motion', order=page.before_log, expand_by_default=False
+            )
+        with self._folder:
+            self._joint: GuiDropdownHandle[str] = gui.add_dropdown('Joint', tuple(joints))
+            self._distance: GuiNumberHandle[float] = gui.add_number('Distance', DISTANCE, step=0.1)
+            self._speed: GuiNumberHandle[float] = gui.add_number('Speed', SPEEDS[self._kind])
+            self._prepare = gui.add_button('Enable and prepare', color=WANTED)
+            self._state: GuiHtmlHandle = gui.add_html('')
+            self._place_of_hold: GuiHtmlHandle = gui.add_html('')
+            self._enough = gui.add_button('That is enough', color=NEUTRAL)
+            self._saw: GuiDropdownHandle[str] = gui.add_dropdown(
+                'What you saw', tuple(each.value for each in Saw)
+            )
+            self._far: GuiNumberHandle[float] = gui.add_number('How far', DISTANCE, step=0.01)
+            self._conclude = gui.add_button('Conclude', color=NEUTRAL)
+            self._verdict: GuiHtmlHandle = gui.add_html('')
+            self._cause: GuiDropdownHandle[str] = gui.add_dropdown('Cause', (CHOOSE,))
+            self._lines = gui.add_markdown('')
+            self._write = gui.add_button('Write it into bus.yml', color=CAUTION)
+            self._note: GuiHtmlHandle = gui.add_html('')
+        order = motion.order
+        self._joint.on_update(lambda _: self._select())
+        self._prepare.on_click(lambda _: order(partial(motion.prepare, self._request())))
+        self._enough.on_click(lambda _: order(motion.finish))
+        self._conclude.on_click(
+            lambda _: order(
+                partial(
+                    motion.conclude,
+                    Saw(self._saw.value),
+                    abs(self._far.value) * self._kind.size,
+                )
+            )
+        )
+        self._cause.on_update(lambda _: self._choose())
+        self._write.on_click(lambda _: order(motion.write))
+        self._use_units()
+        self.begin('', failed=False)
+
+    def remove(self) -> None:
+        """Remove it from the page."""
+        self._drop_hold()
+        self._folder.remove()
+
+    # -- what is shown
+
+    def begin(self, text: str, *, failed: bool) -> None:
+        """Show that nothing is prepared, and why."""
+        self._prepare.disabled = False
+        self._state.content = line(text, BAD if failed else PLAIN) if text else ''
+        self._show(moves=False, asks=False, concluded=False)
+
+    def show_waiting(self, text: str, *, failed: bool) -> None:
+        """Show what is waited for; nothing can be prepared meanwhile."""
+        self._prepare.disabled = True
+        self._state.content = line(text, BAD if failed else PLAIN)
+        self._show(moves=False, asks=False, concluded=False)
+
+    def show_ready(self, announced: Sequence[str]) -> None:
+        """Show what will happen, and offer the button."""
+        self._prepare.disabled = False
+        self._state.content = ''.join(line(text) for text in announced)
+        self._note.content = ''
+        self._show(moves=True, asks=False, concluded=False)
+
+    def show_progress(self, guard: MotionGuard, *, press_anew: bool) -> None:
+        """Show how far it is, and that the button does not count until it was let go."""
+        kind, distance = self._kind, guard.plan.distance
+        way = f'{guard.travelled / kind.size:.3f} of {kind.shown(abs(distance))}'
+        state, color = ('moving', GOOD) if guard.moving else ('at rest', PLAIN)
+        if press_anew:
+            state, color = PRESS_ANEW, BAD
+        self._note.content = line(f'{state}: {way}', color)
+
+    def ask(self, ended: str, reported: float) -> None:
+        """Ask what was seen of a motion that has ended."""
+        kind = self._kind
+        self._state.content = line(
+            f'{ended}; the drive reported {kind.shown(reported)}', PLAIN
+        ) + line('What did the real joint do?')
+        self._far.value = round(abs(reported) / kind.size, 3)  # type: ignore[misc]
+        self._note.content = ''
+        self._show(moves=False, asks=True, concluded=False)
+
+    def show_judgement(self, judgement: Judgement, *, right: bool) -> None:
+        """Show what is concluded."""
+        causes = [f'{each.text} (factor {each.factor:.4g})' for each in judgement.causes]
+        texts = [judgement.remedy] if judgement.remedy else causes
+        self._verdict.content = line(judgement.verdict.value, GOOD if right else BAD) + ''.join(
+            line(text) for text in texts
+        )
+        self._causes = dict(zip(causes, judgement.causes, strict=True))
+        self._cause.options = (CHOOSE, *causes)
+        self._cause.value = CHOOSE  # type: ignore[misc]
+        self._show(moves=False, asks=True, concluded=True)
+        self._cause.visible = len(causes) > 1
+
+    def show_correction(self, lines: str, notes: Sequence[str], *, writable: bool) -> None:
+        """Show what to write."""
+        self._lines.content = f'```yaml\n{lines}\n```'
+        self._lines.visible = True
+        self._write.visible = writable
+        self._note.content = ''.join(line(text) for text in notes)
+
+    def show_written(self, text: str, *, failed: bool) -> None:
+        """Show what became of the file."""
+        self._write.visible = False
+        self._note.content = line(text, BAD if failed else GOOD)
+
+    def _show(self, *, moves: bool, asks: bool, concluded: bool) -> None:
+        self._drop_hold()  # what is pressed for a motion moves nothing in the next one
+        if moves:
+            motion = self._motion
+            self._hold, html = self._live.button(
+                Hold(
+                    HOLD,
+                    lambda: motion.order(partial(motion.beat, time.monotonic())),
+                    lambda: motion.order(motion.release),
+                    always=True,
+                )
+            )
+            self._place_of_hold.content = f'<div class="rv-one">{html}</div>'
+        self._enough.visible = moves
+        for question in (self._saw, self._far, self._conclude):
+            question.visible = asks
+        self._verdict.visible = concluded
+        self._cause.visible = self._lines.visible = self._write.visible = False
+        if not moves and not asks:
+            self._note.content = ''
+
+    def _drop_hold(self) -> None:
+        if self._hold is not None:
+            self._live.remove(self._hold)
+            self._hold, self._place_of_hold.content = None, ''
+
+    # -- what people do
+
+    def _select(self) -> None:
+        self._motion.order(self._motion.forget)
+        self._use_units()
+
+    def _use_units(self) -> None:
+        kind = self._kind = self._joints[self._joint.value]
+        furthest, fastest = FURTHEST[kind] / kind.size, FASTEST[kind] / kind.size
+        self._distance.label = f'Distance [{kind.value}]'
+        self._distance.min, self._distance.max = -furthest, furthest
+        self._distance.value = DISTANCE  # type: ignore[misc]  # it has a setter
+        self._speed.label = f'Speed [{kind.value}/s]'
+        self._speed.min, self._speed.max, self._speed.step = 0.1, fastest, 0.1
+        self._speed.value = SPEEDS[kind]  # type: ignore[misc]
+        self._far.label = f'How far [{kind.value}]'
+
+    def _request(self) -> MotionRequest:
+        size = self._kind.size
+        return MotionRequest(
+            self._joint.value, self._distance.value * size, self._speed.value * size
+        )
+
+    def _choose(self) -> None:
+        cause = self._causes.get(self._cause.value)
+        if cause is not None:
+            self._motion.order(partial(self._motion.propose, cause))

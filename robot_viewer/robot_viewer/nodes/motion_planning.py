@@ -6,35 +6,40 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
+from itertools import pairwise
 import time
-from typing import Any, Protocol
+from typing import Any
 
+import numpy as np
 from rclpy.action.client import ActionClient
 from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.task import Future
 from std_msgs.msg import String
-from urdf_reader import DescriptionError, KinematicTree, Transform
+from urdf_reader import DescriptionError, KinematicTree, Transform, Vector
+from viser import (
+    GuiButtonHandle,
+    GuiDropdownHandle,
+    GuiEvent,
+    GuiHtmlHandle,
+    LineSegmentsHandle,
+    TransformControlsEvent,
+    TransformControlsHandle,
+)
 
 from node_runner import LATCHED
 
-from ..link_poses import link_pose, moved
+from ..link_poses import link_pose, links_beyond, moved
 from ..page.deadman import RELEASED_AFTER
-from ..page.motion_plan import (
-    DRAGGED,
-    NO_GOAL,
-    Order,
-    plan_groups,
-    PlanActions,
-    PlanGroup,
-    PlannedMotion,
-    SceneActions,
-    tip_line,
-)
-from ..page.plan_panel import PlanPanel
+from ..page.live import Hold
+from ..page.robot_page import RobotPage
+from ..page.robot_scene import pose_of, put, RobotScene, Tint
+from ..page.style import BAD, Color, GOOD, line, NEUTRAL, PLAIN, WANTED
 from .action_call import ActionCall
+from .motion_plan import plan_groups, PlanGroup, PlannedMotion, tip_line
 from .planning_messages import (
     ik_request,
     Message,
@@ -43,7 +48,7 @@ from .planning_messages import (
     positions_of,
     refusal,
 )
-from .scene_editor import SceneEditor
+from .planning_scene import PlanningScene
 
 MOVE, EXECUTE = 'move_action', 'execute_trajectory'
 OFFERED = {
@@ -55,15 +60,15 @@ ANSWER_TIME = 2.0
 """Time in [s] after which an answer counts as lost."""
 STOP = 'stop'
 """The event that ends every execution."""
-
-
-class Page(Protocol):
-    """Where it is shown."""
-
-    def offer_plan(
-        self, groups: Sequence[str], actions: tuple[PlanActions, SceneActions, Order]
-    ) -> PlanPanel | None:
-        """Offer to plan motions; None as long as there is no robot."""
+NO_GOAL, DRAGGED = 'none', 'dragged in the view'
+"""Goals that are no states of the SRDF."""
+HOLD_EXECUTE = 'Hold to execute'
+GHOST_TINT: Tint = (0.05, 0.52, 0.6, 0.4)
+LINE_COLOR = (24, 100, 171)
+LINE_WIDTH = 3.0
+"""In [px]."""
+GOAL_SIZE = 0.22
+"""Of the arrows by which the goal is dragged in [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,21 +82,25 @@ class _Links:
 
 
 class MotionPlanning:
-    """What people plan; everything in the thread of the node, and nothing waits."""
+    """What people plan; everything in the thread of the node, and nothing waits.
+
+    Attributes:
+        panel: Where it is shown; None before there is a move_group and a robot.
+        scene: The objects that it plans around.
+    """
 
     def __init__(
         self,
         node: Node,
-        page: Page,
+        page: RobotPage,
         positions: Mapping[str, float],
-        order: Order,
+        order: Callable[[Callable[[], None]], None],
     ) -> None:
         """Find no move_group yet."""
         self._node, self._page, self._positions, self._order = node, page, positions, order
         self._links: _Links | None = None
-        self._tree: KinematicTree | None = None
         self._semantic = ''
-        self._panel: PlanPanel | None = None
+        self.panel: PlanPanel | None = None
         self._groups: Mapping[str, PlanGroup] = {}
         self._group = PlanGroup('', (), '', {})
         self._goal = NO_GOAL
@@ -106,13 +115,13 @@ class MotionPlanning:
         self._canceled_as = ''  # why the page has canceled it
         self._held_at = 0.0  # when the button of the execution was seen to be held
         self._executed_goal: tuple[str, dict[str, float]] = (NO_GOAL, {})
-        self._scene = SceneEditor(node)
+        self.scene = PlanningScene(node, self.say)
 
     # -- what there is
 
-    def describe(self, tree: KinematicTree) -> None:
+    def describe(self) -> None:
         """Use another robot; the page has removed the panel."""
-        self._tree, self._panel = tree, None
+        self.panel = None
         self._drop()
 
     def look(self, services: Mapping[str, Sequence[str]]) -> None:
@@ -126,9 +135,9 @@ class MotionPlanning:
                 self._connect()
         elif not there and self._execution is not None:
             self._execution = None
-            self._say('move_group is gone; what it executed may go on: STOP', failed=True)
-        if self._panel is None and self._semantic and self._tree is not None:
-            self._offer(self._tree)
+            self.say('move_group is gone; what it executed may go on: STOP', failed=True)
+        if self.panel is None and self._semantic and self._page.robot is not None:
+            self._offer(self._page.robot)
 
     def _connect(self) -> None:
         node, actions = self._node, import_module('moveit_msgs.action')
@@ -140,31 +149,30 @@ class MotionPlanning:
             node.create_publisher(String, 'trajectory_execution_event', 10),
         )
         node.create_subscription(String, 'robot_description_semantic', self._name_groups, LATCHED)
-        self._scene.connect()
+        self.scene.connect()
 
     def _name_groups(self, message: String) -> None:
         self._semantic = str(message.data)
 
-    def _offer(self, tree: KinematicTree) -> None:
+    def _offer(self, robot: RobotScene) -> None:
+        if not self._page.has('Plan'):
+            return
         try:
-            self._groups = plan_groups(tree, self._semantic)
+            self._groups = plan_groups(robot.tree, self._semantic)
         except DescriptionError as error:
             self._node.get_logger().error(f'robot_description_semantic: {error}')
             self._semantic = ''
             return
-        actions = (self, self._scene, self._order_here)
-        self._panel = self._page.offer_plan(list(self._groups), actions)
-        if self._panel is not None:
-            self.choose_group(next(iter(self._groups)))
-            self._scene.show_on(self._panel, tree.root)
+        self.panel = PlanPanel(self._page, robot, list(self._groups), self)
+        self.choose_group(next(iter(self._groups)))
 
     # -- what people do
 
-    def _order_here(self, action: Callable[[], None]) -> None:
-        """Carry out actions of the page, unless they belong to a robot that has gone."""
+    def order(self, action: Callable[[], object]) -> None:
+        """Carry out an action of the page, unless it belongs to a robot that has gone."""
 
         def act() -> None:
-            if self._panel is not None:
+            if self.panel is not None:
                 action()
 
         self._order(act)
@@ -207,7 +215,7 @@ class MotionPlanning:
 
     def draw(self) -> None:
         """Show the next picture of a plan, if it is being shown."""
-        if self._panel is None or self._motion is None or self._shown_since is None:
+        if self.panel is None or self._motion is None or self._shown_since is None:
             return
         places = self._motion.shown(time.monotonic() - self._shown_since)
         if places is None:
@@ -215,20 +223,20 @@ class MotionPlanning:
         self._show_ghost(places)
 
     def _show_ghost(self, goals: Mapping[str, float]) -> None:
-        if self._panel is not None and self._tree is not None:
-            self._panel.show_ghost(moved(self._tree, self._positions, goals))
+        if self.panel is not None:
+            self.panel.show_ghost(moved(self.panel.tree, self._positions, goals))
 
     def choose_group(self, name: str) -> None:
         """Plan for another group."""
         self._group = self._groups[name]
-        if self._panel is not None:
-            self._panel.show_group(self._group)
+        if self.panel is not None:
+            self.panel.show_group(self._group)
         self.choose_goal(NO_GOAL)
 
     def choose_goal(self, name: str) -> None:
         """Go to a state of the SRDF, or to where the goal is dragged."""
-        panel, tree = self._panel, self._tree
-        if panel is None or tree is None:
+        panel = self.panel
+        if panel is None:
             return
         self._drop()
         self._goal, self._pose, self._joints = name, None, {}
@@ -241,40 +249,40 @@ class MotionPlanning:
             panel.place_goal(None)
             panel.show_ghost(None)
             return
-        everywhere = moved(tree, self._positions, self._joints)
-        panel.place_goal(link_pose(tree, self._group.tip, everywhere))
+        everywhere = moved(panel.tree, self._positions, self._joints)
+        panel.place_goal(link_pose(panel.tree, self._group.tip, everywhere))
         panel.show_ghost(everywhere)
 
     def drag_goal(self, pose: Transform) -> None:
         """Set the goal of the tip to a pose in the root link."""
         self._drop()
-        if self._goal != DRAGGED and self._panel is not None:
+        if self._goal != DRAGGED and self.panel is not None:
             self._goal = DRAGGED
-            self._panel.show_goal(DRAGGED)
+            self.panel.show_goal(DRAGGED)
         self._pose = pose
         self._solve()
 
     def _solve(self) -> None:
         """Solve for joints that bring the tip to the dragged pose; one request at a time."""
-        links, tree = self._links, self._tree
+        links, panel = self._links, self.panel
         pose, now = self._pose, time.monotonic()
-        if pose is None or links is None or tree is None:
+        if pose is None or links is None or panel is None:
             return
         if self._asked is not None and now - self._asked < ANSWER_TIME:
             return
         if not links.ik.service_is_ready():
-            self._say('compute_ik is not there', failed=True)
+            self.say('compute_ik is not there', failed=True)
             return
         self._asked = now
-        request = ik_request(self._group, pose, tree.root, self._joints)
+        request = ik_request(self._group, pose, panel.tree.root, self._joints)
         links.ik.call_async(request).add_done_callback(lambda done: self._solved(pose, done))
 
     def _solved(self, asked: Transform, future: Future) -> None:
         self._asked = None
-        if self._pose is None or self._panel is None:
+        if self._pose is None or self.panel is None:
             return
         if future.exception() is not None:
-            self._say(f'compute_ik: no answer: {future.exception()}', failed=True)
+            self.say(f'compute_ik: no answer: {future.exception()}', failed=True)
             return
         response: Any = future.result()
         reason = refusal(response.error_code)
@@ -285,50 +293,51 @@ class MotionPlanning:
             self._solve()
         else:
             self._pose = self._pose if reason else None  # the joints are the goal
-            self._say(reason, failed=True)
+            self.say(reason, failed=True)
 
-    def plan(self, share: float) -> None:
-        """Plan, at a share of the greatest velocity and acceleration."""
-        links, tree = self._links, self._tree
+    def plan(self) -> None:
+        """Plan, at the speed of the page."""
+        links, panel = self._links, self.panel
         goal = self._pose or self._joints
-        if links is None or tree is None:
+        if links is None or panel is None:
             return
         if not goal:
-            self._say('choose a goal first: a state, or one that is dragged', failed=True)
+            self.say('choose a goal first: a state, or one that is dragged', failed=True)
             return
         if self._execution is not None:
-            self._say('it is still executing; STOP ends it', failed=True)
+            self.say('it is still executing; STOP ends it', failed=True)
             return
         if not links.move.server_is_ready():
-            self._say(f'{MOVE} is not there', failed=True)
+            self.say(f'{MOVE} is not there', failed=True)
             return
         self._drop()
-        self._say('planning ...')
-        message = plan_goal(self._group, goal, tree.root, share)
+        self.say('planning ...')
+        message = plan_goal(self._group, goal, panel.tree.root, self._page.speed())
         call = ActionCall(
             links.move, message, lambda result, why: self._planned(call, result, why)
         )
         self._planning = call
 
     def _planned(self, call: ActionCall, result: Message, why: str) -> None:
-        if call is not self._planning or self._panel is None or self._tree is None:
+        if call is not self._planning or self.panel is None:
             return  # of a request that counts no more
         self._planning = None
         reason = why or refusal(result.error_code)
         if reason:
-            self._say(reason, failed=True)
+            self.say(reason, failed=True)
             return
         self._trajectory = result.planned_trajectory
         self._motion = motion = planned_motion(self._trajectory)
         if motion.duration == 0.0:
             self._trajectory = None
-            self._say('it is there already', failed=False)
+            self.say('it is there already', failed=False)
             return
         self._shown_since = time.monotonic()
-        self._panel.show_line(tip_line(self._tree, self._group.tip, self._positions, motion))
-        self._panel.allow(execute=True)
+        tree, tip = self.panel.tree, self._group.tip
+        self.panel.show_line(tip_line(tree, tip, self._positions, motion))
+        self.panel.allow(execute=True)
         notes = f'; {result.error_code.message}' if result.error_code.message else ''
-        self._say(
+        self.say(
             f'the motion takes {motion.duration:.1f} s, planned in'
             f' {1000.0 * result.planning_time:.0f} ms{notes}',
             failed=False,
@@ -339,22 +348,22 @@ class MotionPlanning:
         if time.monotonic() - at > RELEASED_AFTER:
             return  # this node was held up; the button may be let go
         links = self._links
-        if links is None or self._panel is None:
+        if links is None or self.panel is None:
             return
         if self._trajectory is None:
-            self._say('nothing is planned that may be executed', failed=True)
+            self.say('nothing is planned that may be executed', failed=True)
             return
         if not links.execute.server_is_ready():
-            self._say(f'{EXECUTE} is not there', failed=True)
+            self.say(f'{EXECUTE} is not there', failed=True)
             return
         goal = import_module('moveit_msgs.action').ExecuteTrajectory.Goal()
         goal.trajectory = self._trajectory
         self._trajectory, self._shown_since, self._held_at = None, None, at
         self._executed_goal = self._goal, self._joints
-        self._panel.allow(execute=False)
+        self.panel.allow(execute=False)
         if self._motion is not None:
             self._show_ghost(self._motion.at(self._motion.duration))
-        self._say('executing ...')
+        self.say('executing ...')
         call = ActionCall(
             links.execute, goal, lambda result, why: self._executed(call, result, why)
         )
@@ -368,23 +377,163 @@ class MotionPlanning:
         if reason and self._canceled_as:
             reason = f'ended, as {self._canceled_as} ({reason})'
         self._canceled_as = ''
-        if self._panel is not None:
-            self._panel.end_hold()
+        if self.panel is not None:
+            self._page.live.end(self.panel.hold)
         if not reason and self._executed_goal == (self._goal, self._joints):
             self.choose_goal(NO_GOAL)  # unless another one was chosen meanwhile
-        self._say(reason or 'executed', failed=bool(reason))
+        self.say(reason or 'executed', failed=bool(reason))
 
     def _drop(self) -> None:
         """Forget what is planned or being planned."""
         if self._planning is not None:
             self._planning.cancel()
             self._planning = None
-            self._say('canceled')
-        if self._motion is not None and self._panel is not None:
-            self._panel.show_line(())
-            self._panel.allow(execute=False)
+            self.say('canceled')
+        if self._motion is not None and self.panel is not None:
+            self.panel.show_line(())
+            self.panel.allow(execute=False)
         self._trajectory = self._motion = self._shown_since = None
 
-    def _say(self, text: str, *, failed: bool | None = None) -> None:
-        if self._panel is not None:
-            self._panel.say(text, failed=failed)
+    def say(self, text: str, *, failed: bool | None = None) -> None:
+        """Show what became of the last request."""
+        if self.panel is not None:
+            self.panel.say(text, failed=failed)
+
+
+class PlanPanel:
+    """Goal, ghost and path of a planned motion on the page.
+
+    Attributes:
+        tree: The robot that it is for.
+        hold: Number of the button that executes.
+    """
+
+    def __init__(
+        self, page: RobotPage, robot: RobotScene, groups: Sequence[str], plan: MotionPlanning
+    ) -> None:
+        self._page, self._robot, self._plan = page, robot, plan
+        self.tree: KinematicTree = robot.tree
+        self._path = robot.path_of(self.tree.root)
+        self._ghost: RobotScene | None = None
+        self._links: frozenset[str] = frozenset()
+        self._line: LineSegmentsHandle | None = None
+        self._gizmo: TransformControlsHandle | None = None
+        gui = page.server.gui
+        with page.place('Plan', self):
+            self._group = self._dropdown('Group', groups, plan.choose_group)
+            self._goal = self._dropdown('Goal', (NO_GOAL, DRAGGED), plan.choose_goal)
+            self._button('Plan motion', plan.plan, WANTED)
+            self._outcome: GuiHtmlHandle = gui.add_html('')
+            self._again = self._button('Show motion again', plan.show_again)
+            self.hold, html = page.live.button(
+                Hold(
+                    HOLD_EXECUTE,
+                    lambda: plan.order(partial(plan.go_on, time.monotonic())),
+                    lambda: plan.order(plan.let_go),
+                    lambda: plan.order(partial(plan.execute, time.monotonic())),
+                )
+            )
+            gui.add_html(f'<div class="rv-one">{html}</div>')
+            plan.scene.offer(page, robot, plan.order)
+        self.allow(execute=False)
+
+    def remove(self) -> None:
+        """Remove it from the page; what is attached to the robot goes with the robot."""
+        self._page.live.remove(self.hold)
+        self._plan.scene.remove()
+        for node in (self._ghost, self._line, self._gizmo):
+            if node is not None:
+                node.remove()
+
+    def show_group(self, group: PlanGroup) -> None:
+        """Show which group is planned for, and its states."""
+        choose(self._group, group.name)
+        self._goal.options = (NO_GOAL, DRAGGED, *group.states)
+        links = links_beyond(self.tree, frozenset(group.joints))
+        if links != self._links and self._ghost is not None:
+            self._ghost.remove()
+            self._ghost = None
+        self._links = links
+
+    def show_goal(self, name: str) -> None:
+        """Show which goal is chosen."""
+        choose(self._goal, name)
+
+    def place_goal(self, pose: Transform | None) -> None:
+        """Show the goal's handle at a pose."""
+        if pose is None:
+            if self._gizmo is not None:
+                self._gizmo.visible = False
+            return
+        if self._gizmo is None:
+            self._gizmo = self._page.server.scene.add_transform_controls(
+                f'{self._path}/goal', GOAL_SIZE, disable_sliders=True
+            )
+            self._gizmo.on_update(self._dragged)
+        put(self._gizmo, pose)
+        self._gizmo.visible = True
+
+    async def _dragged(self, event: TransformControlsEvent) -> None:
+        # coroutines keep their order
+        self._plan.order(partial(self._plan.drag_goal, pose_of(event.target)))
+
+    def show_ghost(self, positions: Mapping[str, float] | None) -> None:
+        """Show the robot where it is not."""
+        if positions is None:
+            if self._ghost is not None:
+                self._ghost.show(seen=False)
+            return
+        if self._ghost is None:
+            self._ghost = self._robot.ghost('ghost', self._links, GHOST_TINT)
+        self._ghost.place(positions)
+        self._ghost.show(seen=True)
+
+    def show_line(self, points: Sequence[Vector]) -> None:
+        """Draw where the tip passes."""
+        if self._line is not None:
+            self._line.remove()
+            self._line = None
+        if len(points) > 1:
+            self._line = self._page.server.scene.add_line_segments(
+                f'{self._path}/line',
+                np.array(list(pairwise(points))),
+                LINE_COLOR,
+                thickness=LINE_WIDTH,
+                thickness_units='screen',
+            )
+
+    def say(self, text: str, *, failed: bool | None = None) -> None:
+        """Show what became of the last request."""
+        mark = PLAIN if failed is None else BAD if failed else GOOD
+        self._outcome.content = line(text, mark) if text else ''
+
+    def allow(self, *, execute: bool) -> None:
+        """Enable the buttons that need a plan."""
+        self._again.disabled = not execute
+        off = self._page.live.off
+        (off.discard if execute else off.add)(self.hold)
+
+    def _dropdown(
+        self, label: str, options: Sequence[str], action: Callable[[str], None]
+    ) -> GuiDropdownHandle[str]:
+        dropdown = self._page.server.gui.add_dropdown(label, tuple(options))
+
+        def chosen(event: GuiEvent[GuiDropdownHandle[str]]) -> None:
+            if event.client_id is not None:  # or it was set here
+                self._plan.order(partial(action, event.target.value))
+
+        dropdown.on_update(chosen)
+        return dropdown
+
+    def _button(
+        self, label: str, press: Callable[[], None], color: Color = NEUTRAL
+    ) -> GuiButtonHandle:
+        button = self._page.server.gui.add_button(label, color=color)
+        button.on_click(lambda _: self._plan.order(press))
+        return button
+
+
+def choose(dropdown: GuiDropdownHandle[str], option: str) -> None:
+    """Show that an option is chosen."""
+    if dropdown.value != option:
+        dropdown.value = option  # type: ignore[misc]  # it has a setter

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, TypeAlias
 
@@ -13,7 +14,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from urdf_reader import Transform
 
-from ..page.motion_plan import PlanGroup, PlannedMotion, SceneObject, ScenePart
+from .motion_plan import PlanGroup, PlannedMotion
 
 Message: TypeAlias = Any
 """Messages have no types."""
@@ -22,8 +23,8 @@ PLANNING_TIME = 5.0
 """That is allowed in [s]."""
 JOINT_TOLERANCE, PLACE_TOLERANCE, TURN_TOLERANCE = 1e-3, 1e-3, 1e-2
 """Of goals in [rad] or [m], in [m] and in [rad]."""
-SHAPES = {1: 'box', 2: 'sphere', 3: 'cylinder', 4: 'cone'}
-"""Of shape_msgs/SolidPrimitive."""
+SHAPES = ('primitives', 'primitive_poses', 'meshes', 'mesh_poses')
+"""Fields of a moveit_msgs/CollisionObject that are shown."""
 
 
 def plan_goal(
@@ -153,17 +154,16 @@ def box_message(
     return _change(box, moveit.CollisionObject.ADD)
 
 
-def moved_message(thing: SceneObject, pose: Transform) -> Message:
+def moved_message(thing: Message, pose: Transform) -> Message:
     """Return a scene in which an object is elsewhere."""
     kind = import_module('moveit_msgs.msg').CollisionObject
-    header = Header(frame_id=thing.frame)
-    return _change(kind(header=header, id=thing.name, pose=pose_message(pose)), kind.MOVE)
+    return _change(kind(header=thing.header, id=thing.id, pose=pose_message(pose)), kind.MOVE)
 
 
-def removed_message(thing: SceneObject) -> Message:
+def removed_message(thing: Message) -> Message:
     """Return a scene without an object."""
     kind = import_module('moveit_msgs.msg').CollisionObject
-    return _change(kind(header=Header(frame_id=thing.frame), id=thing.name), kind.REMOVE)
+    return _change(kind(header=thing.header, id=thing.id), kind.REMOVE)
 
 
 def _change(thing: Message, operation: bytes) -> Message:
@@ -174,65 +174,61 @@ def _change(thing: Message, operation: bytes) -> Message:
     return scene
 
 
+@dataclass(frozen=True, slots=True)
+class SceneObject:
+    """Something that a robot may not touch, or holds.
+
+    Attributes:
+        message: As a moveit_msgs/CollisionObject.
+        attached: The robot holds it.
+    """
+
+    message: Message
+    attached: bool = False
+
+    @property
+    def pose(self) -> Transform:
+        """Where it is in its frame."""
+        return transform_of(self.message.pose)
+
+    @property
+    def frame(self) -> str:
+        """The frame in which it is."""
+        return str(self.message.header.frame_id)
+
+
 def changed(objects: Mapping[str, SceneObject], scene: Message) -> dict[str, SceneObject]:
     """Return the objects after a moveit_msgs/PlanningScene, which is whole or a change."""
-    kind = import_module('moveit_msgs.msg').CollisionObject
     kept = dict(objects) if scene.is_diff else {}
     for message in scene.world.collision_objects:
-        _apply(kept, message, kind, attached=False)
+        _apply(kept, message, attached=False)
     if not scene.robot_state.is_diff:
         kept = {name: each for name, each in kept.items() if not each.attached}
     for body in scene.robot_state.attached_collision_objects:
-        _apply(kept, body.object, kind, attached=True)
+        _apply(kept, body.object, attached=True)
     return kept
 
 
-def _apply(
-    objects: dict[str, SceneObject], message: Message, kind: Message, *, attached: bool
-) -> None:
+def _apply(objects: dict[str, SceneObject], message: Message, *, attached: bool) -> None:
+    kind = type(message)
     known = objects.get(message.id)
     if message.operation == kind.REMOVE:
         if not message.id:
             objects.clear()
         objects.pop(message.id, None)
         return
-    pose = _transform(message.pose)
-    parts = _parts(message)
     if message.operation == kind.MOVE and known is not None:
-        parts = known.parts
+        for shapes in SHAPES:
+            setattr(message, shapes, getattr(known.message, shapes))
     elif message.operation == kind.APPEND and known is not None:
-        pose, parts = known.pose, known.parts + parts
-    objects[message.id] = SceneObject(message.id, message.header.frame_id, pose, parts, attached)
+        message.pose = known.message.pose
+        for shapes in SHAPES:
+            setattr(message, shapes, [*getattr(known.message, shapes), *getattr(message, shapes)])
+    objects[message.id] = SceneObject(message, attached)
 
 
-def _parts(message: Message) -> tuple[ScenePart, ...]:
-    solids = zip(message.primitives, message.primitive_poses, strict=False)
-    meshes = zip(message.meshes, message.mesh_poses, strict=False)
-    return (
-        *(
-            ScenePart(SHAPES[solid.type], tuple(map(float, solid.dimensions)), _transform(pose))
-            for solid, pose in solids
-            if solid.type in SHAPES
-        ),
-        *(
-            ScenePart(
-                'mesh',
-                (),
-                _transform(pose),
-                tuple((point.x, point.y, point.z) for point in mesh.vertices),
-                tuple(_triangle(each) for each in mesh.triangles),
-            )
-            for mesh, pose in meshes
-        ),
-    )
-
-
-def _triangle(message: Message) -> tuple[int, int, int]:
-    first, second, third = map(int, message.vertex_indices)
-    return first, second, third
-
-
-def _transform(pose: Pose) -> Transform:
+def transform_of(pose: Pose) -> Transform:
+    """Return the pose of a geometry_msgs/Pose; one without a rotation has none."""
     place, turn = pose.position, pose.orientation
     rotation = (turn.x, turn.y, turn.z, turn.w)
     if not any(rotation):  # a message that leaves it out

@@ -172,7 +172,7 @@ class WebViewer(Node):
         self._independent = [joint.name for joint in tree.joints if joint.independent]
         self._grippers.describe(tree)
         notes = self.page.show_robot(tree)
-        self._planning.describe(tree)
+        self._planning.describe()
         self._first_motion.describe(tree)
         self._body.describe(tree)
         for note in notes:

@@ -5,18 +5,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import partial
 from html import escape
 from typing import Protocol, TypeAlias
 
 from urdf_reader import Joint, JointKind, KinematicTree
-from viser import GuiDropdownHandle, GuiFolderHandle, GuiTabGroupHandle, ViserServer
+from viser import GuiDropdownHandle, ViserServer
 
 from .live import Hold, Live
 from .robot_scene import RobotScene, travel
-from .sliders import Share, value_of
-from .style import NEUTRAL, pad, sentence, THREE_COLUMNS
+from .style import NEUTRAL, pad, sentence, Share, THREE_COLUMNS, value_of
 from .target_panel import TargetPanel
 
 Twist: TypeAlias = tuple[float, float, float, float, float, float]
@@ -84,32 +84,31 @@ class JogPanel:
         self,
         server: ViserServer,
         robot: RobotScene,
-        tree: KinematicTree,
         offered: Offered,
         ways: tuple[JogActions, Live, Share],
+        place: Callable[[JogPanel], AbstractContextManager[None]],
     ) -> None:
         actions, live, self._speed = ways
         self._gui, self._actions, self._live = server.gui, actions, live
         self._numbers: list[int] = []
-        self._joints = {joint.name: joint for joint in tree.movable()}
+        self._joints = {joint.name: joint for joint in robot.tree.movable()}
         self.target: TargetPanel | None = None
-        self._folder: GuiFolderHandle = self._gui.add_folder(None)
-        with self._folder:
-            tabs: GuiTabGroupHandle = self._gui.add_tab_group()
+        with place(self):
+            self._tabs = tabs = self._gui.add_tab_group()
             with tabs.add_tab('Joints'):
                 self._gui.add_html(self._joint_rows(offered.joints))
                 if not offered.joints:
                     self._gui.add_html(sentence('No servo_node jogs these joints.'))
             with tabs.add_tab('Tool'):
                 if offered.tool:
-                    self._add_twists(tool_frames(tree, offered.joints))
+                    self._add_twists(tool_frames(robot.tree, offered.joints))
                 else:
                     self._gui.add_html(sentence('No servo_node jogs this tool.'))
             with tabs.add_tab('Target'):
                 if offered.targets:
                     joints = [self._joints[name] for name in offered.targets]
                     aiming = actions.aim, actions.let_go, self._speed, self._hold
-                    self.target = TargetPanel(server, robot, tree, joints, aiming)
+                    self.target = TargetPanel(server, robot, joints, aiming)
                 else:
                     self._gui.add_html(sentence('No trajectory controller moves these joints.'))
             with tabs.add_tab('Gripper'):
@@ -124,7 +123,7 @@ class JogPanel:
             self._live.remove(number)
         if self.target is not None:
             self.target.remove()
-        self._folder.remove()
+        self._tabs.remove()
 
     def _hold(self, hold: Hold) -> str:
         number, html = self._live.button(hold)

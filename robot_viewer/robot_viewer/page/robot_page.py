@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
-from contextlib import redirect_stdout
+from contextlib import contextmanager, redirect_stdout
 from functools import partial
 from html import escape
 import io
@@ -28,26 +28,18 @@ from viser import (
     ViserServer,
 )
 
-from first_motion import JointKind as MotionKind
-
 from ..loopback import shown_host
 from ..robot_state import BUS, drives_of, FOLLOWS, Level, RobotState, Status
-from .aim import History
-from .body_panel import BodyPanel
 from .deadman import RELEASED_AFTER
-from .drive_table import drive_html
-from .first_motion_panel import FirstMotionActions, FirstMotionPanel
+from .diagnose import drive_html, Log
 from .gate import Gate
 from .jog_panel import JogActions, JogPanel, joint_texts, Offered
 from .live import Hold, Live
-from .log import Log
-from .motion_plan import Order, PlanActions, SceneActions
 from .overlay import Overlay, StopAnswer
-from .plan_panel import PlanPanel
 from .robot_scene import Ground, RobotScene, start_position, travel
-from .sliders import add_speed, value_of
 from .standing import feet_of
 from .style import (
+    add_speed,
     BAD,
     CAUTION,
     GOOD,
@@ -57,10 +49,11 @@ from .style import (
     sentence,
     status_line,
     THREE_COLUMNS,
+    value_of,
     WANTED,
     WARNING,
 )
-from .target_panel import PlotPanel
+from .target_panel import History, PlotPanel
 
 Velocity: TypeAlias = tuple[float, float, float]
 
@@ -162,13 +155,24 @@ class Actions(JogActions, Protocol):
         """Publish joint states."""
 
 
+class Panel(Protocol):
+    """What stands in a group, for one robot."""
+
+    def remove(self) -> None:
+        """Remove it from the page, but for what goes with its group."""
+
+
 class RobotPage:
     """A page in a browser; shows come from one thread, actions leave in any.
 
     Attributes:
         url: Where it is, with the token where it needs one.
+        server: That of viser.
+        robot: The robot that is shown; None before one.
         live: Its buttons that are held, and what its overlay shows.
+        speed: Share of the greatest velocity that is chosen, above 0 to 1.
         last: What was said last, with the time.
+        before_log: Order of a folder before the log.
     """
 
     def __init__(self, host: str, port: int, actions: Actions) -> None:
@@ -176,24 +180,24 @@ class RobotPage:
         self.live = Live(self._command)
         gate = Gate(host, Overlay(self._stop, self.live))
         with gate.before(), redirect_stdout(io.StringIO()):  # viser draws its own banner
-            self._server = ViserServer(host, port, label='robot', verbose=False)
-        self.url = f'http://{shown_host(host)}:{self._server.get_port()}'
+            self.server = ViserServer(host, port, label='robot', verbose=False)
+        self.url = f'http://{shown_host(host)}:{self.server.get_port()}'
         if gate.token:
             self.url += f'/?token={gate.token}'
-        self._scene: RobotScene | None = None
-        gui = self._server.gui
+        self.robot: RobotScene | None = None
+        gui = self.server.gui
         gui.configure_theme(show_logo=False, show_share_button=False, brand_color=WANTED)
         gui.main_panel.dock_right()
         gui.main_panel.set_width(PANEL_WIDTH)
-        self._server.scene.set_up_direction('+z')
-        self._ground = Ground(self._server.scene)
+        self.server.scene.set_up_direction('+z')
+        self._ground = Ground(self.server.scene)
         for view, (key, _) in VIEWS.items():
             command = gui.add_command(f'View: {view}', hotkey=key, icon=Icon.CAMERA)  # type: ignore[arg-type]
             command.on_trigger(partial(self._look_from, view))
-        self._server.on_client_connect(lambda client: self._place_camera(client, 'Fit'))
+        self.server.on_client_connect(lambda client: self._place_camera(client, 'Fit'))
         self._log = Log()
         self.last = ''
-        self._tree: KinematicTree | None = None
+        self._panels: dict[type, Panel] = {}
         self._tabs: GuiTabGroupHandle | None = None
         self._lay_out(('Drive', 'Plan', 'See', 'Diagnose'))
 
@@ -202,7 +206,7 @@ class RobotPage:
         if self._tabs is not None:
             self._tabs.remove()
         self.live.clear()
-        gui = self._server.gui
+        gui = self.server.gui
         self._tabs = gui.add_tab_group()
         self._groups: dict[str, GuiTabHandle] = {}
         self._notes: dict[str, GuiHtmlHandle] = {}
@@ -215,14 +219,11 @@ class RobotPage:
         self._offered = Offered()
         self._jog: JogPanel | None = None
         self._plots: PlotPanel | None = None
-        self._plan: PlanPanel | None = None
-        self._body: BodyPanel | None = None
-        self._first_motion: FirstMotionPanel | None = None
         self._modes: dict[str, GuiButtonHandle] = {}
         self._disable: int | None = None
         self._walk_holds: dict[int, Velocity] = {}
         with self._groups['Drive']:
-            self._speed = add_speed(gui, ARM_SPEED if 'Plan' in groups else LEGS_SPEED)
+            self.speed = add_speed(gui, ARM_SPEED if 'Plan' in groups else LEGS_SPEED)
         with self._groups['See']:
             self._add_checkboxes()
             self._see: GuiFolderHandle = gui.add_folder(None)
@@ -231,14 +232,13 @@ class RobotPage:
             self._drive_panel: GuiFolderHandle = gui.add_folder(None)
             self._drive: GuiDropdownHandle[str] | None = None
             self._drive_state: GuiHtmlHandle | None = None
-            self._first_motion_folder = gui.add_folder(
-                'First motion', expand_by_default=False, visible=False
-            )
-            with gui.add_folder('Log'):
+            log = gui.add_folder('Log')
+            self.before_log = log.order - 0.5
+            with log:
                 self._log_html: GuiHtmlHandle = gui.add_html('')
 
     def _add_checkboxes(self) -> None:
-        gui = self._server.gui
+        gui = self.server.gui
         target = gui.add_checkbox('Show target', True)
         frames = gui.add_checkbox('Show frames', False)
         target.on_update(lambda _: self._show_target(seen=target.value))
@@ -249,40 +249,41 @@ class RobotPage:
             self._jog.target.seen = seen
 
     def _show_frames(self, *, seen: bool) -> None:
-        if self._scene is not None:
-            self._scene.show_frames(seen=seen)
+        if self.robot is not None:
+            self.robot.show_frames(seen=seen)
 
     @property
     def watched(self) -> bool:
         """Whether a page is open."""
-        return self.live.open or bool(self._server.get_clients())
+        return self.live.open or bool(self.server.get_clients())
 
     def close(self) -> None:
         """Serve it no more."""
         with redirect_stdout(io.StringIO()):
-            self._server.stop()
+            self.server.stop()
 
     # -- what is shown
 
     def show_robot(self, tree: KinematicTree) -> list[str]:
         """Show another robot; return what of it cannot be shown, in words."""
-        for panel in (self._plan, self._body, self._jog, self._scene):
-            if panel is not None:
-                panel.remove()
+        for panel in self._panels.values():
+            panel.remove()
+        self._panels = {}
+        if self.robot is not None:
+            self.robot.remove()
         second = 'Body' if feet_of(tree) else 'Plan'
         self._lay_out(('Drive', second, 'See', 'Diagnose'))
-        self._tree = tree
-        self._scene = RobotScene(self._server.scene, tree)
-        self._server.initial_camera.position = self._camera('Fit')
-        self._server.initial_camera.look_at = (0.0, 0.0, 0.3 * self._scene.size)
-        for client in self._server.get_clients().values():
+        self.robot = RobotScene(self.server.scene, tree)
+        self.server.initial_camera.position = self._camera('Fit')
+        self.server.initial_camera.look_at = (0.0, 0.0, 0.3 * self.robot.size)
+        for client in self.server.get_clients().values():
             self._place_camera(client, 'Fit')
         self.offer_drive(Offered(), force=True)
         self.say(f'robot {tree.name}')
-        return self._scene.notes
+        return self.robot.notes
 
     def _camera(self, view: str) -> Velocity:
-        size = self._scene.size + 0.4 if self._scene is not None else 1.0
+        size = self.robot.size + 0.4 if self.robot is not None else 1.0
         x, y, z = VIEWS[view][1]
         return x * size, y * size, z * size
 
@@ -292,20 +293,20 @@ class RobotPage:
 
     def _place_camera(self, client: ClientHandle, view: str) -> None:
         near = 0.8 if 0 < client.camera.image_height < LOW_PICTURE else 1.0
-        height = 0.3 * self._scene.size if self._scene is not None else 0.3
+        height = 0.3 * self.robot.size if self.robot is not None else 0.3
         x, y, z = (near * part for part in self._camera(view))
         client.camera.position = (x, y, z + height if view != 'Top' else z)
         client.camera.look_at = (0.0, 0.0, height)
 
     def show_joints(self, positions: Mapping[str, float]) -> None:
         """Show where the joints are in [rad] and [m]."""
-        if self._scene is not None:
-            self._scene.place(positions)
+        if self.robot is not None:
+            self.robot.place(positions)
 
     def show_base(self, pose: Transform) -> None:
         """Show how the root link is in the world, and that it moves there."""
-        if self._scene is not None:
-            self._scene.place_base(self._ground.pass_below(pose))
+        if self.robot is not None:
+            self.robot.place_base(self._ground.pass_below(pose))
 
     def follow(self, positions: Mapping[str, float]) -> None:
         """Show the target beside where the joints are."""
@@ -337,7 +338,7 @@ class RobotPage:
         for mode, button in self._modes.items():
             able = state.movable or (faulty and mode in IN_FAULT)
             button.disabled = not able or self.live.stopped
-        tree = self._tree
+        tree = None if self.robot is None else self.robot.tree
         self.live.show(
             {
                 'word': state.word,
@@ -392,7 +393,7 @@ class RobotPage:
         """Draw what the joints did until now."""
         if self._plots is None and history.joints:
             with self._see:
-                self._plots = PlotPanel(self._server, history.joints)
+                self._plots = PlotPanel(self.server, history.joints)
         if self._plots is not None:
             self._plots.show(history, now)
 
@@ -400,8 +401,7 @@ class RobotPage:
 
     def offer_sliders(self, *, offered: bool) -> None:
         """Offer sliders of the joints, where no other node publishes them."""
-        tree = self._tree
-        if tree is None or offered is bool(self._sliders):
+        if self.robot is None or offered is bool(self._sliders):
             return
         if not offered:
             for slider in self._sliders.values():
@@ -409,10 +409,10 @@ class RobotPage:
             self._sliders = {}
             return
         with self._groups['Drive']:
-            for joint in tree.movable():
+            for joint in self.robot.tree.movable():
                 if joint.mimic is None:
                     low, high = travel(joint)
-                    slider = self._server.gui.add_slider(
+                    slider = self.server.gui.add_slider(
                         joint.name, low, high, (high - low) / 1000.0, start_position(joint)
                     )
                     slider.on_update(lambda _: self._publish_sliders())
@@ -424,7 +424,7 @@ class RobotPage:
         found = {name: tuple(verbs) for name, verbs in services.items()}
         if found == self._drives:
             return
-        self._drives, gui = found, self._server.gui
+        self._drives, gui = found, self.server.gui
         self._drive_panel.remove()
         if self._disable is not None:
             self.live.remove(self._disable)
@@ -465,72 +465,40 @@ class RobotPage:
 
         hold = Hold(SINKS, act, lambda: None, start, always=True)
         self._disable, html = self.live.button(hold)
-        self._server.gui.add_html(f'<div class="rv-one">{html}</div>')
+        self.server.gui.add_html(f'<div class="rv-one">{html}</div>')
 
     def offer_drive(self, offered: Offered, *, force: bool = False) -> None:
         """Offer to drive an arm: joints, tool, targets and grippers."""
-        if self._scene is None or self._tree is None or 'Plan' not in self._groups:
+        if self.robot is None or not self.has('Plan'):
             return
         if offered == self._offered and not force:
             return
-        if self._jog is not None:
-            self._jog.remove()
         self._offered = offered
-        self._notes['Drive'].visible = False
-        with self._groups['Drive']:
-            self._jog = JogPanel(
-                self._server,
-                self._scene,
-                self._tree,
-                offered,
-                (self._actions, self.live, self._speed),
-            )
+        ways = self._actions, self.live, self.speed
+        self._jog = JogPanel(self.server, self.robot, offered, ways, partial(self.place, 'Drive'))
 
-    def offer_plan(
-        self, groups: Sequence[str], actions: tuple[PlanActions, SceneActions, Order]
-    ) -> PlanPanel | None:
-        """Offer to plan motions, for the robot that is shown now.
+    def has(self, group: str) -> bool:
+        """Whether there is a group for the robot that is shown."""
+        return group in self._groups
 
-        Returns:
-            Where to show what is planned; None as long as there is no robot.
-        """
-        if self._scene is None or self._tree is None or 'Plan' not in self._groups:
-            return None
-        self._notes['Plan'].visible = False
-        with self._groups['Plan']:
-            self._plan = PlanPanel(
-                self._server, self._scene, self._tree, groups, (*actions, self.live, self._speed)
-            )
-        return self._plan
-
-    def offer_body(self) -> BodyPanel | None:
-        """Offer what is known of the body of a walking robot; None as long as there is none."""
-        if self._scene is None or self._tree is None:
-            return None
-        self._notes['Body'].visible = False
-        with self._groups['Body']:
-            path = self._scene.path_of(self._tree.root)
-            self._body = BodyPanel(self._server, path, self.live)
-        return self._body
-
-    def offer_first_motion(
-        self, joints: Mapping[str, MotionKind], actions: FirstMotionActions
-    ) -> FirstMotionPanel:
-        """Offer the first motion of joints, in the place of those before."""
-        if self._first_motion is not None:
-            self._first_motion.remove()
-        self._first_motion_folder.visible = True
-        with self._first_motion_folder:
-            self._first_motion = FirstMotionPanel(self._server, joints, actions, self.live)
-        return self._first_motion
+    @contextmanager
+    def place(self, group: str, panel: Panel) -> Iterator[None]:
+        """Put what the block adds into a group, in the place of an earlier panel of its kind."""
+        before = self._panels.pop(type(panel), None)
+        if before is not None:
+            before.remove()
+        self._panels[type(panel)] = panel
+        self._notes[group].visible = False
+        with self._groups[group]:
+            yield
 
     def offer_walk(self, *, policy: bool) -> None:
         """Offer to walk as long as a button is held, and the modes of the robot."""
-        if self._modes or 'Body' not in self._groups:
+        if self._modes or not self.has('Body'):
             if 'policy' in self._modes:
                 self._modes['policy'].visible = policy
             return
-        gui = self._server.gui
+        gui = self.server.gui
         self._notes['Drive'].visible = False
         with self._groups['Drive']:
             rest = partial(self._actions.walk, (0.0, 0.0, 0.0))
@@ -568,7 +536,7 @@ class RobotPage:
         self.live.stopped = False
 
     def _walk(self, velocity: Velocity) -> None:
-        x, y, turn = (self._speed() * part for part in velocity)
+        x, y, turn = (self.speed() * part for part in velocity)
         self._actions.walk((x, y, turn))
 
     def _press(self, drive: GuiDropdownHandle[str], label: str, verb: str, _: object) -> None:

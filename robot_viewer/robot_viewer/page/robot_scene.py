@@ -11,12 +11,15 @@ from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
+import trimesh
 from urdf_reader import (
     DescriptionError,
+    find_mesh,
     Joint,
     joint_position,
     joint_transform,
     KinematicTree,
+    mesh_unit,
     MeshFileError,
     Transform,
     UrdfShape,
@@ -24,7 +27,6 @@ from urdf_reader import (
 from viser import FrameHandle, SceneApi, SceneNodeHandle
 
 from ..link_poses import link_paths
-from ..shapes import Meshes, PLAIN, shapes_of
 
 ROOT = '/robot'
 Tint: TypeAlias = tuple[float, float, float, float]
@@ -33,6 +35,10 @@ AXES = (0.1, 0.004)
 """Length and radius of the axes of joints in [m]."""
 SECTION = 0.5
 """Between thick lines of the ground in [m]."""
+
+
+PLAIN = (0.7, 0.72, 0.75, 1.0)
+"""Color of what the description gives none: red, green, blue and opacity from 0 to 1."""
 
 
 class Ground:
@@ -69,6 +75,7 @@ class RobotScene:
     """The links of a robot below one another in a scene, so that a joint moves one frame.
 
     Attributes:
+        tree: Its description.
         notes: What cannot be shown, in words.
         size: How far its links reach from the root in [m].
     """
@@ -84,7 +91,7 @@ class RobotScene:
         """Show the robot, each joint at zero or the limit next to it."""
         look = look or Look()
         self.notes: list[str] = []
-        self._scene, self._tree = scene, tree
+        self._scene, self.tree = scene, tree
         self._links, self._tint = look.links or frozenset(tree.links), look.tint
         self._meshes = meshes or Meshes(folder)
         self._movable = {joint.name: joint for joint in tree.movable()}
@@ -126,7 +133,7 @@ class RobotScene:
             tint: Their color.
         """
         look = Look(f'{ROOT}/{name}', links, tint)
-        return RobotScene(self._scene, self._tree, look=look, meshes=self._meshes)
+        return RobotScene(self._scene, self.tree, look=look, meshes=self._meshes)
 
     def show(self, *, seen: bool) -> None:
         """Show or hide it."""
@@ -151,7 +158,7 @@ class RobotScene:
         self._base.remove()
 
     def _add_joints(self) -> None:
-        joints = {joint.child: joint for joint in self._tree.joints}
+        joints = {joint.child: joint for joint in self.tree.joints}
         for link, path in self._paths.items():
             if link in joints:
                 frame = self._scene.add_frame(
@@ -161,14 +168,14 @@ class RobotScene:
                 self._frames[joints[link].name] = frame
 
     def _reach(self, link: str) -> float:
-        below = (joint for joint in self._tree.joints if joint.parent == link)
+        below = (joint for joint in self.tree.joints if joint.parent == link)
         return max(
             (math.hypot(*j.origin.translation) + self._reach(j.child) for j in below), default=0.1
         )
 
     def _add_shapes(self) -> None:
         missing: dict[str, list[str]] = {}
-        shapes = [each for each in shapes_of(self._tree) if each.link in self._links]
+        shapes = [each for each in shapes_of(self.tree) if each.link in self._links]
         for number, shape in enumerate(shapes):
             if shape.note:
                 missing.setdefault(shape.note, []).append(shape.link)
@@ -248,3 +255,54 @@ def put(node: SceneNodeHandle, pose: Transform) -> None:
     """Move a node of a scene."""
     x, y, z, w = pose.rotation
     node.position, node.wxyz = pose.translation, (w, x, y, z)
+
+
+def pose_of(node: SceneNodeHandle) -> Transform:
+    """Return the pose of a node of a scene."""
+    w, x, y, z = map(float, node.wxyz)
+    (a, b, c) = map(float, node.position)
+    return Transform((a, b, c), (x, y, z, w))
+
+
+def shapes_of(tree: KinematicTree) -> list[UrdfShape]:
+    """Return the visual shapes, and those of collision of links that have no other."""
+    visuals = list(tree.visuals())
+    shown = {each.link for each in visuals}
+    return visuals + [each for each in tree.collisions() if each.link not in shown]
+
+
+class Meshes:
+    """Files of triangles, each of which is read once."""
+
+    def __init__(self, folder: Path | None = None) -> None:
+        """Begin without shapes."""
+        self._folder = folder
+        self._read: dict[Path, trimesh.Trimesh] = {}
+
+    def read(self, shape: UrdfShape) -> tuple[trimesh.Trimesh, tuple[float, float, float]]:
+        """Return the triangles of a mesh and the scale of its axes, which leads to [m].
+
+        Raises:
+            OSError: The file cannot be read.
+            ValueError: It has no triangles, or is of an unknown format.
+        """
+        path = find_mesh(shape.attributes.get('filename', ''), self._folder)
+        mesh = self._read.get(path) or _load(path)
+        if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+            raise MeshFileError(f'{path}: no triangles')
+        self._read[path] = mesh
+        scale = shape.lengths('scale') if 'scale' in shape.attributes else (1.0, 1.0, 1.0)
+        unit = mesh_unit(path)  # trimesh leaves it to us
+        x, y, z = (unit * each for each in scale)
+        return mesh, (x, y, z)
+
+
+def _load(path: Path) -> object:
+    try:
+        return trimesh.load(path, force='mesh')
+    except ModuleNotFoundError as error:
+        package = {'collada': 'pycollada'}.get(error.name or '', error.name)
+        raise MeshFileError(
+            f'{path}: it takes the Python package {package} to read it; install that, or export '
+            'the mesh as STL or OBJ'
+        ) from error

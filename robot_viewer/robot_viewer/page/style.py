@@ -1,17 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Colors by their meaning, marks for the overlay's style sheet, and short pieces of HTML.
+"""Colors by their meaning, marks for the overlay's style sheet, pieces of HTML, sliders.
 
 Red is for STOP and faults alone. Contrast with the text on a color is at least 4.5.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from html import escape
 from typing import TypeAlias
 
+from viser import GuiApi, GuiSliderHandle
+
 Color: TypeAlias = tuple[int, int, int]
+Share = Callable[[], float]
+"""Returns the share of the greatest velocity that was chosen, above 0 to 1."""
 
 NEUTRAL: Color = (233, 236, 239)
 """Of buttons that look, stop or choose."""
@@ -59,3 +63,23 @@ def pad(buttons: Iterable[str], kind: str = 'rv-pad') -> str:
 def sentence(text: str) -> str:
     """Return a sentence of a panel."""
     return f'<div style="margin:0.3em 12px">{escape(text)}</div>'
+
+
+def value_of(slider: GuiSliderHandle[float]) -> float:
+    """Return the value of a slider, within its range.
+
+    Args:
+        slider: The slider.
+    """
+    return min(max(slider.value, slider.min), slider.max)
+
+
+def add_speed(gui: GuiApi, percent: float = 30.0) -> Share:
+    """Add the slider of a speed.
+
+    Args:
+        gui: Of the page.
+        percent: Where it is in the beginning.
+    """
+    slider = gui.add_slider('Speed [%]', 5.0, 100.0, 5.0, percent)
+    return lambda: value_of(slider) / 100.0

@@ -1,14 +1,20 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A target of an arm, which it moves to while a button is held; and plots of how it follows."""
+"""A target of an arm, which it moves to while a button is held; and plots of how it follows.
+
+Positions in [rad] or [m], times in [s].
+"""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
+import math
 
 import numpy as np
-from urdf_reader import Joint, KinematicTree
+from urdf_reader import Joint
 from viser import (
     GuiDropdownHandle,
     GuiEvent,
@@ -19,11 +25,9 @@ from viser import (
 )
 
 from ..link_poses import links_beyond
-from .aim import History, KEPT
 from .live import Hold
 from .robot_scene import RobotScene, Tint, travel
-from .sliders import Share, value_of
-from .style import NEUTRAL, pad, sentence
+from .style import NEUTRAL, pad, sentence, Share, value_of
 
 HOLD_TARGET = 'Hold to move to the target'
 TARGET_TINT: Tint = (0.44, 0.28, 0.91, 0.35)
@@ -32,6 +36,17 @@ REACHED = 0.01
 HEIGHT = 170
 """Of a plot in [px]."""
 TARGET_COLOR, POSITION_COLOR, ERROR_COLOR = '#7048e8', '#1864ab', '#495057'
+KEPT = 30.0
+"""How long the past is kept in [s]."""
+STEP = 0.1
+"""Least time between two samples in [s]."""
+SHORTEST = 0.3
+"""Shortest motion in [s]."""
+GREATEST_ACCELERATION = 2.0
+"""Of a motion to a target in [rad/s^2] or [m/s^2]: descriptions name none."""
+PEAK, PEAK_ACCELERATION = 15.0 / 8.0, 10.0 / math.sqrt(3.0)
+"""Greatest velocity and acceleration of a quintic from rest to rest: as a multiple of its mean
+velocity, and of its way through the square of its time."""
 
 
 Move = Callable[[Mapping[str, float], float], None]
@@ -49,11 +64,13 @@ class TargetPanel:
         self,
         server: ViserServer,
         robot: RobotScene,
-        tree: KinematicTree,
         joints: Sequence[Joint],
         ways: tuple[Move, Callable[[], None], Share, Callable[[Hold], str]],
     ) -> None:
-        self._robot, self._links = robot, links_beyond(tree, frozenset(j.name for j in joints))
+        self._robot, self._links = (
+            robot,
+            links_beyond(robot.tree, frozenset(j.name for j in joints)),
+        )
         self._aim, let_go, self._speed, hold = ways
         self._ghost: RobotScene | None = None
         self._targets: dict[str, float] = {}
@@ -143,3 +160,73 @@ class PlotPanel:
         positions = np.array([sample.position for sample in samples])
         self._positions.data = (times, targets, positions)
         self._errors.data = (times, 1000.0 * (targets - positions))
+
+
+def motion_time(
+    start: Mapping[str, float],
+    target: Mapping[str, float],
+    velocities: Mapping[str, float],
+    share: float,
+) -> float:
+    """Return how long a smooth motion takes.
+
+    Args:
+        start: Where the joints are; one that is missing does not move.
+        target: Where they are to be.
+        velocities: Greatest velocity of each; 1 for one that is missing.
+        share: Of the greatest velocity, above 0 to 1.
+    """
+    longest = SHORTEST
+    for name, position in target.items():
+        way = abs(position - start.get(name, position))
+        greatest = velocities.get(name, 1.0) * share
+        longest = max(
+            longest,
+            PEAK * way / greatest,
+            math.sqrt(PEAK_ACCELERATION * way / (GREATEST_ACCELERATION * share)),
+        )
+    return longest
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """A joint at one time.
+
+    Attributes:
+        time: Steady time.
+        target: Where it was to be.
+        position: Where it was.
+    """
+
+    time: float
+    target: float
+    position: float
+
+
+class History:
+    """The samples of all joints in the last :data:`KEPT` seconds."""
+
+    def __init__(self) -> None:
+        """Begin with none."""
+        self._samples: dict[str, deque[Sample]] = {}
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The joints that have samples."""
+        return tuple(self._samples)
+
+    def add(
+        self, targets: Mapping[str, float], positions: Mapping[str, float], now: float
+    ) -> None:
+        """Store joint positions; ones that come too soon after the last are ignored."""
+        for name in (each for each in targets if each in positions):
+            samples = self._samples.setdefault(name, deque())
+            if samples and now - samples[-1].time < STEP:
+                continue
+            samples.append(Sample(now, targets[name], positions[name]))
+            while samples[0].time < now - KEPT:
+                samples.popleft()
+
+    def of(self, joint: str) -> tuple[Sample, ...]:
+        """Return the samples of a joint, the oldest first."""
+        return tuple(self._samples.get(joint, ()))

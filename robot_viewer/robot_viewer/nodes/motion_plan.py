@@ -1,28 +1,23 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What can be planned for, what was planned, and what people do; no browser, no ROS."""
+"""What can be planned for, and what was planned; no browser, no ROS."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias
 
 from urdf_reader import (
     DescriptionError,
     find_group,
     KinematicTree,
     parse_srdf,
-    Transform,
     Vector,
 )
 
 from ..link_poses import link_pose
 
-NO_GOAL, DRAGGED = 'none', 'dragged in the view'
-"""Goals that are no states of the SRDF."""
-NO_OBJECT = 'none'
 LINE_POINTS = 80
 """Of the line that the tip follows."""
 PAUSE = 0.8
@@ -126,97 +121,3 @@ def tip_line(
         link_pose(tree, tip, {**beside, **motion.at(number * step)}).translation
         for number in range(LINE_POINTS)
     ]
-
-
-@dataclass(frozen=True, slots=True)
-class ScenePart:
-    """A shape of an object.
-
-    Attributes:
-        shape: box, sphere, cylinder (along z), cone (along z) or mesh.
-        size: Lengths in [m]: of a box; radius; height and radius of cylinder and cone.
-        pose: In the object.
-        vertices: Of a mesh in [m].
-        triangles: Of a mesh, indices of its vertices.
-    """
-
-    shape: str
-    size: tuple[float, ...]
-    pose: Transform
-    vertices: tuple[Vector, ...] = ()
-    triangles: tuple[tuple[int, int, int], ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class SceneObject:
-    """Something that a robot may not touch, or holds.
-
-    Attributes:
-        name: Its name.
-        frame: In which its pose is.
-        pose: Of the object.
-        parts: Its shapes.
-        attached: The robot holds it.
-    """
-
-    name: str
-    frame: str
-    pose: Transform
-    parts: tuple[ScenePart, ...]
-    attached: bool = False
-
-
-class PlanActions(Protocol):
-    """What people do to plan motions."""
-
-    def choose_group(self, name: str) -> None:
-        """Plan for another group."""
-
-    def choose_goal(self, name: str) -> None:
-        """Go to a state of the SRDF, or to where the goal is dragged."""
-
-    def drag_goal(self, pose: Transform) -> None:
-        """Set the goal of the tip to a pose in the root link."""
-
-    def plan(self, share: float) -> None:
-        """Plan, at a share of the greatest velocity and acceleration."""
-
-    def execute(self, at: float) -> None:
-        """Execute what was planned; the button was seen to be held at a steady time in [s]."""
-
-    def go_on(self, at: float) -> None:
-        """Go on with the execution: its button was seen to be held at a steady time in [s]."""
-
-    def let_go(self) -> None:
-        """Cancel the execution: its button was let go."""
-
-    def show_again(self) -> None:
-        """Show once more what was planned."""
-
-
-class SceneActions(Protocol):
-    """What people do with the objects of the planning scene."""
-
-    def choose_object(self, name: str) -> None:
-        """Choose an object, to be dragged or removed."""
-
-    def drag_object(self, pose: Transform, *, is_last: bool) -> None:
-        """Move the object that is chosen; the last of several says so."""
-
-    def add_box(self, size: tuple[float, float, float]) -> None:
-        """Add a box of a size in [m]."""
-
-    def remove_object(self) -> None:
-        """Remove the object that is chosen."""
-
-
-Order: TypeAlias = Callable[[Callable[[], None]], None]
-"""Has something done in the thread of the robot."""
-
-
-def free_name(names: Sequence[str]) -> str:
-    """Return a name for one more box."""
-    number = 1
-    while f'box{number}' in names:
-        number += 1
-    return f'box{number}'

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Topics as Foxglove sees them: offered all, subscribed while a client wants them, as bytes."""
+"""Topics of Foxglove's clients, as bytes: subscribed while one wants them, and published to."""
 
 from __future__ import annotations
 
@@ -8,20 +8,53 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from importlib import import_module
+import re
 from typing import Any
 
 from foxglove import Channel, Context, Schema
+from foxglove.websocket import ClientChannel
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
 from message_definitions import DefinitionError, message_definition
 
-from ...foxglove.names import is_hidden, NameFilter
-
+EVERYTHING = '.*'
 UNKNOWN_DEPTH, MAX_DEPTH = 10, 25
 """Depth for a publisher whose depth is unknown, since DDS does not report it, and the greatest of
 a subscription."""
+PUBLISHER_DEPTH = 10
+
+
+class NameFilter:
+    """Accepts names that one of its expressions matches from begin to end."""
+
+    def __init__(self, patterns: Iterable[str]) -> None:
+        """Compile them.
+
+        Raises:
+            ValueError: One of them is none; the message has it and the reason.
+        """
+        self._patterns = [_compiled(pattern) for pattern in patterns]
+
+    def accepts(self, name: str) -> bool:
+        """Whether a name is to be shown."""
+        return any(pattern.fullmatch(name) for pattern in self._patterns)
+
+
+def is_hidden(name: str) -> bool:
+    """Whether ROS hides a name: a part of it begins with an underscore."""
+    return any(part.startswith('_') for part in name.split('/'))
+
+
+def _compiled(pattern: str) -> re.Pattern[str]:
+    try:
+        return re.compile(pattern)
+    except re.error as error:
+        raise ValueError(f'{pattern!r} is no regular expression: {error}') from None
 
 
 @dataclass(slots=True)
@@ -135,6 +168,55 @@ class Topics:
             if latched and offers
             else DurabilityPolicy.VOLATILE,
         )
+
+
+class ClientPublishers:
+    """A publisher for each channel of a client; used in the thread of the node only.
+
+    It ends with the channel, and with the connection: what moves the robot by a stream of messages
+    then lacks them, and the robot's own time-out stops it.
+    """
+
+    def __init__(self, node: Node, allowed: NameFilter, warn: Callable[[str], None]) -> None:
+        self._node, self._allowed, self._warn = node, allowed, warn
+        self._publishers: dict[tuple[int, int], Publisher] = {}
+
+    def advertise(self, client: int, channel: ClientChannel) -> None:
+        """Make a publisher, or report why there is none."""
+        topic = channel.topic
+        if not self._allowed.accepts(topic):
+            self._warn(f'{topic} is not in client_topic_whitelist; nothing is published to it')
+            return
+        if channel.encoding != 'cdr':
+            self._warn(f'{topic}: encoding {channel.encoding!r} is not supported; send cdr')
+            return
+        try:
+            kind = class_of(channel.schema_name)
+            publisher = self._node.create_publisher(kind, topic, PUBLISHER_DEPTH)
+        except (LookupError, InvalidTopicNameException) as error:
+            self._warn(f'{topic}: nothing is published to it: {error}')
+            return
+        self.unadvertise(client, channel.id)
+        self._publishers[client, channel.id] = publisher
+
+    def unadvertise(self, client: int, channel: int) -> None:
+        """Destroy a publisher."""
+        publisher = self._publishers.pop((client, channel), None)
+        if publisher is not None:
+            self._node.destroy_publisher(publisher)
+
+    def publish(self, client: int, channel: int, data: bytes) -> None:
+        """Publish a message; what is none never reaches the topic."""
+        publisher = self._publishers.get((client, channel))
+        if publisher is None:
+            return
+        kind: Any = publisher.msg_type
+        try:
+            message = deserialize_message(data, kind)
+        except Exception:  # noqa: BLE001  # rclpy has an error of its own for each middleware
+            self._warn(f'{publisher.topic_name}: what came is no {kind.__name__}')
+            return
+        publisher.publish(message)
 
 
 def class_of(name: str) -> Any:  # noqa: ANN401  # message types have no type

@@ -9,8 +9,8 @@ from concurrent.futures import Future as Answer
 from concurrent.futures import InvalidStateError
 from concurrent.futures import TimeoutError as AnswerTimeoutError
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
+import threading
 import time
 from typing import Any
 
@@ -23,52 +23,34 @@ from rclpy.task import Future
 
 from message_definitions import DefinitionError, service_definitions
 
-from ...foxglove.names import is_hidden, NameFilter
-from .topics import class_of
+from .topics import class_of, is_hidden, NameFilter
 
 ANSWER_TIMEOUT = 120.0
 """Longest time for an answer in [s]; homing takes long."""
 MATCH_TIMEOUT = 3.0
 """Longest time until a new client and its service know each other in [s]."""
-RETRY_PERIOD = 0.02
+MATCH_PERIOD = 0.02
+"""Time between two looks whether they do in [s]."""
 
 
 class ServiceCallError(Exception):
     """A call without an answer; its words go to the client of Foxglove."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Call:
-    """A call that somebody waits for."""
-
-    service: str
-    request: Any
-    answer: Answer[bytes]
-    deadline: float
-
-
 class Services:
-    """Offers services, and calls them; what has no other note is for the thread of the node only.
+    """Offers services, in the thread of the node, and calls them, in those of the server.
 
     A client of ROS is made at the first call: there are hundreds of services, and each client is
     two endpoints of DDS.
     """
 
-    def __init__(
-        self,
-        node: Node,
-        shown: NameFilter,
-        order: Callable[[Callable[[], None]], None],
-        warn: Callable[[str], None],
-    ) -> None:
-        self._node, self._shown, self._order, self._warn = node, shown, order, warn
+    def __init__(self, node: Node, shown: NameFilter, warn: Callable[[str], None]) -> None:
+        self._node, self._shown, self._warn = node, shown, warn
         self._types: dict[str, str] = {}
         self._refused: set[tuple[str, str]] = set()
         self._clients: dict[str, Client] = {}
-        self._unmatched: list[_Call] = []
+        self._lock = threading.Lock()
         self._unanswered: dict[Answer[bytes], str] = {}
-        self._retry = node.create_timer(RETRY_PERIOD, self._send_unmatched)
-        self._retry.cancel()
 
     def look(self, server: WebSocketServer, services: Iterable[tuple[str, Sequence[str]]]) -> None:
         """Offer what has appeared, withdraw what has gone, by names and types of all services."""
@@ -126,40 +108,25 @@ class Services:
             message = deserialize_message(request.payload, kind.Request)
         except Exception:  # noqa: BLE001  # rclpy has an error of its own for each middleware
             raise ServiceCallError(f'{name}: what came is no request of it in CDR') from None
+        with self._lock:
+            client = self._clients.get(name)
+            if client is None:
+                client = self._clients[name] = self._node.create_client(kind, name)
+        deadline = time.monotonic() + MATCH_TIMEOUT
+        while not client.service_is_ready():
+            if time.monotonic() > deadline:
+                raise ServiceCallError(f'{name} does not answer; its node has gone, perhaps')
+            time.sleep(MATCH_PERIOD)
         answer: Answer[bytes] = Answer()
-        call = _Call(name, message, answer, time.monotonic() + MATCH_TIMEOUT)
-        self._order(partial(self._begin, kind, call))
+        self._unanswered[answer] = name
         try:
+            client.call_async(message).add_done_callback(partial(_answered, answer))
             return answer.result(ANSWER_TIMEOUT)
         except AnswerTimeoutError:
             answer.cancel()  # whatever comes now is late
             raise ServiceCallError(f'{name}: no answer within {ANSWER_TIMEOUT:g} s') from None
-
-    def _begin(self, kind: Any, call: _Call) -> None:  # noqa: ANN401
-        if call.service not in self._clients:
-            self._clients[call.service] = self._node.create_client(kind, call.service)
-        self._unanswered[call.answer] = call.service
-        call.answer.add_done_callback(lambda answer: self._unanswered.pop(answer, None))
-        self._unmatched.append(call)
-        self._send_unmatched()
-
-    def _send_unmatched(self) -> None:
-        waiting, self._unmatched = self._unmatched, []
-        for call in waiting:
-            client = self._clients.get(call.service)
-            if client is None:
-                _fail(call.answer, f'{call.service} has gone')
-            elif client.service_is_ready():
-                future = client.call_async(call.request)
-                future.add_done_callback(partial(_answered, call.answer))
-            elif time.monotonic() > call.deadline:
-                _fail(call.answer, f'{call.service} does not answer; its node has gone, perhaps')
-            else:
-                self._unmatched.append(call)
-        if self._unmatched:
-            self._retry.reset()
-        else:
-            self._retry.cancel()
+        finally:
+            self._unanswered.pop(answer, None)
 
 
 def _answered(answer: Answer[bytes], future: Future) -> None:

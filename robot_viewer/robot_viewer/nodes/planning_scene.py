@@ -1,0 +1,295 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The planning scene on the page: what is in it, and boxes that come, move and go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from importlib import import_module
+from typing import Any, Protocol
+
+import numpy as np
+from rclpy.client import Client
+from rclpy.node import Node
+from rclpy.task import Future
+import trimesh
+from urdf_reader import Transform
+from viser import (
+    FrameHandle,
+    GuiButtonHandle,
+    GuiDropdownHandle,
+    GuiEvent,
+    SceneApi,
+    SceneNodeHandle,
+    TransformControlsEvent,
+    TransformControlsHandle,
+)
+
+from node_runner import LATCHED
+
+from ..page.robot_page import RobotPage
+from ..page.robot_scene import pose_of, put, RobotScene
+from ..page.style import NEUTRAL
+from .planning_messages import (
+    box_message,
+    changed,
+    Message,
+    moved_message,
+    removed_message,
+    SceneObject,
+    transform_of,
+)
+
+WORLD_AND_ATTACHED = 16 | 4
+"""Of moveit_msgs/PlanningSceneComponents."""
+AHEAD = 0.6
+"""How far before the root link a new box comes, in [m]."""
+NO_OBJECT = 'none'
+COLOR, ATTACHED_COLOR = (47, 158, 68), (112, 72, 232)
+OPACITY = 0.6
+GIZMO_SIZE = 0.2
+"""Of the arrows by which an object is dragged in [m]."""
+BOX_SIZE = (0.2, 0.2, 0.2)
+"""Of a new box in [m]."""
+
+
+class Say(Protocol):
+    """Shows what became of a request."""
+
+    def __call__(self, text: str, *, failed: bool | None = None) -> None:
+        """Show it."""
+
+
+class PlanningScene:
+    """What move_group has in its scene; everything in the thread of the node.
+
+    Attributes:
+        chosen: The object that can be dragged or removed.
+        gizmo: The arrows that drag it.
+    """
+
+    def __init__(self, node: Node, say: Say) -> None:
+        self._node, self._say = node, say
+        self._apply: Client | None = None
+        self._whole: Client | None = None
+        self._robot: RobotScene | None = None  # on which it is shown
+        self._objects: dict[str, SceneObject] = {}
+        self._drawn: dict[str, tuple[SceneObject, FrameHandle]] = {}
+        self._count = 0
+        self._name = NO_OBJECT
+        self._grips = False  # the object is being dragged
+        self._changed_since = False  # the whole scene was asked for
+        self.gizmo: TransformControlsHandle | None = None
+
+    def connect(self) -> None:
+        """Subscribe to the scene of a move_group."""
+        services = import_module('moveit_msgs.srv')
+        scene = import_module('moveit_msgs.msg').PlanningScene
+        node = self._node
+        self._apply = node.create_client(services.ApplyPlanningScene, 'apply_planning_scene')
+        self._whole = node.create_client(services.GetPlanningScene, 'get_planning_scene')
+        node.create_subscription(scene, 'monitored_planning_scene', self._take, LATCHED)
+
+    def offer(
+        self, page: RobotPage, robot: RobotScene, order: Callable[[Callable[[], object]], None]
+    ) -> None:
+        """Show the scene beside a robot, and offer to change it."""
+        self._page, self._robot, self._order = page, robot, order
+        gui = page.server.gui
+        self.chosen: GuiDropdownHandle[str] = gui.add_dropdown('Object', (NO_OBJECT,))
+        self._remove: GuiButtonHandle = gui.add_button('Remove object', color=NEUTRAL)
+        size = gui.add_vector3(
+            'Size [m]', BOX_SIZE, min=(0.01, 0.01, 0.01), max=(3.0, 3.0, 3.0), step=0.01
+        )
+
+        def choose(event: GuiEvent[GuiDropdownHandle[str]]) -> None:
+            if event.client_id is not None:  # or it was set here
+                order(partial(self.choose, event.target.value))
+
+        self.chosen.on_update(choose)
+        self._remove.on_click(lambda _: order(self.remove_chosen))
+        gui.add_button('Add box', color=NEUTRAL).on_click(
+            lambda _: order(partial(self.add_box, size.value))
+        )
+        self._show()
+        self._ask()
+
+    def remove(self) -> None:
+        """Show it no more."""
+        self._draw({})
+        self._robot = None
+        if self.gizmo is not None:
+            self.gizmo.remove()
+            self.gizmo = None
+
+    def choose(self, name: str) -> None:
+        """Choose an object, to be dragged or removed."""
+        self._name, self._grips = name, False
+        self._show()
+
+    def _ask(self) -> None:
+        """Request the whole scene: MoveIt's topic may have carried a change only."""
+        if self._whole is not None and self._whole.service_is_ready():
+            self._changed_since = False
+            request = import_module('moveit_msgs.srv').GetPlanningScene.Request()
+            request.components.components = WORLD_AND_ATTACHED
+            self._whole.call_async(request).add_done_callback(self._answered)
+
+    def _answered(self, future: Future) -> None:
+        if future.exception() is not None:
+            return
+        if self._changed_since:  # the answer may be from before that
+            self._ask()
+            return
+        answer: Any = future.result()
+        answer.scene.is_diff = answer.scene.robot_state.is_diff = False
+        self._take(answer.scene)
+
+    def _take(self, message: Message) -> None:
+        self._objects = changed(self._objects, message)
+        self._changed_since = True
+        self._show()
+
+    # -- what is shown
+
+    def _show(self) -> None:
+        if self._robot is None or self._grips:
+            return
+        self._draw(self._objects)
+        free = (NO_OBJECT, *(n for n, each in self._objects.items() if not each.attached))
+        if self.chosen.options != free:
+            self.chosen.options = free
+        thing = self._objects.get(self._name)
+        thing = None if thing is not None and thing.attached else thing
+        if self._name in free and self.chosen.value != self._name:
+            self.chosen.value = self._name  # type: ignore[misc]  # it has a setter
+        self._remove.disabled = thing is None
+        self._remove.label = f'Remove {"object" if thing is None else self._name}'
+        path = '' if thing is None else f'{self._robot.path_of(thing.frame)}/chosen'
+        if self.gizmo is not None and self.gizmo.name != path:
+            self.gizmo.remove()
+            self.gizmo = None
+        if thing is None:
+            return
+        if self.gizmo is None:
+            self.gizmo = self._page.server.scene.add_transform_controls(
+                path, GIZMO_SIZE, disable_sliders=True
+            )
+            self.gizmo.on_update(self._dragged)
+        put(self.gizmo, thing.pose)
+
+    def _draw(self, objects: Mapping[str, SceneObject]) -> None:
+        """Draw these objects, and no others; leave what has not changed as it is."""
+        if self._robot is None:
+            return
+        for name in self._drawn.keys() - objects.keys():
+            self._drawn.pop(name)[1].remove()
+        for name, each in objects.items():
+            if name in self._drawn:
+                before, frame = self._drawn[name]
+                if before == each:
+                    put(frame, each.pose)  # it may have been dragged, in vain
+                    continue
+                frame.remove()
+            self._count += 1  # names of objects may have what paths of nodes may not
+            path = f'{self._robot.path_of(each.frame)}/object{self._count}'
+            self._drawn[name] = each, draw_object(self._page.server.scene, path, each)
+
+    async def _dragged(self, event: TransformControlsEvent) -> None:
+        # coroutines keep their order
+        if event.phase != 'start':
+            pose, is_last = pose_of(event.target), event.phase == 'end'
+            self._order(partial(self.drag, pose, is_last=is_last))
+
+    # -- what people do
+
+    def drag(self, pose: Transform, *, is_last: bool) -> None:
+        """Move the object that is chosen; the last of several says so."""
+        thing = self._objects.get(self._name)
+        if thing is None:
+            return
+        self._grips = not is_last
+        if self._name in self._drawn:
+            put(self._drawn[self._name][1], pose)
+        if is_last:
+            self._change(moved_message(thing.message, pose), f'{self._name} is moved')
+
+    def add_box(self, size: tuple[float, float, float]) -> None:
+        """Add a box of a size in [m]."""
+        if self._robot is None:
+            return
+        number = 1
+        while f'box{number}' in self._objects:
+            number += 1
+        self._name = name = f'box{number}'  # to be dragged as soon as it is there
+        place = Transform((AHEAD, 0.0, size[2] / 2.0))
+        self._change(box_message(name, size, place, self._robot.tree.root), f'{name} is added')
+
+    def remove_chosen(self) -> None:
+        """Remove the object that is chosen."""
+        thing = self._objects.get(self._name)
+        if thing is not None:
+            what, self._name = f'{self._name} is removed', NO_OBJECT
+            self._change(removed_message(thing.message), what)
+
+    def _change(self, scene: Message, what: str) -> None:
+        if self._apply is None or not self._apply.service_is_ready():
+            self._refused('apply_planning_scene is not there')
+            return
+        request = import_module('moveit_msgs.srv').ApplyPlanningScene.Request(scene=scene)
+        self._apply.call_async(request).add_done_callback(lambda done: self._changed(done, what))
+
+    def _changed(self, future: Future, what: str) -> None:
+        if future.exception() is not None:
+            self._refused(f'apply_planning_scene: no answer: {future.exception()}')
+            return
+        answer: Any = future.result()
+        if not answer.success:
+            self._refused(f'refused: {what}; /rosout has the reason of move_group')
+        else:
+            self._say(what, failed=False)
+
+    def _refused(self, reason: str) -> None:
+        self._show()  # where it still is
+        self._say(reason, failed=True)
+
+
+def draw_object(scene: SceneApi, path: str, thing: SceneObject) -> FrameHandle:
+    """Draw a moveit_msgs/CollisionObject; shapes that are none are left out."""
+    frame = scene.add_frame(path, show_axes=False)
+    put(frame, thing.pose)
+    color = ATTACHED_COLOR if thing.attached else COLOR
+    message = thing.message
+    shapes = [
+        *zip(message.primitives, message.primitive_poses, strict=False),
+        *zip(message.meshes, message.mesh_poses, strict=False),
+    ]
+    for number, (shape, pose) in enumerate(shapes):
+        node = _draw_shape(scene, f'{path}/part{number}', shape, color)
+        if node is not None:
+            put(node, transform_of(pose))
+    return frame
+
+
+def _draw_shape(
+    scene: SceneApi, path: str, shape: Message, color: tuple[int, int, int]
+) -> SceneNodeHandle | None:
+    """Draw a shape_msgs/SolidPrimitive or Mesh."""
+    if hasattr(shape, 'triangles'):
+        vertices = np.array([(p.x, p.y, p.z) for p in shape.vertices], float).reshape(-1, 3)
+        faces = np.array([each.vertex_indices for each in shape.triangles], int).reshape(-1, 3)
+        return scene.add_mesh_simple(path, vertices, faces, color=color, opacity=OPACITY)
+    match shape.type, tuple(map(float, shape.dimensions)):
+        case shape.BOX, (x, y, z):
+            return scene.add_box(path, color, (x, y, z), opacity=OPACITY)
+        case shape.SPHERE, (radius, *_):
+            return scene.add_icosphere(path, radius, color, opacity=OPACITY)
+        case shape.CYLINDER, (height, radius):
+            return scene.add_cylinder(path, radius, height, color, opacity=OPACITY)
+        case shape.CONE, (height, radius):
+            cone = trimesh.creation.cone(radius, height)
+            vertices = np.asarray(cone.vertices) - (0.0, 0.0, height / 2.0)  # as MoveIt has it
+            faces = np.asarray(cone.faces)
+            return scene.add_mesh_simple(path, vertices, faces, color=color, opacity=OPACITY)
+    return None
