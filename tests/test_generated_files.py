@@ -47,9 +47,6 @@ PROGRAMS: Mapping[str, Callable[[], Mapping[Path, str]]] = {
     'arm_bringup/tools/make_prbt_dcf.py': lambda: from_drive(
         'arm_bringup/tools/make_prbt_dcf.py', 'derive', ROBOTS / 'prbt' / 'prbt_0_1.dcf'
     ),
-    'arm_canopen/tools/make_two_axes.py': lambda: from_drive(
-        'arm_canopen/tools/make_two_axes.py', 'two_axes', EDS / 'cia402_two_axes.eds'
-    ),
     'ros2 run quad_hardware protocol': lambda: {
         CHECKOUT / 'quad_hardware' / 'PROTOCOL.md': protocol_page()
     },

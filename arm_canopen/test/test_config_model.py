@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from operator import attrgetter
 from pathlib import Path
 import shutil
@@ -25,7 +24,7 @@ from canopen_core import Place
 from canopen_core.eds import load_eds
 from canopen_core.standard import CAN_ID_MASK, DataType
 
-PACKAGE = Path(__file__).parents[1]
+DRIVE_EDS = Path(__file__).parents[1] / 'eds' / 'cia402_drive.eds'
 
 
 @pytest.mark.parametrize(
@@ -395,7 +394,7 @@ def test_what_a_missing_section_lacks_has_its_name(tmp_path: Path) -> None:
 def article(request: pytest.FixtureRequest, tmp_path: Path) -> BusConfig:
     """Load the published bus.yml of a seven-joint arm, unchanged."""
     shutil.copy(ARTICLE_BUS, tmp_path / 'bus.yml')
-    shipped = (PACKAGE / 'eds' / 'cia402_drive.eds').read_text('utf-8')
+    shipped = DRIVE_EDS.read_text('utf-8')
     text = eds_text() if request.param == 'sample EDS' else shipped
     (tmp_path / 'cia402_slave.eds').write_text(text, encoding='utf-8')
     return load_bus(tmp_path / 'bus.yml')
@@ -456,12 +455,20 @@ def test_the_joints_of_the_article(article: BusConfig) -> None:
     )
 
 
-def test_the_default_dictionary_is_made_from_the_simulated_drive() -> None:
-    """The file is what its tool makes of the present EDS."""
-    tool_file = PACKAGE / 'tools' / 'make_default_drive.py'
-    spec = importlib.util.spec_from_file_location('make_default_drive', tool_file)
-    assert spec is not None
-    assert spec.loader is not None
-    tool = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(tool)
-    assert tool.default_drive(tool.SOURCE.read_text('ascii')) == DEFAULT_DRIVE.read_text('ascii')
+def test_the_default_dictionary_knows_what_every_drive_has() -> None:
+    """The objects of CiA 402 as the simulated drive has them, without what only a device knows."""
+    general, drive = (load_eds(path).dictionary for path in (DEFAULT_DRIVE, DRIVE_EDS))
+    of_profile = {entry.address for entry in drive if 0x6000 <= entry.index < 0x7000}
+    assert of_profile == {entry.address for entry in general if entry.index >= 0x6000}
+    for address in of_profile:
+        known, own = general.get(*address), drive.get(*address)
+        assert known is not None
+        assert own is not None
+        assert (known.name, known.data_type, known.access, known.pdo_mappable) == (
+            own.name,
+            own.data_type,
+            own.access,
+            own.pdo_mappable,
+        )
+        assert known.low_limit is known.high_limit is None
+    assert not any(general.number(0x1018, subindex) for subindex in (1, 2, 3, 4))

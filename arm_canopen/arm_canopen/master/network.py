@@ -78,7 +78,6 @@ class Network:
         self.on_feedback: Callable[[float], None] = lambda sync_time: None
         # called with each received frame, for statistics
         self.on_frame: Callable[[Frame], None] = lambda frame: None
-        self.missed_pdos = 0  # TPDOs that did not answer a SYNC, over all devices
         self.controller = ControllerWatch(report)  # the CAN controller as its error frames show it
         self.unknown_frames = 0  # frames with an identifier that nobody on this bus should use
         # sends a frame; a bus that refuses it is reported once until it works again
@@ -118,7 +117,7 @@ class Network:
         }
         nodes = list(self.nodes.values())
         for node in nodes:
-            node.send_nmt = partial(self._send_nmt_to, node)
+            node.send_nmt = partial(self.send_nmt, node_id=node.config.node_id)
         self._startup = Startup(master, nodes, self.scheduler, self.send_nmt, report)
         self._boots = BootManager(
             config, nodes, self.scheduler, self._startup, send=self.send, send_nmt=self.send_nmt
@@ -187,7 +186,7 @@ class Network:
     def cycle(self, now: float, period: float) -> None:
         """Begin the cycle whose SYNC has just been sent."""
         if self._round_open:
-            self._contain_each(self._count_missed)
+            self._contain_each(lambda node: node.count_missed())
         self._round_open = self._syncs
         overdue = self.next_update < NEVER
         self.next_update = now
@@ -225,9 +224,6 @@ class Network:
     def _syncs(self) -> bool:
         """Whether SYNC is sent."""
         return self.state is NmtState.OPERATIONAL and self.config.master.sync_period > 0
-
-    def _count_missed(self, node: RemoteNode) -> None:
-        self.missed_pdos += node.count_missed()
 
     def _send_outputs(self, node: RemoteNode, now: float) -> None:
         for output in node.image.rpdos:
@@ -302,9 +298,6 @@ class Network:
     async def _all(self, sent: Sequence[Promise[None]]) -> None:
         await self.scheduler.gather(sent)
 
-    def _send_nmt_to(self, node: RemoteNode, command: NmtCommand) -> Promise[None]:
-        return self.send_nmt(command, node.config.node_id)
-
     def publish_object(self, node: RemoteNode, index: int, subindex: int, value: Number) -> None:
         """Send an object by the RPDOs that carry it.
 
@@ -350,6 +343,11 @@ class Network:
             self._unconfigured_clients[node_id] = client
             self._handlers[CobId.SDO_RESPONSE + node_id] = client.receive
         return client
+
+    @property
+    def missed_pdos(self) -> int:
+        """TPDOs that did not answer a SYNC, over all devices."""
+        return sum(node.pdos.missed for node in self.nodes.values())
 
     @property
     def late_pdos(self) -> int:

@@ -55,11 +55,9 @@ class PdoWatch:
         for entry in self._every_sync:
             entry.expect()
 
-    def count_missed(self) -> int:
-        """Count those that did not answer the last SYNC, and return their number."""
-        missed = sum(entry.awaited for entry in self._every_sync)
-        self.missed += missed
-        return missed
+    def count_missed(self) -> None:
+        """Count those that did not answer the last SYNC."""
+        self.missed += sum(entry.awaited for entry in self._every_sync)
 
     def look(self, now: float) -> None:
         """Report those that have come and then stopped, at a steady time in [s]."""

@@ -54,25 +54,6 @@ class BootPhase(Enum):
     FAILED = 'failed'
 
 
-class DropBackoff:
-    """Doubles the pause with each drop that follows soon on the one before."""
-
-    def __init__(self) -> None:
-        self.drops = 0  # drops in a row
-        self._booted_at = 0.0
-
-    def booted(self, now: float) -> None:
-        """The device came into operation at a time in [s]."""
-        self._booted_at = now
-
-    def dropped(self, now: float) -> float:
-        """Return how long to wait after a drop at a time in [s], in [s]."""
-        if now - self._booted_at > STABLE_TIME:
-            self.drops = 0
-        self.drops += 1
-        return float(min(FIRST_PAUSE * 2 ** (self.drops - 1), LONGEST_PAUSE))
-
-
 class RemoteNode:
     """One device on the bus."""
 
@@ -130,7 +111,8 @@ class RemoteNode:
         # called when it has to be booted again, though it did not restart, with the time to leave
         # it alone before in [s]
         self.on_dropped_out: Callable[[float], None] = lambda pause: None
-        self._backoff = DropBackoff()
+        self._drops = 0  # drops out of operation in a row
+        self._booted_at = 0.0
         self._commanded: NmtCommand | None = None
         self._commanded_at = 0.0
 
@@ -163,9 +145,9 @@ class RemoteNode:
         if self.online:
             self.pdos.expect()
 
-    def count_missed(self) -> int:
-        """Count the TPDOs that did not answer the last SYNC, and return their number."""
-        return self.pdos.count_missed()
+    def count_missed(self) -> None:
+        """Count the TPDOs that did not answer the last SYNC."""
+        self.pdos.count_missed()
 
     def receive_heartbeat(self, frame: Frame) -> None:
         """Process a heartbeat or boot-up message."""
@@ -178,10 +160,14 @@ class RemoteNode:
             self.emergencies.restarted()
             self.on_boot_up()
         elif self._dropped_out(state, frame.timestamp):
-            pause = self._backoff.dropped(frame.timestamp)
+            if frame.timestamp - self._booted_at > STABLE_TIME:
+                self._drops = 0
+            self._drops += 1
+            pause = float(min(FIRST_PAUSE * 2 ** (self._drops - 1), LONGEST_PAUSE))
+            again = f', as it has done so {self._drops} times in a row' if self._drops > 1 else ''
             self.lost(
                 f'left Operational by itself (NMT state {state.name}): {self._why_dropped()}; it '
-                f'is booted again in {pause:g} s{self._drops_text()}'
+                f'is booted again in {pause:g} s{again}'
             )
             self.on_dropped_out(pause)
 
@@ -219,7 +205,7 @@ class RemoteNode:
         self.image.clear()  # what it sent before it was configured is no longer true
         self.online = True
         self._failed = False
-        self._backoff.booted(now)
+        self._booted_at = now
         self.life.start(now)
         self.loss = ''
         if self.config.is_drive:
@@ -340,10 +326,6 @@ class RemoteNode:
             'it sent no EMCY; it has missed the master or the start, or its error behaviour '
             '0x1029 demands it'
         )
-
-    def _drops_text(self) -> str:
-        drops = self._backoff.drops
-        return f', as it has done so {drops} times in a row' if drops > 1 else ''
 
     def _is_outdated(self, state: NmtState, now: float) -> bool:
         """Whether it was sent before the device had got the command to leave Operational."""
