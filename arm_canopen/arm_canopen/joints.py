@@ -4,9 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple, TypeAlias
 
 from urdf_reader import DescriptionError, Mimic, read_urdf
 
@@ -16,15 +15,11 @@ STALE_AFTER = 0.5  # [s] without news a joint is no longer published
 START_TIMEOUT = 30.0  # [s] in which the first state of a joint comes, or comes again after an end
 
 
-@dataclass(frozen=True, slots=True)
-class RobotJoint:
-    """A joint with one variable."""
-
-    name: str  # name in the URDF
-    mimic: Mimic | None = None  # what it follows, None when it moves by itself
+Joints: TypeAlias = Mapping[str, Mimic | None]
+"""Joints with one variable in URDF order, each with what it follows; None moves by itself."""
 
 
-def movable_joints(robot_description: str) -> list[RobotJoint]:
+def movable_joints(robot_description: str) -> Joints:
     """Return the revolute, continuous and prismatic joints in the order of the URDF, XML text.
 
     Raises:
@@ -34,7 +29,7 @@ def movable_joints(robot_description: str) -> list[RobotJoint]:
         tree = read_urdf(robot_description)
     except DescriptionError as error:
         raise CanopenError(str(error)) from error
-    joints = [RobotJoint(joint.name, joint.mimic) for joint in tree.movable()]
+    joints = {joint.name: joint.mimic for joint in tree.movable()}
     if not joints:
         raise CanopenError('the robot description has no revolute, continuous or prismatic joint')
     return joints
@@ -48,13 +43,11 @@ class JointSample(NamedTuple):
     effort: float
 
 
-@dataclass(frozen=True, slots=True)
-class JointSet:
-    """States of many joints at one moment."""
+class JointSet(NamedTuple):
+    """States of many joints, in URDF order, at one moment in [ns] on the clock of the samples."""
 
-    stamp: int  # the moment in [ns], on the clock of the samples
-    names: list[str]  # the joints, in URDF order
-    samples: list[JointSample]  # their states
+    stamp: int
+    samples: dict[str, JointSample]
 
 
 class JointAggregator:
@@ -66,8 +59,8 @@ class JointAggregator:
     published without them, so that nobody sees a robot of one joint at the start.
     """
 
-    def __init__(self, joints: Sequence[RobotJoint]) -> None:
-        self._joints = list(joints)
+    def __init__(self, joints: Joints) -> None:
+        self._joints = joints
         self._samples: dict[str, JointSample] = {}
         self._arrivals: dict[str, float] = {}  # steady time in [s]
         self._stamp = 0
@@ -101,9 +94,9 @@ class JointAggregator:
     def silent(self, now: float) -> list[str]:
         """Name the joints that are not reported, or not any more."""
         return [
-            joint.name
-            for joint in self._joints
-            if joint.mimic is None and not self._is_recent(joint.name, now)
+            name
+            for name, mimic in self._joints.items()
+            if mimic is None and not self._is_recent(name, now)
         ]
 
     def _may_publish(self, now: float) -> bool:
@@ -113,23 +106,15 @@ class JointAggregator:
 
     def _close(self, now: float) -> JointSet:
         self._published = True
-        names, samples = [], []
-        for joint in self._joints:
-            sample = self._sample_of(joint, now)
-            if sample is not None:
-                names.append(joint.name)
-                samples.append(sample)
-        return JointSet(self._stamp, names, samples)
-
-    def _sample_of(self, joint: RobotJoint, now: float) -> JointSample | None:
-        mimic = joint.mimic
-        if mimic is None or self._is_recent(joint.name, now):
-            return self._samples[joint.name] if self._is_recent(joint.name, now) else None
-        if not self._is_recent(mimic.source, now):
-            return None
-        leader = self._samples[mimic.source]
-        position, velocity = mimic.position(leader.position), mimic.velocity(leader.velocity)
-        return JointSample(position, velocity, 0.0)
+        samples = {}
+        for name, mimic in self._joints.items():
+            if self._is_recent(name, now):
+                samples[name] = self._samples[name]
+            elif mimic is not None and self._is_recent(mimic.source, now):
+                leader = self._samples[mimic.source]
+                position = mimic.position(leader.position)
+                samples[name] = JointSample(position, mimic.velocity(leader.velocity), 0.0)
+        return JointSet(self._stamp, samples)
 
     def _is_recent(self, name: str, now: float) -> bool:
         return name in self._arrivals and now - self._arrivals[name] <= STALE_AFTER

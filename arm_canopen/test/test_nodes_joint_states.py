@@ -174,7 +174,11 @@ def test_a_drive_that_is_not_fresh_is_left_out_after_a_while(scene: Scene) -> No
     scene.cycle(lambda: published() == ['shoulder', 'elbow', 'wrist'])
 
 
-def test_a_text_that_is_no_urdf_is_refused(scene: Scene) -> None:
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [('<robot>', 'no XML'), ('<robot name="r"><link name="a"/></robot>', 'no revolute')],
+)
+def test_a_text_that_is_no_robot_is_refused(scene: Scene, text: str, words: str) -> None:
     """The parameter robot_description, before anything runs."""
-    with pytest.raises(CanopenError):
-        scene.bus.publish_robot('<robot>')
+    with pytest.raises(CanopenError, match=words):
+        scene.bus.publish_robot(text)

@@ -42,7 +42,7 @@ class Slow:
     def __init__(self) -> None:
         self.log = Log()
         self.done: list[object] = []
-        self.thread = OutputThread(self.log)
+        self.thread = OutputThread(self.log)  # type: ignore[arg-type]
         self._gate = threading.Event()
         held_up = threading.Event()
 

@@ -58,8 +58,38 @@ def bus_diagnostics(
     ``recording`` returns the last file of the black box with a fault of a device, of any for an
     empty name; empty before one.
     """
-    about_bus = bus_diagnostic(
-        master, bus, network, counters=counters, load=load, cycle=cycle, recording=recording('')
+    controller = network.controller
+    level, message = _bus_level(controller, counters, load)
+    about_bus = DiagnosticStatus(
+        level=level,
+        name=f'{master}: bus',
+        message=message,
+        hardware_id=bus,
+        values=_values(
+            {
+                'frames_per_second': f'{load.frames_per_second:.1f}',
+                'bus_load': f'{load.load * 100:.2f}',
+                'frames_received': str(counters.received),
+                'frames_sent': str(counters.sent),
+                'frames_lost': str(counters.lost),
+                'send_errors': str(counters.send_errors),
+                'sync_period': f'{cycle.period:.6f}',
+                'cycles': str(cycle.cycles),
+                'overruns': str(cycle.overruns),
+                'jitter_p50': f'{cycle.jitter_p50:.6f}',
+                'jitter_p99': f'{cycle.jitter_p99:.6f}',
+                'jitter_max': f'{cycle.jitter_max:.6f}',
+                'missed_pdos': str(network.missed_pdos),
+                'late_pdos': str(network.late_pdos),
+                'unknown_frames': str(network.unknown_frames),
+                'controller': controller.state.value,
+                'transmit_errors': str(controller.transmit_errors),
+                'receive_errors': str(controller.receive_errors),
+                'error_frames': str(controller.error_frames),
+                'last_error': controller.last_error,
+                'black_box': recording(''),
+            }
+        ),
     )
     statuses = [about_bus]
     for device in network.nodes.values():
@@ -114,52 +144,6 @@ def drive_diagnostic(bus: str, status: DriveStatus, recording: str = '') -> Diag
                 'velocity': f'{status.velocity:.6f}',
                 'setpoint': f'{status.setpoint:.6f}',
                 'following_error': f'{status.following_error:.6f}',
-                'black_box': recording,
-            }
-        ),
-    )
-
-
-def bus_diagnostic(
-    master: str,
-    bus: str,
-    network: Network,
-    *,
-    counters: BusCounters,
-    load: LoadFigures,
-    cycle: CycleFigures,
-    recording: str,
-) -> DiagnosticStatus:
-    """Describe the bus and its cycle."""
-    controller = network.controller
-    level, message = _bus_level(controller, counters, load)
-    return DiagnosticStatus(
-        level=level,
-        name=f'{master}: bus',
-        message=message,
-        hardware_id=bus,
-        values=_values(
-            {
-                'frames_per_second': f'{load.frames_per_second:.1f}',
-                'bus_load': f'{load.load * 100:.2f}',
-                'frames_received': str(counters.received),
-                'frames_sent': str(counters.sent),
-                'frames_lost': str(counters.lost),
-                'send_errors': str(counters.send_errors),
-                'sync_period': f'{cycle.period:.6f}',
-                'cycles': str(cycle.cycles),
-                'overruns': str(cycle.overruns),
-                'jitter_p50': f'{cycle.jitter_p50:.6f}',
-                'jitter_p99': f'{cycle.jitter_p99:.6f}',
-                'jitter_max': f'{cycle.jitter_max:.6f}',
-                'missed_pdos': str(network.missed_pdos),
-                'late_pdos': str(network.late_pdos),
-                'unknown_frames': str(network.unknown_frames),
-                'controller': controller.state.value,
-                'transmit_errors': str(controller.transmit_errors),
-                'receive_errors': str(controller.receive_errors),
-                'error_frames': str(controller.error_frames),
-                'last_error': controller.last_error,
                 'black_box': recording,
             }
         ),

@@ -21,7 +21,7 @@ from node_runner import (
     run_node,
 )
 
-from ..joints import JointSample, RobotJoint, SilenceWatch
+from ..joints import Joints, JointSample, SilenceWatch
 from .joint_states import on_description, RobotJointStates
 
 WATCH_PERIOD = 2.0  # [s] between two looks for joints without states
@@ -49,16 +49,15 @@ class JointStatePublisher(Node):
             self.get_logger().info('waiting for the URDF on the topic robot_description')
         on_description(self, description, self._begin)
 
-    def _begin(self, joints: list[RobotJoint]) -> None:
+    def _begin(self, joints: Joints) -> None:
         self._robot = RobotJointStates(self, joints)
-        moved = [joint.name for joint in joints if joint.mimic is None]
+        moved = [name for name, mimic in joints.items() if mimic is None]
         self._watch = SilenceWatch(moved, time.monotonic())
         self._missing: list[str] = []
         for joint in joints:
-            self._listen_to(joint.name)
+            self._listen_to(joint)
         self.create_timer(WATCH_PERIOD, self._report_silence)
-        names = ', '.join(joint.name for joint in joints)
-        self.get_logger().info(f'publishing {len(joints)} joints: {names}')
+        self.get_logger().info(f'publishing {len(joints)} joints: {", ".join(joints)}')
         notify_ready()
 
     def _listen_to(self, joint: str) -> None:

@@ -18,7 +18,7 @@ from canopen_core import CanopenError
 from node_runner import LATCHED
 
 from ..cia402.state import AxisState
-from ..joints import JointAggregator, JointSample, JointSet, movable_joints, RobotJoint
+from ..joints import JointAggregator, Joints, JointSample, JointSet, movable_joints
 from .output_thread import OutputThread
 
 
@@ -59,13 +59,13 @@ class DriveJointStates:
 class RobotJointStates:
     """``joint_states`` of a robot, put together from those of its drives."""
 
-    def __init__(self, node: Node, joints: Sequence[RobotJoint]) -> None:
+    def __init__(self, node: Node, joints: Joints) -> None:
         self.aggregator = JointAggregator(joints)  # the joints
         self.listened = False  # somebody listens to the topic
         self._clock = node.get_clock()
         self._publisher = _publisher(node, 'joint_states')
 
-    def set_joints(self, joints: Sequence[RobotJoint]) -> None:
+    def set_joints(self, joints: Joints) -> None:
         """Begin anew with other joints, or the same in another order."""
         self.aggregator = JointAggregator(joints)
 
@@ -80,10 +80,9 @@ class RobotJointStates:
                 self._publish(ready)
 
     def _publish(self, ready: JointSet) -> None:
-        positions, velocities, efforts = zip(*ready.samples, strict=True)
-        message = JointState(
-            name=ready.names, position=positions, velocity=velocities, effort=efforts
-        )
+        positions, velocities, efforts = zip(*ready.samples.values(), strict=True)
+        names = [*ready.samples]
+        message = JointState(name=names, position=positions, velocity=velocities, effort=efforts)
         # drivers that leave the stamp empty, as ros2_canopen does, get the time of arrival
         stamp = Time(nanoseconds=ready.stamp) if ready.stamp else self._clock.now()
         message.header.stamp = stamp.to_msg()
@@ -109,20 +108,19 @@ class BusJointStates:
         those of bus.yml in its order; so they stay where it has none of them.
         """
         own = [axis.name for drive in self._drives for axis in drive.axes]
-        robot = RobotJointStates(self._node, [RobotJoint(name) for name in own])
+        robot = RobotJointStates(self._node, dict.fromkeys(own))
 
-        def begin(joints: list[RobotJoint]) -> None:
-            here = [
-                joint
-                for joint in joints
-                if joint.name in own or (joint.mimic is not None and joint.mimic.source in own)
-            ]
-            names = [joint.name for joint in joints]
-            absent = [name for name in own if name not in names]
+        def begin(joints: Joints) -> None:
+            here = {
+                name: mimic
+                for name, mimic in joints.items()
+                if name in own or (mimic is not None and mimic.source in own)
+            }
+            absent = [name for name in own if name not in joints]
             if not here:
                 self._node.get_logger().error(
                     f'joint_states: no drive of bus.yml is a joint of the URDF; bus.yml has '
-                    f'{", ".join(own)}, the URDF has {", ".join(names)}; those of bus.yml are '
+                    f'{", ".join(own)}, the URDF has {", ".join(joints)}; those of bus.yml are '
                     'published'
                 )
                 return
@@ -172,7 +170,7 @@ class BusJointStates:
                     self._robot.update(axis.name, stamp.nanoseconds, joint)
 
 
-def on_description(node: Node, text: str, begin: Callable[[list[RobotJoint]], None]) -> None:
+def on_description(node: Node, text: str, begin: Callable[[Joints], None]) -> None:
     """Call ``begin`` once with the movable joints of the robot.
 
     Of a URDF in XML, or of the topic ``robot_description``.

@@ -8,25 +8,16 @@ from collections.abc import Callable, Hashable
 from functools import partial
 from queue import SimpleQueue
 import threading
-from typing import Protocol
+
+from rclpy.impl.rcutils_logger import RcutilsLogger
 
 WAITING_MAX = 1000  # pieces of work from which on only the newest of each stream is kept
-
-
-class Logger(Protocol):
-    """What is used of a ROS logger."""
-
-    def warning(self, message: str) -> object:
-        """Log what was left out."""
-
-    def error(self, message: str) -> object:
-        """Log a defect."""
 
 
 class OutputThread:
     """Runs what other threads post, one after another."""
 
-    def __init__(self, logger: Logger) -> None:
+    def __init__(self, logger: RcutilsLogger) -> None:
         """``logger`` takes the defects of what was posted, and what had to be left out."""
         self._logger = logger
         self._queue: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
