@@ -26,7 +26,8 @@ import psutil
 from rclpy.qos import qos_profile_sensor_data
 from simulated_quad import AHEAD, SimulatedQuad
 
-from quad_bringup.examples.walk import Track, Velocity, velocity_text
+from quad_bringup.examples.walk import Track, velocity_text
+from quad_controller import Velocity
 from quad_description.rotations import tilt_of
 
 if TYPE_CHECKING:
@@ -39,13 +40,13 @@ PERIOD = 0.02
 """Period of the loop in [s]."""
 
 VELOCITIES = (
-    Velocity(forward=0.1),
-    Velocity(forward=0.2),
-    Velocity(forward=0.3),
-    Velocity(forward=-0.1),
-    Velocity(left=0.1),
-    Velocity(turn=1.0),
-    Velocity(forward=0.15, turn=0.6),
+    Velocity(x=0.1),
+    Velocity(x=0.2),
+    Velocity(x=0.3),
+    Velocity(x=-0.1),
+    Velocity(y=0.1),
+    Velocity(yaw=1.0),
+    Velocity(x=0.15, yaw=0.6),
 )
 
 

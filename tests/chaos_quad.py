@@ -14,9 +14,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from disturbance import Disturbance, Event, full_cpu
 from simulated_quad import SimulatedQuad
 
-from quad_bringup.examples.walk import Velocity
+from quad_controller import Velocity
 from quad_description import movable_joints, robot_urdf
-from quad_description.rotations import tilt_of
 from quad_hardware.joints import JointMap, servo_of
 
 if TYPE_CHECKING:
@@ -53,7 +52,7 @@ SILENCE = 0.2
 """Time in [s] without a state of the robot, of which there are 50 a second: the simulated one, or
 its cable, waits for a processor. The controller has to stop then, as with a cable pulled."""
 FALLEN = math.radians(45.0)
-AHEAD, BACK = Velocity(forward=0.2), Velocity(forward=-0.2)
+AHEAD, BACK = Velocity(x=0.2), Velocity(x=-0.2)
 
 
 class QuadVictim:
@@ -171,9 +170,7 @@ class QuadVictim:
         moved = math.dist(before, after)
         if moved > STRAYED:
             self._violations.append(f'went {moved:.3f} m without a command')
-        turn = self._quad.truth[-1].pose.pose.orientation
-        tilt = tilt_of((turn.x, turn.y, turn.z, turn.w))
-        if tilt > FALLEN:
+        if (tilt := self._quad.tilt) > FALLEN:
             self._violations.append(
                 f'has fallen, it is tilted by {math.degrees(tilt):.0f} degrees'
             )

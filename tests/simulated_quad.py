@@ -21,8 +21,9 @@ from std_msgs.msg import String
 
 from node_runner import LATCHED
 from process_supervisor import find_executable, write_parameters
-from quad_bringup.examples.walk import GROUND_TRUTH, Velocity
+from quad_bringup.examples.walk import GROUND_TRUTH
 from quad_bringup.stack import quad_processes, Stack
+from quad_controller import Velocity
 from quad_description import movable_joints, robot_urdf
 from quad_description.rotations import tilt_of
 from quad_msgs.srv import SetMode
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from isolation import Isolation
     from typing_extensions import Self
 
-AHEAD = Velocity(forward=0.2)
+AHEAD = Velocity(x=0.2)
 """The demo's velocity."""
 TIMEOUT = 20.0
 """Longest time in [s] for a mode to be accepted."""
@@ -171,8 +172,8 @@ class SimulatedQuad:
     def walk(self, seconds: float, velocity: Velocity = AHEAD) -> None:
         """Command a velocity, ten times a second, for so long."""
         twist = Twist()
-        twist.linear.x, twist.linear.y = velocity.forward, velocity.left
-        twist.angular.z = velocity.turn
+        twist.linear.x, twist.linear.y = velocity.x, velocity.y
+        twist.angular.z = velocity.yaw
         for _ in range(round(10 * seconds)):
             self._velocity.publish(twist)
             self.spin(0.1)

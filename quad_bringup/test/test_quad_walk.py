@@ -21,11 +21,11 @@ from quad_bringup.examples.walk import (
     Segment,
     STANDSTILL,
     Track,
-    Velocity,
     Walk,
     wrong_speed,
 )
 from quad_bringup.stack import Session
+from quad_controller import Velocity
 from quad_description import LEGS
 
 PERIOD = 0.02
@@ -34,7 +34,7 @@ PERIOD = 0.02
 speed = st.floats(-0.5, 0.5)
 rate = st.floats(-3.0, 3.0)
 angle = st.floats(-math.pi, math.pi)
-AHEAD = Velocity(forward=0.2)
+AHEAD = Velocity(x=0.2)
 JOINTS = [f'{leg}_{part}_joint' for leg in LEGS for part in PARTS]
 
 
@@ -56,13 +56,13 @@ def drive(
     x, y, yaw = start
     for index in range(round(time / PERIOD) + 1):
         elapsed = index * PERIOD
-        turned = velocity.turn * elapsed
+        turned = velocity.yaw * elapsed
         # the mean direction of a circle's chord is that at half the angle
         chord = math.sin(turned / 2) / (turned / 2) * elapsed if abs(turned) > 1e-9 else elapsed
         heading = yaw + turned / 2
         cosine, sine = math.cos(heading), math.sin(heading)
-        dx = chord * (cosine * velocity.forward - sine * velocity.left)
-        dy = chord * (sine * velocity.forward + cosine * velocity.left)
+        dx = chord * (cosine * velocity.x - sine * velocity.y)
+        dy = chord * (sine * velocity.x + cosine * velocity.y)
         track.take(pose(100.0 + elapsed, x + dx, y + dy, yaw + turned))
 
 
@@ -75,9 +75,9 @@ def test_a_constant_velocity_of_the_body_is_found_wherever_it_goes(
     drive(track, velocity, start, 4.0)
     for found in (track.mean_since(100.0, STANDSTILL), track.velocity):
         assert found is not None
-        assert found.forward == pytest.approx(velocity.forward, abs=2e-4)
-        assert found.left == pytest.approx(velocity.left, abs=2e-4)
-        assert found.turn == pytest.approx(velocity.turn, abs=1e-6)
+        assert found.x == pytest.approx(velocity.x, abs=2e-4)
+        assert found.y == pytest.approx(velocity.y, abs=2e-4)
+        assert found.yaw == pytest.approx(velocity.yaw, abs=1e-6)
 
 
 def test_a_pose_that_is_not_newer_is_passed_over() -> None:
@@ -116,10 +116,10 @@ def test_a_robot_that_moves_otherwise_is_reported(moved: Velocity | None, words:
 
 def test_a_slow_robot_that_stands_has_not_walked_and_odometry_is_second() -> None:
     """What may be missing of a crawl is less than the whole of it."""
-    crawl = Velocity(forward=0.04)
+    crawl = Velocity(x=0.04)
     assert 'walk: commanded +0.040' in wrong_speed(segment(STANDSTILL, commanded=crawl))
-    assert not wrong_speed(segment(Velocity(forward=0.03), commanded=crawl))
-    bad = Velocity(forward=0.1)
+    assert not wrong_speed(segment(Velocity(x=0.03), commanded=crawl))
+    bad = Velocity(x=0.1)
     assert not wrong_speed(segment(None, AHEAD))
     assert wrong_speed(segment(None, bad))
     assert not wrong_speed(segment(AHEAD, bad))

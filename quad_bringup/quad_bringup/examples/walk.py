@@ -28,7 +28,7 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from process_supervisor import CallError, parse_with_ros, RosOptions, SupervisorError, USAGE_ERROR
 from process_supervisor.arguments import seconds_from
 from process_supervisor.demo import Demo, make_table, run_demo, signed
-from quad_controller import Gait, GaitParameters
+from quad_controller import Gait, GaitParameters, Velocity
 from quad_description import LEGS
 from quad_description.rotations import tilt_of, yaw_of
 from quad_msgs.msg import JointCommand
@@ -68,25 +68,11 @@ PARTS = ('hip', 'thigh', 'calf')
 """Joints of a leg, from the body outward."""
 
 
-class Velocity(NamedTuple):
-    """A velocity of the body in its own frame (REP 103) in [m/s], [rad/s], or a way in [m], [rad].
-
-    Attributes:
-        forward: Along x.
-        left: Along y.
-        turn: About z, counter-clockwise.
-    """
-
-    forward: float = 0.0
-    left: float = 0.0
-    turn: float = 0.0
-
-
 STANDSTILL = Velocity()
 SEGMENTS = (
-    ('walk', Velocity(forward=0.2), 0.4),
-    ('turn', Velocity(turn=0.8), 0.25),
-    ('strafe', Velocity(left=0.1), 0.25),
+    ('walk', Velocity(x=0.2), 0.4),
+    ('turn', Velocity(yaw=0.8), 0.25),
+    ('strafe', Velocity(y=0.1), 0.25),
     ('stop', STANDSTILL, 0.1),
 )
 """Segments of a round, with their share of its time; speeds that the XGO's trot is made for."""
@@ -245,8 +231,7 @@ class Walk(Demo[ModeClient]):
         """Return name, velocity and duration of each segment: one round, or rounds without end."""
         total = self.duration or USUAL_ROUND
         one_round = [
-            (name, Velocity(*(self.share * each for each in velocity)), part * total)
-            for name, velocity, part in SEGMENTS
+            (name, velocity.scaled(self.share), part * total) for name, velocity, part in SEGMENTS
         ]
         return itertools.cycle(one_round) if self.duration is None else iter(one_round)
 
@@ -432,10 +417,10 @@ def wrong_speed(segment: Segment) -> str:
     speed = segment.measured or segment.odometry
     if speed is None:
         return f'{name}: no motion was measured, neither by ground truth nor by /odom'
-    linear = math.hypot(speed.forward - wanted.forward, speed.left - wanted.left)
+    linear = math.hypot(speed.x - wanted.x, speed.y - wanted.y)
     bounds = (
-        (linear, LINEAR_TOLERANCE, math.hypot(wanted.forward, wanted.left)),
-        (abs(speed.turn - wanted.turn), TURN_TOLERANCE, abs(wanted.turn)),
+        (linear, LINEAR_TOLERANCE, math.hypot(wanted.x, wanted.y)),
+        (abs(speed.yaw - wanted.yaw), TURN_TOLERANCE, abs(wanted.yaw)),
     )
     if all(
         off <= (min(most, RELATIVE_TOLERANCE * size) if size else most)
