@@ -8,7 +8,7 @@ each other, later ones count, and what is still open then is asked for by name.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -76,9 +76,20 @@ def flatten(values: Mapping[str, Any], prefix: str = '') -> Iterator[tuple[str, 
             yield path, value
 
 
-def document_of(values: Values, origin: str) -> ContractDocument:
+def known(**values: object) -> Values:
+    """Return the values that a file has: none of them is None or empty."""
+    return {key: value for key, value in values.items() if value not in (None, {})}
+
+
+def document_of(
+    values: Values,
+    origin: str,
+    hints: Mapping[str, str] | None = None,
+    refusals: Iterable[str] = (),
+) -> ContractDocument:
     """Make a document whose values all come from one place."""
-    return ContractDocument(values, {path: origin for path, _ in flatten(values)})
+    origins = {path: origin for path, _ in flatten(values)}
+    return ContractDocument(values, origins, hints or {}, tuple(refusals))
 
 
 def read_yaml(text: str, origin: str) -> ContractDocument:

@@ -17,8 +17,7 @@ from typing import Any
 import yaml
 
 from ...exceptions import PolicyError
-from .document import ContractDocument, document_of, Values
-from .model import Source
+from .document import ContractDocument, document_of, known, Values
 from .terms import ISAAC_LAB
 
 JOINTS_HINT = 'the file does not have the order of the joints; Isaac Lab prints robot.joint_names'
@@ -76,17 +75,18 @@ def read_deploy(values: Mapping[str, Any], origin: str) -> ContractDocument:
     actions = _mapping(values, 'actions')
     refusals = _one_action(actions, origin)
     for action in actions.values():
-        contract['action'] = _known(
+        contract['action'] = known(
             scale=action.get('scale'), offset=action.get('offset'), target_clip=action.get('clip')
         )
-    gains = {name: _uniform(values.get(name)) for name in ('stiffness', 'damping')}
-    contract['gains'] = {name: value for name, value in gains.items() if value is not None}
+    contract['gains'] = known(
+        **{name: _uniform(values.get(name)) for name in ('stiffness', 'damping')}
+    )
     commands = _mapping(values, 'commands')
     contract['commands'] = _ranges(_mapping(commands, 'base_velocity').get('ranges'))
     hints = {'joints': JOINTS_HINT}
     if 'stiffness' in values and not contract['gains']:
         hints['gains.stiffness'] = 'in the order of the motors in the file'
-    return _document(contract, origin, hints, refusals)
+    return document_of(known(**contract), origin, hints, refusals)
 
 
 def read_env(values: Mapping[str, Any], origin: str, joints: Sequence[str]) -> ContractDocument:
@@ -132,7 +132,7 @@ def read_env(values: Mapping[str, Any], origin: str, joints: Sequence[str]) -> C
     refusals += _one_action(actions, origin)
     for action in actions.values():
         offset = _matched(action.get('offset'), joints, 0.0)
-        contract['action'] = _known(
+        contract['action'] = known(
             scale=_matched(action.get('scale'), joints, 1.0),
             offset=None if action.get('use_default_offset') else offset,
             target_clip=_matched(action.get('clip'), joints, [-math.inf, math.inf]),
@@ -141,28 +141,19 @@ def read_env(values: Mapping[str, Any], origin: str, joints: Sequence[str]) -> C
     if not joints:
         hints['default_positions'] = 'found by the names of the joints'
         hints['action.scale'] = 'found by the names of the joints'
-    return _document(contract, origin, hints, refusals)
+    return document_of(known(**contract), origin, hints, refusals)
 
 
 def _term(kind: str, term: Mapping[str, Any]) -> Values:
-    known = dict(ISAAC_LAB.get(kind, {}))
+    usual = dict(ISAAC_LAB.get(kind, {}))
     if kind == 'gait_phase':
-        known['phase_period'] = _mapping(term, 'params').get('period')
-    if known.get('source') == Source.HEIGHT_SCAN.value:
-        known.pop('values', None)
-    return _known(
-        **known,
+        usual['phase_period'] = _mapping(term, 'params').get('period')
+    return known(
+        **usual,
         scale=term.get('scale'),
         clip=term.get('clip'),
         history=max(int(term.get('history_length') or 1), 1),
     )
-
-
-def _document(
-    contract: Values, origin: str, hints: Mapping[str, str], refusals: Sequence[str]
-) -> ContractDocument:
-    document = document_of({k: v for k, v in contract.items() if v not in (None, {})}, origin)
-    return ContractDocument(document.values, document.origins, hints, tuple(refusals))
 
 
 def _one_action(actions: Mapping[str, Any], origin: str) -> list[str]:
@@ -211,10 +202,6 @@ def _ranges(ranges: object) -> Values:
         for key, axis in RANGES.items()
         if isinstance(ranges.get(key), (list, tuple))
     }
-
-
-def _known(**values: object) -> Values:
-    return {key: value for key, value in values.items() if value is not None}
 
 
 def _mapping(values: Mapping[str, Any], key: str) -> Mapping[str, Any]:

@@ -22,7 +22,7 @@ import re
 from typing import Any
 
 from ...exceptions import PolicyError
-from .document import ContractDocument, document_of, read_yaml, Values
+from .document import ContractDocument, document_of, known, read_yaml, Values
 from .model import Source
 from .terms import MJLAB
 
@@ -85,9 +85,7 @@ def read_metadata(values: Mapping[str, str]) -> ContractDocument:
         f'metadata {key} = {text} is not understood, and would change observations or actions'
         for key, text in changing(values).items()
     ]
-    document = ContractDocument(
-        document.values, document.origins, HINTS, tuple(refusals + _layouts(values))
-    )
+    document = replace(document, hints=HINTS, refusals=(*refusals, *_layouts(values)))
     if CONTRACT_KEY in values:
         attached = read_yaml(values[CONTRACT_KEY], f'metadata {CONTRACT_KEY}')
         # what came from the exporter still has its three decimals
@@ -107,26 +105,18 @@ HINTS = {
 
 
 def _mjlab(values: Mapping[str, str]) -> Values:
-    contract: Values = {}
-    if 'default_joint_pos' in values:
-        contract['default_positions'] = _numbers(values, 'default_joint_pos')
-    if 'joint_names' in values:
-        contract['joints'] = [_base_name(word) for word in _words(values['joint_names'])]
-    if 'action_scale' in values:
-        scale = _numbers(values, 'action_scale')
-        contract['action'] = {'scale': scale[0] if len(scale) == 1 else scale}
-    gains = {
-        name: _numbers(values, f'joint_{name}')
-        for name in ('stiffness', 'damping')
-        if f'joint_{name}' in values
-    }
-    if gains:
-        contract['gains'] = gains
-    steps = step_periods(values)
-    if steps:
-        contract['period'] = next(iter(steps.values()))
-    if 'kind' in values:
-        contract['kind'] = values['kind']
+    def numbers(key: str) -> list[float] | None:
+        return _numbers(values, key) if key in values else None
+
+    joints, scale, steps = values.get('joint_names'), numbers('action_scale'), step_periods(values)
+    contract = known(
+        default_positions=numbers('default_joint_pos'),
+        joints=None if joints is None else [_base_name(word) for word in _words(joints)],
+        action=known(scale=scale[0] if scale and len(scale) == 1 else scale),
+        gains=known(stiffness=numbers('joint_stiffness'), damping=numbers('joint_damping')),
+        period=next(iter(steps.values()), None),
+        kind=values.get('kind'),
+    )
     if 'observation_names' in values:
         contract['observation'] = {'terms': _terms(values)}
         if any(term.get('history', 1) > 1 for term in contract['observation']['terms'].values()):

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from .document import ContractDocument, document_of, Values
+from .document import ContractDocument, document_of, known, Values
 from .model import Source
 
 TERMS: dict[str, Values] = {
@@ -39,16 +39,15 @@ HINTS = {
 
 def read_config(values: Mapping[str, Any], origin: str) -> ContractDocument:
     """Read ``config.json`` of a training."""
-    contract: Values = {'period': values.get('ctrl_dt')}
-    if 'action_scale' in values:
-        contract['action'] = {'scale': values['action_scale']}
-    gains = {
-        name: values[key]
-        for name, key in (('stiffness', 'Kp'), ('damping', 'Kd'))
-        if isinstance(values.get(key), (int, float))
-    }
-    if gains:
-        contract['gains'] = gains
+    stiffness, damping = (
+        value if isinstance(value, (int, float)) else None
+        for value in (values.get('Kp'), values.get('Kd'))
+    )
+    contract = known(
+        period=values.get('ctrl_dt'),
+        action=known(scale=values.get('action_scale')),
+        gains=known(stiffness=stiffness, damping=damping),
+    )
     refusals: tuple[str, ...] = ()
     if not values.keys() >= GO1_KEYS or values['history_len'] != 1:
         refusals = (f'{origin} is of another task than the Go1 joystick; write its contract',)

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from .document import ContractDocument, document_of, Values
+from .document import ContractDocument, document_of, known, Values
 from .model import Source
 from .terms import RL_SAR
 
@@ -35,32 +35,27 @@ def read_config(values: Mapping[str, Any], origin: str) -> ContractDocument:
         robot, inner = next(iter(values.items()))
         config = inner if isinstance(inner, Mapping) else {}
     refusals: list[str] = []
-    contract: Values = {'robot': str(robot)} if robot else {}
-    if isinstance(config.get('dt'), (int, float)) and isinstance(config.get('decimation'), int):
-        contract['period'] = config['dt'] * config['decimation']
-    names, mapping = config.get('joint_names'), config.get('joint_mapping')
-    if isinstance(names, list):
-        contract['joints'] = names
-    if isinstance(names, list) and isinstance(mapping, list):
-        contract['joints'] = [names[index] for index in mapping]
-    if 'default_dof_pos' in config:
-        contract['default_positions'] = config['default_dof_pos']
+    step, decimation, period = config.get('dt'), config.get('decimation'), None
+    if isinstance(step, (int, float)) and isinstance(decimation, int):
+        period = step * decimation
+    joints, mapping = config.get('joint_names'), config.get('joint_mapping')
+    if isinstance(joints, list) and isinstance(mapping, list):
+        joints = [joints[index] for index in mapping]
+    low, high = config.get('clip_actions_lower'), config.get('clip_actions_upper')
+    contract = known(
+        robot=str(robot) or None,
+        period=period,
+        joints=joints if isinstance(joints, list) else None,
+        default_positions=config.get('default_dof_pos'),
+        action=known(
+            scale=config.get('action_scale'),
+            clip=[list(pair) for pair in zip(low, high, strict=True)] if low and high else None,
+        ),
+        gains=known(stiffness=config.get('rl_kp'), damping=config.get('rl_kd')),
+    )
     if 'observations' in config:
         contract['observation'] = _observation(config, origin, refusals)
-    if 'action_scale' in config:
-        contract['action'] = {'scale': config['action_scale']}
-        low, high = config.get('clip_actions_lower'), config.get('clip_actions_upper')
-        if low and high:
-            contract['action']['clip'] = [list(pair) for pair in zip(low, high, strict=True)]
-    gains = {
-        name: config[key]
-        for name, key in (('stiffness', 'rl_kp'), ('damping', 'rl_kd'))
-        if key in config
-    }
-    if gains:
-        contract['gains'] = gains
-    document = document_of(contract, origin)
-    return ContractDocument(document.values, document.origins, HINTS, tuple(refusals))
+    return document_of(contract, origin, HINTS, refusals)
 
 
 HINTS = {
