@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from arm_bringup.next_commands import next_commands
+from arm_bringup.bringup import next_commands
 from process_supervisor import RosOptions
 
 DRIVES, MODE = ['shoulder', 'elbow'], 'cyclic_position_mode'

@@ -15,8 +15,7 @@ from servo_drives import Drives, PERIOD
 from arm_canopen import CanopenError, Refusal, RefusalCause
 from arm_servo import MotionCore, NotReadyError, Phase, Source, SpeedRequest
 from arm_servo.core.motion_queue import MotionCommand
-from arm_servo.io.drive_reasons import why_not
-from arm_servo.io.drive_source import NOT_ATTACHED
+from arm_servo.io.drive_source import NOT_ATTACHED, why_not
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
 
 

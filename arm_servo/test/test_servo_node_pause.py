@@ -11,7 +11,7 @@ from servo_drives import Drives
 
 from arm_servo import PauseRequest, Source, SpeedRequest
 from arm_servo.core.snapshot import Snapshot
-from arm_servo.ros.trajectory.pause import words_of_pause, words_of_resume
+from arm_servo.ros.trajectory.controller import words_of_pause, words_of_resume
 
 IDLE = Snapshot(1.0, None, None, '')
 

@@ -15,7 +15,7 @@ from arm_model import ArmNames
 from arm_servo.core.requests import CommandType
 from arm_servo.teleop import CartesianJog, Frame, JointJog, KeyboardTeleop, Scales
 from arm_servo.teleop.jog import Jog, rest_of, ServoRequest, Steps
-from arm_servo.teleop.key_map import HELP, JOINTS, TOOL
+from arm_servo.teleop.keyboard_teleop import HELP, JOINTS, TOOL
 from operator_input import (
     CommandStream,
     HeldKeys,

@@ -81,9 +81,9 @@ is planned anew while a motion goes on may follow the rest within a tenth of a s
 EDGES, SHARES, ROOM = (0.08, 0.06, 0.04, 0.03, 0.02), (0.6, 0.5, 0.7, 0.45), 0.06
 """Edges of a box in the way as shares of the arm's reach, the largest that is possible is taken;
 where on a path it appears; and its least distance from both ends, as a share of the reach."""
-LEAST_REACH, LEAST_WAY, FAR = 0.05, 0.25, 1.0
-"""Reach of an arm that is shorter in [m]; least way of the tip to a pose as a share of it; and the
-distance beyond which all count as this in [m]."""
+LEAST_REACH, LEAST_WAY, TURN, FAR = 0.05, 0.25, 2.0, 1.0
+"""Reach of an arm that is shorter in [m]; least way of the tip to a pose as a share of it; turn
+of the first joint in [rad] or [m]; and the distance beyond which all count as this in [m]."""
 GAP, APPROACH = 0.003, 0.1
 """Room below the part in [m]; straight approach and retreat as a share of the reach."""
 PART, PILLAR, VISITOR = 'part', 'pillar', 'visitor'
@@ -401,8 +401,14 @@ class Plan(ArmDemo):
         self._change(CollisionObject(id=VISITOR, operation=CollisionObject.REMOVE))
 
     def _go_there_and_back(self) -> None:
-        """Move to the farthest pose of the SRDF, and back around a box."""
-        poses = [pose for pose in self.model.poses.values() if self.model.clearance(pose) > GAP]
+        """Move to the farthest pose that is known, and back around a box."""
+        limits, turn = self.model.limits, TURN * np.eye(len(self.home))[0]
+        turned = [np.clip(self.home + way, limits.lower, limits.upper) for way in (turn, -turn)]
+        poses = [
+            pose
+            for pose in (*self.model.poses.values(), *turned)
+            if self.model.clearance(pose) > GAP
+        ]
         tip = self.model.pose(self.home).position
 
         def way(pose: Array) -> float:
@@ -410,9 +416,9 @@ class Plan(ArmDemo):
 
         far = max(poses, key=way, default=self.home)
         if way(far) < LEAST_WAY * max(self.model.reach, LEAST_REACH):
-            self.add('box in the way', 'left out: the SRDF has no pose far from home')
+            self.add('box in the way', 'left out: no pose is known that is far from home')
             return
-        self.enter('to a pose of the SRDF, by free motion')
+        self.enter('to the farthest pose, by free motion')
         self._go('there', self._joints(far), FREE)
         self._meet(self._joints(self.home))
 

@@ -4,31 +4,160 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from arm_model import frozen, RobotState
+from arm_canopen import AxisFeedback, MotionSource, Refusal, RefusalCause, Setpoint
+from arm_model import Array, frozen, RobotState
+from arm_trajectory import GoalCode
 
 from ..controllers.controller import Source
 from ..core.gateway import CommandGateway
-from .drive_reasons import (
-    before_first_command,
-    COMMAND,
-    taken_away,
-    too_fast,
-    what_happened,
-    why_not,
-)
 
-if TYPE_CHECKING:
-    from arm_canopen import AxisFeedback, MotionSource, Refusal, Setpoint
-
-
+POWER = 'look after its power and its cable'
+MODE = 'call its ~/cyclic_position_mode or ~/interpolated_position_mode'
+COMMAND = 'the next command takes it back'
 NOT_ATTACHED = f'was not attached yet; {COMMAND}'
+
+UNUSED = f'is ready; {COMMAND}'
+PREPARATIONS = (RefusalCause.COMMANDED, RefusalCause.MODE_SELECTED)
+"""What clients do to a drive before it is moved."""
+
+REMEDIES: Mapping[RefusalCause, str] = {
+    RefusalCause.OFFLINE: POWER,
+    RefusalCause.NOT_OPERATIONAL: 'call its ~/init',
+    RefusalCause.STATE_UNKNOWN: POWER,
+    RefusalCause.SILENT: POWER,
+    RefusalCause.FAULT: 'call its ~/recover',
+    RefusalCause.NOT_ENABLED: 'call its ~/init',
+    RefusalCause.MODE_CHANGE: MODE,
+    RefusalCause.OTHER_MODE: MODE,
+    RefusalCause.MODE_SELECTED: f'{COMMAND} in mode 7 or 8',
+    RefusalCause.HALTED: COMMAND,
+    RefusalCause.SINGLE_TARGET: f'wait until it stands, or call its ~/halt; then {COMMAND}',
+    RefusalCause.OTHER_SOURCE: COMMAND,
+    RefusalCause.COMMANDED: COMMAND,
+    RefusalCause.NOT_FOLLOWING: 'free its way; the next command takes it back',
+    RefusalCause.CYCLE_FAILED: 'see the log; the next command takes it back',
+    RefusalCause.SETPOINT_REFUSED: 'see the log; the next command takes it back',
+    RefusalCause.SHUTDOWN: 'start the master again',
+}
+
+SILENT_AGE_FACTOR = 0.5
+"""Share of the age of a silent drive from which on another one counts as silent, too."""
+
+PLURAL = {
+    'is': 'are',
+    'has': 'have',
+    'was': 'were',
+    'does': 'do',
+    'moves': 'move',
+    'takes': 'take',
+}
+"""Words with which reasons begin, as they are said of several drives."""
+
+OBJECTS = {' its ': ' their ', 'takes it': 'takes them', 'it stands': 'they stand'}
+"""What reasons say of one drive, as it is said of several."""
+
+Released = Mapping[str, Refusal | str]  # drives that were taken away, with what happened
+
+
+def why_not(feedback: Sequence[AxisFeedback], released: Released) -> str:
+    """Return why the arm cannot follow now; empty when it can."""
+    if not released and all(axis.followable and axis.refusal is None for axis in feedback):
+        return ''
+    return _sentence(
+        (axis.name, axis.refusal or released.get(axis.name)) for axis in feedback
+    ) or _sentence((axis.name, UNKNOWN) for axis in feedback if not axis.followable)
+
+
+def too_fast(feedback: Sequence[AxisFeedback], velocities: Array) -> str:
+    """Return which joints may be faster than their drives; empty when none may.
+
+    A path that is faster is refused by the drive half-way, and ends in a stop beside the path.
+    """
+    remedy = 'lower max_velocity there, or raise 0x607F in the sdo list of bus.yml'
+    pairs = zip(feedback, velocities, strict=True)
+    return _sentence(
+        (axis.name, f'is limited to {_rates(axis.speed_limit, velocity)}; {remedy}')
+        for axis, velocity in pairs
+        if velocity > axis.speed_limit
+    )
+
+
+def _rates(limit: float, velocity: float) -> str:
+    return f'{limit:.4g} per second by 0x607F, and limits.yaml allows {velocity:.4g}'
+
+
+def what_happened(feedback: Sequence[AxisFeedback], released: Released) -> tuple[str, GoalCode]:
+    """Return why an arm that followed does not go on, and the code of its trajectory.
+
+    What took a drive away is the cause; the state that it is in now may be a consequence.
+    """
+    causes: list[tuple[str, Refusal | str | None]] = [
+        (axis.name, released.get(axis.name) or axis.refusal) for axis in feedback
+    ]
+    oldest = max((axis.age for axis in feedback if _is_silent(axis)), default=math.inf)
+    for number, axis in enumerate(feedback):
+        # what cuts several drives off at once shows of some of them a few cycles later
+        if causes[number][1] is None and axis.age > SILENT_AGE_FACTOR * oldest:
+            detail = f'the last is {axis.age:.1f} s old'
+            causes[number] = axis.name, Refusal(RefusalCause.SILENT, detail)
+    is_behind = any(
+        isinstance(cause, Refusal) and cause.cause is RefusalCause.NOT_FOLLOWING
+        for _, cause in causes
+    )
+    code = GoalCode.PATH_TOLERANCE_VIOLATED if is_behind else GoalCode.INVALID_GOAL
+    return _sentence(causes) or why_not(feedback, released), code
+
+
+def taken_away(axis: str, refusal: Refusal) -> str:
+    """Return why a drive was taken away."""
+    return _sentence([(axis, refusal)])
+
+
+def before_first_command(refusal: Refusal) -> Refusal | str:
+    """Return why an arm that has not moved yet has to be commanded first.
+
+    A drive that was initialized, or got its mode, before that had no client.
+    """
+    return UNUSED if refusal.cause in PREPARATIONS else refusal
+
+
+def _is_silent(axis: AxisFeedback) -> bool:
+    return axis.refusal is not None and axis.refusal.cause is RefusalCause.SILENT
+
+
+UNKNOWN = 'accepts no set-points; see the log of the master'
+
+
+def _sentence(causes: Iterable[tuple[str, Refusal | str | None]]) -> str:
+    """Name drives with the same trouble together."""
+    names: dict[str, list[str]] = {}
+    for name, cause in causes:
+        if cause is not None:
+            names.setdefault(_words(cause), []).append(name)
+    return '; '.join(
+        f'{", ".join(axes)} {reason if len(axes) == 1 else _of_several(reason)}'
+        for reason, axes in names.items()
+    )
+
+
+def _words(cause: Refusal | str) -> str:
+    if isinstance(cause, str):
+        return cause
+    return f'{cause}; {REMEDIES[cause.cause]}'
+
+
+def _of_several(reason: str) -> str:
+    """Return what is said of one drive, said of several."""
+    verb, rest = reason.split(' ', 1)
+    for one, many in OBJECTS.items():
+        rest = rest.replace(one, many)
+    return f'{PLURAL.get(verb, verb)} {rest}'
 
 
 class DriveSource:
@@ -45,9 +174,6 @@ class DriveSource:
         Args:
             gateway: Commands to the core; it is stepped here only.
         """
-        from arm_canopen import Setpoint
-
-        self._make: type[Setpoint] = Setpoint
         self._gateway = gateway
         self._axes = list(gateway.model.joints)
         self._released: dict[str, Refusal | str] = dict.fromkeys(self._axes, NOT_ATTACHED)
@@ -133,7 +259,7 @@ class DriveSource:
             point.state.position.tolist(), point.state.velocity.tolist(), feedback, strict=True
         )
         return [
-            None if axis.name in self._left else self._make(position, velocity)
+            None if axis.name in self._left else Setpoint(position, velocity)
             for position, velocity, axis in rows
         ]
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import replace
 import time
 import traceback
 from typing import Any
@@ -16,6 +17,7 @@ from control_msgs.srv import QueryTrajectoryState
 from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
+from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
 from arm_model import ArmError
@@ -27,15 +29,71 @@ from ...controllers.controller import Source
 from ...controllers.trajectory import Execution
 from ...core.gateway import CommandGateway
 from ...core.motion_queue import MotionCommand
-from ...core.requests import SpeedRequest, StopRequest
+from ...core.requests import PauseRequest, SpeedRequest, StopRequest
+from ...core.snapshot import Snapshot
 from ...exceptions import NotReadyError
 from ..refusals import LoggedReasons
 from .action import TrajectoryAction
 from .messages import difference, goal_of_action, goal_of_trajectory, point_of
 from .parameters import TrajectoryParameters
-from .pause import TrajectoryPause
 
 TOPIC = 'joint_trajectory'  # stands for all who publish there: their names are not known
+
+SOURCE_WORDS = {
+    Source.TRAJECTORY: 'the trajectory',
+    Source.TARGET: 'the single target',
+    Source.JOG: 'the jog',
+}
+
+
+class TrajectoryPause:
+    """Holds whatever moves the arm, and lets it go on."""
+
+    def __init__(self, node: Node, gateway: CommandGateway) -> None:
+        self._gateway = gateway
+        self._paused = False  # as it was ordered: the cycle may not have come to it yet
+        node.create_service(Trigger, '~/pause', self._pause)
+        node.create_service(Trigger, '~/resume', self._resume)
+
+    def _pause(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        return self._order(True, words_of_pause, response)
+
+    def _resume(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        return self._order(False, words_of_resume, response)
+
+    def _order(
+        self, paused: bool, words: Callable[[Snapshot], str], response: Trigger.Response
+    ) -> Trigger.Response:
+        snapshot = self._gateway.snapshot
+        response.message = snapshot.stale(time.monotonic() - snapshot.time)
+        if response.message:
+            return response
+        self._gateway.command(PauseRequest(paused))
+        response.success, response.message = True, words(replace(snapshot, paused=self._paused))
+        self._paused = paused
+        return response
+
+
+def words_of_pause(snapshot: Snapshot) -> str:
+    """Return what a pause does."""
+    if snapshot.paused:
+        return 'is paused already; ~/resume goes on'
+    if snapshot.source is Source.NONE:
+        return 'paused; nothing is under way, and trajectories wait for ~/resume'
+    if snapshot.source is Source.JOG:
+        return 'paused; the jog ends, and trajectories wait for ~/resume'
+    return f'paused; {SOURCE_WORDS[snapshot.source]} comes to rest on its path until ~/resume'
+
+
+def words_of_resume(snapshot: Snapshot) -> str:
+    """Return what goes on."""
+    if not snapshot.paused:
+        return 'was not paused'
+    if snapshot.speed == 0.0:
+        return 'no longer paused, but the speed override is 0; see ~/speed_scaling_input'
+    if snapshot.source is Source.NONE:
+        return 'takes commands again; nothing is under way'
+    return f'{SOURCE_WORDS[snapshot.source]} goes on'
 
 
 class TrajectoryController:
