@@ -1,27 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A joint that loses its PDOs under a trajectory, with the real master, core and drives.
-
-Master, motion core and simulated drives meet in virtual time, without processes.
-"""
+"""A joint that loses its PDOs under a trajectory, with the real master, core and drives."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Future
 from itertools import pairwise
 
-from bus_rig import VirtualNetwork
-from drive_samples import bus_config, drive_config, MOTION_WRITES, PERIOD, SCALE, sdo_write
-from model_robots import ready, robot
+from drive_samples import PERIOD
 import numpy as np
 import pytest
 from servo_commands import InlineWorker, outcome
+from virtual_arm import VirtualArm
 
-from arm_canopen import DriveState, MotionSource, OperationMode
-from arm_servo import MotionCore
-from arm_servo.core.gateway import CommandGateway
-from arm_servo.io.drive_source import DriveSource
+from arm_canopen import DriveState, OperationMode
 from arm_trajectory import GoalPoint, TrajectoryGoal
 
 pytestmark = pytest.mark.slow
@@ -34,43 +26,16 @@ SWING = 0.35  # [rad] of the trajectory, with the fourth joint the other way
 TIME = 3.0  # [s] of the trajectory
 
 
-class Arm:
-    """The Panda in a virtual network, led by the motion core along a line."""
+class Arm(VirtualArm):
+    """The Panda, led by the motion core along a line."""
 
     def __init__(self, mode: OperationMode) -> None:
-        core = MotionCore(robot('panda'))
-        joints = core.model.joints
-        self.begin = np.array(ready('panda'))
-        nodes = [
-            drive_config(
-                name,
-                2 + number,
-                sdo_writes=(*MOTION_WRITES, sdo_write(0x607F, 0, int(3.0 * SCALE))),
-                scales={'offset_pos_from_dev': at, 'offset_pos_to_dev': -at * SCALE},
-            )
-            for number, (name, at) in enumerate(zip(joints, self.begin.tolist(), strict=True))
-        ]
-        self.net = VirtualNetwork(bus_config(*nodes))
-        self.joints = joints
-        self.gateway = CommandGateway(core, InlineWorker(), lambda: self.net.now)
-        self.source = DriveSource(self.gateway)
-        self.net.boot()
-        for name in joints:
-            self.net.do(name, 'init')
-            self.net.select(name, mode)
-        self.source.attach(self._attach)
-        self.net.run(0.1)
-        self.to = self.begin + SWING
-        self.to[3] -= 2 * SWING
-        goal = TrajectoryGoal(joints, [GoalPoint(TIME, self.to.tolist())])
+        super().__init__(mode, InlineWorker())
+        self._way = np.full(len(self.joints), SWING)
+        self._way[3] = -SWING
+        goal = TrajectoryGoal(self.joints, [GoalPoint(TIME, (self.begin + self._way).tolist())])
         self.command = self.gateway.request(goal)
         self.net.run(TIME / 3)
-
-    def _attach(self, source: MotionSource) -> Future[None]:
-        self.net.master.attach(source)
-        future = Future[None]()
-        future.set_result(None)
-        return future
 
     def lose(self, bases: Sequence[int], *names: str) -> None:
         """Lose PDOs of joints."""
@@ -79,9 +44,8 @@ class Arm:
 
     def progress(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
         """Return how far each motor has come on the line, from 0 to 1."""
-        drives = [self.net.devices[name].drive for name in self.joints]
-        moved = np.array([drive.position / SCALE for drive in drives if drive is not None])
-        return moved / (self.to - self.begin)
+        shares: np.ndarray[tuple[int], np.dtype[np.float64]] = self.moved / self._way
+        return shares
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The demo and the bring-up as a newcomer starts them."""
+"""The demos as a newcomer starts them, and how a bring-up ends."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 import re
 import signal
 import time
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING
 from bus_recorder import BusRecorder
 from canopen_interfaces.srv import COTargetDouble
 from manual_page import missing_in_run
-from processes import RunningProcess
+from processes import find_children, RunningProcess
 import psutil
 import pytest
 from ros_client import RosClient
@@ -26,12 +27,48 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.scenario
 
-DISABLED = dict.fromkeys(range(2, 9), 'Switch on disabled')
+
+@dataclass(frozen=True)
+class Demo:
+    """A demo that ends by itself.
+
+    Attributes:
+        command: Package, program and arguments of `ros2 run`.
+        target: Target of `make` by which docs/index.md starts it.
+        begun: Line of its output by which all its processes run.
+        patterns: What its output has besides what the page shows.
+    """
+
+    command: tuple[str, ...]
+    target: str
+    begun: str
+    patterns: tuple[str, ...] = ()
 
 
-def start(isolation: Isolation, *arguments: str) -> RunningProcess:
+DEMOS = (
+    Demo(('arm_bringup', 'demo', 'panda', '--duration', '6'), 'make demo ', 'waving'),
+    Demo(
+        ('arm_bringup', 'motion_demo', 'gp110', '--duration', '5'),
+        'make demo-arm',
+        'to the start pose',
+    ),
+    Demo(
+        ('arm_bringup', 'plan_demo', 'gp110', '--duration', '1'),
+        'make demo-plan',
+        'to the part, by free motion',
+        (
+            r'^blocked goal +GOAL_IN_COLLISION: goal: \w+ touches pillar',
+            r'^box in the way  at rest .* planned anew in \d+ ms \([2-9] plans\)$',
+        ),
+    ),
+    Demo(('quad_bringup', 'demo', '--duration', '8'), 'make demo-quad', 'standing up'),
+)
+OFF = {'Switch on disabled'}
+
+
+def start(isolation: Isolation, program: str, *arguments: str) -> RunningProcess:
     """Start an executable of arm_bringup by ``ros2 run``, on the test's own bus."""
-    command = ['ros2', 'run', 'arm_bringup', *arguments, '--can', isolation.bus]
+    command = ['ros2', 'run', 'arm_bringup', program, *arguments, '--can', isolation.bus]
     return RunningProcess(command, isolation.env)
 
 
@@ -40,21 +77,38 @@ def children(process: RunningProcess) -> list[psutil.Process]:
     return psutil.Process(process.pid).children(recursive=True)
 
 
-def test_demo_moves_all_joints_and_leaves_them_disabled(isolation: Isolation) -> None:
-    """The demo ends by itself with all seven joints enabled and moved, and exit code 0."""
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize('demo', DEMOS, ids=lambda demo: demo.target.strip())
+def test_a_demo_prints_what_the_manual_shows(isolation: Isolation, demo: Demo) -> None:
+    """It ends by itself with exit code 0; no process is left, and no drive is enabled."""
+    of_arm = demo.command[0] == 'arm_bringup'
+    command = ['ros2', 'run', *demo.command, *(['--can', isolation.bus] if of_arm else [])]
     with BusRecorder(isolation.bus) as recorder:
-        with start(isolation, 'demo', 'panda', '--duration', '6') as demo:
-            demo.wait_for('waving', 40.0)
-            started = children(demo)
-            assert demo.wait(60.0) == 0, demo.output
-        assert not missing_in_run('index.md', 'make demo ', demo.output), demo.output
-        moved = re.findall(r'^panda_joint\d +\S+ +\S+ +(\S+)', demo.output, re.MULTILINE)
-        assert len(moved) == 7
-        assert all(float(amount) > 0.1 for amount in moved), demo.output
-        assert recorder.last_states() == DISABLED
+        with RunningProcess(command, isolation.env) as process:
+            process.wait_for(demo.begun, 120.0)
+            started = children(process)
+            assert process.wait(240.0) == 0, process.output
+        assert set(recorder.last_states().values()) == (OFF if of_arm else set())
+    assert not missing_in_run('index.md', demo.target, process.output), process.output
+    for pattern in demo.patterns:
+        assert re.search(pattern, process.output, re.MULTILINE), process.output
+    moved = re.findall(r'^panda_joint\d +\S+ +\S+ +(\S+)', process.output, re.MULTILINE)
+    assert len(moved) == (7 if demo is DEMOS[0] else 0)
+    assert all(float(amount) > 0.1 for amount in moved), process.output
     gone, alive = psutil.wait_procs(started, timeout=5.0)
     assert not alive
     assert len(gone) >= 3
+
+
+def test_ctrl_c_in_the_middle_of_a_demo(isolation: Isolation) -> None:
+    """The arm comes to rest, the drives are disabled, and what was measured is reported."""
+    with BusRecorder(isolation.bus) as recorder:
+        with start(isolation, 'motion_demo', 'prbt') as demo:
+            demo.wait_for('a square in the base frame', 90.0)
+            demo.signal(signal.SIGINT)
+            assert demo.wait(40.0) == 0, demo.output
+        assert any(line.startswith('peak jerk') for line in demo.lines), demo.output
+        assert set(recorder.last_states().values()) == OFF
 
 
 def wait_for_silence(client: RosClient, topic: str, duration: float) -> None:
@@ -97,27 +151,12 @@ def test_a_drive_that_is_commanded_from_elsewhere_leaves_the_wave(isolation: Iso
     assert demo.output.count('left the wave') == 1
 
 
-def test_ctrl_c_ends_the_bring_up_cleanly(isolation: Isolation) -> None:
-    """After Ctrl-C the exit code is 0, every drive is disabled and no process is left."""
-    with BusRecorder(isolation.bus) as recorder:
-        with start(isolation, 'bringup', 'panda', '--simulate') as bringup:
-            bringup.wait_for('all is ready', 40.0)
-            started = children(bringup)
-            assert bringup.stop() == 0, bringup.output
-        assert recorder.last_states() == DISABLED
-    assert not psutil.wait_procs(started, timeout=5.0)[1]
-
-
 def test_bring_up_ends_when_the_master_dies(isolation: Isolation) -> None:
     """A killed master ends the bring-up with a reason; the drives notice by its heartbeat."""
     with start(isolation, 'bringup', 'panda', '--simulate') as bringup:
         bringup.wait_for('all is ready', 40.0)
         started = children(bringup)
-        master = next(
-            child
-            for child in started
-            if any(word.endswith(('/master', '/motion_node')) for word in child.cmdline())
-        )
+        master = find_children(bringup.pid, '/master', '/motion_node')[0]
         master.send_signal(signal.SIGKILL)
         assert bringup.wait(30.0) == 1, bringup.output
     assert 'master' in bringup.lines[-1]
@@ -130,10 +169,6 @@ def test_nothing_is_left_of_a_killed_bring_up(isolation: Isolation) -> None:
         bringup.wait_for('all is ready', 40.0)
         started = children(bringup)
         # on the system's ROS, `ros2 run` stays as the parent of what it runs
-        supervisor = next(
-            process
-            for process in [psutil.Process(bringup.pid), *started]
-            if any(word.endswith('/arm_bringup/bringup') for word in process.cmdline())
-        )
+        supervisor = find_children(bringup.pid, '/arm_bringup/bringup')[0]
         supervisor.kill()
         assert not psutil.wait_procs(started, timeout=20.0)[1]

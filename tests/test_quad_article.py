@@ -4,10 +4,8 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING
 
-from manual_page import missing_in_run
 from processes import RunningProcess
 import psutil
 import pytest
@@ -81,17 +79,3 @@ def check_frames(isolation: Isolation) -> None:
         static = client.listen(TFMessage, '/tf_static', LATCHED)
         wanted = expected_tree().items()
         client.spin_until(lambda: wanted <= tree([*moving, *static]).items(), 20.0, 'all frames')
-
-
-def test_the_demo_walks_and_says_what_it_measured(isolation: Isolation) -> None:
-    """It ends by itself, and nothing is left of it."""
-    with start(isolation, 'demo', '--duration', '8') as demo:
-        demo.wait_for('standing up', STARTING)
-        started = psutil.Process(demo.pid).children(recursive=True)
-        assert demo.wait(STARTING) == 0, demo.output
-    rows = re.findall(
-        r'^(walk|turn|strafe|stop) +\S+ s(?: +[+-]\d\S+){9}$', demo.output, re.MULTILINE
-    )
-    assert rows == ['walk', 'turn', 'strafe', 'stop'], demo.output
-    assert not missing_in_run('index.md', 'make demo-quad', demo.output), demo.output
-    assert not psutil.wait_procs(started, timeout=5.0)[1]

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the demos of an arm compute: the path of the wave, measures of a motion, cells of parts.
 
-tests/test_demo.py, test_arm_demo.py and test_arm_plan_demo.py run them.
+tests/test_demo.py runs them.
 """
 
 from __future__ import annotations

@@ -191,47 +191,29 @@ def test_every_key_that_the_container_skips_is_used() -> None:
 
 
 @pytest.mark.parametrize('name', PACKAGES)
-def test_colcon_test_runs_pytest(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where setup.py does not name it, colcon runs no test and reports success."""
-    extras = described(PACKAGES[name].folder, monkeypatch).get('extras_require', {})
+def test_what_setup_py_asks_for_is_there(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tests by pytest, packages of the checkout from it, versions and a Python that are tested.
+
+    Where setup.py does not name pytest, colcon runs no test and reports success. A package of the
+    name of a neighbour on PyPI is never installed.
+    """
+    keywords = described(PACKAGES[name].folder, monkeypatch)
     assert (PACKAGES[name].folder / 'test').is_dir()
-    assert 'pytest' in extras.get('test', [])
+    assert 'pytest' in keywords.get('extras_require', {}).get('test', [])
     assert 'python3-pytest' in keys(name, 'test_depend')
-
-
-@pytest.mark.parametrize('name', PACKAGES)
-def test_packages_of_the_checkout_are_taken_from_it(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A package of the same name on PyPI is never installed."""
-    for other, where in declared(name, monkeypatch).items():
-        if other in PACKAGES:
-            assert where == f'@ {PACKAGES[other].folder.as_uri()}'
-
-
-@pytest.mark.parametrize('name', PACKAGES)
-def test_what_is_pinned_is_new_enough(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The environment in which all is tested has versions that setup.py takes."""
+    settings = (LAYOUT.root / 'pyproject.toml').read_text()
+    (checked,) = re.findall("\npython_version = '(.*)'", settings)
+    assert keywords['python_requires'] == f'>={checked}'
     text = ''.join(path.read_text() for path in LAYOUT.requirements.glob('*.txt'))
     for other, versions in declared(name, monkeypatch).items():
         if other in PACKAGES:
+            assert versions == f'@ {PACKAGES[other].folder.as_uri()}'
             continue
         pinned = re.findall(rf'^{other}==([\d.]+)', text, re.MULTILINE | re.IGNORECASE)
         assert pinned, f'{other} is in no file of tools/requirements'
         oldest = re.match(r'>=([\d.]+)(;|$)', versions)
         if oldest is not None:
             assert all(number(version) >= number(oldest[1]) for version in pinned)
-
-
-@pytest.mark.parametrize('name', PACKAGES)
-def test_what_runs_on_older_python_than_the_code_is_refused(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The code is checked for the Python that setup.py asks for."""
-    checked = re.search("\npython_version = '(.*)'", (LAYOUT.root / 'pyproject.toml').read_text())
-    assert checked is not None
-    keywords = described(PACKAGES[name].folder, monkeypatch)
-    assert keywords['python_requires'] == f'>={checked[1]}'
 
 
 def test_what_only_linux_has_is_required_there_only(monkeypatch: pytest.MonkeyPatch) -> None:

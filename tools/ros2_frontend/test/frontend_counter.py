@@ -2,14 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """An action server for the command-line tests; prints `ready` when up.
 
-The order decides the fate of a goal: below 0 it is rejected, 0 is aborted, 100 and above counts
+The method decides the fate of a goal: below 0 it is rejected, 0 is aborted, 100 and above counts
 until it is cancelled, and what is between is counted to.
 """
 
 from __future__ import annotations
 
 import contextlib
-import importlib
 from typing import Any
 
 import rclpy
@@ -18,9 +17,9 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.task import Future
 
+from arm_msgs.action import Home
+
 ENDLESS = 100
-# built by built_action.py; no checker can find it
-Count: Any = importlib.import_module('frontend_test_msgs.action').Count
 
 
 class Counter(Node):
@@ -33,7 +32,7 @@ class Counter(Node):
         self.create_timer(0.01, self._tick)
         self._server = ActionServer(  # type: ignore[no-untyped-call]
             self,
-            Count,
+            Home,
             'count',
             self._count,
             goal_callback=self._judge,
@@ -41,25 +40,25 @@ class Counter(Node):
         )
 
     def _judge(self, goal: Any) -> GoalResponse:
-        return GoalResponse.REJECT if goal.order < 0 else GoalResponse.ACCEPT
+        return GoalResponse.REJECT if goal.method < 0 else GoalResponse.ACCEPT
 
     async def _count(self, handle: Any) -> Any:
-        order, step = handle.request.order, 0
+        order, step = handle.request.method, 0
         while step < order or order >= ENDLESS:
             if handle.is_cancel_requested:
                 print('cancelled', flush=True)
                 handle.canceled()
-                return Count.Result()
+                return Home.Result()
             tick = Future()  # type: ignore[no-untyped-call]
             self._ticks.append(tick)
             await tick
             step += 1
-            handle.publish_feedback(Count.Feedback(step=step))
+            handle.publish_feedback(Home.Feedback(elapsed=float(step)))
         if order:
             handle.succeed()
         else:
             handle.abort()
-        return Count.Result(sequence=list(range(order)))
+        return Home.Result(message=f'counted to {order}')
 
     def _tick(self) -> None:
         ticks, self._ticks = self._ticks, []

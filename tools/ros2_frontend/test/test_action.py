@@ -7,61 +7,52 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 import re
-import subprocess
 import sys
 
-from built_action import build, TYPE, with_package
-from frontend_cli import Outcome, PROGRAM, Ros2, with_frontend
+from frontend_cli import PROGRAM, Ros2, with_frontend
 from isolation import reserve
 from processes import RunningProcess
 import pytest
 
-pytestmark = [pytest.mark.scenario, pytest.mark.xdist_group('frontend_action')]
+pytestmark = [pytest.mark.scenario]
 
+TYPE = 'arm_msgs/action/Home'
 SUCCESS = """\
 Waiting for an action server to become available...
 Sending goal:
-     order: 2
+     method: 2
 
 Goal accepted with ID: [0-9a-f]{32}
 
 Result:
-    sequence:
-- 0
-- 1
+    success: false
+message: counted to 2
+position: 0.0
 
 Goal finished with status: SUCCEEDED
 """
 
 
 @pytest.fixture(scope='module')
-def counter(
-    pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[tuple[RunningProcess, Mapping[str, str]]]:
+def counter() -> Iterator[tuple[RunningProcess, Mapping[str, str]]]:
     """Start the action server in a domain of its own."""
-    cache = getattr(pytestconfig, 'cache', None)  # not there with `-p no:cacheprovider`
-    prefix = build(
-        cache.mkdir('frontend_test_msgs') if cache else tmp_path_factory.mktemp('cmake')
-    )
     program = str(Path(__file__).with_name('frontend_counter.py'))
     with reserve() as isolation:
-        env = with_package(prefix, with_frontend(isolation.env))
+        env = with_frontend(isolation.env)
         with RunningProcess([sys.executable, program], env) as process:
             process.wait_for('^ready$', timeout=60.0)
             yield process, env
 
 
 @pytest.fixture
-def run(counter: tuple[RunningProcess, Mapping[str, str]]) -> Ros2:
-    """Run a command line as a process, which finds the action's libraries."""
-
-    def run_(*words: str) -> Outcome:
-        done = subprocess.run(
-            [*PROGRAM, *words], env=counter[1], capture_output=True, text=True, check=False
-        )
-        return Outcome(done.returncode, done.stdout, done.stderr)
-
-    return run_
+def run(
+    counter: tuple[RunningProcess, Mapping[str, str]],
+    ros2: Ros2,
+    monkeypatch: pytest.MonkeyPatch,
+) -> Ros2:
+    """Run a command line in this process, in the domain of the server."""
+    monkeypatch.setenv('ROS_DOMAIN_ID', counter[1]['ROS_DOMAIN_ID'])
+    return ros2
 
 
 def test_list_info_and_type(run: Ros2) -> None:
@@ -81,15 +72,15 @@ def test_node_info_names_actions(run: Ros2) -> None:
 
 def test_a_goal_that_succeeds(run: Ros2) -> None:
     """Each step is printed, as ros2cli does."""
-    outcome = run('action', 'send_goal', '/count', TYPE, '{order: 2}')
+    outcome = run('action', 'send_goal', '/count', TYPE, '{method: 2}')
     assert (outcome.code, outcome.err) == (0, '')
     assert re.fullmatch(SUCCESS, outcome.out), outcome.out
 
 
 def test_feedback_on_request(run: Ros2) -> None:
     """Steps in their order; on a busy machine DDS drops what its queue of ten does not hold."""
-    out = run('action', 'send_goal', '-f', '/count', TYPE, '{order: 90}').out
-    steps = [int(step) for step in re.findall(r'Feedback:\n    step: (\d+)\n\n', out)]
+    out = run('action', 'send_goal', '-f', '/count', TYPE, '{method: 90}').out
+    steps = [int(step) for step in re.findall(r'Feedback:\n.*\n.*\nelapsed: (\d+)\.0\n\n', out)]
     assert len(steps) > 10
     assert steps == sorted(set(steps))
     assert steps[-1] <= 90
@@ -97,9 +88,9 @@ def test_feedback_on_request(run: Ros2) -> None:
 
 def test_goals_that_do_not_succeed(run: Ros2) -> None:
     """A rejected and an aborted goal are reported, with exit code 0, as ros2cli."""
-    rejected = run('action', 'send_goal', '/count', TYPE, '{order: -1}')
+    rejected = run('action', 'send_goal', '/count', TYPE, '{method: -1}')
     assert (rejected.code, rejected.out.splitlines()[-1]) == (0, 'Goal was rejected.')
-    aborted = run('action', 'send_goal', '/count', TYPE)  # without YAML: order 0
+    aborted = run('action', 'send_goal', '/count', TYPE)  # without YAML: method 0
     assert (aborted.code, aborted.out.splitlines()[-1]) == (
         0,
         'Goal finished with status: ABORTED',
@@ -111,9 +102,9 @@ def test_an_interrupt_cancels_the_goal(
 ) -> None:
     """Ctrl-C does not leave a robot moving."""
     server, env = counter
-    words = [*PROGRAM, 'action', 'send_goal', '-f', '/count', TYPE, '{order: 100}']
+    words = [*PROGRAM, 'action', 'send_goal', '-f', '/count', TYPE, '{method: 100}']
     with RunningProcess(words, env) as process:
-        process.wait_for(r'^    step: \d+$')  # the first ones may come before it listens
+        process.wait_for(r'^elapsed: \d+')  # the first ones may come before it listens
         assert process.stop() == 2
         assert 'Canceling goal...' in process.lines
         assert process.lines[-1] == 'Goal canceled.'
@@ -124,10 +115,10 @@ def test_an_interrupt_cancels_the_goal(
 @pytest.mark.parametrize(
     ('words', 'problem'),
     [
-        (('frontend_test_msgs/action/Cout',), f"is invalid\nDid you mean '{TYPE}'?\n"),
+        (('arm_msgs/action/Hom',), f"is invalid\nDid you mean '{TYPE}'?\n"),
         (('std_srvs/srv/Trigger',), 'The passed action type is invalid: std_srvs/srv/Trigger is'),
-        ((TYPE, '{ordr: 1}'), "Failed to populate message fields: 'Count_Goal' object has no"),
-        ((TYPE, 'order:1'), 'The passed value needs to be a dictionary'),
+        ((TYPE, '{methd: 1}'), "Failed to populate message fields: 'Home_Goal' object has no"),
+        ((TYPE, 'method:1'), 'The passed value needs to be a dictionary'),
     ],
     ids=['type', 'kind', 'field', 'yaml'],
 )
