@@ -7,9 +7,9 @@ robot_state_publisher does; :class:`JointWatch` finds joints that are missing. N
 the nodes are in :mod:`.nodes`. Descriptions are read by urdf_reader.
 """
 
-from .joint_watch import JointWatch
 from .state_publisher import (
     FrameTransform,
+    JointWatch,
     MessageProblem,
     Settings,
     StatePublisher,

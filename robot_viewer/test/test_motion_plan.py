@@ -20,10 +20,9 @@ import numpy as np
 import pytest
 from shape_msgs.msg import Mesh, MeshTriangle, SolidPrimitive
 from test_viewer_kinematics import pose_in_root, published
-from urdf_reader import about, DescriptionError, read_urdf, Transform
+from urdf_reader import about, DescriptionError, link_poses, read_urdf, Transform
 from urdf_robots import ARM, POSITIONS, random_urdfs
 
-from robot_viewer.link_poses import link_pose, links_beyond, moved
 from robot_viewer.nodes.motion_plan import (
     LINE_POINTS,
     PAUSE,
@@ -42,6 +41,7 @@ from robot_viewer.nodes.planning_messages import (
     SceneObject,
 )
 from robot_viewer.nodes.planning_scene import draw_object
+from robot_viewer.page.robot_scene import links_beyond, moved
 
 TREE = read_urdf(ARM)
 SRDF = """
@@ -85,14 +85,14 @@ def test_links_are_where_tf_has_them(urdf: str, position: float) -> None:
     positions = {joint.name: position for joint in tree.movable() if joint.mimic is None}
     frames = published(tree, positions)
     for link in tree.links:
-        pose = link_pose(tree, link, positions)
+        pose = link_poses(tree, positions)[link]
         expected = pose_in_root(link, tree.root, frames)
         assert np.allclose(pose.translation, expected[:3, 3], atol=1e-9)
 
 
 def test_a_joint_that_follows_moves_what_hangs_on_it() -> None:
     """By its factor and offset, and its link belongs to what the other joint moves."""
-    pose = link_pose(TREE, 'thumb', POSITIONS)
+    pose = link_poses(TREE, POSITIONS)['thumb']
     expected = pose_in_root('thumb', 'base', published(TREE, POSITIONS))
     assert np.allclose(pose.translation, expected[:3, 3], atol=1e-9)
     assert links_beyond(TREE, frozenset({'finger_joint'})) == {'finger', 'thumb'}
@@ -104,10 +104,10 @@ def test_a_joint_that_follows_has_one_position() -> None:
     followers = {joint.name: 0.3 for joint in TREE.movable() if joint.mimic}
     measured = POSITIONS | followers
     expected = pose_in_root('thumb', 'base', published(TREE, measured))
-    assert np.allclose(link_pose(TREE, 'thumb', measured).translation, expected[:3, 3], atol=1e-9)
+    assert np.allclose(link_poses(TREE, measured)['thumb'].translation, expected[:3, 3], atol=1e-9)
     goal = moved(TREE, measured, {'finger_joint': 0.1})
     expected = pose_in_root('thumb', 'base', published(TREE, POSITIONS | {'finger_joint': 0.1}))
-    assert np.allclose(link_pose(TREE, 'thumb', goal).translation, expected[:3, 3], atol=1e-9)
+    assert np.allclose(link_poses(TREE, goal)['thumb'].translation, expected[:3, 3], atol=1e-9)
 
 
 def test_groups_with_their_states_arms_first() -> None:
@@ -144,7 +144,7 @@ def test_the_line_of_the_tip_goes_from_start_to_goal() -> None:
     line = tip_line(TREE, 'wheel', {'lift': 0.3, 'shoulder': 9.0}, motion)
     assert len(line) == LINE_POINTS
     for place, angle in ((line[0], -0.5), (line[-1], 0.5)):
-        expected = link_pose(TREE, 'wheel', {'lift': 0.3, 'shoulder': angle}).translation
+        expected = link_poses(TREE, {'lift': 0.3, 'shoulder': angle})['wheel'].translation
         assert place == pytest.approx(expected)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_viewer.page.deadman import Deadman, HEARTBEAT, RELEASED_AFTER
+from robot_viewer.page.live import Deadman, HEARTBEAT, RELEASED_AFTER
 
 
 def test_a_held_button_counts_from_the_first_heartbeat_on() -> None:

@@ -22,7 +22,6 @@ from first_motion import (
     Sample,
     Verdict,
 )
-from robot_viewer.page.deadman import HEARTBEAT
 from robot_viewer.page.first_motion import (
     Axis,
     BusPlace,
@@ -37,6 +36,7 @@ from robot_viewer.page.first_motion import (
     RELEASED_AFTER,
     Saw,
 )
+from robot_viewer.page.live import HEARTBEAT
 
 PLAN = MotionPlan(start=0.5, distance=0.1, speed=0.05, increment=1e-4)
 SCALES = AxisScales(False, 1000.0, 0.001, 1000.0, 0.001, 1.0, 1.0, 0.0)

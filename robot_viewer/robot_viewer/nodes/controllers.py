@@ -16,7 +16,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import qos_profile_sensor_data, QoSProfile
 
-from ..page.deadman import RELEASED_AFTER
+from ..page.live import RELEASED_AFTER
 from ..page.target_panel import History, motion_time
 from ..robots import of_robot
 from .listening import Listening

@@ -15,7 +15,7 @@ from rclpy.node import Node
 from urdf_reader import KinematicTree
 
 from ..page.robot_scene import travel
-from .action_call import ActionCall
+from .calls import ActionCall
 from .controllers import Controller, Report
 
 SEND_GOAL = '/_action/send_goal'

@@ -17,7 +17,7 @@ from rclpy.node import Node
 from ..page.overlay import StopAnswer
 from ..page.robot_page import RobotPage
 from ..robot_state import ALLOW, Level, robot_state, RobotState, SILENCE, Stop
-from .trigger_calls import TRIGGER, TriggerCalls
+from .calls import TRIGGER, TriggerCalls
 from .watch import OWN, STILL_AFTER, Watch
 
 REPORT_PERIOD = 1.0

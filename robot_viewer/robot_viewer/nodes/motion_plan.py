@@ -12,11 +12,10 @@ from urdf_reader import (
     DescriptionError,
     find_group,
     KinematicTree,
+    link_poses,
     parse_srdf,
     Vector,
 )
-
-from ..link_poses import link_pose
 
 LINE_POINTS = 80
 """Of the line that the tip follows."""
@@ -118,6 +117,6 @@ def tip_line(
     """Return the places in the root link where a link passes, in [m]."""
     step = motion.duration / (LINE_POINTS - 1)
     return [
-        link_pose(tree, tip, {**beside, **motion.at(number * step)}).translation
+        link_poses(tree, {**beside, **motion.at(number * step)})[tip].translation
         for number in range(LINE_POINTS)
     ]

@@ -19,7 +19,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.task import Future
 from std_msgs.msg import String
-from urdf_reader import DescriptionError, KinematicTree, Transform, Vector
+from urdf_reader import DescriptionError, KinematicTree, link_poses, Transform, Vector
 from viser import (
     GuiButtonHandle,
     GuiDropdownHandle,
@@ -32,13 +32,11 @@ from viser import (
 
 from node_runner import LATCHED
 
-from ..link_poses import link_pose, links_beyond, moved
-from ..page.deadman import RELEASED_AFTER
-from ..page.live import Hold
+from ..page.live import Hold, RELEASED_AFTER
 from ..page.robot_page import RobotPage
-from ..page.robot_scene import pose_of, put, RobotScene, Tint
+from ..page.robot_scene import links_beyond, moved, pose_of, put, RobotScene, Tint
 from ..page.style import BAD, Color, GOOD, line, NEUTRAL, PLAIN, WANTED
-from .action_call import ActionCall
+from .calls import ActionCall
 from .motion_plan import plan_groups, PlanGroup, PlannedMotion, tip_line
 from .planning_messages import (
     ik_request,
@@ -250,7 +248,7 @@ class MotionPlanning:
             panel.show_ghost(None)
             return
         everywhere = moved(panel.tree, self._positions, self._joints)
-        panel.place_goal(link_pose(panel.tree, self._group.tip, everywhere))
+        panel.place_goal(link_poses(panel.tree, everywhere)[self._group.tip])
         panel.show_ghost(everywhere)
 
     def drag_goal(self, pose: Transform) -> None:

@@ -32,10 +32,10 @@ from node_runner import (
     run_node,
 )
 
-from ..joint_watch import JointWatch
 from ..state_publisher import (
     FrameTransform,
     HIGHEST_FREQUENCY,
+    JointWatch,
     MessageProblem,
     Settings,
     StatePublisher,
@@ -132,10 +132,11 @@ class RobotStatePublisher(Node):
     def _watch_joints(self) -> None:
         topic = self._subscription.topic_name
         now, publishers = time.monotonic(), self.count_publishers(topic)
-        for text in self._watch.notes(now, topic, publishers):
-            self.get_logger().info(text)
-        for text in self._watch.warnings(now, topic, publishers):
-            self.get_logger().warning(text)
+        for text, wrong in self._watch.reports(now, topic, publishers).items():
+            if wrong:  # a line of its own for each severity: rclpy refuses another one
+                self.get_logger().warning(text)
+            else:
+                self.get_logger().info(text)
 
 
 def _message(transforms: Iterable[FrameTransform], stamp: Time) -> TFMessage:

@@ -44,6 +44,7 @@ from ..page.robot_page import RobotPage, Velocity
 from ..page.robot_scene import greatest_velocities
 from ..robots import of_robot, SET_MODE_TYPE, stops_robot
 from .body import Body
+from .calls import TRIGGER, TriggerCalls
 from .controllers import Controllers
 from .first_motion import FirstMotion
 from .grippers import Grippers
@@ -51,7 +52,6 @@ from .judge import Judge
 from .listening import Listening
 from .motion_planning import MotionPlanning
 from .serving import Border, serve
-from .trigger_calls import TRIGGER, TriggerCalls
 from .watch import Watch
 
 NAME = 'web_viewer'

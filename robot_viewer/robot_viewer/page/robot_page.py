@@ -30,11 +30,10 @@ from viser import (
 
 from ..loopback import shown_host
 from ..robot_state import BUS, drives_of, FOLLOWS, Level, RobotState, Status
-from .deadman import RELEASED_AFTER
 from .diagnose import drive_html, Log
 from .gate import Gate
 from .jog_panel import JogActions, JogPanel, joint_texts, Offered
-from .live import Hold, Live
+from .live import Hold, Live, RELEASED_AFTER
 from .overlay import Overlay, StopAnswer
 from .robot_scene import Ground, RobotScene, start_position, travel
 from .standing import feet_of

@@ -21,12 +21,11 @@ from urdf_reader import (
     KinematicTree,
     mesh_unit,
     MeshFileError,
+    parents_first,
     Transform,
     UrdfShape,
 )
 from viser import FrameHandle, SceneApi, SceneNodeHandle
-
-from ..link_poses import link_paths
 
 ROOT = '/robot'
 Tint: TypeAlias = tuple[float, float, float, float]
@@ -306,3 +305,35 @@ def _load(path: Path) -> object:
             f'{path}: it takes the Python package {package} to read it; install that, or export '
             'the mesh as STL or OBJ'
         ) from error
+
+
+def moved(
+    tree: KinematicTree, positions: Mapping[str, float], goals: Mapping[str, float]
+) -> dict[str, float]:
+    """Return positions with some joints at goals; what follows those is left out, to follow.
+
+    Args:
+        tree: The robot.
+        positions: Measured, in [rad] or [m] by name.
+        goals: In [rad] or [m] by name.
+    """
+    followers = {j.name for j in tree.movable() if j.mimic and j.mimic.source in goals}
+    return {name: at for name, at in positions.items() if name not in followers} | dict(goals)
+
+
+def link_paths(tree: KinematicTree, base: str) -> dict[str, str]:
+    """Return a path of each link, below that of the link it hangs on; parents come first."""
+    paths = {tree.root: f'{base}/{tree.root}'}
+    for joint in parents_first(tree):
+        paths[joint.child] = f'{paths[joint.parent]}/{joint.child}'
+    return paths
+
+
+def links_beyond(tree: KinematicTree, joints: frozenset[str]) -> frozenset[str]:
+    """Return the links that joints move, and those that follow one of them."""
+    beyond: set[str] = set()
+    for joint in parents_first(tree):
+        follows = joint.mimic is not None and joint.mimic.source in joints
+        if joint.name in joints or follows or joint.parent in beyond:
+            beyond.add(joint.child)
+    return frozenset(beyond)

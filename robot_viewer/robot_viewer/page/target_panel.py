@@ -24,9 +24,8 @@ from viser import (
     ViserServer,
 )
 
-from ..link_poses import links_beyond
 from .live import Hold
-from .robot_scene import RobotScene, Tint, travel
+from .robot_scene import links_beyond, RobotScene, Tint, travel
 from .style import NEUTRAL, pad, sentence, Share, value_of
 
 HOLD_TARGET = 'Hold to move to the target'
