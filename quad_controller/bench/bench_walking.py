@@ -3,11 +3,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the gait and the shipped policies walk: on servos of any kind, and on several grounds.
 
-Servos and grounds are tried in virtual time on all cores; `--chain-minutes` adds the course over
-the serial line of a robot in real time, with the timing of its commands. The goals stand beside
-the figures; none is judged here: `check_policy` does that.
+Servos and grounds are tried in virtual time on all cores. None of the figures is judged here:
+`check_policy` does that, and it walks the course over a serial line in real time (`--chain`).
 
-    python bench_walking.py --duration 30 --chain-minutes 5     # for figures that are steadier
+    python bench_walking.py --duration 30     # for figures that are steadier
 """
 
 from __future__ import annotations
@@ -16,20 +15,12 @@ import argparse
 from dataclasses import replace
 
 from quad_controller import Velocity
-from quad_controller.exceptions import CheckError
 from quad_controller.gait.parameters import LOW_AND_WIDE
 from quad_controller.policy.report import table_text
 from quad_controller.policy_check.arenas import AS_MADE, Conditions, RobotChoice, TIPPING_PUSH
 from quad_controller.policy_check.course import course_for, CourseFigures
 from quad_controller.policy_check.findings import Table
-from quad_controller.policy_check.trial import (
-    Candidate,
-    chain_duration,
-    run_chain,
-    run_trials,
-    shipped_walkers,
-    Trial,
-)
+from quad_controller.policy_check.trial import Candidate, run_trials, shipped_walkers, Trial
 from quad_sim import ServoModel
 
 GROUNDS = {
@@ -102,7 +93,6 @@ def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--duration', type=float, default=4.0, help='of each command [s]')
-    parser.add_argument('--chain-minutes', type=float, default=0.8, help='0: leave it out')
     options = parser.parse_args()
     walkers = {'gait': Candidate(), 'gait, low, wide': Candidate(gait=LOW_AND_WIDE)}
     walkers |= shipped_walkers()
@@ -118,28 +108,6 @@ def main() -> None:
     print(f'off by, falls, commands without one; {len(commands)} commands of {options.duration} s')
     print(table_text(table, numbers=True))
     servos({'gait': Candidate()} | shipped_walkers(), options.duration)
-    if options.chain_minutes:
-        chain(walkers, options.chain_minutes)
-
-
-def chain(walkers: dict[str, Candidate], minutes: float) -> None:
-    """Print the figures over the serial line."""
-    commands = course_for(None)
-    duration = chain_duration(minutes, len(walkers), len(commands))
-    table: Table = [(*HEADINGS, 'p50 [ms]', 'p99 [ms]', 'jitter p99 [ms]')]
-    try:
-        found = run_chain(list(walkers.values()), commands, duration)
-    except CheckError as error:
-        print(f'\nover the serial line: {error}')
-        return
-    for name, each in zip(walkers, found, strict=True):
-        timing = each.timing
-        if timing is not None:
-            times = timing.latency(0.5), timing.latency(0.99), timing.jitter(0.99)
-            table.append((*row(name, 'serial line', each), *(f'{1e3 * t:.1f}' for t in times)))
-    print(f'\nover the serial line in real time, {len(commands)} commands of {duration:.1f} s')
-    print('goals with real-time priority: p50 below 3 ms, jitter p99 below 2 ms')
-    print(table_text(table, numbers=True))
 
 
 if __name__ == '__main__':

@@ -41,10 +41,6 @@ GROUND_TRUTH = 'fake_xgo/ground_truth'
 """Topic on which the simulated robot publishes where its body is."""
 COMMAND_PERIOD = 0.1
 """Time in [s] between two velocity commands; the controller's time-out is 0.5 s."""
-LOOP_PERIOD = 0.02
-"""Period of the controller in [s]."""
-KEPT_INTERVALS = 3000
-"""Intervals of /joint_command that are kept: one minute."""
 KEPT_SEGMENTS = 40
 """How many segments a demo without end remembers for its summary."""
 FIND_TIMEOUT, MODE_TIMEOUT = 20.0, 15.0
@@ -168,8 +164,7 @@ class Walk(Demo[ModeClient]):
         self.targets: Mapping[str, float] = {}
         self.positions: Mapping[str, float] = {}
         self.segments: deque[Segment] = deque(maxlen=KEPT_SEGMENTS)
-        self._intervals: deque[float] = deque(maxlen=KEPT_INTERVALS)
-        self._last_command = math.nan
+        self.loop: Mapping[str, float] = {}  # how the controller keeps its time [1/s], [s]
 
     def join(self, given_up: Callable[[], bool]) -> ModeClient:
         """Join the ROS graph: velocities out, everything that the robot reports in."""
@@ -201,7 +196,6 @@ class Walk(Demo[ModeClient]):
         self._reach('stand', 'standing up')
         self.moving = True
         self.tilt_max = self.tilt
-        self._intervals.clear()
         self._reach(self.mode, self.mode)
         for name, velocity, duration in self._plan():
             if self.left:
@@ -288,14 +282,12 @@ class Walk(Demo[ModeClient]):
 
     @property
     def rate(self) -> float:
-        """Joint commands per second; NaN before there are two."""
-        total = sum(self._intervals)
-        return len(self._intervals) / total if total > 0 else math.nan
+        """Joint commands per second, as the controller measures them; NaN before it reports."""
+        return self.loop.get('rate', math.nan)
 
-    def jitter(self, share: float) -> float:
+    def _jitter(self, percentile: str) -> float:
         """Return a percentile of the deviations from the period of the loop in [ms]."""
-        late = sorted(abs(each - LOOP_PERIOD) for each in self._intervals)
-        return 1e3 * late[min(len(late) - 1, int(share * len(late)))] if late else math.nan
+        return 1e3 * self.loop.get(f'jitter_{percentile}', math.nan)
 
     def progress(self) -> str:
         """Return how it goes."""
@@ -308,7 +300,7 @@ class Walk(Demo[ModeClient]):
         )
 
     def _loop_text(self) -> str:
-        jitter = f'{self.jitter(0.5):.2f}/{self.jitter(0.99):.2f} ms'
+        jitter = f'{self._jitter("p50"):.2f}/{self._jitter("p99"):.2f} ms'
         return f'joint commands {self.rate:.1f} Hz, jitter p50/p99 {jitter}'
 
     def _conclude(self) -> None:
@@ -371,7 +363,7 @@ class Walk(Demo[ModeClient]):
     def _loop_row(self) -> Text:
         if math.isnan(self.rate):
             return Text('loop  waiting for the controller', style='dim')
-        p50, p99 = self.jitter(0.5), self.jitter(0.99)
+        p50, p99 = map(self._jitter, ('p50', 'p99'))
         text = f'{self.rate:.1f} Hz   jitter p50 {p50:.2f} ms   p99 {p99:.2f} ms'
         return Text.assemble(('loop  ', 'bold'), text)
 
@@ -393,18 +385,17 @@ class Walk(Demo[ModeClient]):
         self.battery = 100.0 * message.percentage
 
     def _take_targets(self, message: JointCommand) -> None:
-        stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
-        if math.isfinite(self._last_command):
-            self._intervals.append(stamp - self._last_command)
-        self._last_command = stamp
         self.targets = dict(zip(self.joints, message.position, strict=False))
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
-        """Keep the errors of the controller: the reason when it is in a fault."""
+        """Keep the errors of the controller, the reason of a fault, and how its loop does."""
         for status in message.status:
-            is_error = status.level == DiagnosticStatus.ERROR
-            if is_error and status.name.startswith('controller_node'):
+            if not status.name.startswith('controller_node'):
+                continue
+            if status.level == DiagnosticStatus.ERROR:
                 self.fault = status.message
+            if status.name.endswith('loop'):
+                self.loop = {each.key: float(each.value) for each in status.values}
 
 
 def _rotation(quaternion: Any) -> tuple[float, float, float, float]:  # noqa: ANN401
