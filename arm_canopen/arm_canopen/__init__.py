@@ -35,9 +35,8 @@ from .config import load_bus
 from .config.model import BusConfig, NodeConfig
 
 if TYPE_CHECKING:
-    from .library.canopen_drive import CanopenDrive
     from .library.canopen_master import CanopenMaster
-    from .library.device import CanopenDevice
+    from .library.device import CanopenDevice, CanopenDrive
     from .master.events import Event, EventKind, Severity
     from .master.other_master import MasterFrames
     from .master.scheduler import Promise, Scheduler
@@ -88,7 +87,7 @@ __all__ = [
 
 _LATE = {
     'CanopenDevice': '.library.device',
-    'CanopenDrive': '.library.canopen_drive',
+    'CanopenDrive': '.library.device',
     'CanopenMaster': '.library.canopen_master',
     'Event': '.master.events',
     'EventKind': '.master.events',

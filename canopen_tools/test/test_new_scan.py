@@ -25,7 +25,7 @@ from arm_canopen.config.model.si_unit import POSITIONS, TIMES, velocity_unit
 from canopen_core.eds import load_eds
 from canopen_sim import DeviceRunner, Fault, FaultInjection
 from canopen_tools.cli.main import main
-from canopen_tools.eds_match import match_eds, NoMatchError, SeveralMatchError
+from canopen_tools.cli.new_scan import match_eds, NoMatchError, SeveralMatchError
 
 LISTEN = ('--listen', '0.1')
 DEADLINE = 20.0  # [s]

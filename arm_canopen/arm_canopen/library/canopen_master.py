@@ -39,8 +39,7 @@ from ..master.remote_node import RemoteNode
 from ..master.runner import Clock, NetworkThread, OWNER
 from ..master.scheduler import Scheduler
 from .bus_recording import BusRecording
-from .canopen_drive import CanopenDrive
-from .device import CanopenDevice, DeviceSdo
+from .device import CanopenDevice, CanopenDrive, DeviceSdo
 
 if TYPE_CHECKING:
     from typing_extensions import Self

@@ -1,17 +1,38 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A device of the bus and its objects, for callers outside of the cycle; each call waits."""
+"""Devices and axes of the bus, for callers outside of the cycle; each call waits for its end."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
-from canopen_core.standard import decode, encode, NmtCommand, object_address, ObjectEntry, Value
+from canopen_core import DriveError
+from canopen_core.standard import (
+    decode,
+    DriveState,
+    encode,
+    NmtCommand,
+    object_address,
+    ObjectEntry,
+    OperationMode,
+    Value,
+)
 
+from ..cia402.commands import AxisCommands, Sequence
+from ..cia402.modes import Move
+from ..cia402.state import DriveStatus
 from ..config.model import NodeConfig
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
 from ..master.status import node_status, NodeStatus
+
+MOVE_TIMEOUT = 60.0  # [s]
+POSITION_MODES = (
+    OperationMode.PROFILE_POSITION,
+    OperationMode.INTERPOLATED_POSITION,
+    OperationMode.CYCLIC_POSITION,
+)
 
 
 class DeviceSdo:
@@ -92,6 +113,141 @@ class CanopenDevice:
         """
         network, node_id = self._thread.network, self._device.config.node_id
         self._thread.run_coroutine(lambda: network.command_nmt(command, node_id)).result()
+
+
+class CanopenDrive:
+    """A drive: its state as of the last cycle, and its commands.
+
+    Positions and velocities are in the user units of bus.yml (rad and rad/s for a revolute joint).
+    A command returns what was reached, in words. It raises a DriveError where the drive refuses,
+    does not get there in time, or another command runs, and a BusError when the master has ended.
+    Commands that stop the drive end whichever runs.
+
+    Attributes:
+        name: Its name in bus.yml; that of its channel for a device with several axes.
+        sdo: Objects of its device.
+    """
+
+    def __init__(self, commands: AxisCommands, thread: NetworkThread) -> None:
+        axis = commands.axis
+        self.name = axis.name
+        self.sdo = DeviceSdo(axis.node, thread)
+        self._commands = commands
+        self._axis = axis
+        self._thread = thread
+
+    def status(self) -> DriveStatus:
+        """Return how the drive was in one cycle: state, mode, position, age, error in words.
+
+        Raises:
+            BusError: The master has ended.
+        """
+        return self._thread.call(self._axis.status).result()
+
+    @property
+    def state(self) -> DriveState:
+        """State of the power drive system."""
+        return self.status().state
+
+    @property
+    def position(self) -> float:
+        """Actual position; the last one of a lost drive, NaN before the first."""
+        return self.status().position
+
+    @property
+    def velocity(self) -> float:
+        """Actual velocity."""
+        return self.status().velocity
+
+    @property
+    def mode(self) -> OperationMode:
+        """Mode of operation that is commanded."""
+        return self._thread.call(lambda: self._axis.mode.number).result()
+
+    def init(self) -> str:
+        """Reset a fault, enable, home where bus.yml has a method; no mode is selected then."""
+        return self._request('init')
+
+    def enable(self) -> str:
+        """Lead to Operation Enabled; a fault is not reset."""
+        return self._request('enable')
+
+    def recover(self) -> str:
+        """Reset a fault and lead to Operation Enabled."""
+        return self._request('recover')
+
+    def home(self, method: int | None = None) -> str:
+        """Home by a method of 0x6098, or the drive's own, and select the mode of before again."""
+        return self._run('home', partial(self._commands.home, method))
+
+    def select_mode(self, mode: OperationMode | int) -> str:
+        """Switch the mode of operation, by its number in 0x6060; return when the drive shows it.
+
+        Raises:
+            DriveError: It is no mode of CiA 402, or the drive refuses it.
+        """
+        return self._run('mode', partial(self._commands.select_mode, _operation_mode(mode)))
+
+    def disable(self) -> str:
+        """Disable the torque (Switched On); return when the axis stands."""
+        return self._request('disable')
+
+    def halt(self) -> str:
+        """Brake, and stay enabled; return when it stands. The next target goes on."""
+        return self._request('halt')
+
+    def quick_stop(self) -> str:
+        """Quick stop; return when it stands, in the state of its option code 0x605A."""
+        return self._request('quick_stop')
+
+    def shutdown(self) -> str:
+        """Bring the drive to rest, and take its power away."""
+        return self._request('shutdown')
+
+    def set_target(self, target: float) -> str:
+        """Command a position, velocity or effort in user units; return when the drive has it."""
+        return self._deliver(lambda: self._commands.set_target(target))
+
+    def move_to(
+        self, position: float, *, relative: bool = False, timeout: float = MOVE_TIMEOUT
+    ) -> str:
+        """Go to a position and wait until the drive stands there.
+
+        In another mode than 1, 7 and 8 mode 1 (profile position) is selected first. A drive that
+        is late is halted, unless somebody else has begun another motion, which is an error here.
+
+        Args:
+            position: In user units.
+            relative: From the last set-point on.
+            timeout: How long the motion may take in [s].
+        """
+        if self.mode not in POSITION_MODES:
+            self.select_mode(OperationMode.PROFILE_POSITION)
+        axis, commands = self._axis, self._commands
+
+        def give() -> str:
+            if axis.mode.number is OperationMode.PROFILE_POSITION:
+                return commands.move(Move(position, relative=relative))
+            return commands.set_target(axis.setpoint + position if relative else position)
+
+        return self._thread.run_coroutine(partial(commands.arrive, give, timeout)).result()
+
+    def _request(self, name: str) -> str:
+        return self._thread.run(partial(self._commands.request, name)).result()
+
+    def _run(self, name: str, sequence: Sequence) -> str:
+        return self._thread.run(lambda: self._commands.run(name, sequence())).result()
+
+    def _deliver(self, command: Callable[[], str]) -> str:
+        return self._thread.run(lambda: self._commands.deliver(command)).result()
+
+
+def _operation_mode(mode: OperationMode | int) -> OperationMode:
+    try:
+        return OperationMode(mode)
+    except ValueError:
+        modes = ', '.join(f'{each.name} ({each.value})' for each in OperationMode if each)
+        raise DriveError(f'unknown mode of operation {mode!r}; choose one of {modes}') from None
 
 
 def _path(target: int | str, subindex: int) -> str:

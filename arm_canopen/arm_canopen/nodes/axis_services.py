@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from functools import partial
-from typing import Any
+from typing import TypeVar
 
 from canopen_interfaces.srv import COTargetDouble
 from std_msgs.msg import Float64
@@ -23,6 +23,8 @@ from .device_node import DeviceNode
 from .home_action import HomeAction
 from .joint_states import DriveJointStates
 from .units_service import BusFile, UnitsService
+
+T = TypeVar('T')
 
 MODE_SERVICES: dict[str, OperationMode] = {
     'position_mode': OperationMode.PROFILE_POSITION,
@@ -63,15 +65,21 @@ class AxisServices:
         self._home = HomeAction(node, commands, f'{place}/home', thread, node.output)
 
     def _offer(self, name: str, request: Callable[[], Promise[str]]) -> None:
-        def run() -> Promise[str]:
-            self._node.admit()  # again, in the thread in which it may have been deactivated
-            return request()
-
+        run = self._admitted(request)
         self._node.offer_trigger(f'{self._place}/{name}', lambda: self._thread.run(run))
 
     def _offer_mode(self, name: str, mode: OperationMode) -> None:
         commands = self._commands
         self._offer(name, lambda: commands.run(name, commands.select_mode(mode)))
+
+    def _admitted(self, command: Callable[[], T]) -> Callable[[], T]:
+        """Ask again in the thread of the cycle, where the device may have been deactivated."""
+
+        def run() -> T:
+            self._node.admit()
+            return command()
+
+        return run
 
     def _set_target(self, request: COTargetDouble.Request) -> Future[str]:
         return self._deliver(lambda: self._commands.set_target(request.target))
@@ -103,9 +111,8 @@ class AxisServices:
         return response
 
     def _stream(self, message: Float64) -> None:
-        self._call(lambda: self._commands.stream_target(message.data)).add_done_callback(
-            self._note_refusal
-        )
+        stream = self._admitted(lambda: self._commands.stream_target(message.data))
+        self._thread.call(stream).add_done_callback(self._note_refusal)
 
     def _note_refusal(self, future: Future[None]) -> None:
         """Log why a stream is refused, once until the reason changes."""
@@ -118,18 +125,7 @@ class AxisServices:
         self._refusal = reason
 
     def _deliver(self, command: Callable[[], str]) -> Future[str]:
-        def run() -> Promise[str]:
-            self._node.admit()
-            return self._commands.deliver(command)
-
-        return self._thread.run(run)
-
-    def _call(self, command: Callable[[], Any]) -> Future[Any]:
-        def run() -> Any:  # noqa: ANN401
-            self._node.admit()
-            return command()
-
-        return self._thread.call(run)
+        return self._thread.run(self._admitted(lambda: self._commands.deliver(command)))
 
 
 def offer_drive(

@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The ROS node of one device: NMT, SDO and raw PDO access, as ros2_canopen's proxy has them."""
+"""The ROS node of one device: NMT, SDO and raw PDO access, as ros2_canopen's proxy has them.
+
+And services that read and write objects of any type by name or number.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +18,10 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from canopen_core import CanopenError, SdoError
-from canopen_core.standard import NmtCommand, object_address
+from arm_msgs.srv import ReadObject, WriteObject
+from canopen_core import CanopenError, ObjectError, SdoError
+from canopen_core.eds import bytes_from_text, text_from_bytes
+from canopen_core.standard import NmtCommand, object_address, object_path, ObjectEntry
 from node_runner import create_deferred_service, destroyed_when_refused
 
 from ..master.object_access import bytes_from_raw, number_from_raw, raw_from_bytes
@@ -25,6 +30,8 @@ from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
 from .device_topics import DeviceTopics, node_options
 from .output_thread import OutputThread
+
+Transfer = tuple[ObjectEntry, bytes]
 
 NMT_SERVICES: dict[str, NmtCommand] = {
     'nmt_start_node': NmtCommand.START,
@@ -54,6 +61,8 @@ class DeviceNode(Node):
         self.create_subscription(COData, '~/tpdo', self._write_pdo, 10)
         for name, command in NMT_SERVICES.items():
             self._offer_nmt(name, command)
+        self.offer(ReadObject, '~/read_object', self._read_object, self._answer_read_object)
+        self.offer(WriteObject, '~/write_object', self._write_object, self._answer_write_object)
         self.offer(CORead, '~/sdo_read', self._read, partial(answer_read, self))
         self.offer(COWrite, '~/sdo_write', self._write, partial(answer_write, self))
 
@@ -150,6 +159,51 @@ class DeviceNode(Node):
 
         return self._thread.run(write)
 
+    def _read_object(self, request: ReadObject.Request) -> Future[Transfer]:
+        _require_clear(request.object)
+        return self._thread.run_coroutine(partial(self.device.objects.upload, request.object))
+
+    def _answer_read_object(
+        self, response: ReadObject.Response, future: Future[Transfer]
+    ) -> ReadObject.Response:
+        try:
+            entry, data = future.result()
+            response.index, response.subindex = entry.address
+            response.type, response.data = entry.data_type.name, data
+            response.value = text_from_bytes(entry.data_type, data)
+        except CanopenError as error:
+            response.message = str(error)
+        else:
+            response.success = True
+        return response
+
+    def _write_object(self, request: WriteObject.Request) -> Future[Transfer]:
+        _require_clear(request.object)
+
+        def to_bytes(entry: ObjectEntry) -> bytes:
+            data = bytes(request.data) or bytes_from_text(entry.data_type, request.value)
+            text_from_bytes(entry.data_type, data)  # refuses raw bytes that are no such value
+            return data
+
+        return self._thread.run_coroutine(
+            partial(self.device.objects.download, request.object, to_bytes)
+        )
+
+    def _answer_write_object(
+        self, response: WriteObject.Response, future: Future[Transfer]
+    ) -> WriteObject.Response:
+        try:
+            entry, data = future.result()
+        except CanopenError as error:
+            response.message = str(error)
+            return response
+        response.index, response.subindex = entry.address
+        written = text_from_bytes(entry.data_type, data)
+        address = object_address(entry.index, entry.subindex)
+        response.success = True
+        response.message = f'{address} {object_path(entry)} = {written}'
+        return response
+
 
 def answer_read(node: Node, response: Any, future: Future[int]) -> Any:  # noqa: ANN401
     """Fill in success and data; a failure, for which there is no field, is logged."""
@@ -168,3 +222,14 @@ def answer_write(node: Node, response: Any, future: Future[Any]) -> Any:  # noqa
     elif error is not None:
         node.get_logger().error(f'{type(error).__name__}: {error}')
     return response
+
+
+def _require_clear(path: str) -> None:
+    """Refuse decimal digits: where 0x2003 is not quoted, YAML makes 8195 of it."""
+    digits = path.strip().partition(':')[0]
+    if digits.isdecimal():
+        number = f'0x{int(digits):X}'
+        raise ObjectError(
+            f'object {path!r} is 0x{digits}, or {number}, of which YAML makes {digits} without '
+            f"quotes; write the one that is meant, in quotes: object: '{number}'"
+        )

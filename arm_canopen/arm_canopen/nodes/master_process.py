@@ -28,7 +28,6 @@ from .diagnostics import bus_diagnostics, DiagnosticsPublisher
 from .joint_states import BusJointStates
 from .managed_bus import ManagedBus
 from .master_node import MasterServices
-from .object_services import ObjectServices
 from .output_thread import OutputThread
 from .stop_service import StopService
 from .units_service import BusFile
@@ -69,8 +68,6 @@ class MasterProcess:
             device.name: DeviceNode(device, self._thread, self._output)
             for device in self._network.nodes.values()
         }
-        for own in self._devices.values():
-            ObjectServices(own, self._thread)
         file = BusFile.at(config.file)
         self._axes = {
             name: self._master.axes(each.device)

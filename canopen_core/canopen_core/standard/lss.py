@@ -9,7 +9,7 @@ from enum import IntEnum
 import struct
 from typing import NamedTuple
 
-from .code_with_text import CodeWithText
+from .sdo_abort import CodeWithText
 
 REQUEST = 0x7E5  # COB-ID from the master
 RESPONSE = 0x7E4  # COB-ID from the slaves

@@ -1,10 +1,27 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""SDO abort codes and their texts (CiA 301, table 22)."""
+"""Codes with a meaning in words, and those of SDO aborts (CiA 301, table 22)."""
 
 from __future__ import annotations
 
-from .code_with_text import CodeWithText
+from enum import IntEnum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+
+class CodeWithText(IntEnum):
+    """Codes, each with its meaning as ``text``."""
+
+    text: str
+
+    def __new__(cls, code: int, text: str = '') -> Self:
+        """Make a member of a row; a member by its code alone has the text of its row."""
+        member = int.__new__(cls, code)
+        member._value_ = code
+        member.text = text
+        return member
 
 
 class AbortCode(CodeWithText):
