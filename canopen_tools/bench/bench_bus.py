@@ -4,22 +4,18 @@
 """What a frame costs on our buses, beside python-can's own in the same run.
 
 Sender and receiver are in one process and one thread, so the figures are CPU time per frame and
-no race. A round trip is between two processes. All of them are printed, none is judged.
+no race. All of them are printed, none is judged.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-import itertools
 import math
-import multiprocessing
-from multiprocessing.synchronize import Event
 import os
 from pathlib import Path
-import statistics
-from time import perf_counter, process_time
+from time import process_time
 from typing import Any
 import warnings
 
@@ -33,12 +29,8 @@ from canopen_tools.monitor import FrameDescriber
 
 FRAMES = 20_000
 BATCH = 100  # frames before they are read; all buffers hold as many
-ROUND_TRIPS = 2000
-BURSTS = (200, 500, 1000, 2000, 5000, 10_000)
 PAYLOAD = bytes(range(8))
-REQUEST, ANSWER, END = 1, 2, 0  # identifiers of a round trip
-
-_ports = itertools.count(29000 + os.getpid() % 900)
+PORT = 29000 + os.getpid() % 900
 
 
 @dataclass
@@ -47,8 +39,6 @@ class Peer:
 
     send: Callable[[int], None]  # sends a frame of eight bytes with this identifier
     receive: Callable[[float], list[int]]  # waits up to some [s], and returns identifiers
-    # returns how many frames it knows to be lost, None when it cannot know
-    lost: Callable[[], int | None]
 
 
 @dataclass(frozen=True)
@@ -71,7 +61,6 @@ class Candidate:
                 yield Peer(
                     lambda can_id: ours.send(Frame(can_id, PAYLOAD)),
                     lambda timeout: [frame.can_id for frame in ours.receive(timeout)],
-                    lambda: ours.counters.lost,
                 )
             return
         with can.Bus(interface=self.name, ignore_config=True, **self.options) as theirs:
@@ -85,21 +74,15 @@ class Candidate:
                 message = can.Message(arbitration_id=can_id, data=PAYLOAD, is_extended_id=False)
                 theirs.send(message)
 
-            yield Peer(send, receive, lambda: None)
-
-
-def multicast() -> tuple[Candidate, Candidate]:
-    """Return ours and python-can's multicast bus, each on a group of its own."""
-    ours = Candidate(f'udp_multicast:239.163.78.1:{next(_ports)}')
-    options = {'channel': '239.163.77.1', 'port': next(_ports)}
-    return ours, Candidate('udp_multicast', options)
+            yield Peer(send, receive)
 
 
 def candidates() -> Iterator[Candidate]:
     """Yield each bus to be compared."""
     yield Candidate('virtual:bench')
     yield Candidate('virtual', {'channel': 'bench'})
-    yield from multicast()
+    yield Candidate(f'udp_multicast:239.163.78.1:{PORT}')  # each on a group of its own
+    yield Candidate('udp_multicast', {'channel': '239.163.77.1', 'port': PORT + 1})
     for name, interface in can_interfaces().items():
         if interface.is_up and name.startswith('vcan'):
             yield Candidate(name)
@@ -131,56 +114,6 @@ def bench_cost(sender: Peer, receiver: Peer) -> tuple[float, float]:
     return sending / FRAMES * 1e6, receiving / max(received, 1) * 1e6
 
 
-def bench_bursts(sender: Peer, receiver: Peer) -> list[str]:
-    """Return what of each burst arrives at a late reader, and the losses that it knows of."""
-    texts = []
-    for burst in BURSTS:
-        drain(receiver, sender)
-        for _ in range(burst):
-            sender.send(0x185)
-        got = drain(receiver, sender)
-        texts.append(f'{got}' if got == burst else f'{got}!')
-    sender.send(0x185)  # the kernel reports the count with the next frame
-    drain(receiver, sender)
-    lost = receiver.lost()
-    return [*texts, '?' if lost is None else f'{lost}']
-
-
-def echo(candidate: Candidate, ready: Event) -> None:
-    """Answer every request, in a process of its own."""
-    with candidate.opened() as peer:
-        ready.set()
-        received: list[int] = []
-        while END not in received:
-            received = peer.receive(math.inf)
-            for _ in range(received.count(REQUEST)):
-                peer.send(ANSWER)
-
-
-def round_trips(candidate: Candidate) -> list[float]:
-    """Return times from request to answer in [us]."""
-    context = multiprocessing.get_context('spawn')
-    ready = context.Event()
-    process = context.Process(target=echo, args=(candidate, ready), daemon=True)
-    process.start()
-    times = []
-    try:
-        with candidate.opened() as peer:
-            if not ready.wait(30.0):
-                raise RuntimeError('the other process did not start')
-            for _ in range(ROUND_TRIPS):
-                start = perf_counter()
-                peer.send(REQUEST)
-                while (received := peer.receive(1.0)) and ANSWER not in received:
-                    pass  # its own echo
-                times.append((perf_counter() - start) * 1e6)
-            peer.send(END)
-    finally:
-        process.join(5.0)
-        process.kill()
-    return times
-
-
 def bench_pieces() -> None:
     """Print what the parts of the path cost."""
     frame = Frame(0x185, PAYLOAD, 1.0)
@@ -205,25 +138,17 @@ def bench_pieces() -> None:
 def main() -> None:
     """Print all figures."""
     warnings.simplefilter('ignore')
-    head = '  '.join(f'{burst:>6}' for burst in BURSTS)
-    print('CPU time per frame of 8 bytes, and what arrives of a burst (! some lost)')
-    print(f'{"bus":<26} {"send us":>8} {"recv us":>8} {"frames/s":>9}   {head}    lost')
+    print('CPU time per frame of 8 bytes')
+    print(f'{"bus":<26} {"send us":>8} {"recv us":>8} {"frames/s":>9}')
     for candidate in candidates():
         try:
             with candidate.opened() as sender, candidate.opened() as receiver:
                 sending, receiving = bench_cost(sender, receiver)
-                arrived = '  '.join(f'{text:>6}' for text in bench_bursts(sender, receiver))
         except (BusError, can.CanError) as error:
             print(f'{"":<26} {error}')
             continue
         rate = 1e6 / (sending + receiving)
-        print(f'{candidate.title:<26} {sending:8.2f} {receiving:8.2f} {rate:9.0f}   {arrived}')
-    print(f'\nround trip between two processes, {ROUND_TRIPS} times   p50 us   p99 us')
-    for candidate in multicast():
-        with suppress(can.CanError):
-            times = round_trips(candidate)
-            p99 = statistics.quantiles(times, n=100)[98]
-            print(f'  {candidate.title:<45} {statistics.median(times):8.0f} {p99:8.0f}')
+        print(f'{candidate.title:<26} {sending:8.2f} {receiving:8.2f} {rate:9.0f}')
     bench_pieces()
 
 
