@@ -15,8 +15,7 @@ from eds_samples import DRIVE_ROWS, eds_text, Row
 import pytest
 
 from arm_canopen import load_bus
-from arm_canopen.config import check_file
-from arm_canopen.config.model.checks import check_bus, Report
+from arm_canopen.config import check_bus, check_file, Report
 from arm_canopen.config.model.checks.drives import period_setting
 from canopen_core import Problem
 

@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen import BusConfig, DriveState, load_bus, NodeConfig
-from arm_canopen.config import DEFAULT_DRIVE, Identity, PdoConfig, SdoWrite
-from arm_canopen.config.model.drive import RecoveryPolicy
+from arm_canopen.config import DEFAULT_DRIVE, Identity, PdoConfig, RecoveryPolicy, SdoWrite
 from arm_canopen.config.read.document import Item, Scalar, ScalarKind, YamlMap
 from arm_canopen.config.resolve.layout import merge_device
 from canopen_core import Place

@@ -19,8 +19,7 @@ from arm_canopen.cia402.modes import Mode
 from arm_canopen.cia402.parameters import DriveParameters
 from arm_canopen.cia402.targets import check_target
 from arm_canopen.cia402.units import Units
-from arm_canopen.config import AxisUnits, check_file, DriveConfig, rate_units, UnitRule
-from arm_canopen.config.model.checks import check_bus
+from arm_canopen.config import AxisUnits, check_bus, check_file, DriveConfig, rate_units, UnitRule
 from canopen_core.standard import Index
 
 JOINT = 'joint1'

@@ -19,8 +19,7 @@ import pytest
 from arm_canopen import load_bus
 from arm_canopen.library.bus_recording import BusRecording
 from black_box import BlackBox, BlackBoxSettings
-from canopen_core.can import Frame, read_log
-from canopen_core.can.frame_ring import FrameRing
+from canopen_core.can import Frame, FrameRing, read_log
 
 SENT = FrameRing.SENT
 error_frames = st.tuples(st.integers(1, 0x1FFF_FFFF), st.binary(max_size=8)).map(

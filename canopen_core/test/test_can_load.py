@@ -10,8 +10,7 @@ from can_strategies import frames
 from hypothesis import given
 import pytest
 
-from canopen_core.can import Frame
-from canopen_core.can.load import BusLoad, frame_bits, stuff_bits_mean, stuff_bits_worst
+from canopen_core.can import BusLoad, Frame, frame_bits, stuff_bits_mean, stuff_bits_worst
 
 
 def _bits(value: int, width: int) -> list[int]:

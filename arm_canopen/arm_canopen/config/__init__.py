@@ -23,6 +23,7 @@ from .model import (
     MasterConfig,
     NodeConfig,
     PdoConfig,
+    RecoveryPolicy,
     SdoWrite,
 )
 from .model.boot_plan import (
@@ -33,6 +34,7 @@ from .model.boot_plan import (
     HeldConsumers,
 )
 from .model.bus import IDENTITY_OBJECTS, U16_MAX
+from .model.checks import check_bus, Report
 from .model.checks.drive_units import (
     ACCELERATION_KEY,
     AxisUnits,
@@ -79,10 +81,13 @@ __all__ = [
     'NamedUnit',
     'NodeConfig',
     'PdoConfig',
+    'RecoveryPolicy',
+    'Report',
     'SdoWrite',
     'Traffic',
     'UnitRule',
     'boot_writes',
+    'check_bus',
     'check_file',
     'consumer_to_read',
     'eds_mapping',

@@ -12,7 +12,7 @@ from drive_samples import bus_config, drive_config, MOTION_WRITES, PERIOD, SCALE
 import pytest
 
 from arm_canopen import DriveState, OperationMode, Severity
-from arm_canopen.config.model.drive import RecoveryPolicy
+from arm_canopen.config import RecoveryPolicy
 from canopen_sim import Drive as SimulatedDrive
 
 NODE_ID = 2

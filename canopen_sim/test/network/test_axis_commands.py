@@ -42,8 +42,7 @@ from arm_canopen import (
 )
 from arm_canopen.cia402.homing import HomingProgress
 from arm_canopen.cia402.modes.profile_position import Move, QUEUE_MAX
-from arm_canopen.config import DriveConfig
-from arm_canopen.config.model.drive import RecoveryPolicy
+from arm_canopen.config import DriveConfig, RecoveryPolicy
 from canopen_core.can import Frame
 from canopen_core.standard import NmtCommand
 from canopen_sim import Fault, FaultInjection, ServoModel

@@ -29,8 +29,8 @@ from scripted_device import (
 
 from arm_canopen import CanopenError, EventKind, NodeConfig, Severity
 from arm_canopen.config import Identity
-from arm_canopen.config.model import Place
 from arm_canopen.master.remote_node import BootPhase, LONGEST_PAUSE, RemoteNode, STABLE_TIME
+from canopen_core import Place
 from canopen_core.can import Frame
 from canopen_core.standard import AccessType, NmtCommand, NmtState, ObjectDictionary
 

@@ -53,8 +53,13 @@ from arm_canopen.cia402.state import DriveStatus
 from arm_canopen.config import Identity, SdoWrite
 from arm_canopen.nodes.diagnostics import drive_diagnostic
 from canopen_core.can import Frame
-from canopen_core.standard import DataType, NmtCommand, ObjectDictionary, ObjectEntry
-from canopen_core.standard.nmt import COMMANDED_STATES
+from canopen_core.standard import (
+    COMMANDED_STATES,
+    DataType,
+    NmtCommand,
+    ObjectDictionary,
+    ObjectEntry,
+)
 from canopen_sim import Device, FaultInjection, ServoModel
 from canopen_sim import Drive as SimulatedDrive
 from canopen_sim import Fault as Deviation

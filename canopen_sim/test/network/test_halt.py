@@ -38,7 +38,7 @@ from arm_canopen import DriveError, DriveState, NodeConfig, OperationMode, Sever
 from arm_canopen.cia402.halt import UNDER_HALT_TIME
 from arm_canopen.cia402.modes import Move
 from arm_canopen.cia402.state import VelocityEstimate, WINDOW
-from arm_canopen.config.model.drive import RecoveryPolicy
+from arm_canopen.config import RecoveryPolicy
 from canopen_core.can import Frame
 from canopen_core.standard import Controlword, ObjectDictionary, Statusword
 

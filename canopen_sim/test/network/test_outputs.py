@@ -22,8 +22,7 @@ from drive_samples import (
 import pytest
 
 from arm_canopen import BusError, CanopenError, CodecError, NodeConfig, OperationMode
-from arm_canopen.config import PdoConfig
-from arm_canopen.config.model.checks import check_bus
+from arm_canopen.config import check_bus, PdoConfig
 from canopen_core.standard import (
     AccessType,
     DataType,

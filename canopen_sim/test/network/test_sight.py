@@ -33,11 +33,10 @@ from arm_canopen import (
     Severity,
 )
 from arm_canopen.cia402.following_watch import Following, FollowingWatch
-from arm_canopen.config import boot_writes
-from arm_canopen.config.model import Place
-from arm_canopen.config.model.checks import check_bus
+from arm_canopen.config import boot_writes, check_bus
 from arm_canopen.config.model.pdo import with_event_timer
 from arm_canopen.master.process_image import ReceivedTpdo, SyncRound
+from canopen_core import Place
 from canopen_core.can import Frame
 from canopen_core.standard import ObjectDictionary, Statusword
 from canopen_sim import Fault, FaultInjection

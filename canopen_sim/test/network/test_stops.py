@@ -22,7 +22,7 @@ import pytest
 from arm_canopen import DriveError, DriveState, EventKind, OperationMode, Severity
 from arm_canopen.cia402.stop import SHUTDOWN_MAX
 from arm_canopen.cia402.stop_all import stop_all, StopReport
-from arm_canopen.config.model.drive import RecoveryPolicy
+from arm_canopen.config import RecoveryPolicy
 from arm_canopen.library.canopen_master import leave_device
 from arm_canopen.master.remote_node import BootPhase
 from arm_canopen.nodes.diagnostics import drive_diagnostic

@@ -25,7 +25,7 @@ from arm_canopen import (
     RefusalCause,
     Severity,
 )
-from arm_canopen.config.model.drive import RecoveryPolicy
+from arm_canopen.config import RecoveryPolicy
 
 pytestmark = pytest.mark.slow
 
