@@ -7,8 +7,9 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
-import signal
 import sys
+
+from quad_description import run_command
 
 from .exceptions import PolicyError, QuadControllerError
 from .policy import onnx_file
@@ -48,9 +49,7 @@ def run(arguments: Sequence[str]) -> int:
 
 def main() -> None:
     """Entry point."""
-    # a script's shell starts background jobs with SIGINT ignored
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    sys.exit(run(sys.argv[1:]))
+    run_command(run)
 
 
 def _document(model: Path, files: Sequence[Path], settings: Sequence[str]) -> ContractDocument:

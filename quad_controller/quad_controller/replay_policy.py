@@ -8,12 +8,18 @@ import argparse
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-import signal
 import sys
 
 import numpy as np
 
-from quad_description import DescriptionError, PRESETS, quadruped, robot_urdf, Targets
+from quad_description import (
+    DescriptionError,
+    PRESETS,
+    quadruped,
+    robot_urdf,
+    run_command,
+    Targets,
+)
 
 from .exceptions import PolicyError, QuadControllerError
 from .gait.generator import GaitGenerator
@@ -216,9 +222,7 @@ def report(
 
 def main() -> None:
     """Entry point."""
-    # a script's shell starts background jobs with SIGINT ignored
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    sys.exit(run(sys.argv[1:]))
+    run_command(run)
 
 
 def _reference(

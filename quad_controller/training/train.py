@@ -14,13 +14,13 @@ import math
 import os
 from pathlib import Path
 import shutil
-import signal
 import sys
 import time
 
 from progress import Progress
 
 from quad_controller.policy_check.main import run as check_policy
+from quad_description import run_command
 
 SERVO = 'firm'  # what it is trained with
 WALKS = ((0.2, 0.0, 0.3), (0.0, 0.1, 0.0), (-0.15, 0.0, -0.5))
@@ -82,12 +82,7 @@ def _check(path: Path, progress: Progress, walk: Sequence[float]) -> int:
 
 def main() -> None:
     """Entry point."""
-    # a script's shell starts background jobs with SIGINT ignored
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        sys.exit(run(sys.argv[1:]))
-    except KeyboardInterrupt:
-        sys.exit(130)
+    run_command(run)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -19,6 +19,7 @@ Public, besides the names below: the module :mod:`.rotations`.
 from urdf_reader import DescriptionError
 
 from .backend import Backend
+from .command_line import run_command
 from .kinematics.leg import FEET, foot_position, jacobian, LegGeometry, LEGS, LegSolution, solve
 from .kinematics.quadruped import Feet, FootPose, Quadruped, quadruped, raised_feet, Targets
 from .presets import Pose, pose_positions, PresetError, PRESETS, robot_urdf, STREAM_TIMEOUT
@@ -66,5 +67,6 @@ __all__ = [
     'quadruped',
     'raised_feet',
     'robot_urdf',
+    'run_command',
     'solve',
 ]

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
 from pathlib import Path
 import subprocess
@@ -23,6 +24,7 @@ from quad_description import (
     PRESETS,
     quadruped,
     robot_urdf,
+    run_command,
 )
 from quad_description.urdf_command import run
 from quad_kinematics import centre_of_mass, inertia, link_pose, mass, parse, rotation
@@ -264,3 +266,14 @@ def test_the_command_prints_the_urdf(capsys: pytest.CaptureFixture[str]) -> None
     assert capsys.readouterr().out == robot_urdf('mini', arm=True) + '\n'
     assert run(['--trunk-mass', '0']) == 2
     assert 'trunk_mass' in capsys.readouterr().err
+
+
+def test_ctrl_c_ends_a_program_without_a_traceback() -> None:
+    """With the exit code that a shell expects."""
+
+    def interrupted(_: Sequence[str]) -> int:
+        raise KeyboardInterrupt
+
+    with pytest.raises(SystemExit) as ended:
+        run_command(interrupted)
+    assert ended.value.code == 130

@@ -11,11 +11,10 @@ from enum import IntEnum
 import logging
 import math
 from pathlib import Path
-import signal
 import sys
 from typing import TYPE_CHECKING
 
-from quad_description import DescriptionError, PRESETS, quadruped, robot_urdf
+from quad_description import DescriptionError, PRESETS, quadruped, robot_urdf, run_command
 
 from ..exceptions import CheckError, PolicyError, QuadControllerError
 from ..gait.generator import GaitGenerator
@@ -94,14 +93,9 @@ def run(arguments: Sequence[str]) -> int:
 
 def main() -> None:
     """Entry point."""
-    # a script's shell starts background jobs with SIGINT ignored
-    signal.signal(signal.SIGINT, signal.default_int_handler)
     # the driver's warnings of a robot that was put on its feet are no trouble of the policy
     logging.getLogger('quad_hardware').setLevel(logging.CRITICAL)
-    try:
-        sys.exit(run(sys.argv[1:]))
-    except KeyboardInterrupt:
-        sys.exit(130)
+    run_command(run)
 
 
 def _load(options: argparse.Namespace) -> LoadedPolicy:

@@ -8,10 +8,8 @@ import argparse
 from collections.abc import Sequence
 import math
 from pathlib import Path
-import signal
-import sys
 
-from quad_description import movable_joints, PRESETS, robot_urdf
+from quad_description import movable_joints, PRESETS, robot_urdf, run_command
 
 from ..exceptions import CommandError, HardwareError
 from ..joints import servo_of
@@ -44,9 +42,7 @@ def run_calibrate(argv: Sequence[str], console: Console) -> int:
 
 def main() -> None:
     """Entry point."""
-    # a script's shell starts background jobs with SIGINT ignored
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    sys.exit(run_calibrate(sys.argv[1:], Console()))
+    run_command(lambda argv: run_calibrate(argv, Console()))
 
 
 def _joints(options: argparse.Namespace, console: Console) -> None:

@@ -9,14 +9,12 @@ from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 import os
 from pathlib import Path
-import signal
-import sys
+
+from quad_description import run_command
 
 from ..link import DEFAULT_PORT
 from .finding import error, Finding, note, Severity
 from .machine_checks import check_environment, check_library, check_memory, check_port
-
-INTERRUPTED = 130  # exit code of a program that Ctrl-C ended
 
 
 def run_doctor(argv: Sequence[str]) -> int:
@@ -32,12 +30,7 @@ def run_doctor(argv: Sequence[str]) -> int:
 
 def main() -> None:
     """Entry point."""
-    # a script's shell starts background jobs with SIGINT ignored
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        sys.exit(run_doctor(sys.argv[1:]))
-    except KeyboardInterrupt:
-        sys.exit(INTERRUPTED)
+    run_command(run_doctor)
 
 
 def _parser() -> argparse.ArgumentParser:
