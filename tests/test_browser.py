@@ -34,10 +34,9 @@ from shape_msgs.msg import SolidPrimitive
 from arm_msgs.srv import InjectFault
 from robot_viewer.nodes.motion_planning import DRAGGED, HOLD_EXECUTE
 from robot_viewer.page.jog_panel import BASE
-from robot_viewer.page.overlay import StopAnswer
 from robot_viewer.page.robot_page import Actions, RobotPage
 from robot_viewer.page.target_panel import HOLD_TARGET
-from robot_viewer.robot_state import ALLOW, Level, RobotState
+from robot_viewer.robot_state import ALLOW, Level, RobotState, Stop
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page
@@ -530,10 +529,10 @@ def test_a_fault_has_two_presses_to_motion(seen: Seen) -> None:
 
 def test_a_robot_that_stops_late(seen: Seen) -> None:
     """The warning gives way to its answer, however often STOP was pressed until then."""
-    answers, stands = list[Future[StopAnswer]](), threading.Event()
-    answer = StopAnswer(stands=True, text='stopped: legs')
+    answers, stands = list[Future[Stop]](), threading.Event()
+    answer = Stop(stands=True, text='stopped: legs')
 
-    def stop() -> Future[StopAnswer]:
+    def stop() -> Future[Stop]:
         answers.append(Future())
         if stands.is_set():
             answers[-1].set_result(answer)

@@ -23,9 +23,8 @@ from urdf_reader import read_urdf
 
 from arm_model import example_files
 from robot_viewer.page.jog_panel import Offered
-from robot_viewer.page.overlay import StopAnswer
 from robot_viewer.page.robot_page import Actions, RobotPage
-from robot_viewer.robot_state import ALLOW, Level, RobotState
+from robot_viewer.robot_state import ALLOW, Level, RobotState, Stop
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -121,9 +120,9 @@ def browser() -> Iterator[Browser]:
 def shown() -> Iterator[Shown]:
     """Serve the page of an arm."""
 
-    def stop() -> Future[StopAnswer]:
-        answer: Future[StopAnswer] = Future()
-        answer.set_result(StopAnswer(stands=True, text='stopped: panda_joint2'))
+    def stop() -> Future[Stop]:
+        answer: Future[Stop] = Future()
+        answer.set_result(Stop(stands=True, text='stopped: panda_joint2'))
         made.stops += 1
         return answer
 

@@ -108,12 +108,6 @@ class StatePublisher:
     """Computes which transforms are to be published when joint positions come in."""
 
     def __init__(self, model: KinematicTree, settings: Settings | None = None) -> None:
-        """Use a robot.
-
-        Args:
-            model: Its tree.
-            settings: How its transforms are published.
-        """
         self.settings = settings or Settings()
         self._model = model
         self._movable = {joint.name: joint for joint in model.movable()}

@@ -16,7 +16,7 @@ from robot_viewer.nodes import judge as judge_module
 from robot_viewer.nodes import watch as watch_module
 from robot_viewer.nodes.judge import Judge
 from robot_viewer.nodes.watch import Watch
-from robot_viewer.page.overlay import StopAnswer
+from robot_viewer.robot_state import Stop
 
 PERIOD = 0.05  # [s]
 
@@ -80,10 +80,10 @@ def test_what_the_page_has_moved_is_no_program(bench: Bench) -> None:
 def test_a_motion_from_before_a_stop_is_no_program(bench: Bench) -> None:
     """The robot stands when it has confirmed it; what moves after that is told."""
     bench.look(1.0, 0.2)
-    answer: Future[StopAnswer] = Future()
+    answer: Future[Stop] = Future()
     bench.judge.stop(answer, lambda order: order())
     assert bench.look(0.2, 0.2).startswith('STOPPING')
-    answer.set_result(StopAnswer(stands=True, text='stopped: all'))
+    answer.set_result(Stop(stands=True, text='stopped: all'))
     assert bench.look(PERIOD, 0.0).startswith('STOPPED')
     assert bench.look(1.0, 0.0).startswith('STOPPED')
     assert 'A program moves it after STOP' in bench.look(0.2, 0.2)

@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import closing, suppress
 import gzip
 from http import HTTPStatus
 from http.client import BadStatusLine, HTTPConnection
 from pathlib import Path
+from typing import cast
 from urllib.parse import urlsplit
 
 import pytest
@@ -21,60 +22,30 @@ from websockets.typing import Origin, Subprotocol
 from robot_viewer.loopback import binding_problem
 from robot_viewer.page import overlay
 from robot_viewer.page.gate import COOKIE, Gate
-from robot_viewer.page.jog_panel import Twist
 from robot_viewer.page.live import Live, LIVE_PATH
-from robot_viewer.page.overlay import Overlay, STOP_HEADER, StopAnswer
-from robot_viewer.page.robot_page import RobotPage, Velocity
+from robot_viewer.page.overlay import Overlay, STOP_HEADER
+from robot_viewer.page.robot_page import Actions, RobotPage
+from robot_viewer.robot_state import Stop
 
 TIMEOUT = 10.0  # [s]
 EVERYWHERE = '0.0.0.0'  # noqa: S104  # what is tested is that it is guarded
 
 
 class Nothing:
-    """Does nothing that is asked for, but to count what stops."""
+    """Counts what stops; nothing else is asked for."""
 
     def __init__(self) -> None:
         """Begin with none, and a robot that has stopped."""
         self.stops = 0
-        self.answer: StopAnswer | None = StopAnswer(stands=True, text='stopped: all')
+        self.answer: Stop | None = Stop(stands=True, text='stopped: all')
 
-    def stop(self) -> Future[StopAnswer]:
+    def stop(self) -> Future[Stop]:
         """Count it; with no answer, the future stays as it is."""
         self.stops += 1
-        future: Future[StopAnswer] = Future()
+        future: Future[Stop] = Future()
         if self.answer is not None:
             future.set_result(self.answer)
         return future
-
-    def act(self, action: str) -> None:
-        """Nothing."""
-
-    def call(self, what: str, services: Sequence[str]) -> None:
-        """Nothing."""
-
-    def jog(self, twist: Twist, frame: str) -> None:
-        """Nothing."""
-
-    def jog_joint(self, joint: str, share: float) -> None:
-        """Nothing."""
-
-    def grip(self, gripper: str, position: float) -> None:
-        """Nothing."""
-
-    def walk(self, velocity: Velocity) -> None:
-        """Nothing."""
-
-    def set_mode(self, mode: str) -> None:
-        """Nothing."""
-
-    def publish_joints(self, positions: Mapping[str, float]) -> None:
-        """Nothing."""
-
-    def aim(self, targets: Mapping[str, float], share: float) -> None:
-        """Nothing."""
-
-    def let_go(self) -> None:
-        """Nothing."""
 
 
 @pytest.fixture
@@ -92,7 +63,7 @@ def ros_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture(params=['127.0.0.1', EVERYWHERE], ids=['loopback', 'open'])
 def page(request: pytest.FixtureRequest, actions: Nothing) -> Iterator[RobotPage]:
     """Serve a page."""
-    made = RobotPage(request.param, 8300, actions)
+    made = RobotPage(request.param, 8300, cast(Actions, actions))
     yield made
     made.close()
 
@@ -158,7 +129,7 @@ def test_stop_is_for_those_who_may_open_the_page(page: RobotPage, actions: Nothi
     ('answer', 'expected'),
     [
         (
-            StopAnswer(stands=False, text='NOT known to stand: joint1'),
+            Stop(stands=False, text='NOT known to stand: joint1'),
             (502, 'NOT known to stand: joint1\n'),
         ),
         (None, (504, 'no answer from the robot: use the emergency stop\n')),
@@ -168,7 +139,7 @@ def test_only_a_robot_that_confirms_has_stopped(
     page: RobotPage,
     actions: Nothing,
     monkeypatch: pytest.MonkeyPatch,
-    answer: StopAnswer | None,
+    answer: Stop | None,
     expected: tuple[int, str],
 ) -> None:
     """That the page's own process has the request says nothing of the robot."""
@@ -180,15 +151,15 @@ def test_only_a_robot_that_confirms_has_stopped(
 def test_two_pages_of_one_host_and_one_that_is_started_again(actions: Nothing) -> None:
     """A browser has the cookies of one host together; STOP of each page works with them."""
     header = {STOP_HEADER: '1'}
-    with closing(RobotPage(EVERYWHERE, 8300, actions)) as second:
-        with closing(RobotPage(EVERYWHERE, 8300, actions)) as first:
+    with closing(RobotPage(EVERYWHERE, 8300, cast(Actions, actions))) as second:
+        with closing(RobotPage(EVERYWHERE, 8300, cast(Actions, actions))) as first:
             cookies = dict(cookie_of(each)['Cookie'].split('=') for each in (first, second))
             assert len(cookies) == 2, 'the second replaced that of the first'
             jar = '; '.join(f'{name}={value}' for name, value in cookies.items())
             assert get(first, '/stop', Cookie=jar, **header)[0] == 200
             assert get(second, '/stop', Cookie=jar, **header)[0] == 200
             port = urlsplit(first.url).port
-        with closing(RobotPage(EVERYWHERE, port or 0, actions)) as again:
+        with closing(RobotPage(EVERYWHERE, port or 0, cast(Actions, actions))) as again:
             assert urlsplit(again.url).port == port
             assert get(again, '/stop', Cookie=jar, **header)[0] == 200
 
@@ -198,7 +169,7 @@ def test_the_url_of_any_binding_opens_the_page(actions: Nothing, host: str) -> N
     """It names an address of this computer, not the one that stands for all."""
     if ':' in host and binding_problem(host):
         pytest.skip('this computer has no IPv6')
-    with closing(RobotPage(host, 8300, actions)) as page:
+    with closing(RobotPage(host, 8300, cast(Actions, actions))) as page:
         status, text, _ = get(page, **cookie_of(page))
         assert (status, '<html' in text) == (200, True)
         assert urlsplit(page.url).hostname not in {EVERYWHERE, '::'}

@@ -39,10 +39,9 @@ from robot_viewer.nodes import controllers as controllers_module
 from robot_viewer.nodes import listening, watch, web_viewer
 from robot_viewer.nodes.controllers import Controller
 from robot_viewer.nodes.web_viewer import WebViewer
-from robot_viewer.page.overlay import StopAnswer
 from robot_viewer.page.robot_page import RobotPage
 from robot_viewer.page.target_panel import TargetPanel
-from robot_viewer.robot_state import ALLOW
+from robot_viewer.robot_state import ALLOW, Stop
 
 pytestmark = pytest.mark.scenario
 
@@ -115,7 +114,7 @@ class Robot(ViewerRig):
         self.calls.clear()
         return called
 
-    def answer_to(self, stop: Future[StopAnswer]) -> StopAnswer:
+    def answer_to(self, stop: Future[Stop]) -> Stop:
         """Serve until the robot has answered to a STOP, and return what."""
         self.spin_until(stop.done, 'an answer')
         return stop.result()
@@ -168,7 +167,7 @@ def test_stop_halts_every_drive(robot: Robot) -> None:
     robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
     answer = robot.viewer.stop()
     assert robot.called_until_enable() == ['joint1/halt', 'joint2/halt']
-    assert robot.answer_to(answer) == StopAnswer(stands=True, text='done. done')
+    assert robot.answer_to(answer) == Stop(stands=True, text='done. done')
     robot.viewer.call(
         'Enable', ['/nobody/enable']
     )  # after good answers one that fails, which is a warning
@@ -178,14 +177,12 @@ def test_stop_halts_every_drive(robot: Robot) -> None:
 def test_stop_is_answered_by_the_robot_alone(robot: Robot, said: list[str]) -> None:
     """Not by a robot that refuses, by none, or by one whose process hangs or has ended."""
     answer = robot.viewer.stop()
-    assert robot.answer_to(answer) == StopAnswer(
-        stands=False, text='nothing here offers to be stopped'
-    )
+    assert robot.answer_to(answer) == Stop(stands=False, text='nothing here offers to be stopped')
     robot.success = False
     robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
     answer = robot.viewer.stop()
     robot.called_until_enable()
-    assert robot.answer_to(answer) == StopAnswer(stands=False, text='/joint1/halt: done')
+    assert robot.answer_to(answer) == Stop(stands=False, text='/joint1/halt: done')
     robot.success = True
     context = Context()
     rclpy.init(args=[], context=context, domain_id=robot.node.context.get_domain_id())
@@ -204,7 +201,7 @@ def test_stop_is_answered_by_the_robot_alone(robot: Robot, said: list[str]) -> N
     robot.spin_until(lambda: not client.service_is_ready(), 'its end')
     answer = robot.viewer.stop()
     robot.called_until_enable()
-    assert robot.answer_to(answer) == StopAnswer(stands=False, text='/stop is not there')
+    assert robot.answer_to(answer) == Stop(stands=False, text='/stop is not there')
 
 
 def test_stop_calls_one_service_that_stops_all(
@@ -223,7 +220,7 @@ def test_stop_calls_one_service_that_stops_all(
     with monkeypatch.context() as lost:  # as after a stall that is longer than the lease of DDS
         lost.setattr(robot.viewer, 'get_node_names_and_namespaces', list)
         answer = robot.viewer.stop()
-        assert robot.answer_to(answer) == StopAnswer(stands=True, text='done')
+        assert robot.answer_to(answer) == Stop(stands=True, text='done')
         assert robot.called_until_enable() == ['stop']
     robot.node.destroy_service(service)
     client = robot.viewer._triggers.client('/stop')

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import PurePosixPath
 import re
@@ -56,66 +55,11 @@ def read_asset(uri: str) -> bytes:
     return find_mesh(uri).read_bytes()
 
 
-@dataclass(frozen=True, slots=True)
-class Settings:
-    """What the parameters say.
-
-    Attributes:
-        address: Host that the port is bound to.
-        port: 0 for a free one.
-        tls: Certificate and key; None for connections that are not encrypted.
-        origins: Sites whose pages may connect, besides those of this host.
-        buffer: How many bytes of messages may wait for a slow client.
-        topics: Which topics are shown.
-        services: Which services are offered.
-        client_topics: Topics to which clients may publish.
-    """
-
-    address: str
-    port: int
-    tls: ssl.SSLContext | None
-    origins: list[str]
-    buffer: int
-    topics: NameFilter
-    services: NameFilter
-    client_topics: NameFilter
-
-
-def read_settings(node: Node) -> Settings:
-    """Declare and read all parameters.
-
-    Raises:
-        ParameterError: A value is not usable, or a name is misspelt.
-    """
-    read = ParameterReader(node)
-
-    def names(name: str, meaning: str) -> NameFilter:
-        try:
-            return NameFilter(read.texts(name, [EVERYTHING], f'{meaning}; regular expressions'))
-        except ValueError as error:
-            raise ParameterError(f'{name}: {error}') from None
-
-    settings = Settings(
-        address=read.text('address', '127.0.0.1', 'bound to it; not loopback: with a token'),
-        port=read.whole('port', PORT, (0, 65535), 'of the server; 0: a free one'),
-        tls=_tls(read),
-        origins=read.texts(
-            'allowed_origins',
-            list(FOXGLOVE_ORIGINS),
-            'sites whose pages may connect, besides those of this host; *: all',
-        ),
-        buffer=read.whole(
-            'send_buffer_limit',
-            SEND_BUFFER_LIMIT,
-            (1, 2**40),
-            'bytes that wait for a slow client; messages of topics beyond are dropped',
-        ),
-        topics=names('topic_whitelist', 'topics that are shown'),
-        services=names('service_whitelist', 'services that may be called'),
-        client_topics=names('client_topic_whitelist', 'topics to publish to'),
-    )
-    refuse_misspelt(node)
-    return settings
+def _names(read: ParameterReader, name: str, meaning: str) -> NameFilter:
+    try:
+        return NameFilter(read.texts(name, [EVERYTHING], f'{meaning}; regular expressions'))
+    except ValueError as error:
+        raise ParameterError(f'{name}: {error}') from None
 
 
 def _tls(read: ParameterReader) -> ssl.SSLContext | None:
@@ -183,12 +127,30 @@ class FoxgloveBridge(Node):
             BridgeError: The port is in use.
         """
         super().__init__(name)
-        settings = read_settings(self)
+        read = ParameterReader(self)
+        address = read.text('address', '127.0.0.1', 'bound to it; not loopback: with a token')
+        port = read.whole('port', PORT, (0, 65535), 'of the server; 0: a free one')
+        tls = _tls(read)
+        origins = read.texts(
+            'allowed_origins',
+            list(FOXGLOVE_ORIGINS),
+            'sites whose pages may connect, besides those of this host; *: all',
+        )
+        limit = read.whole(
+            'send_buffer_limit',
+            SEND_BUFFER_LIMIT,
+            (1, 2**40),
+            'bytes that wait for a slow client; messages of topics beyond are dropped',
+        )
+        topics = _names(read, 'topic_whitelist', 'topics that are shown')
+        services = _names(read, 'service_whitelist', 'services that may be called')
+        client_topics = _names(read, 'client_topic_whitelist', 'topics to publish to')
+        refuse_misspelt(self)
         self._orders: deque[Callable[[], None]] = deque()
         context = Context()
-        self._topic_channels = Topics(self, context, settings.topics, self._warn)
-        self._service_calls = Services(self, settings.services, self._warn)
-        publishers = ClientPublishers(self, settings.client_topics, self._warn)
+        self._topic_channels = Topics(self, context, topics, self._warn)
+        self._service_calls = Services(self, services, self._warn)
+        publishers = ClientPublishers(self, client_topics, self._warn)
         behind = hidden_address()
         self._server = start_server(
             name=name,
@@ -200,25 +162,23 @@ class FoxgloveBridge(Node):
             asset_handler=read_asset,
             context=context,
         )
-        admission = Admission.to(settings.address, settings.origins)
-        address = (settings.address, settings.port)
+        admission = Admission.to(address, origins)
         try:
             self._relay = Relay(
-                address,
-                (behind, self._server.port),
-                admission,
-                settings.tls,
-                limit=settings.buffer,
+                (address, port), (behind, self._server.port), admission, tls, limit=limit
             )
         except OSError as error:
             self._server.stop()
             raise BridgeError(
-                f'port {settings.port} of {settings.address}: {error.strerror or error}; '
+                f'port {port} of {address}: {error.strerror or error}; '
                 'choose another with -p port:=8766, or 0 for a free one'
             ) from None
         self.create_timer(LOOK_PERIOD, self._look)
         self._look()
-        self.url = _url(settings, self._relay.port, admission.token)
+        host = gethostname() if address in {'0.0.0.0', '::'} else address  # noqa: S104
+        host = f'[{host}]' if ':' in host else host
+        token = f'/?token={quote(admission.token)}' if admission.token else ''
+        self.url = f'{"ws" if tls is None else "wss"}://{host}:{self._relay.port}{token}'
 
     @property
     def seen_at(self) -> str:
@@ -252,10 +212,3 @@ class FoxgloveBridge(Node):
         self._orders.append(order)
         if self.executor is not None:
             self.executor.create_task(self._work)
-
-
-def _url(settings: Settings, port: int, token: str) -> str:
-    host = gethostname() if settings.address in {'0.0.0.0', '::'} else settings.address  # noqa: S104
-    host = f'[{host}]' if ':' in host else host
-    scheme = 'ws' if settings.tls is None else 'wss'
-    return f'{scheme}://{host}:{port}' + (f'/?token={quote(token)}' if token else '')

@@ -116,13 +116,11 @@ class FirstMotion:
         self._attempt = 0  # what is answered for an earlier one counts no more
         self._request = MotionRequest('', 0.0, 0.0)
         self._axis: Axis | None = None
-        self._asking: tuple[str, float] | None = None  # which service, and until when
+        self._step: Callable[[float], None] | None = None  # what goes on at a steady time
         self._disabling: Disabling | None = None
         self._unconfirmed: Disabling | None = None  # what the page shows of one that was late
         self._seen_at = -math.inf  # when a position of the joint came
-        self._enabled: tuple[float, Status | None] | None = None  # when, and the status before
         self._targets: GuardedTargets | None = None
-        self._rests_at: float | None = None  # when the position after the motion is read
         self._commanded = 0.0
         self._reported: float | None = None
         self._judgement: Judgement | None = None
@@ -131,8 +129,7 @@ class FirstMotion:
     @property
     def busy(self) -> bool:
         """Whether positions matter, also for a page that was closed."""
-        preparing = self._asking is not None or self._enabled is not None
-        return preparing or self._targets is not None
+        return self._step is not None
 
     # -- what the robot offers
 
@@ -176,7 +173,7 @@ class FirstMotion:
     def _end(self) -> None:
         """Forget what was prepared and measured."""
         self._attempt += 1
-        self._asking = self._enabled = self._targets = self._rests_at = self._reported = None
+        self._step = self._targets = self._reported = None
         self._judgement = self._correction = self._unconfirmed = None
 
     def forget(self) -> None:
@@ -220,12 +217,12 @@ class FirstMotion:
     ) -> None:
         """Call a service of the drive; an answer to an attempt that is over is dropped."""
         attempt = self._attempt
-        self._asking = name, time.monotonic() + ANSWER_TIMEOUT
+        self._step = partial(self._await_answer, name, time.monotonic() + ANSWER_TIMEOUT)
 
         def answered(response: Any, refusal: str) -> None:  # noqa: ANN401
             if attempt != self._attempt:
                 return
-            self._asking = None
+            self._step = None
             if refusal:
                 self._fail(f'{name}: {refusal}')
             else:
@@ -268,7 +265,7 @@ class FirstMotion:
 
     def _enabled_now(self, _response: Trigger.Response) -> None:
         """The drive is enabled; what is known of it is older."""
-        self._enabled = time.monotonic(), self._status()
+        self._step = partial(self._await_status, time.monotonic(), self._status())
 
     def _status(self) -> Status | None:
         return self._statuses.get(f'{self._request.joint}{DRIVE}')
@@ -278,14 +275,18 @@ class FirstMotion:
         values = {} if status is None else status.values
         return problem_of(values, time.monotonic() - self._seen_at)
 
-    def _await_status(self, since: float, before: Status | None) -> None:
+    def _await_answer(self, name: str, until: float, now: float) -> None:
+        if now > until:
+            self._fail(f'{name}: no answer within {ANSWER_TIMEOUT:g} s; does its master run?')
+
+    def _await_status(self, since: float, before: Status | None, now: float) -> None:
         """Offer the motion once /diagnostics shows a drive that takes targets."""
         silent = self._status() is before
         problem = 'nothing came on /diagnostics' if silent else self._problem()
         if not problem:
-            self._enabled = None
+            self._step = None
             self._ready()
-        elif time.monotonic() - since > (SILENCE_TIMEOUT if silent else STATUS_TIMEOUT):
+        elif now - since > (SILENCE_TIMEOUT if silent else STATUS_TIMEOUT):
             self._fail(problem)
 
     def _ready(self) -> None:
@@ -302,7 +303,8 @@ class FirstMotion:
         except ValueError as error:
             self._fail(str(error))
             return
-        self._targets = GuardedTargets(plan, time.monotonic())
+        self._targets = targets = GuardedTargets(plan, time.monotonic())
+        self._step = partial(self._move, targets)
         self._panel.show_ready(list(announcement(request, axis, plan.start)))
 
     # -- the motion
@@ -328,17 +330,8 @@ class FirstMotion:
         if self._disabling is not None and now > self._disabling.deadline:
             refusal = f'no answer within {DISABLE_TIMEOUT:g} s'
             self._report_disabling(self._disabling, refusal)
-        if self._asking is not None:
-            name, until = self._asking
-            if now > until:
-                self._fail(f'{name}: no answer within {ANSWER_TIMEOUT:g} s; does its master run?')
-        elif self._enabled is not None:
-            self._await_status(*self._enabled)
-        elif self._rests_at is not None:
-            if now >= self._rests_at:
-                self._ask()
-        elif self._targets is not None:
-            self._move(self._targets, now)
+        if self._step is not None:
+            self._step(now)
 
     def _move(self, targets: GuardedTargets, now: float) -> None:
         guard = targets.guard
@@ -350,7 +343,7 @@ class FirstMotion:
         if not guard.detail:
             return
         if guard.outcome.is_judged:
-            self._rests_at = now + SETTLE_TIME
+            self._step = partial(self._await_rest, targets, now + SETTLE_TIME)
             return
         if guard.outcome is Outcome.IDLE:
             self._end()
@@ -391,8 +384,8 @@ class FirstMotion:
 
     def list(self) -> None:
         """Show how far it is; called some times a second."""
-        if self._targets is not None and self._rests_at is None and self._panel is not None:
-            targets = self._targets
+        targets = self._targets
+        if targets is not None and not targets.guard.detail and self._panel is not None:
             self._panel.show_progress(targets.guard, press_anew=targets.press_anew)
 
     def _publisher(self) -> Publisher:
@@ -403,13 +396,13 @@ class FirstMotion:
 
     # -- after the motion
 
-    def _ask(self) -> None:
-        if self._targets is None or self._panel is None:
+    def _await_rest(self, targets: GuardedTargets, until: float, now: float) -> None:
+        if now < until or self._panel is None:
             return
-        guard = self._targets.guard
-        self._commanded = self._targets.commanded
+        guard = targets.guard
+        self._commanded = targets.commanded
         self._reported = self._positions[self._request.joint] - guard.plan.start
-        self._targets = self._rests_at = None
+        self._step = self._targets = None
         self._panel.ask(guard.detail, self._reported)
 
     def conclude(self, saw: Saw, distance: float) -> None:

@@ -14,7 +14,6 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
-from ..page.overlay import StopAnswer
 from ..page.robot_page import RobotPage
 from ..robot_state import ALLOW, Level, robot_state, RobotState, SILENCE, Stop
 from .calls import TRIGGER, TriggerCalls
@@ -144,18 +143,16 @@ class Judge:
         )
         self._publisher.publish(message)
 
-    def stop(
-        self, answer: Future[StopAnswer], order: Callable[[Callable[[], None]], None]
-    ) -> None:
+    def stop(self, answer: Future[Stop], order: Callable[[Callable[[], None]], None]) -> None:
         """Record a STOP, and what the robot answers to it."""
         self._page.live.stop()  # what was allowed just before does not count
         self._acting, self._group = '', ()
         self._stop = stop = Stop()
         answer.add_done_callback(lambda done: order(partial(self._has_stopped, stop, done)))
 
-    def _has_stopped(self, stop: Stop, answer: Future[StopAnswer]) -> None:
+    def _has_stopped(self, stop: Stop, answer: Future[Stop]) -> None:
         if self._stop is stop:  # the last one counts, and none that was allowed after
-            self._stop = Stop(answer.result().text, answer.result().stands)
+            self._stop = answer.result()
             self._stood_at = time.monotonic()
 
     def act(self, action: str) -> None:

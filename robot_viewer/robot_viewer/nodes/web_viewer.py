@@ -39,9 +39,9 @@ from node_runner import (
 
 from ..loopback import binding_problem
 from ..page.jog_panel import Offered, Twist
-from ..page.overlay import StopAnswer
 from ..page.robot_page import RobotPage, Velocity
 from ..page.robot_scene import greatest_velocities
+from ..robot_state import Stop
 from ..robots import of_robot, SET_MODE_TYPE, stops_robot
 from .body import Body
 from .calls import TRIGGER, TriggerCalls
@@ -369,9 +369,9 @@ class WebViewer(Node):
 
     # -- what people do on the page, in its threads
 
-    def stop(self) -> concurrent.futures.Future[StopAnswer]:
+    def stop(self) -> concurrent.futures.Future[Stop]:
         """Stop whatever moves; the future has the robot's answer."""
-        answer: concurrent.futures.Future[StopAnswer] = concurrent.futures.Future()
+        answer: concurrent.futures.Future[Stop] = concurrent.futures.Future()
         self._order(partial(self._stop, answer))
         return answer
 
@@ -434,7 +434,7 @@ class WebViewer(Node):
     def _order(self, order: Callable[[], object]) -> None:
         self._orders.append(order)
 
-    def _stop(self, answer: concurrent.futures.Future[StopAnswer]) -> None:
+    def _stop(self, answer: concurrent.futures.Future[Stop]) -> None:
         self.page.say('STOP: no answer from the robot yet', failed=None)
         self._judge.stop(answer, self._order)
         calls = {service: self._triggers.call(service) for service in sorted(self._stops)}
@@ -458,7 +458,7 @@ class WebViewer(Node):
         if not counted:
             text = 'nothing here offers to be stopped'
             self.page.say(f'STOP: {text}', failed=True)
-            answer.set_result(StopAnswer(stands=False, text=text))
+            answer.set_result(Stop(stands=False, text=text))
             return
         _StopCalls(counted, answer)
 
@@ -523,7 +523,7 @@ class _StopCalls:
     def __init__(
         self,
         calls: Mapping[str, Future | None],
-        answer: concurrent.futures.Future[StopAnswer],
+        answer: concurrent.futures.Future[Stop],
     ) -> None:
         """Wait for them; the first that fails is the answer."""
         self._answer = answer
@@ -546,11 +546,11 @@ class _StopCalls:
             return
         self._texts.append(response.message)
         if not self._open and not self._answer.done():
-            self._answer.set_result(StopAnswer(stands=True, text='. '.join(self._texts)))
+            self._answer.set_result(Stop(stands=True, text='. '.join(self._texts)))
 
     def _fail(self, text: str) -> None:
         if not self._answer.done():  # also when the page waits no more
-            self._answer.set_result(StopAnswer(stands=False, text=text))
+            self._answer.set_result(Stop(stands=False, text=text))
 
 
 def _stop_beside(node: str) -> str:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
-from dataclasses import dataclass
 import gzip
 from http import HTTPStatus
 from pathlib import Path
@@ -19,6 +18,7 @@ from pathlib import Path
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
+from ..robot_state import Stop
 from .live import Live
 
 STOP_PATH = '/stop'
@@ -31,19 +31,6 @@ warns long before."""
 NO_ANSWER = 'no answer from the robot: use the emergency stop'
 
 
-@dataclass(frozen=True, slots=True)
-class StopAnswer:
-    """What the robot answered to a STOP.
-
-    Attributes:
-        stands: It has confirmed that nothing moves.
-        text: Its words, or why there are none.
-    """
-
-    stands: bool
-    text: str
-
-
 class Overlay:
     """Answers requests for STOP, and adds itself to the page that viser serves.
 
@@ -51,7 +38,7 @@ class Overlay:
         live: Its connections with the pages.
     """
 
-    def __init__(self, stop: Callable[[], Future[StopAnswer]], live: Live) -> None:
+    def __init__(self, stop: Callable[[], Future[Stop]], live: Live) -> None:
         """Set what STOP does: in the server's thread, without waiting for the robot."""
         self._stop, self.live = stop, live
         self._html = Path(__file__).with_name('overlay.html').read_bytes()

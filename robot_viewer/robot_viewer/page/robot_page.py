@@ -29,12 +29,12 @@ from viser import (
 )
 
 from ..loopback import shown_host
-from ..robot_state import BUS, drives_of, FOLLOWS, Level, RobotState, Status
+from ..robot_state import BUS, drives_of, FOLLOWS, Level, RobotState, Status, Stop
 from .diagnose import drive_html, Log
 from .gate import Gate
 from .jog_panel import JogActions, JogPanel, joint_texts, Offered
 from .live import Hold, Live, RELEASED_AFTER
-from .overlay import Overlay, StopAnswer
+from .overlay import Overlay
 from .robot_scene import Ground, RobotScene, start_position, travel
 from .standing import feet_of
 from .style import (
@@ -135,7 +135,7 @@ ICONS = {
 class Actions(JogActions, Protocol):
     """What a page may have done; any thread may call it, and none of it waits."""
 
-    def stop(self) -> Future[StopAnswer]:
+    def stop(self) -> Future[Stop]:
         """Stop whatever moves; the future has the robot's answer."""
 
     def act(self, action: str) -> None:
@@ -526,7 +526,7 @@ class RobotPage:
         elif word == 'say':
             self.say(rest, failed=True)
 
-    def _stop(self) -> Future[StopAnswer]:
+    def _stop(self) -> Future[Stop]:
         self.live.stop()  # or a button that is held would go on
         return self._actions.stop()
 

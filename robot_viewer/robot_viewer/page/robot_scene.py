@@ -116,21 +116,11 @@ class RobotScene:
                 put(self._frames[name], joint_transform(joint, position))
 
     def place_base(self, pose: Transform) -> None:
-        """Move the whole robot.
-
-        Args:
-            pose: Of its root link in the scene.
-        """
+        """Move the whole robot."""
         put(self._base, pose)
 
     def ghost(self, name: str, links: frozenset[str], tint: Tint) -> RobotScene:
-        """Return the robot once more, on the same base, with joints of its own.
-
-        Args:
-            name: Of its node in the scene.
-            links: Those that are seen.
-            tint: Their color.
-        """
+        """Return the robot once more, on the same base, with joints of its own."""
         look = Look(f'{ROOT}/{name}', links, tint)
         return RobotScene(self._scene, self.tree, look=look, meshes=self._meshes)
 
@@ -145,11 +135,7 @@ class RobotScene:
             frame.show_axes = seen
 
     def path_of(self, frame: str) -> str:
-        """Return the node of a frame; that of the world where it is no link.
-
-        Args:
-            frame: Its name.
-        """
+        """Return the node of a frame; that of the world where it is no link."""
         return self._paths.get(frame, '')
 
     def remove(self) -> None:

@@ -35,11 +35,7 @@ class Contacts:
     source: str
 
     def html(self, found: Support) -> str:
-        """Return it in words.
-
-        Args:
-            found: What these feet span.
-        """
+        """Return it in words."""
         names = ', '.join(sorted(foot.removesuffix(FOOT) for foot in self.feet)) or 'none'
         source = SOURCES.get(self.source, self.source or 'nobody says how that is known')
         margin = found.margin
@@ -74,22 +70,13 @@ class Support:
 
 
 def feet_of(tree: KinematicTree) -> tuple[str, ...]:
-    """Return the links of the feet; none where there are too few to stand on.
-
-    Args:
-        tree: The robot.
-    """
+    """Return the links of the feet; none where there are too few to stand on."""
     feet = tuple(link for link in tree.links if link.endswith(FOOT))
     return feet if len(feet) >= LEAST_FEET else ()
 
 
 def foot_radius(tree: KinematicTree, foot: str) -> float:
-    """Return the radius of a foot that is a ball in [m]; 0 for others.
-
-    Args:
-        tree: The robot.
-        foot: Its link.
-    """
+    """Return the radius of a foot that is a ball in [m]; 0 for others."""
     balls = (s for s in tree.collisions() if s.link == foot and s.shape == 'sphere')
     return next((ball.lengths('radius')[0] for ball in balls), 0.0)
 
@@ -139,11 +126,7 @@ def _margin(corners: Sequence[Vector], x: float, y: float) -> float:
 
 
 def roll_pitch(attitude: Quaternion) -> tuple[float, float]:
-    """Return roll and pitch in [rad], positive with the right side and the nose down.
-
-    Args:
-        attitude: Of the root link in a level frame.
-    """
+    """Return roll and pitch in [rad], positive with the right side and the nose down."""
     x, y, z, w = attitude
     sine = max(-1.0, min(1.0, 2.0 * (w * y - z * x)))
     return math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)), math.asin(sine)

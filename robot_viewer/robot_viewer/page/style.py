@@ -66,20 +66,11 @@ def sentence(text: str) -> str:
 
 
 def value_of(slider: GuiSliderHandle[float]) -> float:
-    """Return the value of a slider, within its range.
-
-    Args:
-        slider: The slider.
-    """
+    """Return the value of a slider, within its range."""
     return min(max(slider.value, slider.min), slider.max)
 
 
 def add_speed(gui: GuiApi, percent: float = 30.0) -> Share:
-    """Add the slider of a speed.
-
-    Args:
-        gui: Of the page.
-        percent: Where it is in the beginning.
-    """
+    """Add the slider of a speed."""
     slider = gui.add_slider('Speed [%]', 5.0, 100.0, 5.0, percent)
     return lambda: value_of(slider) / 100.0
