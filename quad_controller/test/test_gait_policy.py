@@ -16,7 +16,6 @@ import pytest
 
 from quad_controller import (
     find_policy,
-    GaitGenerator,
     load_policy,
     ParameterError,
     PolicyError,
@@ -30,7 +29,6 @@ from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy.observation import gravity, Situation
 from quad_controller.policy.options import GravitySource, ImuFrame
 from quad_description import ImuSample, JointSample
-from quad_gait_physics import FIRM, firm, MODEL, PhysicsRig
 from quad_gait_policies import FakeNetwork, joined, metadata, STAND, TERMS, write_policy
 from quad_gait_rig import ARM_ROBOT, ROBOT, tilted, UPRIGHT
 
@@ -371,22 +369,3 @@ def test_files_that_are_none_are_refused(tmp_path: Path) -> None:
     narrow = write_policy(tmp_path / 'narrow.onnx', metadata(), width=45)
     with pytest.raises(PolicyError, match='input'):
         load_policy(narrow, ROBOT, STAND, options, PERIOD)
-
-
-@pytest.mark.parametrize('velocity', [Velocity(0.2), Velocity(-0.1, 0.05, 0.6)])
-def test_the_shipped_policy_walks(velocity: Velocity) -> None:
-    """It goes as commanded in physics with the servos of its training, and does not fall."""
-    stand = GaitGenerator(MODEL, FIRM).stand_targets
-    policy = load_policy(SHIPPED, MODEL, stand, PolicyOptions(), PERIOD)
-    rig = PhysicsRig(firm(), FIRM, policy.runner)
-    rig.mode('policy')
-    rig.run(1.5, velocity)
-    travel = rig.travel(10.0, velocity)
-    assert rig.state == 'policy'
-    assert travel.x == pytest.approx(velocity.x, abs=0.03)
-    assert travel.y == pytest.approx(velocity.y, abs=0.02)
-    assert travel.yaw == pytest.approx(velocity.yaw, abs=max(0.1 * abs(velocity.yaw), 0.06))
-    assert travel.tilt < math.radians(5.0)
-    rig.mode('lie')
-    rig.run(4.0)
-    assert rig.state == 'lie'
