@@ -8,7 +8,7 @@ import os
 from pathlib import Path
 
 from isolation import Isolation
-from processes import executable, RunningProcess
+from processes import executable, find_children, RunningProcess
 import pytest
 
 pytestmark = [pytest.mark.scenario, pytest.mark.slow]
@@ -24,16 +24,6 @@ WITHOUT_RIGHTS = [
 ]
 
 
-def descendants(pid: int) -> list[int]:
-    """Return the processes that a process has started, and theirs."""
-    children = [
-        int(child)
-        for task in Path(f'/proc/{pid}/task').iterdir()
-        for child in (task / 'children').read_text(encoding='ascii').split()
-    ]
-    return children + [each for child in children for each in descendants(child)]
-
-
 def real_time_threads(pid: int) -> list[int]:
     """Return the threads of a process that have real-time priority."""
     threads = [int(task.name) for task in Path(f'/proc/{pid}/task').iterdir()]
@@ -41,31 +31,23 @@ def real_time_threads(pid: int) -> list[int]:
     return [each for each in threads if os.sched_getscheduler(each) & mask == os.SCHED_FIFO]
 
 
-@pytest.mark.parametrize(
-    ('package', 'arguments', 'programs'),
-    [
-        ('arm_bringup', ['panda', '--simulate'], ['fake_slaves', 'motion_node']),
-        ('quad_bringup', ['--simulate'], ['hardware_node', 'controller_node']),
-    ],
-    ids=['arm', 'quadruped'],
-)
-def test_cycles_have_real_time_priority(
-    package: str, arguments: list[str], programs: list[str], isolation: Isolation
-) -> None:
+def test_cycles_have_real_time_priority(isolation: Isolation) -> None:
     """One thread of each process; where it is refused, one line for each says how to get it."""
-    command = [executable(package, 'bringup'), *arguments]
-    if package == 'arm_bringup':
-        command += ['--can', isolation.bus]
-    with RunningProcess(command, isolation.env) as bringup:
-        bringup.wait_for('all is ready', 60.0)
-        found = {
-            Path(f'/proc/{pid}/cmdline').read_bytes().decode().replace('\0', ' '): pid
-            for pid in descendants(bringup.pid)
-        }
-        for program in programs:
-            (pid,) = [pid for line, pid in found.items() if f'/{program} ' in line]
-            refused = [line for line in bringup.lines if REFUSED in line and program in line]
-            assert len(real_time_threads(pid)) == (0 if refused else 1), (program, found)
+    arm = [executable('arm_bringup', 'bringup'), 'panda', '--simulate', '--can', isolation.bus]
+    dog = [executable('quad_bringup', 'bringup'), '--simulate', '--namespace', 'dog']
+    with (
+        RunningProcess(arm, isolation.env) as arm_bringup,
+        RunningProcess(dog, isolation.env) as dog_bringup,
+    ):
+        for bringup, programs in (
+            (arm_bringup, ('fake_slaves', 'motion_node')),
+            (dog_bringup, ('hardware_node', 'controller_node')),
+        ):
+            bringup.wait_for('all is ready', 60.0)
+            for program in programs:
+                (process,) = find_children(bringup.pid, f'/{program}')
+                refused = [line for line in bringup.lines if REFUSED in line and program in line]
+                assert len(real_time_threads(process.pid)) == (0 if refused else 1), program
 
 
 def test_without_the_right_to_it_a_cycle_runs_all_the_same(isolation: Isolation) -> None:

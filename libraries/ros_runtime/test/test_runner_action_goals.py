@@ -16,6 +16,7 @@ import pytest
 import rclpy
 from rclpy.action.server import CancelResponse
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
 from ros_client import RosClient
 from std_srvs.srv import Trigger
 from tf2_msgs.action import LookupTransform
@@ -23,6 +24,28 @@ from tf2_msgs.action import LookupTransform
 from node_runner import action_goals, create_deferred_service
 
 TIMEOUT = 20.0  # [s]
+
+
+def serve(
+    node: Node,
+    start: Callable[[Any], None],
+    conclude: Callable[[Any], LookupTransform.Result] = lambda _: LookupTransform.Result(),
+) -> Any:
+    """Serve goals of an action; none is cancelled."""
+    return action_goals.serve_goals(
+        node,
+        LookupTransform,
+        'look_up',
+        start=start,
+        conclude=conclude,
+        cancel=lambda _: CancelResponse.REJECT,
+    )
+
+
+def succeed(goal: Any) -> LookupTransform.Result:
+    """Conclude a goal well."""
+    goal.succeed()
+    return LookupTransform.Result()
 
 
 @pytest.mark.slow
@@ -33,19 +56,8 @@ def test_a_goal_goes_on_after_its_callback_and_is_forgotten_after_its_end(
     monkeypatch.setattr(action_goals, 'RESULT_TIMEOUT', 1.0)
     begun: list[Any] = []
 
-    def conclude(goal: Any) -> LookupTransform.Result:
-        goal.succeed()
-        return LookupTransform.Result()
-
     with RosClient(isolation.domain_id) as client:
-        server = action_goals.serve_goals(
-            client.node,
-            LookupTransform,
-            'look_up',
-            start=begun.append,
-            conclude=conclude,
-            cancel=lambda _: CancelResponse.REJECT,
-        )
+        server = serve(client.node, begun.append, succeed)
         caller = client.action(LookupTransform, 'look_up')
         assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
 
@@ -59,12 +71,12 @@ def test_a_goal_goes_on_after_its_callback_and_is_forgotten_after_its_end(
         goal = sent.result()
         client.spin_until(lambda: bool(begun), TIMEOUT, 'the start')
         assert begun[0].status == GoalStatus.STATUS_EXECUTING
-        server.notify_execute(begun[0], None)  # type: ignore[no-untyped-call]
+        server.notify_execute(begun[0], None)
         assert result_of(goal).status == GoalStatus.STATUS_SUCCEEDED
         client.spin_until(
             lambda: result_of(goal).status == GoalStatus.STATUS_UNKNOWN, TIMEOUT, 'its end'
         )
-        server.destroy()  # type: ignore[no-untyped-call]
+        server.destroy()
 
 
 @pytest.mark.slow
@@ -75,14 +87,7 @@ def test_a_goal_is_answered_by_an_executor_that_heeds_groups(isolation: Isolatio
         node = rclpy.create_node('server', context=context)
         executor = SingleThreadedExecutor(context=context)
         executor.add_node(node)
-        server = action_goals.serve_goals(
-            node,
-            LookupTransform,
-            'look_up',
-            start=lambda _: None,
-            conclude=lambda _: LookupTransform.Result(),
-            cancel=lambda _: CancelResponse.REJECT,
-        )
+        server = serve(node, lambda _: None)
         caller = client.action(LookupTransform, 'look_up')
         assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
         sent = caller.send_goal_async(LookupTransform.Goal())  # type: ignore[no-untyped-call]
@@ -93,9 +98,9 @@ def test_a_goal_is_answered_by_an_executor_that_heeds_groups(isolation: Isolatio
 
         client.spin_until(answered, TIMEOUT, 'acceptance')
         assert sent.result().accepted
-        server.destroy()  # type: ignore[no-untyped-call]
+        server.destroy()
         executor.shutdown()
-        node.destroy_node()
+        node.destroy_node()  # type: ignore[no-untyped-call]
 
 
 class _SlowClient:
@@ -122,22 +127,11 @@ class _SlowClient:
 def test_no_answer_is_lost_that_a_client_expects_too_late(isolation: Isolation) -> None:
     """Rclpy drops an answer that one thread gets before another has noted the request."""
 
-    def conclude(goal: Any) -> LookupTransform.Result:
-        goal.succeed()
-        return LookupTransform.Result()
-
     def start(goal: Any) -> None:
-        server.notify_execute(goal, None)  # type: ignore[no-untyped-call]
+        server.notify_execute(goal, None)
 
     with RosClient(isolation.domain_id) as serving, RosClient(isolation.domain_id) as client:
-        server = action_goals.serve_goals(
-            serving.node,
-            LookupTransform,
-            'look_up',
-            start=start,
-            conclude=conclude,
-            cancel=lambda _: CancelResponse.REJECT,
-        )
+        server = serve(serving.node, start, succeed)
         caller = client.action(LookupTransform, 'look_up')
         caller._client_handle = _SlowClient(caller._client_handle)
         ended = threading.Event()
@@ -152,7 +146,7 @@ def test_no_answer_is_lost_that_a_client_expects_too_late(isolation: Isolation) 
                     assert eventually(goal.result().get_result_async().done)
             finally:
                 ended.set()
-        server.destroy()  # type: ignore[no-untyped-call]
+        server.destroy()
 
 
 def eventually(condition: Callable[[], bool]) -> bool:

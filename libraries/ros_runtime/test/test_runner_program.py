@@ -56,10 +56,9 @@ def ignores(process: subprocess.Popen[str], number: signal.Signals) -> bool:
     return bool(mask >> (number - 1) & 1)
 
 
-@pytest.mark.parametrize('option', ['-h', '--help'])
-def test_help_starts_nothing(isolation: Isolation, option: str) -> None:
+def test_help_starts_nothing(isolation: Isolation) -> None:
     """Also of a program that has no help of its own."""
-    with running(isolation, option) as process:
+    with running(isolation, '--help') as process:
         output, errors = process.communicate(timeout=TIMEOUT)
     assert (process.returncode, errors) == (0, '')
     assert output.startswith('usage: careful --ros-args')
@@ -74,18 +73,20 @@ def test_help_starts_nothing(isolation: Isolation, option: str) -> None:
 def test_the_first_signal_ends_it_and_a_sigterm_does_not_cut_the_end_short(
     isolation: Isolation, first: signal.Signals, ignored: str
 ) -> None:
-    """Whatever the signal, the program ends its own way, though a SIGTERM follows; code 0.
+    """Whatever the signal, the program ends its own way, though others follow; with its own code.
 
-    Shells start the background jobs of a script with SIGINT ignored.
+    Shells start the background jobs of a script with SIGINT ignored. A patient program, which has
+    a terminal to restore, does so however often Ctrl-C is pressed.
     """
-    with running(isolation, ignored=ignored) as process:
+    words = ('--patient', '--ros-args', '-p', 'code:=7') if ignored else ()
+    with running(isolation, *words, ignored=ignored) as process:
         assert said(process) == 'ready'
         process.send_signal(first)
         assert said(process) == 'stopping'
-        process.send_signal(signal.SIGTERM)
-        process.send_signal(signal.SIGHUP)
+        for more in (signal.SIGTERM, signal.SIGHUP, *([signal.SIGINT] if ignored else [])):
+            process.send_signal(more)
         output, errors = process.communicate('go on\n', timeout=TIMEOUT)
-        assert (output.strip(), process.returncode) == ('ended', 0), errors
+        assert (output.strip(), process.returncode) == ('ended', 7 if ignored else 0), errors
 
 
 @pytest.mark.scenario
@@ -104,18 +105,6 @@ def test_a_second_ctrl_c_ends_it_at_once(isolation: Isolation) -> None:
 
 
 @pytest.mark.scenario
-def test_a_patient_program_takes_a_second_ctrl_c(isolation: Isolation) -> None:
-    """A program that has a terminal to restore does so, however often Ctrl-C is pressed."""
-    with running(isolation, '--patient') as process:
-        assert said(process) == 'ready'
-        process.send_signal(signal.SIGINT)
-        assert said(process) == 'stopping'
-        process.send_signal(signal.SIGINT)
-        output, _ = process.communicate('go on\n', timeout=TIMEOUT)
-        assert (output.strip(), process.returncode) == ('ended', 0)
-
-
-@pytest.mark.scenario
 def test_nohup_is_respected(isolation: Isolation) -> None:
     """A SIGHUP that was ignored when the program began does not end it."""
     with running(isolation, prefix=('nohup',)) as process:
@@ -125,16 +114,6 @@ def test_nohup_is_respected(isolation: Isolation) -> None:
         assert said(process) == 'stopping'
         process.communicate('go on\n', timeout=TIMEOUT)
         assert process.returncode == 0
-
-
-@pytest.mark.scenario
-def test_the_exit_code_is_that_of_the_body(isolation: Isolation) -> None:
-    """What the body returns is what the process ends with."""
-    with running(isolation, '--ros-args', '-p', 'code:=7') as process:
-        assert said(process) == 'ready'
-        process.send_signal(signal.SIGTERM)
-        process.communicate('go on\n', timeout=TIMEOUT)
-        assert process.returncode == 7
 
 
 WRONG = {
