@@ -16,7 +16,7 @@ from arm_model import CommandError
 from arm_servo import NotReadyError, PauseRequest, SpeedRequest, TargetRequest
 from arm_servo.ros.gripper import controller
 from arm_servo.ros.gripper.controller import GripperController
-from arm_servo.ros.gripper.interfaces import ParallelGripper, SingleGripper
+from arm_servo.ros.gripper.interfaces import PARALLEL, SINGLE
 from arm_servo.ros.gripper.parameters import GripperParameters
 from arm_servo.ros.group_motion import set_tool_active
 from arm_servo.ros.trajectory.controller import TrajectoryController
@@ -226,7 +226,7 @@ def test_a_goal_with_wrong_numbers_is_refused(
     """A speed that is no number is not taken for none."""
     command = SimpleNamespace(name=names, position=positions, velocity=velocities)
     with pytest.raises(CommandError, match=words):
-        ParallelGripper().request(SimpleNamespace(command=command), ['a', 'b'])
+        PARALLEL.request(SimpleNamespace(command=command), ['a', 'b'])
 
 
 @pytest.mark.parametrize('effort', [False, True])
@@ -244,7 +244,7 @@ def test_an_effort_is_warned_of_once(clock: Any, effort: bool) -> None:
 @pytest.mark.parametrize('effort', [0.0, 5.0])
 def test_both_actions_report_an_effort(effort: float) -> None:
     """Of a message of theirs; 0 is none."""
-    single, parallel = SingleGripper(), ParallelGripper()
+    single, parallel = SINGLE, PARALLEL
     goal = single.action.Goal()
     goal.command.max_effort = effort
     assert single.asks_effort(goal) == bool(effort)

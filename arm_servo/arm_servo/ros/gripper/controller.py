@@ -23,7 +23,7 @@ from ...controllers.controller import CONTINUED, Source
 from ...core.gateway import CommandGateway
 from ...core.motion_queue import MotionCommand
 from ...core.requests import TargetRequest
-from .interfaces import GripperInterface, GripperState, ParallelGripper, SingleGripper
+from .interfaces import GripperInterface, GripperState, PARALLEL, SINGLE
 from .parameters import GripperParameters
 
 WATCH_RATE = 20.0  # rate of feedback in [Hz]
@@ -77,9 +77,7 @@ class GripperController:
         self._newest: MotionCommand | None = None  # of those that have begun
         self._abandoned: MotionCommand | None = None  # drives still have its set-points
         self._has_warned = False
-        interfaces: list[GripperInterface] = [ParallelGripper()]
-        if len(self._joints) == 1:
-            interfaces.append(SingleGripper())
+        interfaces = [PARALLEL, SINGLE] if len(self._joints) == 1 else [PARALLEL]
         self._servers: dict[str, ActionServer] = {
             interface.name: serve_goals(
                 node,

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import math
 from typing import Any
@@ -27,78 +27,43 @@ class GripperState:
     reached: bool = False  # it is at the goal
 
 
-class SingleGripper:
-    """``control_msgs/GripperCommand``: the position of the one joint."""
+@dataclass(frozen=True, slots=True)
+class GripperInterface:
+    """An action of a gripper; its goals and messages have no type."""
 
-    action: Any = GripperCommand
-    name = '~/gripper_cmd'
-
-    def request(self, goal: Any, joints: Sequence[str]) -> TargetRequest:  # noqa: ANN401
-        """Return what a goal asks."""
-        return TargetRequest(_finite({joints[0]: goal.command.position}))
-
-    def asks_effort(self, goal: Any) -> bool:  # noqa: ANN401
-        """Whether a goal asks for a limit of effort."""
-        return bool(goal.command.max_effort)
+    action: Any
+    name: str
+    request: Callable[[Any, Sequence[str]], TargetRequest]  # what a goal asks of the joints
+    asks_effort: Callable[[Any], bool]  # whether a goal asks for a limit of effort
 
     def feedback(self, state: GripperState) -> Any:  # noqa: ANN401
         """Return a state as feedback."""
-        return GripperCommand.Feedback(**self._fields(state))
+        return _message(self.action.Feedback, state)
 
     def result(self, state: GripperState) -> Any:  # noqa: ANN401
         """Return a state as result."""
-        return GripperCommand.Result(**self._fields(state))
-
-    def _fields(self, state: GripperState) -> dict[str, Any]:
-        position = float(state.measured.position[0])
-        return {'position': position, 'stalled': state.stalled, 'reached_goal': state.reached}
+        return _message(self.action.Result, state)
 
 
-class ParallelGripper:
-    """``control_msgs/ParallelGripperCommand``: positions of joints, and how fast at most."""
-
-    action: Any = ParallelGripperCommand
-    name = '~/parallel_gripper_cmd'
-
-    def request(self, goal: Any, joints: Sequence[str]) -> TargetRequest:  # noqa: ANN401
-        """Return what a goal asks; one joint need not be named."""
-        command = goal.command
-        names = list(command.name) or list(joints[:1])
-        if len(names) != len(command.position):
-            raise CommandError(f'{len(names)} names, but {len(command.position)} positions')
-        if lost := [name for name in names if name not in joints]:
-            raise CommandError(f'no joint {lost[0]!r} in the gripper; joints: {", ".join(joints)}')
-        if twice := [name for name in names if names.count(name) > 1]:
-            raise CommandError(f'joint {twice[0]!r} is named twice')
-        if wrong := [speed for speed in command.velocity if not speed >= 0.0]:
-            raise CommandError(f'velocity {wrong[0]}: it must be above 0, or 0 for the limit')
-        speeds = [speed for speed in command.velocity if speed > 0.0]
-        targets = _finite(dict(zip(names, command.position, strict=True)))
-        return TargetRequest(targets, min(speeds, default=math.inf))
-
-    def asks_effort(self, goal: Any) -> bool:  # noqa: ANN401
-        """Whether a goal asks for a limit of effort."""
-        return any(goal.command.effort)
-
-    def feedback(self, state: GripperState) -> Any:  # noqa: ANN401
-        """Return a state as feedback."""
-        return ParallelGripperCommand.Feedback(state=self._joints(state))
-
-    def result(self, state: GripperState) -> Any:  # noqa: ANN401
-        """Return a state as result."""
-        return ParallelGripperCommand.Result(
-            state=self._joints(state), stalled=state.stalled, reached_goal=state.reached
-        )
-
-    def _joints(self, state: GripperState) -> JointState:
-        return JointState(
-            name=list(state.joints),
-            position=state.measured.position.tolist(),
-            velocity=state.measured.velocity.tolist(),
-        )
+def _single_request(goal: Any, joints: Sequence[str]) -> TargetRequest:  # noqa: ANN401
+    return TargetRequest(_finite({joints[0]: goal.command.position}))
 
 
-GripperInterface = SingleGripper | ParallelGripper
+def _parallel_request(goal: Any, joints: Sequence[str]) -> TargetRequest:  # noqa: ANN401
+    """Return what a goal asks; one joint need not be named."""
+    command = goal.command
+    names = list(command.name) or list(joints[:1])
+    if len(names) != len(command.position):
+        raise CommandError(f'{len(names)} names, but {len(command.position)} positions')
+    if lost := [name for name in names if name not in joints]:
+        raise CommandError(f'no joint {lost[0]!r} in the gripper; joints: {", ".join(joints)}')
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise CommandError(f'joint {twice[0]!r} is named twice')
+    if wrong := [speed for speed in command.velocity if not speed >= 0.0]:
+        raise CommandError(f'velocity {wrong[0]}: it must be above 0, or 0 for the limit')
+    speeds = [speed for speed in command.velocity if speed > 0.0]
+    targets = _finite(dict(zip(names, command.position, strict=True)))
+    return TargetRequest(targets, min(speeds, default=math.inf))
 
 
 def _finite(positions: Mapping[str, float]) -> Mapping[str, float]:
@@ -106,3 +71,34 @@ def _finite(positions: Mapping[str, float]) -> Mapping[str, float]:
         if not math.isfinite(position):
             raise CommandError(f'{name}: {position} is no position')
     return positions
+
+
+def _message(kind: Any, state: GripperState) -> Any:  # noqa: ANN401
+    """Return a state as a message, which may lack some of the fields."""
+    measured = state.measured
+    fields = {
+        'position': float(measured.position[0]),
+        'state': JointState(
+            name=list(state.joints),
+            position=measured.position.tolist(),
+            velocity=measured.velocity.tolist(),
+        ),
+        'stalled': state.stalled,
+        'reached_goal': state.reached,
+    }
+    known = kind.get_fields_and_field_types()
+    return kind(**{name: value for name, value in fields.items() if name in known})
+
+
+SINGLE = GripperInterface(
+    GripperCommand, '~/gripper_cmd', _single_request, lambda goal: bool(goal.command.max_effort)
+)
+"""The position of the one joint."""
+
+PARALLEL = GripperInterface(
+    ParallelGripperCommand,
+    '~/parallel_gripper_cmd',
+    _parallel_request,
+    lambda goal: any(goal.command.effort),
+)
+"""Positions of joints, and how fast at most."""
