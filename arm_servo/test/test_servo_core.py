@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import contextlib
 import math
 
 import core_commands
@@ -23,104 +22,12 @@ from arm_trajectory import GoalCode, OnlineTrajectoryGenerator
 
 pytestmark = pytest.mark.slow
 
-Action = Callable[[MotionCore, float, np.random.Generator], object]
-
 
 def core_of(name: str) -> MotionCore:
     """Return a core of a robot in its pose to start from."""
     core = MotionCore(robot(name))
     core.reset(ready(name))
     return core
-
-
-def near(core: MotionCore, rng: np.random.Generator, far: float) -> dict[str, float]:
-    """Return joint positions near the arm's, within the limits."""
-    limits = core.model.limits
-    at = core.state.position + rng.uniform(-far, far, len(limits))
-    inside = np.clip(at, limits.lower, limits.upper)
-    return dict(zip(limits.names, inside.tolist(), strict=True))
-
-
-def twist(core: MotionCore, now: float, rng: np.random.Generator) -> None:
-    """Jog the tool."""
-    link = core.model.tip if rng.random() < 0.5 else None
-    core_commands.twist(
-        core, rng.normal(size=6) * [0.1, 0.1, 0.1, 0.3, 0.3, 0.3], now, link=link, duration=0.3
-    )
-
-
-def jog(core: MotionCore, now: float, rng: np.random.Generator) -> None:
-    """Jog a joint."""
-    name = rng.choice(core.model.joints)
-    core_commands.jog(core, {str(name): float(rng.uniform(-1, 1))}, now, duration=0.3)
-
-
-def track(core: MotionCore, now: float, rng: np.random.Generator) -> None:
-    """Track a pose."""
-    at = np.array(list(near(core, rng, 0.1).values()))
-    core_commands.track(core, core.model.pose(at), now, duration=0.3)
-
-
-def follow(core: MotionCore, now: float, rng: np.random.Generator) -> None:
-    """Follow a trajectory from the pose to start from."""
-    model = core.model
-    core_commands.follow(
-        core, wave(model, ready(model.name), str(rng.choice(['l', 'c', 'q'])), step=2.0)
-    )
-
-
-def target(core: MotionCore, now: float, rng: np.random.Generator) -> None:
-    """Move to a single target."""
-    core_commands.move_to(core, near(core, rng, 0.3))
-
-
-def speed(core: MotionCore, now: float, rng: np.random.Generator) -> None:
-    """Change the speed."""
-    core_commands.override(core, float(rng.choice([0.0, 0.3, 1.0])))
-
-
-def pause(core: MotionCore, now: float, rng: np.random.Generator) -> None:
-    """Pause, or go on."""
-    (core_commands.resume if core.paused else core_commands.pause)(core)
-
-
-def stop(core: MotionCore, now: float, rng: np.random.Generator) -> None:
-    """Stop."""
-    core_commands.stop(core)
-
-
-ACTIONS: list[Action] = [twist, twist, jog, track, follow, target, speed, pause, stop]
-
-
-@pytest.mark.parametrize('name', ROBOTS)
-@settings(max_examples=12, deadline=None)
-@given(
-    seed=st.integers(0, 10**6),
-    steps=st.lists(
-        st.tuples(st.sampled_from(ACTIONS), st.integers(1, 60)), min_size=4, max_size=9
-    ),
-)
-def test_sources_hand_over_without_a_jump(
-    name: str, seed: int, steps: list[tuple[Action, int]]
-) -> None:
-    """In any order, at any moment: velocity, acceleration and jerk keep their limits."""
-    rng, core = np.random.default_rng(seed), core_of(name)
-    states, cycle = [core.state], 0
-    for action, cycles in steps:
-        # refused: jogging while paused, a trajectory that begins too far away; nothing changes
-        with contextlib.suppress(CommandError):
-            action(core, cycle * PERIOD, rng)
-        for _ in range(cycles):
-            states.append(core.step(cycle * PERIOD, PERIOD).state)
-            cycle += 1
-    core_commands.stop(core)
-    for _ in range(700):
-        states.append(core.step(cycle * PERIOD, PERIOD).state)
-        cycle += 1
-        if not states[-1].moving:
-            break
-    assert not states[-1].moving
-    kept(robot(name).limits, states)
 
 
 @pytest.mark.parametrize('name', ROBOTS)

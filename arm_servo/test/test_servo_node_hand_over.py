@@ -8,13 +8,15 @@ from dataclasses import replace
 
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from model_robots import robot, ROBOTS
 import numpy as np
 import pytest
 from servo_commands import jog, move_by, twist
 from servo_drives import Drives, PERIOD
+from servo_streams import kept
 
 from arm_model import ArmError
-from arm_servo import PauseRequest, SpeedRequest, StopRequest
+from arm_servo import JogRequest, PauseRequest, PoseCommand, SpeedRequest, StopRequest
 from arm_servo.controllers.controller import MOTIONS
 from arm_servo.core.requests import ImmediateRequest
 from arm_trajectory import GoalPoint, TrajectoryGoal
@@ -26,6 +28,7 @@ TWISTS = st.lists(st.floats(-0.3, 0.3), min_size=6, max_size=6)
 STEPS = st.one_of(
     st.tuples(st.just('twist'), TWISTS),
     st.tuples(st.just('jog'), NUDGES),
+    st.tuples(st.just('pose'), NUDGES),
     st.tuples(st.just('target'), NUDGES),
     st.tuples(st.just('trajectory'), NUDGES),
     st.tuples(st.just('wave'), NUDGES),
@@ -50,6 +53,7 @@ def perform(drives: Drives, kind: str, numbers: list[float]) -> None:
     """Command a step, or let a drive drop out or come back."""
     gateway = drives.gateway
     names = gateway.model.joints
+    numbers = numbers if kind == 'twist' else numbers[: len(names)]
     immediate: dict[str, ImmediateRequest] = {
         'slow': SpeedRequest(0.3),
         'fast': SpeedRequest(1.0),
@@ -65,6 +69,9 @@ def perform(drives: Drives, kind: str, numbers: list[float]) -> None:
         twist(gateway, numbers, drives.now, 0.2)
     elif kind == 'jog':
         jog(gateway, dict(zip(names, numbers, strict=True)), drives.now, 0.2)
+    elif kind == 'pose':
+        there = gateway.model.pose(np.array([axis.setpoint for axis in drives.axes]) + numbers)
+        gateway.command(JogRequest(PoseCommand(there), drives.now + 0.3))
     elif kind == 'target':
         move_by(gateway, dict(zip(names, numbers, strict=True)))
     elif kind == 'trajectory':
@@ -107,6 +114,28 @@ def test_no_hand_over_makes_the_set_points_jump(
         rates[max(loss - 1, 0) : loss + 1, 3] = 0.0
     limits = drives.gateway.model.limits.acceleration
     assert (rates.max(axis=0) <= 1.02 * limits + 1e-6).all()
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@given(PLANS)
+@settings(max_examples=20, deadline=None)
+def test_set_points_keep_every_limit(
+    name: str, plan: list[tuple[tuple[str, list[float]], int]]
+) -> None:
+    """Velocity, acceleration and jerk of every arm, from any source to any other."""
+    drives = Drives(name)
+    drives.attach()
+    drives.run(2)
+    states = []
+    for (kind, numbers), cycles in [*plan, (('stop', []), 300)]:
+        if kind not in {'lose', 'find'}:
+            perform(drives, kind, numbers)
+        for _ in range(cycles):
+            drives.run()
+            point = drives.gateway.snapshot.set_point
+            assert point is not None
+            states.append(point.state)
+    kept(robot(name).limits, states, PERIOD)
 
 
 @given(TWISTS)
