@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
-from geometry_msgs.msg import Point, Point32, Polygon, Pose, Quaternion
+from geometry_msgs.msg import Point, Point32, Polygon, Pose
 from model_robots import chain, ready, robot
 from moveit_msgs.msg import (
     AllowedCollisionEntry,
@@ -236,36 +236,3 @@ def test_links_that_a_matrix_does_not_name_keep_what_they_had() -> None:
     assert all(scene.allowed.allows(*pair) for pair in before)
     message.allowed_collision_matrix = matrix(['cup', 'panda_hand'])
     assert not apply_planning_scene(scene, message, at).allowed.allows('box', 'panda_hand')
-
-
-@pytest.mark.parametrize(
-    ('change', 'words'),
-    [
-        (lambda m: setattr(m, 'operation', b'\7'), "'box': no operation 7"),
-        (lambda m: m.primitives[0].dimensions.pop(), 'a box has 3 dimensions, not 2'),
-        (lambda m: setattr(m.primitives[0], 'type', 9), 'no primitive 9'),
-        (lambda m: setattr(m, 'id', ''), 'needs a name'),
-        (lambda m: setattr(m, 'primitive_poses', [Pose(), Pose()]), '1 primitive shapes and 2'),
-        (lambda m: setattr(m.pose.position, 'x', float('nan')), "'box': position"),
-        (lambda m: setattr(m.pose, 'orientation', Quaternion(w=2.0)), 'its length is 2, not 1'),
-        (lambda m: setattr(m.primitives[0], 'dimensions', [0.1, -0.2, 0.3]), 'positive'),
-        (lambda m: setattr(m, 'meshes', [MeshMessage()]), "'box'.*corners"),
-    ],
-)
-def test_what_is_not_usable_is_refused(
-    change: Callable[[CollisionObject], None], words: str
-) -> None:
-    """With the object and the value."""
-    message = thing()
-    message.pose.orientation = Quaternion(w=1.0)
-    change(message)
-    with pytest.raises(SceneError, match=words):
-        changed(MODEL.scene, message, AT)
-
-
-def test_a_matrix_without_its_rows_is_refused() -> None:
-    """The message has its counts."""
-    message = scene_message()
-    message.allowed_collision_matrix = AllowedCollisionMatrix(entry_names=['a', 'b'])
-    with pytest.raises(SceneError, match='2 entry_names need as many entry_values'):
-        apply_planning_scene(MODEL.scene, message, AT)

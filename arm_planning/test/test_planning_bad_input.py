@@ -283,6 +283,14 @@ SCENES: dict[str, tuple[PlanningScene, PlanningCode, str]] = {
     'half a subframe': (crate(subframe_names=['tip']), OTHER, 'subframes'),
     'unknown operation': (crate(operation=b'\x07'), OTHER, 'operation 7'),
     'unknown frame': (crate(header=Header(frame_id='x')), CODE.FRAME_TRANSFORM_FAILURE, "'x'"),
+    'no unit quaternion': (
+        crate(pose=PoseMessage(orientation=Quaternion(w=2.0))), OTHER, 'length is 2'
+    ),
+    'box of two edges': (
+        crate(primitives=[SolidPrimitive(type=1, dimensions=[0.1, 0.1])]), OTHER, '3 dimensions'
+    ),
+    'unknown primitive': (crate(primitives=[SolidPrimitive(type=9)]), OTHER, 'no primitive 9'),
+    'two poses of a box': (crate(primitive_poses=[pose_at(0.0)] * 2), OTHER, '1 primitive shapes'),
     'no name': (crate(id=''), NO_OBJECT, 'name'),
     'name of a link': (crate(id='panda_link3'), NO_OBJECT, 'link'),
     'no shape': (ghost(CollisionObject.ADD), OTHER, "'ghost'.*shape"),
