@@ -25,7 +25,7 @@ from canopen_core.standard import (
 )
 
 from ..config.model.drive import DriveConfig
-from ..master.process_image import ReceivedTpdo
+from ..master.process_image import InputReader, ReceivedTpdo
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler
 from ..master.status import node_status, NodeStatus
@@ -414,6 +414,26 @@ class AxisState:
         if not self.fresh:
             self._estimate.note(self._scheduler.now, position_inc)
         return drive_state(word)
+
+    async def confirm(self) -> bool:
+        """Read 0x6041 where a TPDO with it may have got lost; return whether it was another one.
+
+        What is read takes the place of what the last TPDO has shown.
+        """
+        reader = self._statusword
+        if not (isinstance(reader, InputReader) and reader.source.loss_unnoticed):
+            return False
+        count = reader.source.count
+        try:
+            word = await self.node.objects.read_object(self.at(Index.STATUSWORD))
+        except (SdoError, CodecError):
+            return False
+        if not isinstance(word, int) or reader.source.count != count or reader.value is None:
+            return False  # a TPDO that came meanwhile is newer, or as new
+        other = drive_state(word) is not drive_state(int(reader.value))
+        if other:
+            reader.correct(word)
+        return other
 
     @contextmanager
     def looking(self) -> Iterator[None]:

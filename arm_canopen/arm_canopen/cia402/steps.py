@@ -88,6 +88,8 @@ class AxisSteps:
         """
         axis = self.axis
         enabling = goal is DriveState.OPERATION_ENABLED
+        if enabling and await axis.view.confirm():
+            await self.settle()  # until the cycle has seen the state that a lost TPDO had
         if enabling and not axis.stays_enabled:
             await self._begin_enabling()
         timeout = self.quirks.state_timeout

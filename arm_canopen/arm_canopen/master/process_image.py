@@ -238,6 +238,12 @@ class InputReader:
         """Its TPDO."""
         return self._source
 
+    def correct(self, value: Number) -> None:
+        """Replace the value by one that was read by SDO, as a TPDO with it got lost."""
+        values = [*(self._source.values or ())]
+        values[self._position : self._position + 1] = [value]
+        self._source.values = tuple(values)
+
 
 class OutputWriter:
     """Writes an object into every RPDO that carries it, so that none brings an old value.

@@ -376,6 +376,26 @@ def test_an_axis_is_not_held_at_a_position_of_unknown_age(
     assert led.net.simulated().state is DriveState.SWITCH_ON_DISABLED
 
 
+@pytest.mark.parametrize('verb', ['enable', 'recover', 'init'])
+@pytest.mark.parametrize(
+    'config', [on_change(timer=False), on_change(0)], ids=['no timer', 'type 0']
+)
+def test_a_change_that_got_lost_is_read_before_a_drive_is_enabled(
+    config: NodeConfig, verb: str
+) -> None:
+    """Else it would count as enabled for good, by the last TPDO that came."""
+    net = enabled(config, OperationMode.PROFILE_POSITION)
+    net.wire.loses = lambda sender, frame: frame.can_id in TPDOS
+    with pytest.raises(DriveError):
+        net.do(JOINT, 'quick_stop', preempt=True)
+    net.run(5.0)
+    assert net.simulated().state is not DriveState.OPERATION_ENABLED
+    net.wire.loses = lambda sender, frame: False
+    answer = net.do(JOINT, verb)
+    assert 'Operation enabled' in answer
+    assert net.simulated().state is DriveState.OPERATION_ENABLED
+
+
 def test_a_device_that_refuses_its_event_timer_is_named() -> None:
     """It boots, and is not taken for silent when it only rests."""
     without = on_change(timer=False).dictionary
