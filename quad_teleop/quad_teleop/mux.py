@@ -14,15 +14,11 @@ Parameters are named as in twist_mux 4: ``topics.<name>.{topic, timeout, priorit
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-import difflib
 import math
 
-from .exceptions import CommandError, SettingError
+from .exceptions import CommandError
 
-MAX_PRIORITY = 255
-FIELDS = ('topic', 'timeout', 'priority')
 NEVER = -math.inf
 
 
@@ -126,65 +122,3 @@ class Multiplexer:
             return False
         self._forwarded = None
         return True
-
-
-def read_inputs(topics: Mapping[str, object], locks: Mapping[str, object]) -> Inputs:
-    """Read the parameters.
-
-    Args:
-        topics: Values below ``topics.``, by what follows it: ``keyboard.topic``.
-        locks: Values below ``locks.``.
-
-    Returns:
-        The inputs; :data:`DEFAULTS` when there is not one parameter.
-
-    Raises:
-        SettingError: One is misspelt, missing or wrong; the message names it.
-    """
-    if not topics and not locks:
-        return DEFAULTS
-    sources = _read('topics', topics)
-    if not sources:
-        raise SettingError('there are locks but no topics: nothing could ever be forwarded')
-    inputs = Inputs(sources, _read('locks', locks))
-    seen: dict[str, str] = {}
-    for each in (*inputs.sources, *inputs.locks):
-        if each.topic in seen:
-            raise SettingError(f'{seen[each.topic]} and {each.name} both name {each.topic!r}')
-        seen[each.topic] = each.name
-    return inputs
-
-
-def _read(group: str, values: Mapping[str, object]) -> tuple[Input, ...]:
-    fields: dict[str, dict[str, object]] = {}
-    for path, value in sorted(values.items()):
-        name, _, field = path.rpartition('.')
-        if not name or field not in FIELDS:
-            close = difflib.get_close_matches(field, FIELDS, n=1)
-            hint = f'; did you mean {close[0]!r}?' if close else f'; there are {", ".join(FIELDS)}'
-            raise SettingError(f'unknown parameter {group}.{path}{hint}')
-        fields.setdefault(name, {})[field] = value
-    return tuple(_input(f'{group}.{name}', name, found) for name, found in fields.items())
-
-
-def _input(path: str, name: str, found: Mapping[str, object]) -> Input:
-    def wrong(field: str, wanted: str) -> SettingError:
-        return SettingError(f'{path}.{field} is {found[field]!r}: it must be {wanted}')
-
-    missing = [field for field in FIELDS if field not in found]
-    if missing:
-        raise SettingError(f'{path}.{missing[0]} is missing')
-    topic, timeout, priority = (found[field] for field in FIELDS)
-    if topic == '':
-        raise SettingError(f'{path}.topic is empty: name the topic')
-    if not isinstance(topic, str):
-        raise wrong('topic', 'the name of a topic')
-    if isinstance(timeout, bool) or not isinstance(timeout, float | int):
-        raise wrong('timeout', 'a time in [s]')
-    if not 0.0 <= timeout < math.inf:
-        raise wrong('timeout', 'a time in [s], or 0 for never')
-    if isinstance(priority, bool) or not isinstance(priority, int):
-        raise wrong('priority', 'a whole number')
-    if not 0 <= priority <= MAX_PRIORITY:
-        raise wrong('priority', f'0 to {MAX_PRIORITY}')
-    return Input(name, topic, float(timeout), priority)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from quad_teleop import CommandError, SettingError
-from quad_teleop.mux import DEFAULTS, Input, Inputs, Multiplexer, read_inputs
+from quad_teleop import CommandError
+from quad_teleop.mux import Input, Inputs, Multiplexer
 
 FORWARD = (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
 STILL = (0.0,) * 6
@@ -68,15 +67,8 @@ def test_source_without_a_time_out_keeps_its_place() -> None:
 
 def test_equal_priorities_go_by_name() -> None:
     """Of two the first by name is forwarded, so that it is always the same one."""
-    inputs = read_inputs(
-        {
-            f'{name}.{field}': value
-            for name in ('tablet', 'joystick')
-            for field, value in (('topic', name), ('timeout', 0.5), ('priority', 100))
-        },
-        {},
-    )
-    target = Multiplexer(inputs)
+    sources = tuple(Input(name, name, 0.5, 100) for name in ('joystick', 'tablet'))
+    target = Multiplexer(Inputs(sources, locks=()))
     target.velocity('tablet', FORWARD, 0.0)
     assert target.velocity('joystick', FORWARD, 0.1)
     assert not target.velocity('tablet', FORWARD, 0.2)
@@ -132,39 +124,3 @@ def test_lower_priority_never_overrules(steps: list[tuple[str, bool, float]]) ->
             assert target.velocity(name, FORWARD, now)
         elif name == NAVIGATION:
             assert target.velocity(name, FORWARD, now) == (not locked and now - spoke > 0.5)
-
-
-ONE = {'keyboard.topic': 'key_vel', 'keyboard.timeout': 0.5, 'keyboard.priority': 90}
-
-
-def test_parameters_of_twist_mux_are_read() -> None:
-    """Names, and whole numbers as times, are as in its files; there are defaults."""
-    assert read_inputs({}, {}) == DEFAULTS
-    inputs = read_inputs(ONE | {'keyboard.timeout': 1}, {})
-    assert inputs.sources == (Input('keyboard', 'key_vel', 1.0, 90),)
-
-
-@pytest.mark.parametrize(
-    ('topics', 'locks', 'message'),
-    [
-        (ONE | {'keyboard.priorty': 1}, {}, r"topics\.keyboard\.priorty; did you mean 'priority'"),
-        ({'keyboard.topic': 'a'}, {}, r'topics\.keyboard\.timeout is missing'),
-        (ONE | {'keyboard.priority': 256}, {}, r'keyboard\.priority is 256: it must be 0 to 255'),
-        (ONE | {'keyboard.priority': 1.5}, {}, r'priority is 1\.5: it must be a whole number'),
-        (ONE | {'keyboard.priority': True}, {}, 'priority is True'),
-        (ONE | {'keyboard.timeout': -1.0}, {}, r'timeout is -1\.0'),
-        (ONE | {'keyboard.timeout': math.nan}, {}, 'timeout is nan'),
-        (ONE | {'keyboard.timeout': 'soon'}, {}, "timeout is 'soon'"),
-        (ONE | {'keyboard.topic': ''}, {}, 'topic is empty'),
-        (ONE | {'keyboard.topic': 7}, {}, 'topic is 7'),
-        (ONE, {f'stop.{key[9:]}': value for key, value in ONE.items()}, 'keyboard and stop both'),
-        ({}, {f'stop.{key[9:]}': value for key, value in ONE.items()}, 'no topics'),
-        ({'keyboard': 'key_vel'}, {}, r'unknown parameter topics\.keyboard'),
-    ],
-)
-def test_wrong_parameters_are_refused_by_name(
-    topics: dict[str, Any], locks: dict[str, Any], message: str
-) -> None:
-    """A parameter that is misspelt, missing or senseless is named, with what it must be."""
-    with pytest.raises(SettingError, match=message):
-        read_inputs(topics, locks)

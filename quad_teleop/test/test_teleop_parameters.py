@@ -59,6 +59,8 @@ def make(isolation: Isolation, node: Callable[[], Node], *parameters: str) -> se
         (gamepad, 'turbo_spede:=1.0', "did you mean 'turbo_speed'?"),
         (TwistMux, 'use_stampd:=true', "'use_stampd'; did you mean 'use_stamped'?"),
         (TwistMux, 'topics.keyboard.topic:=key_vel', 'topics.keyboard.timeout is missing'),
+        (TwistMux, 'topcs.keyboard.topic:=key_vel', "'topcs'; did you mean 'topics'?"),
+        (TwistMux, 'topics.keyboard:=key_vel', 'unknown parameter topics.keyboard'),
     ],
 )
 def test_wrong_parameter_is_refused(
@@ -68,6 +70,36 @@ def test_wrong_parameter_is_refused(
     errors = ParameterError, TeleopError, OperatorInputError
     with pytest.raises(errors, match=re.escape(message)):
         make(isolation, node, parameter)
+
+
+ONE = {'topics.a.topic': 'a', 'topics.a.timeout': '1', 'topics.a.priority': '3'}
+STOP = {name.replace('topics.a', 'locks.stop'): value for name, value in ONE.items()}
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'message'),
+    [
+        (ONE | {'topics.a.priorty': '1'}, "did you mean 'topics.a.priority'?"),
+        (ONE | {'topics.a.priority': '256'}, 'topics.a.priority is 256: it must be 0 to 255'),
+        (ONE | {'topics.a.priority': '1.5'}, 'priority is 1.5: it must be a whole number'),
+        (ONE | {'topics.a.priority': 'true'}, 'priority is True'),
+        (ONE | {'topics.a.timeout': '-1.0'}, 'timeout is -1'),
+        (ONE | {'topics.a.timeout': '.nan'}, 'timeout is nan'),
+        (ONE | {'topics.a.timeout': '.inf'}, 'timeout is inf'),
+        (ONE | {'topics.a.timeout': 'soon'}, "timeout is 'soon'"),
+        (ONE | {'topics.a.topic': '""'}, 'topic is empty'),
+        (ONE | {'topics.a.topic': '7'}, 'topic is 7'),
+        (ONE | STOP, 'a and stop both'),
+        (STOP, 'no topics'),
+    ],
+)
+def test_wrong_sources_of_twist_mux_are_refused_by_name(
+    isolation: Isolation, parameters: dict[str, str], message: str
+) -> None:
+    """A parameter that is misspelt, missing or senseless is named, with what it must be."""
+    words = [f'{name}:={value}' for name, value in parameters.items()]
+    with pytest.raises((ParameterError, TeleopError), match=re.escape(message)):
+        make(isolation, TwistMux, *words)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 import sys
 import time
@@ -16,14 +17,24 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from std_msgs.msg import Bool
 
-from node_runner import destroyed_when_refused, ParameterReader, refuse_similar, run_node
+from node_runner import (
+    destroyed_when_refused,
+    given_values,
+    ParameterReader,
+    refuse_misspelt,
+    refuse_similar,
+    run_node,
+)
 
-from ..exceptions import CommandError, TeleopError
-from ..mux import Input, Inputs, Multiplexer, read_inputs
+from ..exceptions import CommandError, SettingError, TeleopError
+from ..mux import DEFAULTS, Input, Inputs, Multiplexer
 
 WATCH_PERIOD = 0.05  # [s] between two looks whether the active source fell silent
 DIAGNOSTIC_PERIOD = 1.0  # [s]
-GROUPS = ('topics', 'locks')
+GROUPS = ('topics.', 'locks.')  # what the parameters of sources and locks begin with
+FIELDS = ('topic', 'timeout', 'priority')
+MAX_PRIORITY = 255
+MAX_TIMEOUT = 1e6  # [s]
 
 
 class TwistMux(Node):
@@ -37,10 +48,12 @@ class TwistMux(Node):
             ParameterError: A parameter is misspelt, or of another kind.
             SettingError: The sources and locks make no sense.
         """
-        super().__init__('twist_mux', automatically_declare_parameters_from_overrides=True)
-        inputs = self._inputs()
+        super().__init__('twist_mux')
+        read = ParameterReader(self)
+        meaning = 'TwistStamped in and out, instead of Twist'
+        stamped = read.flag('use_stamped', meaning, default=False)
+        inputs = _inputs(self, read)
         self._mux = Multiplexer(inputs)
-        stamped = self._stamped()
         self._type: Any = TwistStamped if stamped else Twist
         self._output = self.create_publisher(self._type, 'cmd_vel_out', 1)
         self._diagnostics = self.create_publisher(DiagnosticArray, 'diagnostics', 10)
@@ -54,23 +67,6 @@ class TwistMux(Node):
         self.create_timer(WATCH_PERIOD, self._watch, clock=steady)
         self.create_timer(DIAGNOSTIC_PERIOD, self._diagnose, clock=steady)
         self._log_inputs(inputs)
-
-    def _inputs(self) -> Inputs:
-        topics, locks = (
-            {path: self.get_parameter(f'{group}.{path}').value for path in paths}
-            for group in GROUPS
-            for paths in [self.get_parameters_by_prefix(group)]
-        )
-        return read_inputs(topics, locks)
-
-    def _stamped(self) -> bool:
-        known = {'use_stamped', 'use_sim_time', *GROUPS}
-        groups = {name.partition('.')[0] for name in self.get_parameters_by_prefix('')}
-        refuse_similar(groups - known, known)
-        if self.has_parameter('use_stamped'):  # of any kind: declared because it was given
-            self.undeclare_parameter('use_stamped')
-        meaning = 'TwistStamped in and out, instead of Twist'
-        return ParameterReader(self).flag('use_stamped', meaning, default=False)
 
     def _velocity(self, name: str, message: Any) -> None:  # noqa: ANN401
         twist = message.twist if isinstance(message, TwistStamped) else message
@@ -118,6 +114,46 @@ class TwistMux(Node):
         for kind, group in (('source', inputs.sources), ('lock', inputs.locks)):
             for each in sorted(group, key=lambda one: -one.priority):
                 self.get_logger().info(f'{kind} {each.name}: {_text(each)}')
+
+
+def _inputs(node: Node, read: ParameterReader) -> Inputs:
+    """Read sources and locks; the defaults when there is not one parameter of them.
+
+    Raises:
+        ParameterError: A parameter is misspelt, of another kind or out of its range.
+        SettingError: One is unknown or missing, or they make no sense together.
+    """
+    given = given_values(node)
+    sources, locks = (_group(prefix, given, read) for prefix in GROUPS)
+    unknown = refuse_misspelt(node)
+    if wrong := [name for name in unknown if name.startswith(GROUPS)]:
+        raise SettingError(f'unknown parameter {wrong[0]}; there are {", ".join(FIELDS)}')
+    refuse_similar((name.partition('.')[0] for name in unknown), ('topics', 'locks'))
+    if not sources and not locks:
+        return DEFAULTS
+    if not sources:
+        raise SettingError('there are locks but no topics: nothing could ever be forwarded')
+    seen: dict[str, str] = {}
+    for each in (*sources, *locks):
+        if each.topic in seen:
+            raise SettingError(f'{seen[each.topic]} and {each.name} both name {each.topic!r}')
+        seen[each.topic] = each.name
+    return Inputs(sources, locks)
+
+
+def _group(prefix: str, given: Mapping[str, object], read: ParameterReader) -> tuple[Input, ...]:
+    paths = {name.rpartition('.')[0] for name in given if name.startswith(prefix)}
+    inputs = []
+    for path in sorted(paths - {prefix.rstrip('.')}):
+        if missing := [field for field in FIELDS if f'{path}.{field}' not in given]:
+            raise SettingError(f'{path}.{missing[0]} is missing')
+        topic = read.text(f'{path}.topic', '', 'name of the topic')
+        if not topic:
+            raise SettingError(f'{path}.topic is empty: name the topic')
+        timeout = read.number(f'{path}.timeout', 0.0, (0.0, MAX_TIMEOUT), '[s]; 0: never stale')
+        priority = read.whole(f'{path}.priority', 0, (0, MAX_PRIORITY), 'the highest is active')
+        inputs.append(Input(path.removeprefix(prefix), topic, timeout, priority))
+    return tuple(inputs)
 
 
 def _text(each: Input) -> str:
