@@ -35,7 +35,7 @@ class Bench:
         self.plans = 0
         self.stops = True
         self.stale = self.moving = 0
-        self.refusal: PlanningError | None = None
+        self.refusal: Exception | None = None
         self.executions: list[Done] = []
         self.may_plan = threading.Event()
         self.may_plan.set()
@@ -152,6 +152,20 @@ def test_a_refusal_of_the_second_plan_says_why_the_first_has_ended(bench: Bench)
     assert result.error_code.message == (
         'the goal is covered; the arm was stopped on its way: a box has come'
     )
+
+
+@pytest.mark.parametrize(
+    ('kind', 'name'),
+    [(MoveGroup, 'move_action'), (MoveGroupSequence, 'sequence_move_group')],
+    ids=['motion', 'sequence'],
+)
+def test_whatever_a_goal_raises_ends_that_goal_only(bench: Bench, kind: Any, name: str) -> None:
+    """With the place of the defect; an executor would end the program."""
+    bench.refusal = ZeroDivisionError('no such luck')
+    status, result = bench.result(bench.send(kind, name, kind.Goal()))
+    code = getattr(result, 'response', result).error_code
+    assert (status, code.val) == (GoalStatus.STATUS_ABORTED, PlanningCode.CRASH)
+    assert 'ZeroDivisionError: no such luck (a defect in _prepare' in code.message
 
 
 def test_a_sequence_is_followed_part_by_part(bench: Bench) -> None:

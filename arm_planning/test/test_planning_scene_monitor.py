@@ -24,6 +24,7 @@ class TickingNode(QuietNode):
 
     def __init__(self) -> None:
         self.published: list[PlanningScene] = []
+        self.warnings: list[str] = []
         self.receive: dict[str, Callable[[Any], None]] = {}
         self.tick: Callable[[], None] = lambda: None
 
@@ -46,6 +47,10 @@ class TickingNode(QuietNode):
         """Return a clock that stands."""
         stamp = PlanningScene().robot_state.joint_state.header.stamp
         return SimpleNamespace(now=lambda: SimpleNamespace(to_msg=lambda: stamp))
+
+    def get_logger(self) -> Any:
+        """Return a logger whose warnings are kept."""
+        return SimpleNamespace(warning=self.warnings.append)
 
     def at(self, position: float) -> None:
         """Have the first joint somewhere, and look."""
@@ -99,3 +104,14 @@ def test_a_joint_of_which_nothing_comes_any_more_does_not_move(
     now[0] += 2.0
     node.receive['joint_states'](JointState(name=['panda_joint2'], position=[0.0]))
     assert not monitor.is_moving('panda_arm')
+
+
+def test_whatever_a_scene_raises_refuses_that_scene_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An executor would end the program."""
+    node = TickingNode()
+    monitor = SceneMonitor(node, panda())  # type: ignore[arg-type]
+    before = monitor.snapshot
+    monkeypatch.setattr('arm_planning.ros.scene_monitor.apply_scene', lambda *_: 1 // 0)
+    node.receive['planning_scene'](PlanningScene())
+    assert monitor.snapshot is before
+    assert 'planning_scene refused: CRASH: ZeroDivisionError' in node.warnings[0]

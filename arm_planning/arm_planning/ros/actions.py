@@ -64,8 +64,9 @@ class ExecuteAction:
             self._running[key] = self._execution.start(
                 goal.trajectory.joint_trajectory, done, list(goal.controller_names)
             )
-        except PlanningError as error:
-            done(error.code, str(error))
+        except Exception as error:  # noqa: BLE001  # a goal must not end the program
+            refusal = as_refusal(error)
+            done(refusal.code, str(refusal))
             return
         handle.publish_feedback(ExecuteTrajectory.Feedback(state='MONITOR'))
 
@@ -220,13 +221,14 @@ class MotionAction:
             work = self._kind.prepare(
                 goal.handle.request, goal.replans > 0, lambda: goal.is_canceled
             )
-        except PlanningError as error:
-            is_stale = error.code is PlanningCode.ROBOT_STATE_STALE
+        except Exception as error:  # noqa: BLE001  # a goal must not end the program
+            refusal = as_refusal(error)
+            is_stale = refusal.code is PlanningCode.ROBOT_STATE_STALE
             if is_stale and goal.state_waits < STATE_WAITS:
                 goal.state_waits += 1
                 self._after(goal, STATE_PERIOD, self._plan)
             else:
-                self._refuse(goal, error)
+                self._refuse(goal, refusal)
             return
         goal.work = self._background.submit(work, lambda done: self._planned(goal, done), lane)
 
@@ -264,8 +266,9 @@ class MotionAction:
                 planned.trajectories[goal.begun].joint_trajectory,
                 lambda code, reason: self._executed(goal, code, reason),
             )
-        except PlanningError as refused:
-            self._end(goal, refused.code, str(refused))
+        except Exception as error:  # noqa: BLE001  # a goal must not end the program
+            refusal = as_refusal(error)
+            self._end(goal, refusal.code, str(refusal))
         else:
             goal.begun += 1
 

@@ -28,6 +28,7 @@ from node_runner import LATCHED
 from robot_primitives import JointStateStore
 
 from ..exceptions import coded, PlanningCode, PlanningError
+from .background import as_refusal
 from .robot_groups import RobotGroups
 from .scene_changes import apply_scene
 from .scene_messages import ALL_COMPONENTS, attached_messages, collision_message, scene_message
@@ -211,8 +212,9 @@ class SceneMonitor:
         known = self.snapshot.notes
         try:
             self.snapshot = apply_scene(self.snapshot, scene, self.positions())
-        except PlanningError as error:
-            self._node.get_logger().warning(f'{source} refused: {error.code.name}: {error}')
+        except Exception as error:  # noqa: BLE001  # a message must not end the program
+            refusal = as_refusal(error)
+            self._node.get_logger().warning(f'{source} refused: {refusal.code.name}: {refusal}')
             return False
         for note in self.snapshot.notes:
             if note not in known:
