@@ -33,9 +33,8 @@ from ..read.section import read_section, texts
 from ..sections import DEVICE_KEYS, DeviceSettings, DRIVE_KEYS, MasterSettings, Options
 from ..units import MILLISECONDS
 from .axes import check_node_name, read_axes, read_drive
-from .drivers import check_driver
 from .eds_files import EdsFiles
-from .master import check_namespace
+from .master import check_driver, check_namespace
 from .pdos import PdoReader
 from .sdo_list import parameter_writes, read_writes
 
