@@ -16,6 +16,7 @@ from .controllers.controller import ArmState, Controller, Outcome, SetPoint, Sou
 from .controllers.jog import JointCommand, PoseCommand, ServoSettings, TwistCommand
 from .controllers.trajectory import Execution, ExecutionSettings, Feedback, Phase
 from .core.motion_core import check_arm, MotionCore
+from .core.preparation import CoreSettings
 from .core.requests import (
     DisplacementRequest,
     JogRequest,
@@ -24,7 +25,6 @@ from .core.requests import (
     StopRequest,
     TargetRequest,
 )
-from .core.settings import CoreSettings
 from .exceptions import NotReadyError
 from .jog.velocity_bounds import VelocityBoundsSettings
 from .jog.velocity_ik import IkSettings

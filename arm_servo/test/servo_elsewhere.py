@@ -16,8 +16,7 @@ from arm_model import Array
 from arm_servo import MotionCore, SetPoint
 from arm_servo.core.gateway import CommandGateway
 from arm_servo.io.following import FollowingLimits, FollowingWatch
-from arm_servo.io.joint_feedback import JointFeedback
-from arm_servo.io.motion_thread import MotionCycle
+from arm_servo.io.motion_thread import JointFeedback, MotionCycle
 from arm_trajectory import GoalPoint, TrajectoryGoal
 
 PERIOD = 0.01

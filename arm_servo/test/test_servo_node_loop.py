@@ -16,8 +16,7 @@ from servo_commands import outcome
 from servo_elsewhere import Elsewhere, jog, PERIOD, swing
 
 from arm_servo import MotionCore, NotReadyError
-from arm_servo.io.joint_feedback import JointFeedback
-from arm_servo.io.motion_thread import MotionThread
+from arm_servo.io.motion_thread import JointFeedback, MotionThread
 from arm_trajectory import GoalCode
 
 

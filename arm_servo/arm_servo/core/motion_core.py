@@ -44,7 +44,7 @@ from ..controllers.trajectory import Execution
 from ..exceptions import NotReadyError
 from ..report import Cause, Limiter, MotionReport
 from .moving_arms import Neighbours
-from .preparation import CommandBasis, Motion, Preparation, Prepared, PreparedScene
+from .preparation import CommandBasis, CoreSettings, Motion, Preparation, Prepared, PreparedScene
 from .requests import (
     ImmediateRequest,
     in_base,
@@ -55,7 +55,6 @@ from .requests import (
     StopRequest,
 )
 from .safety_filter import SafetyFilter
-from .settings import CoreSettings
 
 PREPARED_STATE_TOLERANCE = 0.01
 """How far the arm may be from where a trajectory was prepared in [rad]."""

@@ -10,7 +10,7 @@ another state or before another command.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 import math
 
 import numpy as np
@@ -35,8 +35,9 @@ from arm_trajectory import (
 )
 
 from ..controllers.controller import Source
+from ..controllers.jog import ServoSettings
 from ..controllers.target import SingleTarget
-from ..controllers.trajectory import Execution
+from ..controllers.trajectory import Execution, ExecutionSettings
 from .requests import (
     by_joint,
     check_command,
@@ -46,9 +47,21 @@ from .requests import (
     MotionRequest,
     SpeedRequest,
 )
-from .settings import CoreSettings
 
 Motion = Execution | SingleTarget  # what has a goal, and an outcome once it ended
+
+
+@dataclass(frozen=True, slots=True)
+class CoreSettings:
+    """How the core behaves."""
+
+    servo: ServoSettings = field(default_factory=ServoSettings)  # how jogging behaves
+    # how trajectories are followed
+    execution: ExecutionSettings = field(default_factory=ExecutionSettings)
+    # least distance between links that a jog and its stop may bring about in [m]; None is any
+    clearance: float | None = 0.005
+    # whether a trajectory or a single target is refused on whose way links meet
+    check_self_collision: bool = True
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,7 +18,7 @@ from node_runner import destroyed_if_refused
 
 from ..core.gateway import CommandGateway, start_worker
 from ..core.motion_core import MotionCore
-from ..core.settings import CoreSettings
+from ..core.preparation import CoreSettings
 from ..exceptions import BackendError
 from ..io.drive_source import DriveSource
 from .controller_manager import ControllerManager, declare_manager

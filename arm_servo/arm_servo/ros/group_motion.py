@@ -17,8 +17,8 @@ from node_runner import ParameterReader
 
 from ..controllers.controller import Source
 from ..core.gateway import CommandGateway
+from ..core.preparation import CoreSettings
 from ..core.requests import StopRequest
-from ..core.settings import CoreSettings
 from .controller_manager import Controller
 from .gripper.controller import GripperController
 from .gripper.parameters import declare_gripper

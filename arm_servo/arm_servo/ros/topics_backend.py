@@ -24,10 +24,9 @@ from node_runner import (
 
 from ..core.gateway import CommandGateway, start_worker
 from ..core.motion_core import MotionCore
-from ..core.settings import CoreSettings
+from ..core.preparation import CoreSettings
 from ..io.following import FollowingWatch
-from ..io.joint_feedback import JointFeedback
-from ..io.motion_thread import MotionCycle, MotionThread
+from ..io.motion_thread import JointFeedback, MotionCycle, MotionThread
 from ..io.topic_output import ARRAY, declare_loop, declare_output, TopicOutput, TRAJECTORY
 from .controller_manager import ControllerManager, declare_manager
 from .group_motion import build_arm, build_groups, by_check, MakeNode, Offers
