@@ -13,10 +13,7 @@ from bus_rig import (
     booted,
     JOINT,
     Leader,
-    MODES,
-    POSITION_MODES,
     TORQUE_MODES,
-    VELOCITY_MODES,
     VirtualNetwork,
 )
 from drive_samples import (
@@ -68,50 +65,6 @@ def with_modes(**changes: Any) -> VirtualNetwork:
     return booted(full_drive(**changes))
 
 
-def target_of(mode: OperationMode) -> float:
-    """Return a target that sets the drive in motion for a second."""
-    if mode in TORQUE_MODES:
-        return 200.0
-    return 0.4 if mode in VELOCITY_MODES else 0.9
-
-
-@pytest.mark.parametrize('mode', MODES, ids=by_name)
-def test_every_mode_moves_as_it_is_commanded(mode: OperationMode) -> None:
-    """Selected it moves nothing; a target is reached and held; a quick stop disables."""
-    net = with_modes()
-    net.do(JOINT, 'init')
-    assert f'mode {mode.title}' in net.select(JOINT, mode)
-    net.run(0.5)
-    assert net.motor() == pytest.approx(0.0, abs=1e-3)
-    assert 'already in mode' in net.select(JOINT, mode)
-    for target in (-target_of(mode), target_of(mode)):
-        net.target(target)
-        net.run(3.0 if mode in POSITION_MODES else 1.5)
-        shown = net.drives[JOINT].view
-        if mode in POSITION_MODES:
-            assert shown.position == pytest.approx(target, abs=2 / SCALE)
-        elif mode in VELOCITY_MODES:
-            assert shown.velocity == pytest.approx(target, rel=0.05)
-        else:
-            assert struct.unpack('<h', net.frames(0x400 + NODE_ID)[-1][4:6]) == (target,)
-            assert net.speed() * target > 0.0
-    if mode in POSITION_MODES:
-        net.target(-target_of(mode))
-        net.run(0.5)
-    else:
-        net.target(0.0)
-        before = abs(net.speed())
-        net.run(1.5)
-        assert abs(net.speed()) < (0.8 * before if mode in TORQUE_MODES else 0.01)
-        net.target(target_of(mode))
-        net.run(0.5)
-    assert abs(net.speed()) > 0.05
-    net.do(JOINT, 'quick_stop', preempt=True)
-    net.run(2.0)
-    assert net.drives[JOINT].view.state is DriveState.SWITCH_ON_DISABLED
-    assert net.speed() == pytest.approx(0.0, abs=0.01)
-
-
 def test_a_switch_to_torque_keeps_the_load() -> None:
     """Mode 10 begins with the torque that holds the axis, not with zero."""
     net = with_modes()
@@ -125,38 +78,6 @@ def test_a_switch_to_torque_keeps_the_load() -> None:
     assert abs(first) == pytest.approx(150, abs=30)
     net.run(0.2)
     assert net.motor() == pytest.approx(held, abs=0.05)
-
-
-def test_queued_moves_are_all_made_in_their_order() -> None:
-    """However fast they come: none is lost, and each is passed."""
-    net = with_modes()
-    net.enable(OperationMode.PROFILE_POSITION)
-    targets = [0.1, -0.05, 0.15, 0.0, 0.2, 0.05]
-    for target in targets:
-        net.commands[JOINT].move(Move(target, immediate=False))
-    turns, positions = [], [net.motor()]
-    for _ in range(1500):
-        net.run(PERIOD)
-        positions.append(net.motor())
-    for a, b, c in zip(positions, positions[1:], positions[2:], strict=False):
-        if (b - a) * (c - b) < 0:
-            turns.append(b)
-    assert positions[-1] == pytest.approx(targets[-1], abs=1e-3)
-    assert turns[: len(targets) - 1] == pytest.approx(targets[:-1], abs=5e-3)
-
-
-def test_of_immediate_moves_the_newest_counts() -> None:
-    """A move that is replaced while it waits is not made."""
-    net = with_modes()
-    net.enable(OperationMode.PROFILE_POSITION)
-    for target in (0.5, -0.5, 0.2):
-        net.commands[JOINT].move(Move(target))
-    lowest = 0.0
-    for _ in range(200):
-        net.run(PERIOD)
-        lowest = min(lowest, net.motor())
-    assert lowest > -0.05
-    assert net.motor() == pytest.approx(0.2, abs=1e-3)
 
 
 def test_moves_are_for_mode_1_and_within_the_limits() -> None:
@@ -178,19 +99,6 @@ def test_moves_are_for_mode_1_and_within_the_limits() -> None:
         net.commands[JOINT].move(Move(0.1, immediate=False))
 
 
-@pytest.mark.parametrize('mode', MODES, ids=by_name)
-@pytest.mark.parametrize('value', [math.nan, math.inf, 1e12], ids=str)
-def test_what_is_no_target_is_refused(mode: OperationMode, value: float) -> None:
-    """Nothing leaves: neither by service nor by stream."""
-    net = with_modes()
-    net.enable(mode)
-    for command in (net.commands[JOINT].set_target, net.commands[JOINT].stream_target):
-        with pytest.raises(DriveError, match=JOINT):
-            command(value)
-    net.run(0.5)
-    assert net.speed() == pytest.approx(0.0, abs=0.01)
-
-
 def test_home_is_a_command_of_its_own() -> None:
     """It enables, reports its phases, sets the reference and returns to the mode of before."""
     net = with_modes(sdo_writes=(*MOTION_WRITES, sdo_write(0x607C, 0, 2_000)))
@@ -203,23 +111,6 @@ def test_home_is_a_command_of_its_own() -> None:
     assert net.drives[JOINT].mode.number is OperationMode.NO_MODE
     net.run(0.1)
     assert net.drives[JOINT].view.position == pytest.approx(0.2, abs=1e-3)
-
-
-def test_a_second_homing_is_a_new_one() -> None:
-    """Right after another one, too: the bits of the last do not pass for its own."""
-    speeds = (
-        sdo_write(0x6099, 1, 2_000),
-        sdo_write(0x6099, 2, 1_000),
-        sdo_write(0x609A, 0, 9_000),
-    )
-    net = with_modes(sdo_writes=(*MOTION_WRITES, *speeds))
-    net.result(net.home(35))
-    running = net.home(17)
-    net.run(0.5)
-    assert not running.done
-    assert net.speed() < -0.01
-    net.result(running)
-    assert net.motor() == pytest.approx(0.0, abs=0.02)  # the switch is the new zero
 
 
 def test_a_homing_method_that_fails_says_so() -> None:
@@ -255,33 +146,6 @@ def test_init_homes_by_the_method_of_bus_yml_whatever_was_tried_before() -> None
     assert 'homed by method 37' in net.do(JOINT, 'init')
     writes = [data[4] for data in net.frames(0x600 + NODE_ID) if data[:3] == b'\x2f\x98\x60']
     assert writes == [37, 34, 37, 35, 37, 35]
-
-
-@pytest.mark.parametrize('policy', list(RecoveryPolicy), ids=lambda policy: policy.value)
-def test_recovery_after_a_power_cut_is_by_policy(policy: RecoveryPolicy) -> None:
-    """By policy it is enabled again, in its mode, and moves nowhere; by default it is not."""
-    config = full_drive()
-    config = replace(config, axes=(replace(config.drive, recovery=policy),))
-    net = VirtualNetwork(bus_config(config))
-    net.boot()
-    net.enable(OperationMode.CYCLIC_POSITION)
-    net.target(0.5)
-    net.run(0.3)
-    net.power_off(JOINT)
-    net.run(1.0)
-    net.power_on(JOINT)
-    net.run_until(net.all_ready)
-    rest = net.motor()
-    net.run(3.0)
-    again = policy is RecoveryPolicy.AUTO
-    assert (net.drives[JOINT].view.state is DriveState.OPERATION_ENABLED) is again
-    assert net.motor() == pytest.approx(rest, abs=1e-3)
-    assert any('enabled again (recovery: auto)' in text for text in net.reported()) is again
-    if again:
-        assert net.drives[JOINT].mode.number is OperationMode.CYCLIC_POSITION
-        assert 'select a mode' not in net.do(JOINT, 'recover')
-    else:
-        assert 'select a mode before the first target' in net.do(JOINT, 'recover')
 
 
 def test_recovery_does_not_reset_a_fault() -> None:
@@ -434,32 +298,6 @@ def deviating(*faults: Fault, **scales: Any) -> VirtualNetwork:
     return net
 
 
-@pytest.mark.parametrize('command', ['init', 'enable', 'recover', 'home'])
-@pytest.mark.parametrize('quirks', ['', 'no_mode_zero'])
-def test_a_drive_that_is_not_enabled_without_a_mode_gets_that_of_bus_yml(
-    command: str, quirks: str
-) -> None:
-    """First, at once where the quirk is named; it moves nothing, stays selected, and is said."""
-    faults = (Fault.MODE_REQUIRED, Fault.MODE_ZERO_REFUSED)
-    net = deviating(*faults, quirks=quirks, position_mode=8, velocity_mode=3)
-    answer = net.result(net.home(35)) if command == 'home' else net.do(JOINT, command)
-    assert 'Operation enabled' in answer
-    assert net.drives[JOINT].view.mode == OperationMode.CYCLIC_POSITION
-    assert net.motor() == pytest.approx(0.0, abs=1e-3)
-    reported = [
-        text for text in net.reported(Severity.WARNING) if '`quirks: no_mode_zero`' in text
-    ]
-    assert len(reported) == (not quirks), net.story()
-    net.target(0.3)
-    net.run(1.5)
-    assert net.motor() == pytest.approx(0.3, abs=1e-3)
-    net.do(JOINT, 'disable')
-    net.do(JOINT, command if command != 'home' else 'init')
-    assert len([text for text in net.reported(Severity.WARNING) if 'quirks' in text]) == len(
-        reported
-    )
-
-
 def test_a_homing_that_takes_too_long_names_the_key_of_bus_yml() -> None:
     """The motor stops, and 10 s are no fact of nature."""
     net = with_modes(scales={'homing_timeout': 0.5})
@@ -501,32 +339,6 @@ def test_homing_does_not_leave_a_drive_without_mode_zero_in_mode_6(
     net.target(0.2)
     net.run(0.3)
     assert net.motor() > 0.02
-
-
-@pytest.mark.parametrize('before', [1, 2, 3, 6, 7, 8, 9])
-def test_a_drive_that_ignores_its_mode_under_halt_is_switched_at_rest(before: int) -> None:
-    """Bit 8 is taken back where it stands, no old target comes back; that is reported once."""
-    net = deviating(Fault.MODE_HELD_UNDER_HALT)
-    mode, other = OperationMode(before), OperationMode.CYCLIC_POSITION
-    if other is mode:
-        other = OperationMode.PROFILE_POSITION
-    net.do(JOINT, 'init')
-    for _ in range(2):
-        net.select(JOINT, mode)
-        if mode is not OperationMode.HOMING:
-            net.target(target_of(mode))
-            net.run(0.4)
-            assert abs(net.speed()) > 0.1
-        net.do(JOINT, 'halt', preempt=True)
-        stood = net.motor()
-        net.select(JOINT, other)
-        net.run(0.5)
-        assert net.motor() == pytest.approx(stood, abs=2e-3)
-        net.target(0.0)
-        net.run(2.0)
-    reported = [text for text in net.reported(Severity.WARNING) if 'ignores 0x6060' in text]
-    assert len(reported) <= 1, net.story()
-    assert bool(reported) is (mode in (1, 2, 3, 6) or other == 1)
 
 
 @pytest.mark.parametrize('mode', TORQUE_MODES, ids=by_name)
@@ -670,30 +482,6 @@ def in_drive(net: VirtualNetwork) -> int:
     return int.from_bytes(net.devices[JOINT].store.read(METHOD), 'little', signed=True)
 
 
-def test_a_method_is_for_one_homing() -> None:
-    """One without a method uses, and names, that of bus.yml, also right after another one."""
-    net = homing_by(35)
-    assert 'homed by method 37' in net.result(net.home(37))
-    net.result(net.home(34))
-    net.run(0.1)
-    assert in_drive(net) == 35
-    assert 'homed by method 35' in net.result(net.home())
-    assert net.reported(Severity.WARNING) == []
-
-
-def test_a_cancelled_homing_gives_the_method_back() -> None:
-    """There is no time to wait for the answer, and it is written all the same."""
-    net = homing_by(35)
-    task = net.home(1)
-    net.run_until(lambda: in_drive(net) == 1)
-    net.run(0.2)
-    net.commands[JOINT].cancel('homing was cancelled')
-    with pytest.raises(DriveError, match='cancelled'):
-        net.result(task)
-    net.run(0.1)
-    assert in_drive(net) == 35
-
-
 def test_a_method_that_cannot_be_put_back_is_reported() -> None:
     """A drive that is lost in mid-homing keeps the method, which somebody has to know."""
     net = homing_by(35)
@@ -742,15 +530,6 @@ def test_bits_of_an_earlier_homing_do_not_count() -> None:
 
 
 LAG = 0.05  # [s] of a motor that comes after its set-points
-WAITED_FOR = pytest.mark.parametrize(
-    'mode',
-    [
-        OperationMode.PROFILE_POSITION,
-        OperationMode.INTERPOLATED_POSITION,
-        OperationMode.CYCLIC_POSITION,
-    ],
-    ids=lambda mode: mode.name,
-)
 
 
 class Client:
@@ -773,19 +552,6 @@ class Client:
             return commands.set_target(position)
 
         return self.net.network.scheduler.spawn(commands.arrive(give, timeout))
-
-
-@WAITED_FOR
-def test_a_motion_that_is_replaced_fails_and_the_other_one_arrives(mode: OperationMode) -> None:
-    """Its caller learns it at once, and its time-out halts nobody."""
-    client = Client(mode)
-    first = client.move_to(1.5, timeout=0.5)
-    client.net.run(0.3)
-    second = client.move_to(-1.5)
-    with pytest.raises(DriveError, match='got another target'):
-        client.net.result(first, timeout=0.1)
-    client.net.result(second)
-    assert client.net.motor() == pytest.approx(-1.5, abs=0.01)
 
 
 def test_a_motion_source_that_takes_the_drive_replaces_a_motion() -> None:

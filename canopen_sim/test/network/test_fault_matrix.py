@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 import itertools
-import random
 import re
 from typing import Any
 
@@ -75,7 +74,6 @@ SETTLING = 1.0  # [s] for a fault to be noticed and every ramp to end
 STANDING = 0.03  # [rad/s]
 CREEP = 0.002  # [rad] that a motor without torque may still roll
 TORQUE = 200.0  # [per mille] of the rated one
-HALTED_BY_DRIVE = [OperationMode.PROFILE_POSITION, *TORQUE_MODES]
 
 
 class Way(Enum):
@@ -394,47 +392,6 @@ def assert_accepts_targets(arm: Arm, mode: OperationMode) -> None:
     assert arm.net.motor(FAULTY) == pytest.approx(-0.2, abs=0.01)
 
 
-DEVIATIONS = {
-    'no state without a mode': (Deviation.MODE_REQUIRED, Deviation.MODE_ZERO_REFUSED),
-    'no mode under halt': (Deviation.MODE_HELD_UNDER_HALT,),
-    'EMCYs without end': (Deviation.EMCY_FLOOD,),
-    'bits of an arrival without power': (Deviation.ARRIVED_WHEN_DISABLED,),
-    'other COB-IDs': (
-        FaultInjection(Deviation.OBJECT_KEPT, object=(0x1800, 1), value=0x1F0),
-        FaultInjection(Deviation.OBJECT_KEPT, object=(0x1400, 1), value=0x1F1),
-    ),
-}
-
-
-@pytest.mark.parametrize(('deviations', 'mode'), with_modes([*DEVIATIONS.values()]))
-def test_a_drive_that_deviates_is_used_as_any_other(
-    deviations: tuple[Deviation | FaultInjection, ...], mode: OperationMode
-) -> None:
-    """It is enabled, moves in each mode, stops, is switched, and reports errors in EMCYs.
-
-    What is odd is reported once.
-    """
-    arm = Arm(0.3, *deviations)
-    arm.move(mode)
-    arm.stop(FAULTY, mode)
-    if mode in TORQUE_MODES:
-        arm.net.do(FAULTY, 'disable')
-    for other in (OperationMode.PROFILE_POSITION, OperationMode.CYCLIC_POSITION):
-        arm.net.select(FAULTY, other)
-        arm.net.do(FAULTY, 'enable')
-        arm.stands(FAULTY)
-        assert_accepts_targets(arm, other)
-    assert 'homed' in arm.net.result(arm.net.home(35))
-    assert_accepts_targets(arm, OperationMode.CYCLIC_POSITION)
-    assert arm.state() is DriveState.OPERATION_ENABLED
-    warnings = [event.text for event in arm.net.events if event.severity is Severity.WARNING]
-    assert len(warnings) == len(set(warnings))
-    over_current(arm)
-    arm.net.run(SETTLING)
-    history = arm.net.network.nodes[FAULTY].emergencies.history
-    assert 0x2310 in [emcy.code for _, emcy in history]
-
-
 def rates(velocity: float, acceleration: float) -> FaultInjection:
     """Return a drive that counts in units of so many [inc/s] and [inc/s^2]."""
     return FaultInjection(Deviation.RATE_UNITS, velocity=velocity, acceleration=acceleration)
@@ -648,44 +605,7 @@ def test_lost_pdos_in_motion(
     assert_accepts_targets(arm, mode)
 
 
-NO_HALT = (Deviation.HALT_IGNORED,)
-NO_STOP = (Deviation.HALT_IGNORED, Deviation.QUICK_STOP_IGNORED)
-
-
-@pytest.mark.parametrize(
-    ('ignoring', 'mode'),
-    with_modes(
-        [('halt', NO_HALT), ('halt', NO_STOP), ('quick_stop', NO_STOP), ('shutdown', NO_STOP)],
-        *(0, 2, 4, 6),
-    ),
-)
-def test_a_stop_that_the_drive_ignores(
-    ignoring: tuple[str, tuple[Deviation, ...]], mode: OperationMode
-) -> None:
-    """A stronger one follows at once, and the answer names the state in which the motor stands."""
-    stop, ignored = ignoring
-    arm = Arm()
-    arm.move(mode)
-    if mode in POSITION_MODES:
-        arm.net.target(50.0)
-        arm.net.run(0.1)
-    for fault in ignored:
-        arm.net.devices[FAULTY].faults.inject(FaultInjection(fault), arm.net.now)
-    begin = arm.net.now
-    answer = arm.net.do(FAULTY, stop, preempt=True)
-    assert abs(arm.net.speed()) < STANDING
-    assert arm.net.now - begin < 2.5
-    assert arm.state().title in answer
-    halted = stop == 'halt' and mode not in HALTED_BY_DRIVE  # the master brakes its target itself
-    assert arm.state() is (DriveState.OPERATION_ENABLED if halted else SWITCHED_OFF)
-    arm.stands(FAULTY)
-    assert arm.state(WITNESS) is DriveState.OPERATION_ENABLED
-
-
 PRE_OPERATIONAL, STOP = NmtCommand.ENTER_PRE_OPERATIONAL, NmtCommand.STOP
-STOPS = ('halt', 'quick_stop', 'disable', 'shutdown')
-IN_PRE_OPERATIONAL = [(0.1, 0.3), (1.0, 0.05), (1.0, 0.3), (1.0, 1.2)]
-"""Period of the heartbeat, and time from the NMT command to the stop, in [s]."""
 
 
 def slow_heartbeat(period: float, **faulty: Any) -> Arm:
@@ -695,24 +615,6 @@ def slow_heartbeat(period: float, **faulty: Any) -> Arm:
     """
     writes = (*MOTION_WRITES, sdo_write(0x60C2, 1, round(1000 * CYCLE)), sdo_write(0x6007, 0, 0))
     return Arm(3.0 * period, heartbeat_producer=period, sdo_writes=writes, **faulty)
-
-
-@pytest.mark.parametrize(
-    ('moment', 'mode'),
-    with_modes([(*moment, stop) for moment in IN_PRE_OPERATIONAL for stop in STOPS]),
-)
-def test_a_stop_in_pre_operational(moment: tuple[float, float, str], mode: OperationMode) -> None:
-    """The device takes SDOs, so its motor stands when the answer comes, whenever that is."""
-    period, wait, stop = moment
-    arm = slow_heartbeat(period)
-    arm.move(mode)
-    arm.net.send_as('tool', Frame(0, bytes((PRE_OPERATIONAL, NODE_ID))))
-    arm.net.run(wait)
-    answer = arm.net.do(FAULTY, stop, preempt=True)
-    assert abs(arm.net.speed()) < STANDING
-    assert SWITCHED_OFF.title in answer
-    assert arm.state() is SWITCHED_OFF
-    arm.stands(FAULTY)
 
 
 @pytest.mark.parametrize(
@@ -866,27 +768,6 @@ def test_sdo_time_outs_do_not_disturb_motion(mode: OperationMode) -> None:
     restore_bus(arm)
     arm.net.run(1.0)
     assert_accepts_targets(arm, mode)
-
-
-@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
-def test_a_twentieth_of_all_frames_lost(mode: OperationMode) -> None:
-    """Boot, enabling and motion succeed all the same, and what was lost is counted."""
-    chance = random.Random(int(mode))
-    arm = Arm(heartbeat_timeout=1.0)  # of three heartbeats all are lost too often
-
-    def loses(sender: str, frame: Frame) -> bool:
-        del sender, frame
-        return chance.random() < 0.05
-
-    arm.net.wire.loses = loses
-    arm.move(mode)
-    arm.stop(FAULTY, mode)
-    arm.stop(WITNESS, mode)
-    assert arm.state() is DriveState.OPERATION_ENABLED
-    arm.stands(FAULTY, WITNESS)
-    assert_accepts_targets(arm, mode)
-    assert arm.net.network.missed_pdos > 0
-    assert arm.net.network.nodes[FAULTY].online
 
 
 BLOB = 0x2FFF

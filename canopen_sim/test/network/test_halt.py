@@ -12,11 +12,8 @@ import struct
 from bus_rig import (
     booted,
     JOINT,
-    MODES,
     SetPointKind,
     SetPoints,
-    TORQUE_MODES,
-    VELOCITY_MODES,
     VirtualNetwork,
 )
 from drive_samples import (
@@ -34,13 +31,12 @@ from hypothesis import given, Phase, settings, strategies
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen import DriveError, DriveState, NodeConfig, OperationMode, Severity
+from arm_canopen import DriveError, NodeConfig, OperationMode, Severity
 from arm_canopen.cia402.halt import UNDER_HALT_TIME
 from arm_canopen.cia402.modes import Move
 from arm_canopen.cia402.state import VelocityEstimate, WINDOW
-from arm_canopen.config import RecoveryPolicy
 from canopen_core.can import Frame
-from canopen_core.standard import Controlword, ObjectDictionary, Statusword
+from canopen_core.standard import ObjectDictionary, Statusword
 
 pytestmark = pytest.mark.slow
 
@@ -81,65 +77,6 @@ def assert_rests(net: VirtualNetwork, duration: float = 0.5) -> None:
     begin = net.motor()
     net.run(duration)
     assert net.motor() == pytest.approx(begin, abs=2e-3)
-
-
-@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
-def test_halt_brakes_and_the_next_target_goes_on(mode: OperationMode) -> None:
-    """The drive stays enabled, and holds in torque modes; nothing of the old target comes back."""
-    net = running_in(mode)
-    there, back = (0.4, -0.3) if mode in VELOCITY_MODES else (0.9, -0.3)
-    if mode in TORQUE_MODES:
-        there, back = 200.0, -200.0
-    net.target(there)
-    net.run(0.6)
-    assert net.speed() > 0.05
-    answer = net.do(JOINT, 'halt', preempt=True)
-    assert 'Operation enabled' in answer
-    assert 'halted' in answer
-    net.run(0.3)
-    assert_rests(net, 1.0)
-    net.target(back)
-    fastest = 0.0
-    for _ in range(400):
-        net.run(PERIOD)
-        fastest = max(fastest, net.speed())
-    assert fastest < 0.05, 'it went on with the old target'
-    if mode in VELOCITY_MODES:
-        assert net.speed() == pytest.approx(-0.3, rel=0.05)
-    elif mode in TORQUE_MODES:
-        assert net.speed() < -0.05
-    else:
-        assert net.motor() == pytest.approx(-0.3, abs=2e-3)
-
-
-@pytest.mark.parametrize('delay', [0.0, 0.005, 0.01, 0.02, 0.03, 0.05])
-@pytest.mark.parametrize(
-    ('mode', 'target'),
-    [
-        (OperationMode.PROFILE_POSITION, 1.0),
-        (OperationMode.PROFILE_VELOCITY, 0.3),
-        (OperationMode.CYCLIC_POSITION, 1.0),
-    ],
-)
-def test_a_halt_right_after_a_target_holds(
-    mode: OperationMode, target: float, delay: float
-) -> None:
-    """Wherever the hand-over of the target stands: it is halted, and it stays halted."""
-    net = running_in(mode)
-    net.target(target)
-    net.run(0.3)
-    net.do(JOINT, 'halt', preempt=True)
-    net.run(0.5)
-    net.target(2.0 if mode is not OperationMode.PROFILE_VELOCITY else 0.3)
-    net.run(delay)
-    assert 'halted' in net.do(JOINT, 'halt', preempt=True)
-    assert_rests(net)
-    assert net.drives[JOINT].halt.held
-    net.target(-0.2)
-    go(net, 4.0 if mode is not OperationMode.PROFILE_VELOCITY else 0.5)
-    assert not net.drives[JOINT].halt.held
-    if mode is not OperationMode.PROFILE_VELOCITY:
-        assert net.motor() == pytest.approx(-0.2, abs=2e-3)
 
 
 def full(net: VirtualNetwork) -> None:
@@ -271,26 +208,6 @@ def test_a_drive_that_acknowledges_no_more_is_judged_by_its_motion() -> None:
     assert_rests(net)
 
 
-def test_relative_moves_count_from_what_the_drive_has_or_gets() -> None:
-    """An immediate one that waits is not lost by the next, and the answers are where they end."""
-    net = running_in(OperationMode.PROFILE_POSITION)
-    commands = net.commands[JOINT]
-    assert 'to 1,' in commands.move(Move(1.0))
-    assert 'to 1.5,' in commands.move(Move(0.5, relative=True))
-    go(net, 4.0)
-    assert net.motor() == pytest.approx(1.5, abs=2e-3)
-    for destination in ('1.6', '1.7', '1.8'):
-        assert f'to {destination},' in commands.move(Move(0.1, relative=True))
-    go(net, 3.0)
-    assert net.motor() == pytest.approx(1.8, abs=2e-3)
-    assert net.drives[JOINT].setpoint == pytest.approx(1.8)
-    commands.move(Move(0.1, relative=True))
-    commands.move(Move(0.5))
-    assert 'to 0.4,' in commands.move(Move(-0.1, relative=True))
-    go(net, 4.0)
-    assert net.motor() == pytest.approx(0.4, abs=2e-3)
-
-
 def test_a_relative_move_after_a_halt_is_refused() -> None:
     """It would count from the target that was given up; after an absolute one it is taken."""
     net = running_in(OperationMode.PROFILE_POSITION)
@@ -352,106 +269,6 @@ def test_a_mode_that_goes_by_sdo_and_gets_lost_does_not_let_the_old_move_go_on()
     assert net.now > begin + 1.5
     assert net.motor() - position < BRAKING_MAX
     assert_rests(net)
-
-
-def test_init_in_motion_does_not_let_the_old_move_go_on() -> None:
-    """Also for a drive that does not take mode 0."""
-    net = running_in(OperationMode.PROFILE_POSITION)
-    net.target(3.0)
-    net.run(0.5)
-    begin = net.motor()
-    net.keep_mode(OperationMode.PROFILE_POSITION)
-    net.do(JOINT, 'init')
-    net.run(1.0)
-    assert net.motor() - begin < BRAKING_MAX
-    assert_rests(net)
-
-
-@pytest.mark.parametrize('cycles', range(4, 60, 4))
-def test_homing_that_is_cancelled_leaves_the_axis_at_rest(cycles: int) -> None:
-    """While it brakes the move of before, while it switches, while it homes: it stops."""
-    net = running_in(OperationMode.PROFILE_POSITION)
-    net.target(2.0)
-    net.run(0.5)
-    begin = net.motor()
-    commands = net.commands[JOINT]
-    running = net.home(17)
-    net.run(cycles * PERIOD)
-    commands.cancel('cancelled')
-    assert running.done
-    net.run(0.5)
-    assert abs(net.motor() - begin) < BRAKING_MAX
-    assert_rests(net)
-    net.run_until(lambda: net.drives[JOINT].accepts_targets)
-    net.target(begin)
-    go(net, 2.0)
-    assert net.drives[JOINT].view.position == pytest.approx(begin, abs=2e-3)
-
-
-def test_a_switch_that_is_cancelled_stays_halted() -> None:
-    """A stop that ends it has the drive halted in the mode of before."""
-    net = running_in(OperationMode.PROFILE_POSITION)
-    net.target(3.0)
-    net.run(0.5)
-    net.keep_mode(OperationMode.PROFILE_POSITION)
-    commands = net.commands[JOINT]
-    running = commands.run('select', commands.select_mode(OperationMode.PROFILE_VELOCITY))
-    net.run(1.0)
-    assert not running.done
-    assert 'halted' in net.do(JOINT, 'halt', preempt=True)
-    assert_rests(net)
-    assert net.drives[JOINT].mode.number is OperationMode.PROFILE_POSITION
-
-
-@pytest.mark.parametrize('verb', ['halt', 'quick_stop', 'disable'])
-def test_a_stop_at_any_moment_of_init_is_answered_truly(verb: str) -> None:
-    """What the answer says of the state still holds later, whenever the stop came."""
-    for millisecond in range(0, 80, 3):  # which meets the cycle of 10 ms at each of its moments
-        net = booted(drive_config(JOINT, NODE_ID))
-        net.begin(JOINT, 'init')
-        net.run(0.001 * millisecond)
-        answer = net.do(JOINT, verb, preempt=True)
-        net.run(0.1)
-        drive = net.drives[JOINT]
-        reported = 'Operation enabled' in answer
-        assert reported == (drive.view.state is DriveState.OPERATION_ENABLED), (
-            millisecond,
-            answer,
-        )
-        assert reported == (verb == 'halt' and drive.halt.held), (millisecond, answer)
-
-
-@pytest.mark.parametrize('cycles', range(16))
-def test_a_halt_in_a_mode_switch_is_answered_truly(cycles: int) -> None:
-    """Where the switch disables the drive: it stays as it is said to be, and nothing is wrong."""
-    drive = drive_config(JOINT, NODE_ID)
-    axis = replace(drive.axes[0], switching_state=DriveState.SWITCHED_ON)
-    net = running_in(OperationMode.PROFILE_VELOCITY, axes=(axis,))
-    commands = net.commands[JOINT]
-    commands.run('select', commands.select_mode(OperationMode.PROFILE_POSITION))
-    net.run(cycles * PERIOD)
-    answer = net.do(JOINT, 'halt', preempt=True)
-    net.run(0.2)
-    enabled = net.drives[JOINT].view.state is DriveState.OPERATION_ENABLED
-    assert ('Operation enabled' in answer) == enabled, answer
-    assert not net.reported(Severity.ERROR)
-
-
-@pytest.mark.parametrize('verb', ['', 'disable', 'quick_stop', 'halt', 'shutdown'])
-def test_recovery_does_not_undo_a_stop(verb: str) -> None:
-    """A drive that was commanded to stop while it was away is not enabled when it comes back."""
-    drive = drive_config(JOINT, NODE_ID)
-    axis = replace(drive.axes[0], recovery=RecoveryPolicy.AUTO)
-    net = running_in(OperationMode.CYCLIC_POSITION, axes=(axis,))
-    net.power_off(JOINT)
-    net.run(1.0)
-    if verb:
-        with pytest.raises(DriveError, match='cut its power: offline'):
-            net.do(JOINT, verb, preempt=True)
-    net.power_on(JOINT)
-    net.run(3.0)
-    enabled = net.drives[JOINT].view.state is DriveState.OPERATION_ENABLED
-    assert enabled is not bool(verb)
 
 
 OLD = 3.0  # [rad] the target that a halt gives up; the axis never gets there
@@ -543,27 +360,6 @@ def test_a_halt_ends_with_the_new_target_or_with_an_error(
         net.do(JOINT, 'halt', preempt=True)
 
 
-@pytest.mark.parametrize('verb', ['halt', 'disable', 'select'])
-def test_a_target_that_is_stopped_before_it_is_taken_is_an_error(verb: str) -> None:
-    """Whoever stops the axis meanwhile, the answer is not that it goes there."""
-    net = halting(SetPointKind.AFTER_HALT)
-    net.run(0.5)
-    net.do(JOINT, 'halt', preempt=True)
-    net.run(0.5)
-    commands = net.commands[JOINT]
-    promise = commands.deliver(lambda: commands.set_target(0.0))
-    net.run(0.1)
-    assert not promise.done
-    if verb == 'select':
-        net.select(JOINT, OperationMode.PROFILE_VELOCITY)
-    else:
-        net.do(JOINT, verb, preempt=True)
-    begin = net.motor()
-    net.run(1.0)
-    assert isinstance(promise.error, DriveError)
-    assert net.motor() == pytest.approx(begin, abs=ACCURACY)
-
-
 def test_only_the_first_target_waits_for_an_acknowledge_under_halt() -> None:
     """That a drive sees set-points only after a halt is learned, and no warning is due."""
     net = halting(SetPointKind.EDGE_AFTER_HALT)
@@ -605,43 +401,6 @@ def running(config: NodeConfig, mode: OperationMode, target: float) -> VirtualNe
     net.run(0.8)
     assert abs(net.speed()) > 0.3
     return net
-
-
-@pytest.mark.parametrize(
-    ('config', 'mode', 'target'),
-    [
-        (without_velocity(), OperationMode.PROFILE_POSITION, 3.0),
-        (without_velocity(), OperationMode.PROFILE_VELOCITY, 0.8),
-        (with_profile_velocity(500_000), OperationMode.PROFILE_VELOCITY, 0.45),
-    ],
-    ids=['no 0x606C, PP', 'no 0x606C, PV', 'fast profile'],
-)
-def test_halt_and_switch_wait_for_the_standstill(
-    config: NodeConfig, mode: OperationMode, target: float
-) -> None:
-    """The answer comes when the motor rests, and bit 8 has braked it."""
-    net = running(config, mode, target)
-    net.do(JOINT, 'halt', preempt=True)
-    assert abs(net.speed()) <= STANDING
-    net.run(0.5)
-    net.target(-target)
-    net.run(0.8)
-    begin = net.now
-    commands = net.commands[JOINT]
-    other = (
-        OperationMode.PROFILE_POSITION
-        if mode is OperationMode.PROFILE_VELOCITY
-        else OperationMode.PROFILE_VELOCITY
-    )
-    promise = commands.run('select', commands.select_mode(other))
-    fastest = 0.0
-    while not promise.done:
-        net.run(PERIOD / 2)
-        if net.drives[JOINT].view.mode == other:
-            fastest = max(fastest, abs(net.speed()))
-    assert fastest <= STANDING
-    promise.result()
-    assert any(word & Controlword.HALT for word in net.controlwords(JOINT, since=begin))
 
 
 def test_the_velocity_is_that_of_the_position_where_no_pdo_carries_it() -> None:

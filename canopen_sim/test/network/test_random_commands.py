@@ -7,10 +7,14 @@ and of other NMT masters. It runs in virtual time, so that a seed is always the 
 fails is shortened, and the message has it as a row of ``FOUND``.
 
 - Nothing moves before a client commanded it, nor after a stop that was answered.
+- No command takes the power from a motor that turns.
 - A stop is answered only when the motor stands, and an answer of a state is true.
 - Every command ends in time; an error has words and a type of the package.
+- A homing that succeeds has found home, and 0x6098 is as bus.yml has it; cancelled, it stops.
+- What has an end comes to rest: a target of a position mode, a stream, a motion source.
 - No set-point of modes 7 and 8 jumps, and none leaves the software limits.
-- Only a command enables the drive, and each controlword fits the state that the drive has shown.
+- Only a command enables the drive, or `recovery: auto` one that nobody has stopped; each
+  controlword fits the state that the drive has shown.
 - When the faults are over, the drive is recovered and goes where it is sent.
 """
 
@@ -21,7 +25,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass, replace
 from enum import Enum
+import math
 import random
+import re
 import struct
 from typing import Any, TypeAlias
 
@@ -48,7 +54,10 @@ from drive_samples import (
 )
 import pytest
 
-from arm_canopen import CanopenError, DriveState, NodeConfig, OperationMode, Promise
+from arm_canopen import CanopenError, DriveError, DriveState, NodeConfig, OperationMode, Promise
+from arm_canopen.cia402.modes import Move
+from arm_canopen.cia402.stop_all import stop_all, StopReport
+from arm_canopen.config import RecoveryPolicy
 from canopen_core.can import Frame
 from canopen_core.standard import Controlword, drive_state, NmtCommand, TARGET_OBJECTS
 from canopen_sim import Fault, FaultInjection, ServoModel
@@ -64,11 +73,16 @@ CREEP = 0.01  # [rad] by which a motor may roll while nothing is commanded
 SETTLED_AFTER = 1.0  # [s] at rest, after which nothing goes on by itself
 LATE = 0.7  # [s] by which frames may be late
 COMMAND_MAX, STOP_MAX = 40.0, 20.0  # [s]
+REST_AFTER = 4.0  # [s] of what has ended, beside the way to its target
+NEAR = 0.01  # [rad]
+NEVER = float('inf')
 READY_MAX = 15.0  # [s] until all is booted when the faults are over
 
+STOP_ALL = 'stop all'
 ENABLING = ('init', 'enable', 'recover', 'home')
-CAUSES = ('fault', 'nmt', 'left', 'follow', 'stream')
-STOPPING = ('halt', 'quick_stop', 'disable', 'shutdown')
+CAUSES = ('fault', 'nmt', 'left', 'follow', 'stream', 'cancel')
+MOTIONS = ('target', 'follow', 'stream', 'move', 'arrive', 'home')
+STOPPING = ('halt', 'quick_stop', 'disable', 'shutdown', STOP_ALL)
 MASTER_UNHEARD, BUS_DOWN = 'master unheard', 'bus down'
 MOMENTS = (Fault.OVER_CURRENT, Fault.FOLLOWING_ERROR, Fault.UNDER_VOLTAGE, Fault.OVER_TEMPERATURE)
 FAULTS = (
@@ -83,6 +97,11 @@ DEVIATIONS = (
     *(Fault.MODE_HELD_UNDER_HALT, Fault.ARRIVED_WHEN_DISABLED, Fault.EMCY_FLOOD),
     *(Fault.SDO_FOUR_BYTES, Fault.SDO_NO_SIZE, Fault.SDO_SHORT),
 )
+HOMING = {17: 0.05, 33: 0.05, 35: NEAR, 37: NEAR}
+"""How far from home [rad] the axis stands after a homing method."""
+NO_METHOD = 99
+ENDED = re.compile('was ended by|^cancelled')
+SLOW_RAMP = round(SCALE / 60)  # [inc/s^2] of a quick stop that takes a minute
 OPTIONS = {0x6007: range(4), 0x605A: (0, 1, 2, 5, 6), 0x605B: (0, 1), 0x605C: (0, 1)}
 OPTIONS |= {0x605D: (1, 2, 3), 0x605E: (0, 1, 2)}
 BY_SDO = (
@@ -111,7 +130,16 @@ ACCEPTED = {
 }
 """States in which a drive takes a command (CiA 402-2, figure 4)."""
 
+POWERED = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
+UNPOWERED = (
+    DriveState.SWITCH_ON_DISABLED,
+    DriveState.READY_TO_SWITCH_ON,
+    DriveState.SWITCHED_ON,
+)
 LOST_TPDOS = (Fault.TPDO_LOSS, Fault.FRAME_LOSS, Fault.DISCONNECT, BUS_DOWN)
+
+MOVE_KINDS = ((True, False), (True, True), (False, False), (False, True))
+"""Whether a move is immediate, and relative."""
 
 Step: TypeAlias = tuple[Any, ...]
 """What happens, its arguments, and the time to the next step in [s], None for until it ends."""
@@ -128,6 +156,10 @@ class Kind:
         velocity: 0x606C is in a PDO.
         by_sdo: No RPDO carries a target, so that they go by SDO.
         options: Option codes by index.
+        slow: Its quick stop takes a minute.
+        home_method: That of bus.yml (0x6098), 0 for none.
+        recovery: What becomes of it when its device comes back.
+        switching_state: In which its mode is switched.
     """
 
     deviations: tuple[Fault, ...] = ()
@@ -136,6 +168,10 @@ class Kind:
     velocity: bool = True
     by_sdo: bool = False
     options: tuple[tuple[int, int], ...] = ()
+    slow: bool = False
+    home_method: int = 0
+    recovery: RecoveryPolicy = RecoveryPolicy.MANUAL
+    switching_state: DriveState = DriveState.OPERATION_ENABLED
 
     @property
     def config(self) -> NodeConfig:
@@ -143,12 +179,24 @@ class Kind:
         limits = ((0x607D, 1, round(-LIMIT * SCALE)), (0x607D, 2, round(LIMIT * SCALE)))
         options = ((index, 0, value) for index, value in self.options)
         timing = (0x60C2, 1, round(1000 * CYCLE))
-        writes = (sdo_write(*write) for write in (timing, *limits, *options))
+        homing = [(0x6099, 1, 3_000), (0x6099, 2, 1_000), (0x609A, 0, 30_000)]
+        if self.home_method:
+            homing.append((0x6098, 0, self.home_method))
+        if self.slow:
+            homing.append((0x6085, 0, SLOW_RAMP))
+        writes = (sdo_write(*write) for write in (timing, *limits, *options, *homing))
+        position_mode = (
+            OperationMode.PROFILE_POSITION if self.by_sdo else OperationMode.CYCLIC_POSITION
+        )
         drive = every_mode(
             drive_config(
                 JOINT,
                 NODE_ID,
-                scales={'position_mode': int(OperationMode.CYCLIC_POSITION)},
+                scales={
+                    'position_mode': int(position_mode),
+                    'recovery': self.recovery,
+                    'switching_state': self.switching_state,
+                },
                 heartbeat_consumer=True,
                 sdo_writes=(*MOTION_WRITES, *writes),
             )
@@ -191,17 +239,28 @@ def draw(seed: int) -> Scenario:
             tuple(
                 (index, chance.choice(OPTIONS[index])) for index in chance.sample([*OPTIONS], 2)
             ),
+            chance.random() < 0.25,
+            chance.choice((0, 0, *HOMING)),
+            chance.choice(list(RecoveryPolicy)),
+            chance.choice((*[DriveState.OPERATION_ENABLED] * 3, DriveState.SWITCHED_ON)),
         )
+    if kind.slow:
+        kind = replace(kind, options=((0x605A, 6),))  # it keeps its power
     if kind.set_points is SetPointKind.NEVER:  # which is in nothing of use in mode 1
         kind = replace(kind, set_points=SetPointKind.NEVER_ACKNOWLEDGES)
     steps: list[Step] = [('enable', None), ('mode', chance.choice(MODES), None)]
     for _ in range(chance.randrange(3, 11)):
         steps.append((*_draw_step(chance), chance.choice((0.0, 0.03, 0.2, 0.6, None, None))))
-        if steps[-1][0] in ('target', 'follow', 'stream') and chance.random() < 0.5:
-            verb = chance.choice((*STOPPING, 'mode'))  # in motion
-            arguments = (chance.choice(MODES),) if verb == 'mode' else ()
-            steps[-1] = (*steps[-1][:-1], 0.4)
+        if steps[-1][0] in MOTIONS and chance.random() < 0.6:
+            verb = chance.choice((*STOPPING, 'mode', 'cancel', 'home', 'init'))  # in motion
+            choices: dict[str, Sequence[Any]] = {'mode': MODES, 'home': (None, *HOMING)}
+            arguments = (chance.choice(choices[verb]),) if verb in choices else ()
+            steps[-1] = (*steps[-1][:-1], chance.choice((0.02, 0.06, 0.4, 0.4)))
             steps.append((verb, *arguments, chance.choice((0.03, None, None))))
+        if chance.random() < 0.1:  # a halt that something is about to end
+            way = round(chance.uniform(-1.0, 1.0), 2)
+            steps += [('halt', None), ('target', way, chance.choice((0.0, 0.02, 0.06)))]
+            steps.append((chance.choice(('halt', 'halt', *STOPPING)), None))
     if any(fault in step for step in steps for fault in LOST_TPDOS):
         kind = replace(kind, transmission=kind.transmission or 1)  # a change that is lost is lost
     return Scenario(kind, tuple(steps), chance.choice(BY_SDO if kind.by_sdo else MODES))
@@ -211,10 +270,14 @@ def _draw_step(chance: random.Random) -> Step:
     one = chance.choice
     steps: list[tuple[int, Step]] = [
         (10, ('target', round(chance.uniform(-1.0, 1.0), 2))),
-        (1, ('target', one((-7.0, 7.0)))),
+        (1, ('target', one((-7.0, 7.0, 1e12, math.nan, math.inf)))),
+        (3, ('move', round(chance.uniform(-0.4, 0.4), 2), *one(MOVE_KINDS))),
+        (2, ('arrive', round(chance.uniform(-1.0, 1.0), 2), one((0.1, 5.0)))),
+        (2, ('home', one((None, NO_METHOD, *HOMING)))),
+        (1, ('cancel',)),
         (5, ('mode', one(MODES))),
         (5, (one(STOPPING),)),
-        (5, (one(('init', 'enable', 'recover', 'recover', 'home')),)),
+        (5, (one(('init', 'enable', 'recover', 'recover')),)),
         (6, ('fault', one(FAULTS), one((0.06, 0.3, 2.0)))),
         (2, ('fault', one(MOMENTS), 0.0)),
         (1, ('left', one(BY_SDO), chance.randint(-3000, 3000))),
@@ -253,6 +316,9 @@ class Run:
         self._stream_speed = self._published = 0.0
         self._stream_ended = False
         self._mode_before = OperationMode.NO_MODE
+        self._rest_by, self._rest_of = NEVER, ''
+        self._halted = False
+        self._may_return = False  # `recovery: auto` enables it again
         self._late_until = self._enabling_until = self._trouble_until = 0.0
         self._states: deque[tuple[float, DriveState]] = deque()
         net.boot()
@@ -277,26 +343,19 @@ class Run:
     def _do(self, step: Step) -> None:
         what, *arguments, wait = step
         match what:
-            case 'target':
-                value = arguments[0] * (200.0 if self._mode in TORQUE_MODES else 1.0)
-                self._begin(what, value, self._commands.deliver(lambda: self._set(value)))
-            case 'mode':
-                mode = arguments[0]
-                self._begin(what, mode, self._commands.run(what, self._commands.select_mode(mode)))
             case 'fault':
                 self._break(*arguments)
             case 'nmt':
-                self._trouble_until = float('inf')
+                self._trouble_until = NEVER
                 self.net.send_as('tool', Frame(0, bytes((arguments[0], NODE_ID))))
             case 'left':
                 self._leave_behind(*arguments)
             case 'follow':
                 self._follow(*arguments)
             case 'stream':
-                self._stream_speed, self._published = arguments[0], self.net.motor()
-                self._stream_ended = False
+                self._stream(*arguments)
             case _:
-                self._begin(what, None, self._commands.request(what))
+                self._command(what, *arguments)
         if wait is not None:
             self.run(wait)
         elif what in CAUSES:
@@ -305,17 +364,66 @@ class Run:
             self._finish()
             self.run(CYCLE)
 
+    def _command(self, what: str, *arguments: Any) -> None:
+        commands, argument = self._commands, arguments[0] if arguments else None
+        match what:
+            case 'target':
+                assert argument is not None
+                value = argument * (200.0 if self._mode in TORQUE_MODES else 1.0)
+                self._begin(what, value, commands.deliver(lambda: self._set(value)))
+            case 'move' | 'arrive':
+                self._move(what, *arguments)
+            case 'home':
+                self._begin(what, argument, commands.run(what, commands.home(argument)))
+            case 'mode':
+                self._begin(what, argument, commands.run(what, commands.select_mode(*arguments)))
+            case 'cancel':
+                if any(running in ('home', 'mode', 'init') for running, *_ in self._promises):
+                    self._expect_rest('a command was cancelled')
+                commands.cancel('cancelled')
+            case 'stop all':
+                scheduler = self.net.network.scheduler
+                self._begin(what, None, scheduler.spawn(stop_all([commands], scheduler)))
+            case _:
+                self._begin(what, None, commands.request(what))
+
     def _set(self, value: float) -> str:
         answer = self._commands.set_target(value)
         if not self._is_late:
             states = {state for _, state in self._states}
             assert DriveState.OPERATION_ENABLED in states, 'a target of a drive without power'
+        assert abs(value) < 1e6, 'what is no target'  # nor is NaN
         assert abs(value) < 5.0 or self._mode not in POSITION_MODES, 'target beyond the limits'
         self._allow_motion()
+        if self._mode in POSITION_MODES:
+            way = abs(value - self.net.motor())
+            self._expect_rest(f'a target of {value:g}', REST_AFTER + way)
         return answer
 
+    def _move(self, what: str, value: float, *how: Any) -> None:
+        commands = self._commands
+
+        def command() -> str:
+            if what == 'arrive':
+                return self._set(value)
+            answer = commands.move(Move(value, immediate=how[0], relative=how[1]))
+            self._allow_motion()
+            return answer
+
+        if what == 'arrive' and self._mode in POSITION_MODES:
+            arrival = self.net.network.scheduler.spawn(commands.arrive(command, how[0]))
+            self._begin(what, value, arrival)
+        else:
+            self._begin('move', value, commands.deliver(command))
+
     def _allow_motion(self) -> None:
-        self._may_move, self._rested = True, 0.0
+        self._may_move, self._rested, self._rest_by = True, 0.0, NEVER
+        self._halted = False
+
+    def _expect_rest(self, why: str, time: float = REST_AFTER) -> None:
+        """Require rest from then on, until something else may move it."""
+        if self._mode not in TORQUE_MODES and not self._kind.slow:
+            self._rest_by, self._rest_of = self.net.now + time, why
 
     @property
     def _mode(self) -> OperationMode:
@@ -331,12 +439,21 @@ class Run:
             store.write(index, 0, value.to_bytes(size, 'little', signed=True), self.net.now)
 
     def _begin(self, what: str, argument: object, promise: Promise[Any]) -> None:
-        if what == 'home' and not promise.done:
+        homes = what == 'home' or (what == 'init' and self._kind.home_method)
+        if homes and not promise.done:
             self._allow_motion()
         if argument in TORQUE_MODES and Fault.MODE_HELD_UNDER_HALT in self._kind.deviations:
             self._allow_motion()  # what it moves by to end its halt goes on without a torque
         self._stream_ended = what in STOPPING
+        self._may_return &= what not in STOPPING
+        self._halted = False
         self._promises.append((what, (argument, self._mode_before), promise, self.net.now))
+
+    def _stream(self, speed: float) -> None:
+        if self._stream_speed and not self._stream_ended:
+            self._expect_rest('its stream has paused')
+        self._stream_speed, self._published = speed, self.net.motor()
+        self._stream_ended = False
 
     def _follow(self, speed: float, duration: float) -> None:
         leader = Leader(JOINT, speed=speed)
@@ -344,6 +461,7 @@ class Run:
         self._allow_motion()
         self.run(duration)
         self.net.master.detach(leader)
+        self._expect_rest('its motion source has left')
 
     def _publish(self) -> None:
         """Send the next of a stream of targets, as a client does that heeds no answer."""
@@ -412,6 +530,11 @@ class Run:
                 assert isinstance(promise.error, CanopenError), f'{what}: {promise.error!r}'
                 assert str(promise.error), f'{what} failed without a word'
                 self._judge_error(what, begun, promise.error)
+            elif isinstance(report := promise.result(), StopReport):
+                if not report.failed:
+                    self._rest(f'{what}: {report}')
+                else:
+                    self._judge_error(what, begun, DriveError('; '.join(report.failed)))
             else:
                 assert promise.result(), f'{what} has an empty answer'
                 self._judge_success(what, argument, str(promise.result()))
@@ -419,28 +542,57 @@ class Run:
     def _judge_error(self, what: str, begun: float, error: Exception) -> None:
         fault = self.net.drives[JOINT].view.state in (DriveState.FAULT, DriveState.UNKNOWN)
         reachable = begun > self._trouble_until and not self._broken and not fault
-        if what in STOPPING and reachable and 'was ended by' not in str(error):
+        if self._kind.slow and 'is not seen to come to rest' in str(error):
+            return
+        if what in STOPPING and reachable and not ENDED.search(str(error)):
             raise AssertionError(f'{what} of a drive that can be reached: {error}')
 
     def _judge_success(self, what: str, command: tuple[object, Any], answer: str) -> None:
         drive = self.net.simulated()
         argument, before = command
         recent = {state for _, state in self._states} | {drive.state}
-        if what in STOPPING or what == 'home':
+        enabled = drive.state is DriveState.OPERATION_ENABLED  # else it may coast
+        ignored = what == 'halt' and Fault.HALT_IGNORED in self._kind.deviations
+        if ignored and self._mode in TORQUE_MODES:
+            self._allow_motion()  # it stood, as its torque had only begun
+            self.run(REST_AFTER)
+        elif what in STOPPING or what == 'home':
             self._rest(f'{what}: {answer}')
+        self._halted = what == 'halt' and 'halted' in answer
+        if what == 'home':
+            self._judge_home(argument)
+        if what == 'arrive':
+            shown = self.net.drives[JOINT].view.position
+            assert shown == pytest.approx(argument, abs=NEAR), f'arrived, but is at {shown:.3f}'
+            self._rest('it has arrived')
         if what in ENABLING:
+            self._may_return = True
             assert DriveState.OPERATION_ENABLED in recent, f'{what}: {answer!r}, but is {recent}'
+        if what in STOPPING:
+            said = DriveState.OPERATION_ENABLED.title in answer
+            true = DriveState.OPERATION_ENABLED in recent if said else not enabled
+            assert true, f'{what}: {answer!r}, but it is in {drive.state}'
         if what in ('disable', 'shutdown'):
             assert drive.state is not DriveState.OPERATION_ENABLED, f'{what}: {answer!r}'
         torque = before in TORQUE_MODES or argument in TORQUE_MODES  # which holds a load
-        enabled = drive.state is DriveState.OPERATION_ENABLED  # else it may coast
         if what in ('mode', 'init') and enabled and not torque and 'already' not in answer:
             self._rest(f'{what}: {answer}')
         if what == 'mode' and not self._is_late:
             shown = self.net.devices[JOINT].store.integer(0x6061).value
             assert shown == argument or drive.state is DriveState.NOT_READY_TO_SWITCH_ON, answer
 
+    def _judge_home(self, method: object) -> None:
+        method = method or self._kind.home_method
+        assert method in HOMING, f'homed by method {method}'
+        assert isinstance(method, int)
+        drive, store = self.net.simulated(), self.net.devices[JOINT].store
+        assert abs(drive.position / SCALE) < HOMING[method], 'homed elsewhere'
+        self.run(2 * CYCLE)
+        stored = store.integer(0x6098).value
+        assert stored == self._kind.home_method or self._is_late, f'0x6098 is left at {stored}'
+
     def _rest(self, why: str) -> None:
+        self._rest_by = NEVER
         self._may_move, self._why, self._crept = False, why, 0.0
 
     @property
@@ -451,22 +603,54 @@ class Run:
         drive = self.net.simulated()
         before, self._place = self._place, (drive.position - drive.origin) / SCALE
         speed = (self._place - before) / CYCLE
-        self._rested = self._rested + CYCLE if abs(speed) < STANDING else 0.0
+        self._rested = self._rested + CYCLE if abs(speed) < STANDING / 2 else 0.0
         if not self._may_move:
             self._crept += speed * CYCLE
             assert abs(speed) < STANDING, f'it moves at {speed:.3f} rad/s after {self._why}'
             assert abs(self._crept) < CREEP, f'it creeps after {self._why}'
-        elif self._rested > SETTLED_AFTER and not self._promises and not self._is_late:
+        elif self._is_late or self._trouble_until > self.net.now:
+            self._rest_by = NEVER
+        elif self.net.now > self._rest_by:
+            assert abs(speed) < STANDING, f'it moves at {speed:.3f} rad/s though {self._rest_of}'
+        if (
+            self._may_move
+            and self._rested > SETTLED_AFTER
+            and not self._promises
+            and not self._is_late
+        ):
             self._rest('it had come to rest')
+
+    @property
+    def _keeps_power(self) -> bool:
+        """Whether the kind of drive has ramps wherever its power is taken."""
+        coasts = any(value == 0 for _, value in self._kind.options)
+        ignores = {Fault.HALT_IGNORED, Fault.QUICK_STOP_IGNORED} & {*self._kind.deviations}
+        return not (coasts or ignores or self._kind.slow)
+
+    @property
+    def _enabling(self) -> tuple[str, ...]:
+        """Commands that may enable the drive."""
+        switches = self._kind.switching_state is DriveState.OPERATION_ENABLED
+        return ENABLING if switches else (*ENABLING, 'mode')
 
     def _judge_state(self) -> None:
         now, state = self.net.now, self.net.simulated().state
-        if any(what in ENABLING for what, *_ in self._promises):
+        if any(what in self._enabling for what, *_ in self._promises):
             self._enabling_until = now + (LATE if self._is_late else 5 * CYCLE)
         enabled = state is DriveState.OPERATION_ENABLED
-        was = bool(self._states) and self._states[-1][1] is DriveState.OPERATION_ENABLED
+        if self._halted and enabled and not self._is_late:
+            assert 'halted' in self.net.drives[JOINT].describe(), 'its halt has ended by itself'
+        before = self._states[-1][1] if self._states else state
+        was = before is DriveState.OPERATION_ENABLED
         if enabled and not was:
-            assert now < self._enabling_until, f'enabled by itself: {self.net.story()}'
+            again = self._may_return and self._kind.recovery is RecoveryPolicy.AUTO
+            assert now < self._enabling_until or again, f'enabled by itself: {self.net.story()}'
+            if now >= self._enabling_until:
+                self._expect_rest('it was enabled again by itself', 1.0)
+        cut = before in POWERED and state in UNPOWERED and self._keeps_power
+        if cut and now > self._trouble_until and not self._is_late:
+            speed = abs(self.net.speed())
+            assert speed < 2 * STANDING, f'no power at {speed:.2f} rad/s'
         self._states.append((now, state))
         while self._states[0][0] < now - (LATE if self._is_late else 4 * CYCLE):
             self._states.popleft()
@@ -485,6 +669,10 @@ class Run:
         while not net.all_ready():
             assert net.now < deadline, f'not ready again: {net.story()}'
             self.run(CYCLE)
+        if self._kind.recovery is RecoveryPolicy.AUTO:
+            self.run(6.0)  # until it is enabled again
+        if self._kind.slow:
+            self.run(STOP_MAX)
         self._late_until = self._trouble_until = 0.0
 
     def _end(self) -> None:
@@ -498,21 +686,46 @@ class Run:
         self._succeed('halt', self._commands.request('halt'))
         self.run(0.2)
         here = net.drives[JOINT].view.position
-        target = {**dict.fromkeys(VELOCITY_MODES, 0.4), **dict.fromkeys(TORQUE_MODES, 150.0)}
+        rate = -0.4 if here > 0.0 else 0.4  # away from the limit that is nearer
+        target = {**dict.fromkeys(VELOCITY_MODES, rate), **dict.fromkeys(TORQUE_MODES, 150.0)}
         value = target.get(mode, 0.0 if abs(here) > 0.3 else 0.5)
         self._succeed('target', self._commands.deliver(lambda: self._set(value)))
         if mode in POSITION_MODES:
             self.run(1.5 + abs(value - here))
             shown = net.drives[JOINT].view.position
-            assert shown == pytest.approx(value, abs=0.01), 'not where it was sent'
+            assert shown == pytest.approx(value, abs=NEAR), 'not where it was sent'
             assert abs(net.speed()) < STANDING
+            if mode is OperationMode.PROFILE_POSITION:
+                self._make_moves(value)
         else:
-            self.run(0.5 if mode in VELOCITY_MODES else 2.0)
-            assert net.speed() > 0.05, 'it does not move'
+            self.run(0.6 if mode in VELOCITY_MODES else 2.0)
+            assert abs(net.speed()) > 0.05, 'it does not move'
+            assert mode in TORQUE_MODES or net.speed() == pytest.approx(value, rel=0.05)
         self._succeed('halt', self._commands.request('halt'))
         self.run(0.3)
         self._succeed('shutdown', self._commands.request('shutdown'))
         assert net.simulated().state is DriveState.SWITCH_ON_DISABLED
+
+    def _make_moves(self, start: float) -> None:
+        """Make moves in their order; then of immediate ones the newest counts."""
+        net, commands = self.net, self._commands
+        self._allow_motion()
+        for move in (
+            Move(start - 0.2, immediate=False),
+            Move(0.1, relative=True, immediate=False),
+        ):
+            commands.move(move)
+        lowest = start
+        for _ in range(round(3.0 / CYCLE)):
+            self.run(CYCLE)
+            lowest = min(lowest, net.motor())
+        assert lowest == pytest.approx(start - 0.2, abs=NEAR), 'a move was not made'
+        assert net.motor() == pytest.approx(start - 0.1, abs=NEAR), 'moves in another order'
+        self._allow_motion()
+        for target in (start + 0.3, start - 0.3, start):
+            commands.move(Move(target))
+        self.run(3.0)
+        assert net.motor() == pytest.approx(start, abs=NEAR), 'an older move was made'
 
     def _succeed(self, what: str, promise: Promise[Any], argument: object = None) -> None:
         self._begin(what, argument, promise)

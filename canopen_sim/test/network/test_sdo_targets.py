@@ -97,32 +97,6 @@ def give(net: VirtualNetwork, target: float) -> Promise[str]:
     return commands.deliver(lambda: commands.set_target(target))
 
 
-@pytest.mark.parametrize('moment', ['enable', 'switch'])
-@pytest.mark.parametrize('mode', TARGETS)
-def test_what_others_left_in_the_target_moves_nothing(mode: OperationMode, moment: str) -> None:
-    """The holding value is written whatever the master wrote before, ahead of the edge.
-
-    Also where the drive stays enabled, and the mode was left a moment ago.
-    """
-    net = running_in(mode)
-    other = OperationMode.PROFILE_POSITION
-    if mode is other:
-        other = OperationMode.PROFILE_VELOCITY
-    if moment == 'enable':
-        net.do(JOINT, 'disable')
-    else:
-        net.select(JOINT, other)
-    leave_behind(net, TARGETS[mode], 3_000)
-    begin, before = net.now, net.motor()
-    if moment == 'enable':
-        net.do(JOINT, 'enable')
-    else:
-        net.select(JOINT, mode)
-    net.run(1.0)
-    assert net.motor() == pytest.approx(before, abs=1e-3)
-    assert moment == 'switch' or downloads(net, since=begin) == [TARGETS[mode]]
-
-
 @pytest.mark.parametrize('mode', TARGETS)
 def test_a_refused_holding_value_keeps_the_drive_disabled(mode: OperationMode) -> None:
     """The answer has the object and the reason of the drive."""
@@ -136,21 +110,6 @@ def test_a_refused_holding_value_keeps_the_drive_disabled(mode: OperationMode) -
     assert net.drives[JOINT].view.state is not DriveState.OPERATION_ENABLED
     accept(net)
     assert 'Operation enabled' in net.do(JOINT, 'enable')
-
-
-def test_the_mode_that_a_drive_stays_in_is_held_at_enable() -> None:
-    """It does not follow to mode 0; what others left in the target of mode 3 would move it."""
-    net = running_in(OperationMode.PROFILE_VELOCITY)
-    net.keep_mode(OperationMode.PROFILE_VELOCITY)
-    net.do(JOINT, 'init')
-    net.do(JOINT, 'disable')
-    leave_behind(net, VELOCITY, 3_000)
-    before = net.motor()
-    net.do(JOINT, 'enable')
-    assert net.drives[JOINT].mode.number is OperationMode.NO_MODE
-    assert net.drives[JOINT].view.mode == OperationMode.PROFILE_VELOCITY
-    net.run(1.0)
-    assert net.motor() == pytest.approx(before, abs=1e-3)
 
 
 def test_a_refused_holding_value_keeps_the_mode() -> None:
@@ -167,27 +126,6 @@ def test_a_refused_holding_value_keeps_the_mode() -> None:
     net.result(give(net, 0.2))
     net.run(2.0)
     assert net.motor() == pytest.approx(0.2, abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    ('mode', 'target'),
-    [(OperationMode.PROFILE_VELOCITY, 0.3), (OperationMode.PROFILE_TORQUE, 3.0)],
-)
-def test_the_end_of_a_halt_does_not_overtake_its_target(
-    mode: OperationMode, target: float
-) -> None:
-    """However late it arrives, bit 8 goes after the new target has come."""
-    net = running_in(mode)
-    net.do(JOINT, 'halt')
-    net.run(0.2)
-    begin = net.now
-    fault = FaultInjection(Fault.SDO_DELAY, delay=0.15)  # within the SDO time-out
-    net.devices[JOINT].faults.inject(fault, begin)
-    net.result(give(net, target))
-    assert net.now - begin > 0.15
-    words = [s for s in net.wire.log if s.frame.can_id == 0x200 + NODE_ID and s.time >= begin]
-    halted = [bool(sent.frame.data[1]) for sent in words if sent.time < begin + 0.15]
-    assert all(halted)
 
 
 def test_a_target_that_is_refused_at_the_end_of_a_halt_leaves_it_halted() -> None:
@@ -223,29 +161,6 @@ def test_moves_of_which_the_first_is_refused_leave_a_halted_axis_halted_at_once(
     assert not net.drives[JOINT].halt.leaving
 
 
-@pytest.mark.parametrize('mode', [OperationMode.PROFILE_POSITION, OperationMode.PROFILE_VELOCITY])
-def test_a_target_that_came_too_late_for_its_answer_moves_nothing(mode: OperationMode) -> None:
-    """Its SDO waits behind a long transfer of somebody else; the answer is an error by then."""
-    net = running_in(mode)
-    net.result(give(net, 0.0))
-    ahead: Promise[None] = Promise()
-
-    async def occupied(*address: object) -> None:
-        await ahead
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(net.network.nodes[JOINT].objects, 'write_object', occupied)
-        with pytest.raises(DriveError, match='did not reach its target'):
-            net.result(give(net, 0.4))
-    leave_behind(net, TARGETS[mode], 400)
-    ahead.resolve(None)
-    net.run(1.0)
-    assert net.motor() == pytest.approx(0.0, abs=1e-3)
-    net.result(give(net, 0.2))
-    net.run(2.0)
-    assert net.motor() > 0.1
-
-
 @pytest.mark.parametrize('mode', TARGETS)
 def test_a_refused_target_is_answered_with_the_reason(mode: OperationMode) -> None:
     """What the drive did before goes on, and the next target is executed."""
@@ -278,34 +193,6 @@ def test_a_target_that_is_not_answered_is_no_success() -> None:
     assert net.motor() == pytest.approx(0.3, abs=1e-3)
 
 
-@pytest.mark.parametrize('mode', [m for m in TARGETS if m != OperationMode.PROFILE_POSITION])
-def test_a_target_whose_answer_is_lost_does_not_go_on_moving(mode: OperationMode) -> None:
-    """The drive has it, and nobody knows: as the answer is an error, the axis is halted."""
-    net = running_in(mode)
-    net.run(0.1)
-    net.wire.loses = lambda sender, frame: frame.can_id == ANSWER
-    with pytest.raises(DriveError, match='did not answer'):
-        net.result(give(net, 0.4 if mode is not OperationMode.PROFILE_TORQUE else 200.0))
-    net.run(1.0)
-    assert abs(net.drives[JOINT].view.rate) < 0.01
-    net.wire.loses = lambda sender, frame: False
-    net.run(0.5)
-    net.result(give(net, 0.2 if mode is not OperationMode.PROFILE_TORQUE else 200.0))
-    net.run(1.0)
-    assert net.drives[JOINT].view.rate > 0.1
-
-
-@pytest.mark.parametrize('verb', ['halt', 'disable', 'quick_stop'])
-def test_a_stop_before_the_target_is_in_the_drive_is_no_success(verb: str) -> None:
-    """Whatever the drive answers later: the target moves nothing any more."""
-    net = running_in(OperationMode.PROFILE_VELOCITY)
-    net.devices[JOINT].faults.inject(FaultInjection(Fault.SDO_DELAY, delay=0.15), net.now)
-    answered = give(net, 0.4)
-    net.do(JOINT, verb, preempt=True)
-    with pytest.raises(DriveError, match='stopped before'):
-        net.result(answered)
-
-
 def test_the_moves_behind_a_refused_one_are_dropped() -> None:
     """Each counts from the one before, so none of them would end where it should."""
     net = running_in(OperationMode.PROFILE_POSITION)
@@ -331,20 +218,6 @@ def test_of_targets_that_come_faster_than_they_are_written_the_newest_counts() -
     assert all('target' in answered.result() for answered in answers)
     assert len(downloads(net, since=begin)) <= 2
     assert net.drives[JOINT].view.rate == pytest.approx(0.29, abs=0.02)
-
-
-@pytest.mark.parametrize('mode', [OperationMode.PROFILE_POSITION, OperationMode.PROFILE_VELOCITY])
-def test_any_number_of_targets_may_come_while_one_is_written(mode: OperationMode) -> None:
-    """A client that does not wait for its answers gets all of them."""
-    net = running_in(mode)
-    net.devices[JOINT].faults.inject(FaultInjection(Fault.SDO_DELAY, delay=0.1), net.now)
-    answers = []
-    for n in range(2_000):
-        answers.append(give(net, 1e-4 * n))
-        if n % 50 == 0:
-            net.run(PERIOD)
-    net.run(1.0)
-    assert all('target' in answered.result() for answered in answers)
 
 
 def test_a_stream_whose_targets_are_refused_stops_the_axis() -> None:

@@ -95,26 +95,6 @@ def test_a_drive_of_which_a_tpdo_is_missing_is_taken_from_its_source(
 
 
 @STREAMED
-def test_a_fault_while_a_drive_cannot_be_seen_is_known_when_it_can(mode: OperationMode) -> None:
-    """Nobody takes it for enabled meanwhile, and nothing moves when the TPDOs come again."""
-    led = Led(mode, Leader())
-    led.lose(*TPDOS)
-    led.net.run(1.0)
-    led.net.simulated().raise_fault(0x2310, led.net.now)
-    led.net.run(1.0)
-    drive = led.net.drives[JOINT]
-    assert not drive.accepts_targets
-    assert not drive.view.fresh
-    assert drive.view.age > 1.5
-    rest = led.net.motor()
-    led.lose()
-    led.net.run(1.0)
-    assert drive.view.fresh
-    assert drive.view.state is DriveState.FAULT
-    assert led.net.motor() == pytest.approx(rest, abs=2e-3)
-
-
-@STREAMED
 def test_a_source_that_goes_on_moves_a_silent_drive_no_further(mode: OperationMode) -> None:
     """What is granted for stopping on the path ends after a second, whatever the source does."""
     led = Led(mode, Leader(heeds=False))
@@ -123,23 +103,6 @@ def test_a_source_that_goes_on_moves_a_silent_drive_no_further(mode: OperationMo
     rest = led.net.motor()
     led.net.run(2.0)
     assert led.net.motor() == pytest.approx(rest, abs=2 * PERIOD * 1e-2)
-
-
-@pytest.mark.parametrize('answers', [(), (0x580 + NODE_ID,)], ids=['SDO', 'no SDO'])
-@pytest.mark.parametrize('stop', ['halt', 'disable', 'quick_stop'])
-def test_a_stop_reaches_a_drive_that_cannot_be_seen(stop: str, answers: tuple[int, ...]) -> None:
-    """It is sent at once; where SDOs do not show the rest either, the answer is an error."""
-    led = Led(OperationMode.CYCLIC_POSITION, Leader())
-    led.lose(*TPDOS, *answers)
-    led.net.run(0.6)
-    if answers:
-        with pytest.raises(DriveError, match='no TPDOs for'):
-            led.net.do(JOINT, stop, preempt=True)
-    else:
-        led.net.do(JOINT, stop, preempt=True)
-        assert led.net.drives[JOINT].view.position == pytest.approx(led.net.motor(), abs=2e-3)
-    assert led.net.speed() == 0.0
-    assert (led.net.simulated().state is DriveState.OPERATION_ENABLED) is (stop == 'halt')
 
 
 def test_a_drive_that_cannot_be_seen_is_not_enabled() -> None:

@@ -41,52 +41,6 @@ def assert_braked(moving: MovingDrive, *states: DriveState) -> None:
     assert moving.fastest < STANDING
 
 
-def test_a_drive_that_makes_a_quick_stop_by_itself_brakes_to_the_end() -> None:
-    """It is not enabled again when the cause goes away; what may have been the cause is named."""
-    moving = MovingDrive(2, QUICK_STOP_ON_LOSS)
-    moving.device.connection_lost(moving.net.now)
-    moving.run(RAMP + 1.0)
-    assert_braked(moving, DriveState.QUICK_STOP_ACTIVE, DriveState.SWITCH_ON_DISABLED)
-    assert len(moving.errors) == 1, moving.errors
-    assert 'left Operation enabled by itself' in moving.errors[0]
-    assert 'is it at a limit switch' in moving.errors[0]
-    moving.net.do(JOINT, 'enable')
-    assert moving.device.state is DriveState.OPERATION_ENABLED
-
-
-def test_a_drive_that_holds_after_its_own_quick_stop_goes_on_holding() -> None:
-    """With 0x605A = 6 a load without brake would drop; `disable` takes the power away."""
-    moving = MovingDrive(6, QUICK_STOP_ON_LOSS)
-    moving.device.connection_lost(moving.net.now)
-    moving.run(RAMP + 1.0)
-    assert_braked(moving, DriveState.QUICK_STOP_ACTIVE)
-    moving.net.do(JOINT, 'disable', preempt=True)
-    assert moving.device.state is DriveState.SWITCH_ON_DISABLED
-
-
-@pytest.mark.parametrize('verb', ['halt', 'quick_stop', 'disable', 'shutdown'])
-@pytest.mark.parametrize('first', ['disable', 'quick_stop'])
-@pytest.mark.parametrize('option', [2, 6])
-def test_a_stop_during_a_stop_takes_no_power_from_what_still_moves(
-    option: int, first: str, verb: str
-) -> None:
-    """A second person may press another button while the axis brakes."""
-    moving = MovingDrive(option, SLOW_DISABLE)
-    moving.net.begin(JOINT, first, preempt=True)
-    moving.run(3 * PERIOD)
-    second = moving.net.begin(JOINT, verb, preempt=True)
-    moving.net.run_until(lambda: second.done)
-    second.result()
-    if verb in {'disable', 'shutdown'}:
-        assert moving.device.state in {DriveState.SWITCH_ON_DISABLED, DriveState.SWITCHED_ON}
-    moving.run(RAMP + 1.0)
-    assert moving.fastest < STANDING
-    assert abs(moving.net.speed()) < STANDING
-    holds = option == 6 and first == 'quick_stop' and verb in {'halt', 'quick_stop'}
-    assert (moving.device.state is DriveState.QUICK_STOP_ACTIVE) is holds
-    assert moving.device.state is not DriveState.OPERATION_ENABLED
-
-
 def test_a_disable_lasts_as_long_as_its_ramp() -> None:
     """1 rad/s at 0.15 rad/s^2 takes 6.7 s, longer than a change of state without ramp may."""
     moving = MovingDrive(2, (0x6084, 0, 1_500))
@@ -401,20 +355,6 @@ def test_nothing_enables_a_drive_while_it_is_stopped(monkeypatch: pytest.MonkeyP
     assert not failing.net.drives[JOINT].status().failure
 
 
-def test_what_goes_wrong_after_it_was_enabled_again_is_named_again(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Each enabling may fail once in the log."""
-    failing = MovingDrive(2)
-    for number in (1, 2):
-        inject(monkeypatch, *owner_of(failing, 'mode'))
-        failing.run(RAMP + 1.0)
-        assert len(failing.errors) == number
-        monkeypatch.undo()
-        failing.net.do(JOINT, 'enable')
-        failing.run(0.5)
-
-
 def test_texts_with_values_do_not_flood_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither those of devices without a drive nor those of the cycle."""
     failing = MovingDrive(2)
@@ -460,87 +400,6 @@ def test_all_drives_stand_and_it_says_what_became_of_each() -> None:
         assert all(abs(net.speed(name)) < STANDING for name in net.devices)
     again = stop(net)
     assert (again.stopped, again.standing) == ((), (MOVES, RESTS, HOMES))
-
-
-@pytest.mark.parametrize('nmt', [NmtCommand.ENTER_PRE_OPERATIONAL, NmtCommand.STOP])
-@pytest.mark.parametrize('lost', [(), (0x582,)], ids=['SDO', 'no SDO'])
-def test_a_device_without_pdos_is_stopped_by_sdo(nmt: NmtCommand, lost: tuple[int, ...]) -> None:
-    """Stopped it takes none before it is pre-operational; unanswered, its rest is unknown.
-
-    The NMT command has begun to stop and disable it; the robot's stop waits for the end of that.
-    """
-    writes = (*MOTION_WRITES, sdo_write(0x6007, 0, 0), sdo_write(0x605A, 0, 6))
-    net = booted(drive_config(MOVES, 2, sdo_writes=writes))
-    net.enable(OperationMode.PROFILE_VELOCITY, MOVES)
-    net.target(0.5, MOVES)
-    net.run(0.5)
-    net.wire.loses = lambda sender, frame: frame.can_id in lost
-    net.network.send_nmt(nmt, 2)
-    net.run(3 * PERIOD)
-    assert abs(net.speed(MOVES)) > 0.1
-    report = stop(net)
-    assert abs(net.speed(MOVES)) < STANDING
-    if lost:
-        assert report == StopReport((), (), (), report.failed)
-        assert report.failed[0].startswith(f'{MOVES} is not seen to come to rest; ')
-        assert 'NMT state PRE_OPERATIONAL' in report.failed[0]
-        return
-    assert report == StopReport((), (), (MOVES,), ())
-    assert net.simulated(MOVES).state is DriveState.SWITCH_ON_DISABLED
-
-
-def test_a_second_stop_does_not_spoil_the_answer_of_the_first() -> None:
-    """Two people press it: both answers are right, and it was stopped once."""
-    net = booted(drive_config(MOVES, 2))
-    net.enable(OperationMode.PROFILE_POSITION, MOVES)
-    net.target(3.0, MOVES)
-    net.run(0.5)
-    scheduler, commands = net.network.scheduler, list(net.commands.values())
-    first = scheduler.spawn(stop_all(commands, scheduler))
-    net.run(0.02)
-    assert not first.done
-    second = scheduler.spawn(stop_all(commands, scheduler))
-    assert net.result(second).stopped == (MOVES,)
-    assert net.result(first) == StopReport((MOVES,), (), (), ())
-
-
-def test_a_quick_stop_in_progress_is_waited_for() -> None:
-    """A halt leaves it alone; the answer comes when the motor stands, and not before."""
-    moving = MovingDrive(option=6)  # stays in Quick Stop Active
-    moving.net.begin(JOINT, 'quick_stop', preempt=True)
-    moving.net.run(3 * PERIOD)
-    assert abs(moving.net.speed()) > 0.8
-    report = stop(moving.net)
-    assert abs(moving.net.speed()) < STANDING
-    assert report == StopReport((JOINT,), (), (), ())
-    assert moving.net.drives[JOINT].view.state is DriveState.QUICK_STOP_ACTIVE
-
-
-def test_the_reaction_to_a_fault_is_waited_for() -> None:
-    """It brakes by itself, under power; only then nothing moves it."""
-    moving = MovingDrive()
-    moving.device.raise_fault(0x2310, moving.net.now)
-    moving.net.run(3 * PERIOD)
-    assert moving.net.drives[JOINT].view.state is DriveState.FAULT_REACTION_ACTIVE
-    report = stop(moving.net)
-    assert abs(moving.net.speed()) < STANDING
-    assert report == StopReport((), (), (f'{JOINT} (faulted)',), ())
-    assert stop(moving.net) == report
-
-
-@pytest.mark.parametrize('begins', ['quick_stop', 'fault'])
-def test_what_does_not_come_to_rest_is_said(begins: str) -> None:
-    """A ramp that takes a minute: within some seconds the answer is that it moves."""
-    moving = MovingDrive(6, (0x6085, 0, round(SCALE / 60)))
-    if begins == 'fault':
-        moving.device.raise_fault(0x2310, moving.net.now)
-    else:
-        moving.net.begin(JOINT, 'quick_stop', preempt=True)
-    moving.net.run(3 * PERIOD)
-    report = stop(moving.net)
-    assert abs(moving.net.speed()) > 0.5
-    assert report.failed[0].startswith(f'{JOINT} is not seen to come to rest')
-    assert report == StopReport((), (), (), report.failed)
 
 
 def test_it_is_there_before_and_while_devices_boot() -> None:
@@ -591,50 +450,6 @@ def test_a_late_heartbeat_stops_nothing_while_tpdos_come() -> None:
     late = [text for text in moving.net.reported(Severity.WARNING) if 'heartbeat lost' in text]
     assert len(late) == 1
     assert 'but its TPDOs come' in late[0]
-
-
-@OPTIONS
-def test_a_heartbeat_that_is_gone_brakes_the_axis_before_its_device_is_configured(
-    option: int,
-) -> None:
-    """Quick stop, rest, disable, and only then Pre-operational."""
-    moving = MovingDrive(option)
-    lose(moving, 0x700 + NODE_ID)
-    moving.run(RAMP)
-    assert nmt_commands(moving) == []
-    moving.run(RAMP)
-    assert moving.states == [
-        DriveState.OPERATION_ENABLED,
-        DriveState.QUICK_STOP_ACTIVE,
-        DriveState.SWITCH_ON_DISABLED,
-    ]
-    assert moving.fastest < STANDING
-    assert nmt_commands(moving)[:1] == [NmtCommand.ENTER_PRE_OPERATIONAL]
-    assert [text for text in moving.errors if 'stopping: heartbeat lost' in text]
-    lose(moving)
-    moving.net.run_until(moving.net.all_ready)
-    assert moving.net.drives[JOINT].failure == ''
-
-
-@pytest.mark.parametrize('policy', list(RecoveryPolicy), ids=lambda policy: policy.value)
-@pytest.mark.parametrize('returns', [RAMP / 2, 3 * RAMP], ids=['while it brakes', 'after it'])
-def test_a_drive_without_heartbeat_is_given_back_by_policy(
-    returns: float, policy: RecoveryPolicy
-) -> None:
-    """Its device is lost and booted again, also when the heartbeat comes while it brakes."""
-    moving = MovingDrive(recovery=policy)
-    lose(moving, 0x700 + NODE_ID)
-    while moving.device.state is DriveState.OPERATION_ENABLED:
-        moving.run(PERIOD)
-    moving.run(returns)
-    lose(moving)
-    moving.net.run_until(lambda: not moving.net.network.nodes[JOINT].operational)
-    moving.net.run_until(moving.net.all_ready)
-    drive = moving.net.drives[JOINT]
-    assert drive.failure == ''
-    moving.net.run(1.0)
-    assert drive.accepts_targets is (policy is RecoveryPolicy.AUTO)
-    assert abs(moving.net.speed()) < STANDING
 
 
 def test_a_device_that_is_commanded_away_while_it_brakes_is_left_there() -> None:
@@ -722,51 +537,6 @@ def test_a_quick_stop_at_rest_ends_where_its_option_says(option: int) -> None:
     net.run(1.0)
     state = DriveState.SWITCH_ON_DISABLED if option == 2 else DriveState.QUICK_STOP_ACTIVE
     assert net.drives[JOINT].view.state is net.simulated().state is state
-
-
-def test_a_stop_without_end_is_not_waited_for_for_ever() -> None:
-    """With next to no deceleration the power goes after the longest time, and that is said."""
-    moving = MovingDrive(6, (0x6085, 0, 100))
-    net = moving.net
-    net.do(JOINT, 'shutdown', preempt=True)
-    assert net.now - moving.began <= SHUTDOWN_MAX
-    assert net.drives[JOINT].view.state is DriveState.SWITCH_ON_DISABLED
-    assert [text for text in net.reported() if 'did not come to rest' in text]
-
-
-@pytest.mark.parametrize(
-    ('mode', 'option', 'ramp', 'halted'),
-    [
-        (OperationMode.PROFILE_POSITION, 1, 0.5, False),
-        (OperationMode.PROFILE_POSITION, 6, 0.5, True),
-        (OperationMode.PROFILE_POSITION, 2, 6.7, False),  # longer than any other time-out
-        (OperationMode.PROFILE_POSITION, 6, 6.7, False),
-        (OperationMode.PROFILE_VELOCITY, 2, 0.5, True),
-        (OperationMode.PROFILE_VELOCITY, 5, 0.5, False),
-        (OperationMode.CYCLIC_POSITION, 5, 0.5, True),
-        (OperationMode.CYCLIC_POSITION, 2, 0.5, False),
-        (OperationMode.INTERPOLATED_POSITION, 1, 0.5, True),
-        (OperationMode.INTERPOLATED_POSITION, 6, 0.5, False),
-    ],
-)
-def test_shutdown_never_lets_a_moving_axis_go(
-    mode: OperationMode, option: int, ramp: float, *, halted: bool
-) -> None:
-    """Whatever 0x605A says, and also in the middle of a quick stop: rest first, then no power."""
-    ramps = ((index, 0, round(SCALE / ramp)) for index in (0x6084, 0x6085))
-    moving = MovingDrive(option, *ramps, mode=mode)
-    if halted:
-        moving.net.begin(JOINT, 'quick_stop', preempt=True)
-        moving.run(0.05)
-        assert abs(moving.net.speed()) > 0.1
-    running = moving.net.begin(JOINT, 'shutdown', preempt=True)
-    moving.run(0.9 * ramp - 0.1)
-    assert not running.done
-    moving.run(2.0)
-    running.result()
-    assert moving.states[-1] is DriveState.SWITCH_ON_DISABLED
-    assert moving.fastest < STANDING
-    assert not [text for text in moving.net.reported() if 'did not come to rest' in text]
 
 
 def test_shutdown_of_a_drive_that_is_off_or_faulted_ends_at_once() -> None:

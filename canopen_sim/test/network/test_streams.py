@@ -78,40 +78,7 @@ COMMANDS: dict[str, Callable[[Publisher], Promise[str]]] = {
 }
 
 
-@pytest.mark.parametrize('name', COMMANDS)
-@pytest.mark.parametrize('mode', [OperationMode.CYCLIC_POSITION, OperationMode.PROFILE_POSITION])
-def test_a_command_wins_over_a_stream(mode: OperationMode, name: str) -> None:
-    """It succeeds while the stream goes on, and nothing moves after it."""
-    client = Publisher(mode)
-    client.publish(1.0)
-    begin = client.motor
-    assert client.net.drives[JOINT].view.velocity > 0.3
-    client.result(COMMANDS[name](client))
-    assert client.motor - begin < 0.15
-    rest = client.motor
-    client.publish(2.0)
-    assert client.motor == pytest.approx(rest, abs=0.03)  # at most it runs out of its braking
-    assert 'ended by' in client.refusals[-1]
-
-
-STOPS = ['halt', 'quick_stop', 'disable']
 PAUSES = [0.25, 0.7, 3.0]  # [s] of a stalled publisher or network; the stream ends after 0.2 s
-
-
-@pytest.mark.parametrize('pause', PAUSES)
-@pytest.mark.parametrize('name', STOPS)
-@pytest.mark.parametrize('mode', [OperationMode.CYCLIC_POSITION, OperationMode.PROFILE_POSITION])
-def test_a_pause_is_no_request(mode: OperationMode, name: str, pause: float) -> None:
-    """A publisher that was held up while somebody stopped the drive moves it no more."""
-    client = Publisher(mode)
-    client.publish(0.5)
-    client.result(client.net.begin(JOINT, name, preempt=True))
-    rest = client.motor
-    for _ in range(3):
-        client.net.run(pause)
-        client.publish(0.3)
-    assert client.motor == pytest.approx(rest, abs=0.03)
-    assert 'ended by' in client.refusals[-1]
 
 
 @pytest.mark.parametrize('mode', [OperationMode.CYCLIC_POSITION, OperationMode.PROFILE_POSITION])
@@ -227,18 +194,6 @@ def test_nothing_is_called_stopped_that_moves(mode: OperationMode) -> None:
     client.commands.set_target(0.0)
     client.net.run(5.0)
     assert [text for text in client.net.reported() if 'has paused' in text] == said
-
-
-def test_a_stream_never_jumps() -> None:
-    """A first value far away is approached within the limits of the profile."""
-    client = Publisher(CYCLIC)
-    targets = []
-    for _ in range(60):
-        client.commands.stream_target(0.9)
-        client.net.run(PERIOD)
-        targets.append(client.net.targets(JOINT)[-1])
-    steps = [abs(b - a) for a, b in pairwise(targets)]
-    assert max(steps) <= 1.01 * SCALE * PERIOD  # 1 rad/s
 
 
 @pytest.mark.parametrize('mode', [OperationMode.CYCLIC_POSITION, OperationMode.PROFILE_POSITION])
