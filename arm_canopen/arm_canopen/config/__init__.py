@@ -15,7 +15,6 @@ remedy; ``check_file`` reports them, and what works and was probably meant other
 
 from canopen_core.eds import load_eds
 
-from .load import check_file, load_bus
 from .model import (
     BusConfig,
     DriveConfig,
@@ -48,6 +47,7 @@ from .model.checks.traffic import LoadEstimate, Traffic
 from .model.factor_group import FACTOR_ADDRESSES, FACTOR_OBJECTS, FactorGroup, UNSET
 from .model.pdo import Direction, RPDO, TPDO
 from .model.si_unit import NamedUnit, position_unit, RPM
+from .resolve.bus import check_file, load_bus
 from .resolve.eds_files import DEFAULT_DRIVE
 from .resolve.pdo_mapping import eds_mapping, is_fixed, mapping_slots
 from .units import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS

@@ -1,17 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A whole bus: what its bus.yml says, the EDS files, and what counts of both."""
+"""From a bus.yml and the EDS files that it names to the model of a bus, and its check."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+import os
 from pathlib import Path
 
-from canopen_core import Findings, Place
+from canopen_core import ConfigError, Findings, Place
 
 from ..model import BusConfig, MasterConfig, NodeConfig
+from ..model.checks import check_bus, Report
 from ..model.pdo import RPDO, TPDO
-from ..read.document import Item, YamlMap
+from ..read.document import Item, read_document, YamlMap
 from ..read.section import read_section
 from ..sections import OPTION_KEYS, Options
 from .cob_ids import assign_cob_ids
@@ -22,6 +24,45 @@ from .master import build_master, read_master
 
 PDO_SECTIONS = (RPDO.name, TPDO.name)
 DEPTH_MAX = 3  # device, tpdo, number; below are the keys of a PDO
+
+
+def load_bus(
+    path: str | os.PathLike[str], *, bus_config_path: str | os.PathLike[str] | None = None
+) -> BusConfig:
+    """Read a bus.yml of either format and the EDS files that it names.
+
+    ``@BUS_CONFIG_PATH@`` stands for bus_config_path, or for the folder of the file.
+
+    Returns:
+        The bus; oddities are among its warnings.
+
+    Raises:
+        ConfigError: Something is wrong; the error lists every problem with file, line, key and
+            remedy.
+    """
+    folder = None if bus_config_path is None else Path(bus_config_path)
+    config, findings = _read_and_resolve(Path(path), folder)
+    findings.raise_errors()
+    return config
+
+
+def check_file(path: str | os.PathLike[str], bitrate: int | None = None) -> Report:
+    """Read a bus.yml and report everything that is wrong with it and its EDS files at once.
+
+    The bit rate in [bit/s] replaces that of bus.yml.
+    """
+    try:
+        config, findings = _read_and_resolve(Path(path), None)
+    except ConfigError as error:
+        return Report(error.problems, ())
+    return check_bus(config, bitrate, findings)
+
+
+def _read_and_resolve(file: Path, bus_config_path: Path | None) -> tuple[BusConfig, Findings]:
+    """Make as much of a bus as can be understood, and collect everything that is wrong."""
+    findings = Findings()
+    document = read_document(file, findings)
+    return resolve_bus(document, file, bus_config_path, findings), findings
 
 
 def resolve_bus(
