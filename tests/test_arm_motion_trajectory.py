@@ -75,12 +75,15 @@ def _refuses_what_is_wrong(arm: MovingArm) -> None:
     old.trajectory.header.stamp.sec = 1
     nan = goal_to([float('nan'), *READY[1:]], 3.0)
     fast = goal_to(READY, 0.1)
+    twice = goal_to(READY, 3.0)
+    twice.trajectory.points *= 2
     for goal, code, words in (
         (unknown, Result.INVALID_JOINTS, 'elbow'),
         (beyond, Result.INVALID_GOAL, 'panda_joint1'),
         (old, Result.OLD_HEADER_TIMESTAMP, 'stamp'),
         (nan, Result.INVALID_GOAL, 'nan'),
         (fast, Result.INVALID_GOAL, 'rad/s'),
+        (twice, Result.INVALID_GOAL, 'must increase'),
         (goal_to(READY[:3], 3.0), Result.INVALID_GOAL, '3 positions'),
     ):
         status, result = arm.send(goal).wait()
