@@ -384,29 +384,6 @@ def test_safe_torque_off_is_no_fault(rig: Rig) -> None:
     assert rig.get(0x6041) & 0x6F == 0x27
 
 
-def test_units_and_encoder_that_the_eds_does_not_say(rig: Rig) -> None:
-    """The same motion, and the same place, are other numbers."""
-    for index, rate in ((0x60FF, 600), (0x6083, 3_000), (0x6084, 3_000)):
-        rig.put(index, rate)
-    rig.enable(3)
-    rig.run(1.0)
-    rig.inject(Fault.RATE_UNITS, velocity=0.5, acceleration=2.0, duration=1.0)
-    assert rig.get(0x606C) == 1_200
-    begin = rig.now
-    rig.put(0x60FF, 2_400)  # 1200 inc/s, at 6000 inc/s^2
-    rig.run(0.05)
-    assert rig.velocity == pytest.approx(600.0 + 6_000.0 * (rig.now - begin), rel=0.1)
-    rig.run(0.9)
-    assert rig.velocity == pytest.approx(1_200.0)
-    rig.run(0.1)
-    assert rig.get(0x606C) == 1_200
-    origin = rig.drive.origin - rig.position
-    rig.inject(Fault.ENCODER_SHIFTED, position=-7_000)
-    assert rig.get(0x6064) == -7_000
-    assert rig.drive.origin - rig.position == pytest.approx(origin)
-    assert rig.device.faults.active == ()
-
-
 @pytest.mark.parametrize('mode', [1, 3, 8, 9])
 def test_stop_in_the_way_makes_a_following_error(mode: int) -> None:
     """An axis that a stop holds does not pass it, and faults with 0x8611."""
@@ -523,15 +500,6 @@ def test_drive_stops_when_it_is_taken_off_the_network(loss: NmtCommand, mode: in
     rig.nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
     assert (rig.state, rig.get(0x603F)) == (DriveState.FAULT, 0x8130)
     assert rig.get(0x1001) == 0x11
-
-
-def test_option_to_go_on() -> None:
-    """With 0x6007 = 0 a drive finishes its move also when it is Stopped."""
-    rig = moving(1)
-    rig.put(0x6007, 0)
-    rig.nmt(NmtCommand.STOP)
-    rig.run(5.0)
-    assert rig.position == pytest.approx(1250)
 
 
 @pytest.mark.parametrize('mode', MODES)

@@ -7,7 +7,6 @@ from __future__ import annotations
 from device_rig import (
     drive_dictionary,
     ENABLE,
-    QUICK_STOP,
     RefusedError,
     Rig,
     SHUTDOWN,
@@ -336,26 +335,6 @@ def test_the_profile_is_that_of_the_hand_over() -> None:
     assert rig.get(0x606C) == -50
 
 
-OFFERS: dict[str, tuple[list[tuple[int, int]], int]] = {
-    'the third has no room': ([(300, 0), (600, 0), (900, 0)], 600),
-    'immediately discards what waits': ([(500, 0), (900, 0), (100, IMMEDIATE)], 100),
-    'relative to a target that waits': ([(300, 0), (200, RELATIVE)], 500),
-    'relative back': ([(300, 0), (-50, RELATIVE)], 250),
-    'immediately': ([(2000, 0), (1500, IMMEDIATE)], 1500),
-}
-
-
-@pytest.mark.parametrize('case', OFFERS)
-def test_set_points_offered_in_a_row(case: str) -> None:
-    """Where the axis ends."""
-    offers, ends = OFFERS[case]
-    rig = enabled(1)
-    for target, bits in offers:
-        offer(rig, target, bits)
-    rig.run(5.0)
-    assert rig.get(0x6064) == ends
-
-
 def test_a_second_set_point_waits_and_begins_at_once() -> None:
     """The acknowledge bit says so until then; two moves take exactly the sum of their times."""
     rig = enabled(1, (0x6068, 0))
@@ -476,28 +455,3 @@ def test_halt_and_resume(option: int, time: float) -> None:
     rig.command(ENABLE)
     rig.run(2.0)
     assert rig.get(0x6064) == 400
-
-
-def test_quick_stop_drops_the_set_points() -> None:
-    """After a quick stop nothing goes on by itself."""
-    rig = enabled(1, (0x605A, 6))
-    offer(rig, 1000)
-    offer(rig, 2000)
-    rig.run(0.5)
-    rig.command(QUICK_STOP)
-    rig.run(0.5)
-    stopped = rig.get(0x6064)
-    rig.command(ENABLE)
-    assert not rig.statusword & ACKNOWLEDGE
-    rig.run(3.0)
-    assert rig.get(0x6064) == stopped
-
-
-def test_selecting_the_mode_in_motion_stops() -> None:
-    """Coming from a velocity, the mode ramps down and waits for a set-point."""
-    rig = enabled(3, (0x60FF, 500))
-    rig.run(1.0)
-    rig.put(0x6060, 1)
-    rig.run(1.0)
-    assert rig.get(0x606C) == 0
-    assert rig.statusword & REACHED

@@ -8,8 +8,6 @@ from binascii import crc_hqx
 import struct
 
 from device_rig import drive_dictionary, NODE_ID, Rig
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
 
 from canopen_core.can import Frame
 from canopen_core.standard import (
@@ -71,88 +69,12 @@ def end_of(data: bytes, crc: int | None = None) -> bytes:
 
 
 def download(rig: Rig, data: bytes) -> None:
-    """Write the file, block after block."""
+    """Write the file in one block."""
     begin_download(rig, len(data))
-    frames = segments_of_blocks(data)
-    for block in frames:
-        answers = [answer for frame in block for answer in query(rig, frame)]
-        assert answers == [bytes((0xA2, len(block), 127, 0, 0, 0, 0, 0))]
+    block = segments(data)
+    answers = [answer for frame in block for answer in query(rig, frame)]
+    assert answers == [bytes((0xA2, len(block), 127, 0, 0, 0, 0, 0))]
     assert query(rig, end_of(data)) == [b'\xa1' + bytes(7)]
-
-
-def segments_of_blocks(data: bytes) -> list[list[bytes]]:
-    """Cut data into blocks of 127 segments."""
-    size = 127 * 7
-    blocks = []
-    for start in range(0, max(1, len(data)), size):
-        block = segments(data[start : start + size])
-        if start + size < len(data):
-            block[-1] = bytes((block[-1][0] & 0x7F,)) + block[-1][1:]
-        blocks.append(block)
-    return blocks
-
-
-def upload(rig: Rig, block_size: int = 127, *, damage: int | None = None) -> bytes:
-    """Read the file by blocks; of the first block the segments after ``damage`` get lost."""
-    (answer,) = query(rig, struct.pack('<B3sBB2x', 0xA4, FILE_NAME, block_size, 0))
-    command, name, size = struct.unpack('<B3sI', answer)
-    assert (command, name) == (0xC6, FILE_NAME)
-    data = b''
-    frames = query(rig, b'\xa3' + bytes(7))
-    while frames[0][0] & 0xE3 != 0xC1 or len(frames) > 1:
-        assert [frame[0] & 0x7F for frame in frames] == list(range(1, len(frames) + 1))
-        assert len(frames) <= block_size
-        taken = len(frames) if damage is None else min(damage, len(frames))
-        damage = None
-        data += b''.join(frame[1:] for frame in frames[:taken])
-        frames = query(rig, bytes((0xA2, taken, block_size)) + bytes(5))
-        if len(data) >= size and len(frames) == 1 and frames[0][0] & 0xE3 == 0xC1:
-            break
-    unused, crc = frames[0][0] >> 2 & 0x07, struct.unpack_from('<xH', frames[0])[0]
-    data = data[: len(data) - unused]
-    assert crc == crc_hqx(data, 0)
-    assert len(data) == size
-    assert query(rig, b'\xa1' + bytes(7)) == []
-    return data
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.binary(max_size=2000), st.integers(1, 127))
-@example(b'', 127)
-@example(bytes(7), 127)
-@example(bytes(8), 1)
-@example(bytes(127 * 7), 127)
-@example(bytes(range(250)) * 240, 127)
-def test_what_is_written_is_read(data: bytes, block_size: int) -> None:
-    """Any data make the way there and back, in blocks of any size, several blocks included."""
-    rig = make_rig()
-    download(rig, data)
-    assert rig.read(FILE) == data
-    assert upload(rig, block_size) == data
-
-
-def test_lost_segment_of_a_download_is_sent_again() -> None:
-    """The device says how far segments came in order, and takes the rest in the next block."""
-    rig = make_rig()
-    data = bytes(range(70))
-    begin_download(rig, len(data))
-    frames = segments(data)
-    answers = [answer for frame in frames[:3] + frames[4:] for answer in query(rig, frame)]
-    assert answers == [bytes((0xA2, 3, 127, 0, 0, 0, 0, 0))]
-    again = segments(data[21:])
-    answers = [answer for frame in again for answer in query(rig, frame)]
-    assert answers == [bytes((0xA2, 7, 127, 0, 0, 0, 0, 0))]
-    assert query(rig, end_of(data)) == [b'\xa1' + bytes(7)]
-    assert rig.read(FILE) == data
-
-
-def test_lost_segment_of_an_upload_is_sent_again() -> None:
-    """A client that took part of a block gets the rest in the next one."""
-    rig = make_rig()
-    data = bytes(range(200))
-    download(rig, data)
-    assert upload(rig, damage=5) == data
-    assert upload(rig, 20, damage=0) == data
 
 
 def abort_code(answers: list[bytes]) -> int:

@@ -102,17 +102,6 @@ def test_starts_by_itself() -> None:
     assert rig.drive.state is SOD
 
 
-def test_reset_of_the_node_starts_anew() -> None:
-    """An enabled drive is Switch on disabled after a reset of its node, and stays where it is."""
-    rig = rig_in(OE)
-    position = rig.position
-    rig.send(0, bytes((0x81, rig.node_id)))
-    assert rig.state is SOD
-    assert rig.position == position
-    rig.run(1.0)
-    assert rig.position == position
-
-
 @pytest.mark.parametrize('state', [SOD, READY, ON, OE, QS])
 def test_fault_from_every_state(state: State) -> None:
     """Transitions 13 and 14: a fault leads to Fault from everywhere, and is reported."""

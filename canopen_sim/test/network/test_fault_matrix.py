@@ -319,8 +319,7 @@ def test_what_stops_a_motion_names_the_error(happen: Callable[[Arm], None], erro
     assert refusals[0].detail[:6] == error
 
 
-@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
-@pytest.mark.parametrize('fault', FAULTS, ids=str)
+@pytest.mark.parametrize(('fault', 'mode'), with_modes(FAULTS))
 def test_fault_in_motion(fault: Fault, mode: OperationMode) -> None:
     """It is reported, the drive stops, refuses targets, and only a command brings it back."""
     arm = Arm()
@@ -672,8 +671,9 @@ def test_an_axis_is_led_to_rest_when_its_device_leaves_operational(
     assert_accepts_targets(arm, mode)
 
 
-@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
-@pytest.mark.parametrize('command', [PRE_OPERATIONAL, STOP, NmtCommand.RESET_NODE])
+@pytest.mark.parametrize(
+    ('command', 'mode'), with_modes([PRE_OPERATIONAL, STOP, NmtCommand.RESET_NODE])
+)
 def test_an_nmt_command_of_a_client_leaves_when_the_axis_stands(
     command: NmtCommand, mode: OperationMode
 ) -> None:

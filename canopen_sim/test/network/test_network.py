@@ -104,19 +104,6 @@ def test_a_lost_heartbeat_is_reported_within_the_consumer_time() -> None:
     assert status.nmt_state is None
 
 
-def test_a_short_power_cut_is_noticed_by_the_boot_up_message() -> None:
-    """Also one shorter than the consumer time: the restart is reported, and the device booted."""
-    net = network()
-    net.boot()
-    net.run(0.2)
-    net.power_off('a')
-    net.run(0.05)
-    net.power_on('a')
-    net.run_until(lambda: not net.network.nodes['a'].online, 0.1)
-    net.run_until(net.all_ready, 0.5)
-    assert 'restarted' in events(net, EventKind.HEARTBEAT_LOST, 'a')[0]
-
-
 def test_a_device_without_heartbeat_is_not_watched() -> None:
     """With no producer time configured, silence is no loss."""
     config = drive_config('a', 2, heartbeat_producer=0.0, heartbeat_timeout=0.0)
