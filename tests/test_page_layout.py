@@ -232,6 +232,31 @@ def test_stop_is_in_reach_and_nothing_overlaps_or_moves(
     page.close()
 
 
+@pytest.mark.parametrize('size', ['desk', 'phone'])
+def test_a_press_of_a_button_that_does_nothing_says_why(
+    browser: Browser, shown: Shown, size: str
+) -> None:
+    """The state of the robot, or what is wanted first; STOP stays in reach."""
+    page = opened(browser, shown, size)
+    chromium.show(page, 'Drive')
+    jog = page.locator('.rv-hold:visible').first
+    why = page.locator('#rv-why')
+    for state, reason in ((STATES[1], 'over current'), (READY, 'Press Walk first.')):
+        if state is READY:
+            number = int(jog.get_attribute('data-hold') or 0)
+            shown.page.live.off[number] = reason
+            page.locator('.rv-off').first.wait_for()
+        see(page, shown, state)
+        jog.dispatch_event('pointerdown', {'button': 0})
+        why.filter(has_text=f'1 −: {reason}' if state is READY else reason).wait_for()
+        low, stop = boxes(page, '#rv-why'), boxes(page, '#robot-stop')
+        ((_, top, _, high),), ((_, above, _, _),) = low.values(), stop.values()
+        assert size == 'desk' or top + high <= above
+    shown.page.live.off.clear()
+    why.wait_for(state='hidden')
+    page.close()
+
+
 def test_the_card_has_the_commands_of_the_readme(browser: Browser, shown: Shown) -> None:
     """Where there is no robot, it says what to type, and goes by itself."""
     page = opened(browser, shown, 'desk')

@@ -508,8 +508,9 @@ class PlanPanel:
     def allow(self, *, execute: bool) -> None:
         """Enable the buttons that need a plan."""
         self._again.disabled = not execute
-        off = self._page.live.off
-        (off.discard if execute else off.add)(self.hold)
+        self._page.live.off.pop(self.hold, None)
+        if not execute:
+            self._page.live.off[self.hold] = 'Plan a motion first.'
 
     def _dropdown(
         self, label: str, options: Sequence[str], action: Callable[[str], None]

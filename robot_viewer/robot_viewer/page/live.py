@@ -61,7 +61,7 @@ class Live:
 
     Attributes:
         movable: The state of the robot lets it be moved.
-        off: Numbers of buttons that would do nothing now.
+        off: Why a button would do nothing now, by its number.
         stopped: STOP was pressed, and nothing was allowed since.
         held: Label of the button that is held; empty for none.
     """
@@ -78,7 +78,7 @@ class Live:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._last = ''
         self.movable = self.stopped = False
-        self.off: set[int] = set()
+        self.off: dict[int, str] = {}
 
     # -- buttons
 
@@ -96,7 +96,7 @@ class Live:
     def remove(self, number: int) -> None:
         """Disconnect a button."""
         self._holds.pop(number, None)
-        self.off.discard(number)
+        self.off.pop(number, None)
 
     def clear(self) -> None:
         """Disconnect all buttons."""
@@ -197,7 +197,7 @@ class Live:
     def show(self, state: dict[str, object]) -> None:
         """Show a state on all pages, from any thread."""
         kind = self._pages.get(self.holder, (None, ''))[1]
-        more = {'holder': self.holder, 'kind': kind, 'off': sorted(self.off)}
+        more = {'holder': self.holder, 'kind': kind, 'off': self.off}
         self._last = json.dumps({**state, **more})
         if self._loop is not None:
             with suppress(RuntimeError):  # it has ended

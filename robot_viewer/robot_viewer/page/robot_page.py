@@ -362,8 +362,11 @@ class RobotPage:
             if button.color != color:
                 button.color = color
         for number, (x, y, _) in self._walk_holds.items():
-            off = mode not in FOLLOWS or (mode == 'turn' and bool(x or y))
-            (self.live.off.add if off else self.live.off.discard)(number)
+            self.live.off.pop(number, None)
+            if mode not in FOLLOWS:
+                self.live.off[number] = 'Press Walk first.'
+            elif mode == 'turn' and (x or y):
+                self.live.off[number] = 'Turn ignores forward and sideways. Press Walk first.'
 
     def show_statuses(self, statuses: Sequence[Status]) -> None:
         """Show how everything is, what is worst first."""
