@@ -632,12 +632,16 @@ def test_a_target_moves_its_joint_alone(robot: Robot, monkeypatch: pytest.Monkey
     assert controllers.history.of('a')[-1].target == 0.504
     monkeypatch.setattr(controllers_module, 'SETTLING_TIMEOUT', 0.1)
     monkeypatch.setattr(controllers_module, 'motion_time', lambda *_: 0.1)
+    live = robot.viewer.page.live
     for count in (5, 7):  # after a stop, and after a target that was not reached
+        assert live._deadman.beat(1, target.hold, time.monotonic())
         robot.viewer.aim({'a': 1.0}, 1.0)
         robot.spin_until(lambda count=count: len(sent) == count, 'an empty trajectory and another')
         assert not sent[-2].points
         assert list(sent[-1].points[0].positions) == [1.0, -9.004]
         robot.spin_until(lambda: not controller.busy, 'the end')
+        assert not live.held, 'it has to be let go before it moves again'
+        live._deadman.release(1, target.hold, time.monotonic() - 1.0)
         robot.viewer.let_go()
 
 

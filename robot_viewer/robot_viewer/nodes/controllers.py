@@ -106,8 +106,12 @@ class Controllers:
         history: What their joints did.
     """
 
-    def __init__(self, node: Node, listening: Listening, report: Report) -> None:
+    def __init__(
+        self, node: Node, listening: Listening, report: Report, ended: Callable[[], None]
+    ) -> None:
+        """Find none yet; ``ended`` is called when a motion has ended whose button is held."""
         self._node, self._listening, self._report = node, listening, report
+        self._ended = ended
         self.found: dict[str, Controller] = {}
         self.history = History()
 
@@ -194,10 +198,12 @@ class Controllers:
                 controller.commands.publish(_trajectory(controller, duration))
             elif controller.busy and controller.arrived:
                 self._conclude(controller, 'target: reached', failed=False)
+                self._ended()
             elif controller.busy and now > controller.ends + SETTLING_TIMEOUT:
                 why = 'target: not reached; are the drives enabled? /rosout has the reason'
                 self._conclude(controller, why, failed=True)
                 controller.lets_go = True
+                self._ended()
 
     def _conclude(self, controller: Controller, text: str, *, failed: bool) -> None:
         controller.targets = {}

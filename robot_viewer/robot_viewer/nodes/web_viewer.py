@@ -131,16 +131,14 @@ class WebViewer(Node):
         self._velocities: Mapping[str, float] = {}
         self._independent: Sequence[str] = ()
         self._listening = Listening(self)
-        self._controllers = Controllers(
-            self, self._listening, lambda text, failed: self.page.say(text, failed=failed)
-        )
-        self._grippers = Grippers(self, lambda text, failed: self.page.say(text, failed=failed))
         self._base = self._shown_base = Transform()
         self._jogs: Publisher | None = None
         self._joint_jogs: Publisher | None = None
         self._walks: Publisher | None = None
         self._joint_states: Publisher | None = None
         self.page = RobotPage(host, port, self)
+        self._controllers = Controllers(self, self._listening, self._say, self.page.end_target)
+        self._grippers = Grippers(self, self._say)
         self._judge = Judge(self, self.page, self._watch, self._triggers)
         self.border = Border(self, lambda text: self.page.say(text, failed=True))
         self._body = Body(self, self.page, self._listening, self._positions)
@@ -498,6 +496,9 @@ class WebViewer(Node):
             return
         response = future.result()
         self._report(what, response.message, failed=not response.success)
+
+    def _say(self, text: str, failed: bool) -> None:
+        self.page.say(text, failed=failed)
 
     def _report(self, what: str, text: str, *, failed: bool) -> None:
         self.page.say(f'{what}: {text}', failed=failed)

@@ -125,10 +125,10 @@ class JogPanel:
             self.target.remove()
         self._tabs.remove()
 
-    def _hold(self, hold: Hold) -> str:
+    def _hold(self, hold: Hold) -> tuple[int, str]:
         number, html = self._live.button(hold)
         self._numbers.append(number)
-        return html
+        return number, html
 
     def _joint_rows(self, jogged: Sequence[str]) -> str:
         free = [joint for joint in self._joints.values() if joint.mimic is None]
@@ -149,7 +149,7 @@ class JogPanel:
                             partial(self._jog_joint, joint.name, way),
                             partial(self._actions.jog_joint, joint.name, 0.0),
                         )
-                    )
+                    )[1]
                     for sign, way in (('−', -1.0), ('+', 1.0))
                 ]
             rows += [cell, *buttons]
@@ -160,7 +160,7 @@ class JogPanel:
         buttons = [
             self._hold(
                 Hold(title, partial(self._jog, axes, twist), partial(self._jog, axes, REST))
-            )
+            )[1]
             for title, twist in TWISTS.items()
         ]
         self._gui.add_html(pad(buttons))

@@ -312,6 +312,11 @@ class RobotPage:
         if self._jog is not None and self._jog.target is not None:
             self._jog.target.follow(positions)
 
+    def end_target(self) -> None:
+        """End the press that moves to the target: that motion has ended."""
+        if self._jog is not None and self._jog.target is not None:
+            self.live.end(self._jog.target.hold)
+
     def show_state(
         self,
         state: RobotState,

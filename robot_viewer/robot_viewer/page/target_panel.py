@@ -57,6 +57,7 @@ class TargetPanel:
 
     Attributes:
         seen: The target is shown.
+        hold: Number of the button that moves to it.
     """
 
     def __init__(
@@ -64,7 +65,7 @@ class TargetPanel:
         server: ViserServer,
         robot: RobotScene,
         joints: Sequence[Joint],
-        ways: tuple[Move, Callable[[], None], Share, Callable[[Hold], str]],
+        ways: tuple[Move, Callable[[], None], Share, Callable[[Hold], tuple[int, str]]],
     ) -> None:
         self._robot, self._links = (
             robot,
@@ -77,7 +78,8 @@ class TargetPanel:
         self.seen = True
         gui = server.gui
         gui.add_html(sentence('Sliders move the violet target only.'))
-        gui.add_html(pad([hold(Hold(HOLD_TARGET, self._move, let_go))], 'rv-one'))
+        self.hold, html = hold(Hold(HOLD_TARGET, self._move, let_go))
+        gui.add_html(pad([html], 'rv-one'))
         for joint in joints:
             low, high = travel(joint)
             slider = gui.add_slider(joint.name, low, high, (high - low) / 1000.0, low)
