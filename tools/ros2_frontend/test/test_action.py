@@ -117,7 +117,7 @@ def test_an_interrupt_cancels_the_goal(
     [
         (('arm_msgs/action/Hom',), f"is invalid\nDid you mean '{TYPE}'?\n"),
         (('std_srvs/srv/Trigger',), 'The passed action type is invalid: std_srvs/srv/Trigger is'),
-        ((TYPE, '{methd: 1}'), "Failed to populate message fields: 'Home_Goal' object has no"),
+        ((TYPE, '{velocity: 1}'), "Failed to populate message fields: 'Home_Goal' object has no"),
         ((TYPE, 'method:1'), 'The passed value needs to be a dictionary'),
     ],
     ids=['type', 'kind', 'field', 'yaml'],
