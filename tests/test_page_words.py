@@ -24,7 +24,7 @@ ENDS = {BootPhase.WAITING, BootPhase.OPERATIONAL, BootPhase.FAILED}
 
 
 def test_words_of_drives() -> None:
-    """Each phase of a boot is one; a fault and a drive with torque are told by their titles."""
+    """Each phase of a boot is one; a fault and a drive with torque are known by their titles."""
     assert set(BOOTING) == {phase.value for phase in BootPhase if phase not in ENDS}
     faults = DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE
     assert {state.title for state in faults} == FAULTY

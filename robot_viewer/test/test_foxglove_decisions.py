@@ -11,8 +11,8 @@ import threading
 from hypothesis import given, strategies
 import pytest
 
-from robot_viewer.foxglove.relay import Admission, FOXGLOVE_ORIGINS, hidden_address, Relay
-from robot_viewer.foxglove.topics import EVERYTHING, is_hidden, NameFilter
+from robot_viewer.nodes.foxglove.relay import Admission, FOXGLOVE_ORIGINS, hidden_address, Relay
+from robot_viewer.nodes.foxglove.topics import EVERYTHING, is_hidden, NameFilter
 
 HEAD = (
     'GET {path} HTTP/1.1\r\nHost: localhost:8765\r\nUpgrade: websocket\r\n'

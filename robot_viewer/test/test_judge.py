@@ -78,7 +78,7 @@ def test_what_the_page_has_moved_is_no_program(bench: Bench) -> None:
 
 
 def test_a_motion_from_before_a_stop_is_no_program(bench: Bench) -> None:
-    """The robot stands when it has confirmed it; what moves after that is told."""
+    """The robot stands when it has confirmed it; what moves after that is reported."""
     bench.look(1.0, 0.2)
     answer: Future[Stop] = Future()
     bench.judge.stop(answer, lambda order: order())

@@ -9,7 +9,7 @@ import threading
 
 from node_runner import run_program
 
-from ..foxglove import BridgeError
+from .foxglove import BridgeError
 from .serving import serve
 
 NAME = 'foxglove_bridge'
@@ -33,7 +33,7 @@ def main() -> int:
 
 def _serve(stop: threading.Event) -> None:
     try:
-        from ..foxglove.node import FoxgloveBridge
+        from .foxglove.node import FoxgloveBridge
     except ModuleNotFoundError as error:
         if error.name != 'foxglove':
             raise

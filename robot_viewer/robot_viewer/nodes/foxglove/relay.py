@@ -30,7 +30,7 @@ import ssl
 import threading
 from urllib.parse import parse_qs, urlsplit
 
-from ..loopback import is_loopback
+from ...loopback import is_loopback
 
 FOXGLOVE_ORIGINS = ('https://app.foxglove.dev', 'file://')
 """Foxglove in a browser, and desktop programs, whose pages are files of their own."""
