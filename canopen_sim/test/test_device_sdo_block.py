@@ -77,6 +77,21 @@ def download(rig: Rig, data: bytes) -> None:
     assert query(rig, end_of(data)) == [b'\xa1' + bytes(7)]
 
 
+def test_lost_segment_of_a_download_is_sent_again() -> None:
+    """The device says how far segments came in order, and takes the rest in the next block."""
+    rig = make_rig()
+    data = bytes(range(70))
+    begin_download(rig, len(data))
+    frames = segments(data)
+    answers = [answer for frame in frames[:3] + frames[4:] for answer in query(rig, frame)]
+    assert answers == [bytes((0xA2, 3, 127, 0, 0, 0, 0, 0))]
+    again = segments(data[21:])
+    answers = [answer for frame in again for answer in query(rig, frame)]
+    assert answers == [bytes((0xA2, 7, 127, 0, 0, 0, 0, 0))]
+    assert query(rig, end_of(data)) == [b'\xa1' + bytes(7)]
+    assert rig.read(FILE) == data
+
+
 def abort_code(answers: list[bytes]) -> int:
     """Return the code of the one answer, which is an abort of the file's transfer."""
     (answer,) = answers

@@ -437,7 +437,7 @@ class VirtualNetwork:
             self._deliver(sender, frame)
         for name in late:  # what the frames have made due is the next event
             if name in self.stations:
-                self.stations[name].advance(self.now)
+                _contain(self.stations[name].advance, self.now)
                 self._look(name)
         return received
 
@@ -467,7 +467,7 @@ class VirtualNetwork:
         for name, station in list(self.stations.items()):
             if name == sender or (isinstance(station, Device) and _ignores(station, frame)):
                 continue
-            station.receive(frame, self.now)
+            _contain(station.receive, frame, self.now)
             self._look(name)
 
     def _look(self, *names: str) -> None:
@@ -584,6 +584,14 @@ def booted(*nodes: NodeConfig, **master: Any) -> VirtualNetwork:
     net = VirtualNetwork(bus_config(*nodes, **master))
     net.boot()
     return net
+
+
+def _contain(call: Callable[..., None], *arguments: Any) -> None:
+    """Note a defect of a station, which the master would take for one of its bus."""
+    try:
+        call(*arguments)
+    except Exception as error:  # noqa: BLE001
+        _defects.found.append(f'a station fails: {error!r}')
 
 
 def _ignores(device: Device, frame: Frame) -> bool:

@@ -31,10 +31,11 @@ from hypothesis import given, Phase, settings, strategies
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen import DriveError, NodeConfig, OperationMode, Severity
+from arm_canopen import DriveError, DriveState, NodeConfig, OperationMode, Severity
 from arm_canopen.cia402.halt import UNDER_HALT_TIME
 from arm_canopen.cia402.modes import Move
 from arm_canopen.cia402.state import VelocityEstimate, WINDOW
+from arm_canopen.config import RecoveryPolicy
 from canopen_core.can import Frame
 from canopen_core.standard import ObjectDictionary, Statusword
 
@@ -269,6 +270,44 @@ def test_a_mode_that_goes_by_sdo_and_gets_lost_does_not_let_the_old_move_go_on()
     assert net.now > begin + 1.5
     assert net.motor() - position < BRAKING_MAX
     assert_rests(net)
+
+
+@pytest.mark.parametrize('verb', ['', 'disable', 'quick_stop', 'halt', 'shutdown'])
+def test_recovery_does_not_undo_a_stop(verb: str) -> None:
+    """A drive that was commanded to stop while it was away is not enabled when it comes back."""
+    drive = drive_config(JOINT, NODE_ID)
+    axis = replace(drive.axes[0], recovery=RecoveryPolicy.AUTO)
+    net = running_in(OperationMode.CYCLIC_POSITION, axes=(axis,))
+    net.power_off(JOINT)
+    net.run(1.0)
+    if verb:
+        with pytest.raises(DriveError, match='cut its power: offline'):
+            net.do(JOINT, verb, preempt=True)
+    net.power_on(JOINT)
+    net.run(3.0)
+    enabled = net.drives[JOINT].view.state is DriveState.OPERATION_ENABLED
+    assert enabled is not bool(verb)
+
+
+@pytest.mark.parametrize('cycles', range(4, 60, 4))
+def test_homing_that_is_cancelled_leaves_the_axis_at_rest(cycles: int) -> None:
+    """While it brakes the move of before, while it switches, while it homes: it stops."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    net.target(2.0)
+    net.run(0.5)
+    begin = net.motor()
+    commands = net.commands[JOINT]
+    running = net.home(17)
+    net.run(cycles * PERIOD)
+    commands.cancel('cancelled')
+    assert running.done
+    net.run(0.5)
+    assert abs(net.motor() - begin) < BRAKING_MAX
+    assert_rests(net)
+    net.run_until(lambda: net.drives[JOINT].accepts_targets)
+    net.target(begin)
+    go(net, 2.0)
+    assert net.drives[JOINT].view.position == pytest.approx(begin, abs=2e-3)
 
 
 OLD = 3.0  # [rad] the target that a halt gives up; the axis never gets there

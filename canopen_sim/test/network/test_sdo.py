@@ -591,6 +591,7 @@ def test_any_long_value_survives_both_ways(size: int, source: random.Random) -> 
 @settings(max_examples=40)
 @given(st.sets(st.integers(1, 250), max_size=6), st.booleans())
 @example({40}, False)
+@example({40}, True)
 def test_lost_segments_are_sent_again(losses: set[int], write: bool) -> None:
     """What comes is the whole value or an error, never something else; one costs no transfer."""
     line = BlockLine()

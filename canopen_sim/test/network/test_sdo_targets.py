@@ -193,6 +193,23 @@ def test_a_target_that_is_not_answered_is_no_success() -> None:
     assert net.motor() == pytest.approx(0.3, abs=1e-3)
 
 
+@pytest.mark.parametrize('mode', [m for m in TARGETS if m != OperationMode.PROFILE_POSITION])
+def test_a_target_whose_answer_is_lost_does_not_go_on_moving(mode: OperationMode) -> None:
+    """The drive has it, and nobody knows: as the answer is an error, the axis is halted."""
+    net = running_in(mode)
+    net.run(0.1)
+    net.wire.loses = lambda sender, frame: frame.can_id == ANSWER
+    with pytest.raises(DriveError, match='did not answer'):
+        net.result(give(net, 0.4 if mode is not OperationMode.PROFILE_TORQUE else 200.0))
+    net.run(1.0)
+    assert abs(net.drives[JOINT].view.rate) < 0.01
+    net.wire.loses = lambda sender, frame: False
+    net.run(0.5)
+    net.result(give(net, 0.2 if mode is not OperationMode.PROFILE_TORQUE else 200.0))
+    net.run(1.0)
+    assert net.drives[JOINT].view.rate > 0.1
+
+
 def test_the_moves_behind_a_refused_one_are_dropped() -> None:
     """Each counts from the one before, so none of them would end where it should."""
     net = running_in(OperationMode.PROFILE_POSITION)
