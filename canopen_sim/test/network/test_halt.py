@@ -209,6 +209,26 @@ def test_a_drive_that_acknowledges_no_more_is_judged_by_its_motion() -> None:
     assert_rests(net)
 
 
+def test_relative_moves_count_from_what_the_drive_has_or_gets() -> None:
+    """An immediate one that waits is not lost by the next, and the answers are where they end."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    commands = net.commands[JOINT]
+    assert 'to 1,' in commands.move(Move(1.0))
+    assert 'to 1.5,' in commands.move(Move(0.5, relative=True))
+    go(net, 4.0)
+    assert net.motor() == pytest.approx(1.5, abs=2e-3)
+    for destination in ('1.6', '1.7', '1.8'):
+        assert f'to {destination},' in commands.move(Move(0.1, relative=True))
+    go(net, 3.0)
+    assert net.motor() == pytest.approx(1.8, abs=2e-3)
+    assert net.drives[JOINT].setpoint == pytest.approx(1.8)
+    commands.move(Move(0.1, relative=True))
+    commands.move(Move(0.5))
+    assert 'to 0.4,' in commands.move(Move(-0.1, relative=True))
+    go(net, 4.0)
+    assert net.motor() == pytest.approx(0.4, abs=2e-3)
+
+
 def test_a_relative_move_after_a_halt_is_refused() -> None:
     """It would count from the target that was given up; after an absolute one it is taken."""
     net = running_in(OperationMode.PROFILE_POSITION)
