@@ -349,7 +349,7 @@ class CanopenMaster:
         """Listen for another master before the first frame; call it right before :meth:`start`.
 
         Returns:
-            The other master, or why none could be heard, where the bus is led beside it; else
+            The other master, or why none could be found, where the bus is led beside it; else
             empty.
 
         Raises:

@@ -1189,7 +1189,7 @@ def test_a_bus_that_is_not_read_to_its_end_is_refused_in_words(frame: Frame, ste
     assert 'beside_master:=true' in str(no.value)
 
 
-def test_a_master_that_is_heard_counts_where_the_rest_stays_unread() -> None:
+def test_a_master_that_is_found_counts_where_the_rest_stays_unread() -> None:
     """It is named, as in any other case."""
     bus = EndlessBus(Frame(0x080, timestamp=10.1), UNREAD)
     with bus:
@@ -1197,7 +1197,7 @@ def test_a_master_that_is_heard_counts_where_the_rest_stays_unread() -> None:
 
 
 def test_beside_another_master_a_bus_that_is_not_read_to_its_end_is_reported() -> None:
-    """It is led all the same, and the owner is told what is not known."""
+    """It is led all the same, and what is not known is reported."""
     bus = EndlessBus(UNREAD)
     with bus:
         clock = Clock(lambda: bus.now, Future)
