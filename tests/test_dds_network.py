@@ -158,8 +158,8 @@ def test_a_link_that_is_cut_or_slow_stops_the_arm_and_heals(isolation: Isolation
 
 @pytest.mark.timeout(300)
 @pytest.mark.skipif(bool(chromium.lacking()), reason=chromium.lacking())
-def test_a_page_of_the_other_side_jogs_stops_with_the_link_and_heals(isolation: Isolation) -> None:
-    """A button held in a browser there, beside the viewer; it says when the robot is silent."""
+def test_a_page_of_the_other_side_jogs_and_stops_with_the_link(isolation: Isolation) -> None:
+    """A slow link ends while the button is held; after a silent robot it has to be pressed anew."""
     with two_linked_hosts() as (robot, desk, link):
         env = isolation.env | {NETWORK_VARIABLE: desk.interface}
         with (
@@ -183,6 +183,10 @@ def test_a_page_of_the_other_side_jogs_stops_with_the_link_and_heals(isolation: 
                 if fault.cut:
                     chromium.state_is(page, 'NO CONTACT WITH THE ROBOT')
                 link.condition = Condition()
+                if fault.cut:
+                    chromium.state_is(page, 'READY')
+                    page.mouse.up()
+                    chromium.hold(page, turn)
                 watch.wait_until_last('^moving')
                 chromium.state_is(page, 'MOVING')
                 page.mouse.up()

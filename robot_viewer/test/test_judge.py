@@ -38,10 +38,11 @@ class Bench:
             get_clock=lambda: clock,
             get_name=lambda: 'web_viewer',
         )
-        self.calls: Any = SimpleNamespace(running='', forget=lambda _: None)
+        calls: Any = SimpleNamespace(running='', forget=lambda _: None)
+        self.calls = calls
         self.watch = Watch()
         self.watch.listen(begins=True)
-        self.judge = Judge(node, page, self.watch, self.calls)
+        self.judge = Judge(node, page, self.watch, calls)
         self.judge.robot = 'arm'
 
     def look(self, seconds: float, velocity: float, drives: str = '') -> str:
