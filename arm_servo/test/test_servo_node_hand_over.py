@@ -136,6 +136,7 @@ def test_set_points_keep_every_limit(
             assert point is not None
             states.append(point.state)
     kept(robot(name).limits, states, PERIOD)
+    assert not states[-1].moving
 
 
 @given(TWISTS)

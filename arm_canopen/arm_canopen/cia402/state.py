@@ -416,28 +416,35 @@ class AxisState:
         return drive_state(word)
 
     async def confirm(self) -> bool:
-        """Read 0x6041 where a TPDO with it may have got lost; return whether it was another one.
+        """Read by SDO what a lost TPDO may have changed; return whether anything differs.
 
-        What is read takes the place of what the last TPDO has shown.
+        State, mode, position and velocity that were read take the place of those of the last TPDOs.
         """
-        reader = self._statusword
-        if not (isinstance(reader, InputReader) and reader.source.loss_unnoticed):
-            return False
-        count = reader.source.count
-        try:
-            word = await self.node.objects.read_object(self.at(Index.STATUSWORD))
-        except (SdoError, CodecError):
-            return False
-        if not isinstance(word, int) or reader.source.count != count or reader.value is None:
-            return False  # a TPDO that came meanwhile is newer, or as new
-        other = drive_state(word) is not drive_state(int(reader.value))
-        if other:
-            reader.correct(word)
-        return other
+        differs = False
+        for index, reader in (
+            (Index.STATUSWORD, self._statusword),
+            (Index.MODE_OF_OPERATION_DISPLAY, self._mode),
+            (Index.POSITION_ACTUAL, self._position),
+            (Index.VELOCITY_ACTUAL, self._velocity),
+        ):
+            if not (isinstance(reader, InputReader) and reader.source.loss_unnoticed):
+                continue
+            count = reader.source.count
+            try:
+                value = await self.node.objects.read_object(self.at(index))
+            except (SdoError, CodecError):
+                continue
+            if not isinstance(value, int) or reader.source.count != count:
+                continue  # a TPDO that came meanwhile is newer, or as new
+            if reader.value not in (None, value):
+                reader.correct(value, self._scheduler.now)
+                self._estimate.clear()  # the way between both was not seen
+                differs = True
+        return differs
 
     @contextmanager
     def looking(self) -> Iterator[None]:
-        """Read by SDO periodically while TPDOs do not show the state."""
+        """Read by SDO periodically while TPDOs do not show the state, or may have got lost."""
         task = self._scheduler.background(self._look_on())
         try:
             yield
@@ -447,8 +454,7 @@ class AxisState:
     async def _look_on(self) -> None:
         while True:
             await self._scheduler.timer(LOOK_PERIOD)
-            if not self.fresh:
-                await self.look()
+            await (self.confirm() if self.fresh else self.look())
 
     def actual(self) -> Actual:
         """Return where the drive is, and the velocity from which it has to be braked.

@@ -77,6 +77,8 @@ class AxisSteps:
             await self._scheduler.until(ready, READY_TIMEOUT)
         except TimeoutError:
             raise DriveError(self._why_not_ready()) from None
+        if not to_stop and await axis.view.confirm():
+            await self.settle()  # until the cycle has seen what lost TPDOs had
         self._require_operational()
 
     async def reach(self, goal: DriveState) -> None:
@@ -88,8 +90,6 @@ class AxisSteps:
         """
         axis = self.axis
         enabling = goal is DriveState.OPERATION_ENABLED
-        if enabling and await axis.view.confirm():
-            await self.settle()  # until the cycle has seen the state that a lost TPDO had
         if enabling and not axis.stays_enabled:
             await self._begin_enabling()
         timeout = self.quirks.state_timeout

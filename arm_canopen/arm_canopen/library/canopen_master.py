@@ -235,7 +235,7 @@ class CanopenMaster:
             raise BusError(f'{OWNER} has ended')
         if not self.started:
             if other := self.listen():
-                logger.warning('going on beside another master: %s', other)
+                logger.warning('beside_master is set; starting anyway: %s', other)
             atexit.register(self.close)
             self.start(self._raise_priority)
         if timeout is None:

@@ -149,7 +149,8 @@ def refuse_other_master(bus: Bus, config: BusConfig, clock: Callable[[], float])
     """Listen, and refuse a bus that another master leads.
 
     Raises:
-        OtherMasterError: There is one; the message names its frames. Or that is not known.
+        OtherMasterError: Another master leads the bus, and the message names its frames; or the
+            bus could not be read to its end.
     """
     try:
         found = listen(bus, config, clock)

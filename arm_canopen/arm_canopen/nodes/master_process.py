@@ -102,9 +102,7 @@ class MasterProcess:
             OtherMasterError: There is one, or that is not known, and beside_master is not set.
         """
         if other := self._master.listen():
-            self._node.get_logger().warning(
-                f'going on beside another master, by beside_master: {other}'
-            )
+            self._node.get_logger().warning(f'beside_master is set; starting anyway: {other}')
 
     def start(self) -> None:
         """Boot the devices and start the cycle."""

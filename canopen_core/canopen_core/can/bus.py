@@ -85,7 +85,7 @@ class WallClock:
     """How far the wall clock is ahead of the steady clock, also while somebody sets it.
 
     Both run at one rate, so what is known of the difference is kept within what is read anew. A
-    thread that loses the processor between two readings learns little, and nothing wrong.
+    thread that loses the processor between two readings gets a wider bound, and no error.
     """
 
     def __init__(self) -> None:

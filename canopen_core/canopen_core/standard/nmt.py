@@ -80,7 +80,7 @@ def parse_nmt(data: bytes) -> tuple[NmtCommand, int] | None:
 
 
 def nmt_addressee(node_id: int) -> str:
-    """Say whom an NMT command with this node id is for."""
+    """Return the addressee of an NMT command in words."""
     return 'all nodes' if node_id == ALL_NODES else f'node {node_id}'
 
 

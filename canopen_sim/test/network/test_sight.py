@@ -339,24 +339,69 @@ def test_an_axis_is_not_held_at_a_position_of_unknown_age(
     assert led.net.simulated().state is DriveState.SWITCH_ON_DISABLED
 
 
-@pytest.mark.parametrize('verb', ['enable', 'recover', 'init'])
-@pytest.mark.parametrize(
+UNNOTICED = pytest.mark.parametrize(
     'config', [on_change(timer=False), on_change(0)], ids=['no timer', 'type 0']
 )
+
+
+@pytest.mark.parametrize('verb', ['enable', 'recover', 'init'])
+@UNNOTICED
 def test_a_change_that_got_lost_is_read_before_a_drive_is_enabled(
     config: NodeConfig, verb: str
 ) -> None:
     """Else it would count as enabled for good, by the last TPDO that came."""
     net = enabled(config, OperationMode.PROFILE_POSITION)
     net.wire.loses = lambda sender, frame: frame.can_id in TPDOS
-    with pytest.raises(DriveError):
-        net.do(JOINT, 'quick_stop', preempt=True)
-    net.run(5.0)
+    net.devices[JOINT].faults.inject(FaultInjection(Fault.STO, duration=0.5), net.now)
+    net.run(1.0)
     assert net.simulated().state is not DriveState.OPERATION_ENABLED
     net.wire.loses = lambda sender, frame: False
     answer = net.do(JOINT, verb)
     assert 'Operation enabled' in answer
     assert net.simulated().state is DriveState.OPERATION_ENABLED
+
+
+@pytest.mark.parametrize('verb', ['halt', 'quick_stop', 'shutdown'])
+@UNNOTICED
+def test_a_stop_is_seen_by_sdo_where_its_tpdos_get_lost(config: NodeConfig, verb: str) -> None:
+    """It is answered when the drive stands, in its true state, and not before."""
+    led = Led(OperationMode.CYCLIC_POSITION, Leader(), config)
+    led.lose(*TPDOS)
+    answer = led.net.do(JOINT, verb, preempt=True)
+    assert led.net.speed() == pytest.approx(0.0, abs=1e-2)
+    assert led.net.simulated().state.title in answer
+
+
+@UNNOTICED
+def test_a_fault_that_got_lost_is_reset_at_once(config: NodeConfig) -> None:
+    """By recover and init; enable names it."""
+    net = enabled(config, OperationMode.PROFILE_POSITION)
+    net.wire.loses = lambda sender, frame: frame.can_id in (*TPDOS, 0x080 + NODE_ID)
+    net.devices[JOINT].faults.inject(FaultInjection(Fault.OVER_CURRENT), net.now)
+    net.run(1.0)
+    net.wire.loses = lambda sender, frame: False
+    assert net.simulated().state is DriveState.FAULT
+    with pytest.raises(DriveError, match='is faulted; recover it first'):
+        net.do(JOINT, 'enable')
+    assert 'Operation enabled' in net.do(JOINT, 'recover')
+
+
+@STREAMED
+@UNNOTICED
+def test_a_drive_that_moved_unseen_is_enabled_where_it_is(
+    config: NodeConfig, mode: OperationMode
+) -> None:
+    """Its position is read, too, and the motor does not go back to the last one that came."""
+    led = Led(mode, Leader(), config)
+    led.lose(*TPDOS)
+    shown = led.net.motor()
+    led.net.run(10.0)
+    rest = led.net.motor()
+    assert abs(rest - shown) > 0.05
+    led.lose()
+    led.net.do(JOINT, 'enable')
+    assert max(map(abs, led.velocities(1.0))) < 0.02
+    assert led.net.motor() == pytest.approx(rest, abs=1e-3)
 
 
 def test_a_device_that_refuses_its_event_timer_is_named() -> None:
