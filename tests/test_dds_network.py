@@ -159,7 +159,7 @@ def test_a_link_that_is_cut_or_slow_stops_the_arm_and_heals(isolation: Isolation
 @pytest.mark.timeout(300)
 @pytest.mark.skipif(bool(chromium.lacking()), reason=chromium.lacking())
 def test_a_page_of_the_other_side_jogs_and_stops_with_the_link(isolation: Isolation) -> None:
-    """A slow link ends while the button is held; after a silent robot it has to be pressed anew."""
+    """The button held goes on after a slow link; after a silent robot it is pressed anew."""
     with two_linked_hosts() as (robot, desk, link):
         env = isolation.env | {NETWORK_VARIABLE: desk.interface}
         with (

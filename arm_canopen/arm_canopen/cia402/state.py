@@ -418,7 +418,7 @@ class AxisState:
     async def confirm(self) -> bool:
         """Read by SDO what a lost TPDO may have changed; return whether anything differs.
 
-        State, mode, position and velocity that were read take the place of those of the last TPDOs.
+        State, mode, position and velocity as read take the place of those of the last TPDOs.
         """
         differs = False
         for index, reader in (

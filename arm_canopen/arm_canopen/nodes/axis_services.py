@@ -73,7 +73,7 @@ class AxisServices:
         self._offer(name, lambda: commands.run(name, commands.select_mode(mode)))
 
     def _admitted(self, command: Callable[[], T]) -> Callable[[], T]:
-        """Return the command with the check of ``admit`` made once more, in the thread of the cycle."""
+        """Return the command with ``admit`` checked once more, in the thread of the cycle."""
 
         def run() -> T:
             self._node.admit()
