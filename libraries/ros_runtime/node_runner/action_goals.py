@@ -23,8 +23,8 @@ ANSWER_DELAY = 0.02
 
 Clients of rclpy 7.1 note a request after it was sent, and drop an answer that another thread gets
 before: 1 of 40 motions of pymoveit2 waited for ever. Python switches threads every 5 ms, and with
-several of them, or on a busy computer, it takes some switches. An answer to a cancel is not held
-back: with it the goal itself would be.
+several of them, or on a busy computer, it takes some switches. Cancel requests are not delayed,
+because the motion would go on meanwhile.
 """
 
 
