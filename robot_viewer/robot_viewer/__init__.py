@@ -12,6 +12,7 @@ from .state_publisher import (
     JointWatch,
     MessageProblem,
     Settings,
+    Severity,
     StatePublisher,
 )
 
@@ -22,5 +23,6 @@ __all__ = [
     'JointWatch',
     'MessageProblem',
     'Settings',
+    'Severity',
     'StatePublisher',
 ]

@@ -30,6 +30,13 @@ START_TIMEOUT = 30.0
 """Time in [s] in which a publisher comes: a robot may take so long to start."""
 
 
+class Severity(Enum):
+    """How bad it is what :class:`JointWatch` reports."""
+
+    NOTE = 'note'
+    WARNING = 'warning'
+
+
 @dataclass(frozen=True, slots=True)
 class Settings:
     """How transforms are published; names and defaults are robot_state_publisher's.
@@ -212,36 +219,38 @@ class JointWatch:
         self._silent.difference_update(names)
         self._unknown.update(name for name in names if name not in self._known)
 
-    def reports(self, now: float, topic: str, publishers: int) -> dict[str, bool]:
-        """Return what was not reported yet, and whether it is wrong or only a note."""
+    def reports(self, now: float, topic: str, publishers: int) -> dict[str, Severity]:
+        """Return the texts that were not reported yet, with their severities."""
         found = self._received_reports(topic) if self._received else {}
         if not self._received and self._silent:
             found = self._silence_reports(now, topic, publishers)
         if now < self._due:
             return {}
-        fresh = {text: wrong for text, wrong in found.items() if text not in self._reported}
+        fresh = {text: how for text, how in found.items() if text not in self._reported}
         self._reported.update(fresh)
         return fresh
 
-    def _received_reports(self, topic: str) -> dict[str, bool]:
+    def _received_reports(self, topic: str) -> dict[str, Severity]:
         silent, unknown = ', '.join(sorted(self._silent)), ', '.join(sorted(self._unknown))
         found = {}
         if silent:
             text = f'{silent}: no /tf below these joints of the robot description'
-            found[f'no message on {topic} has {text}'] = True
+            found[f'no message on {topic} has {text}'] = Severity.WARNING
         if unknown:
-            found[f'on {topic}, but not in the robot description: {unknown}'] = True
+            text = f'on {topic}, but not in the robot description: {unknown}'
+            found[text] = Severity.WARNING
         return found
 
-    def _silence_reports(self, now: float, topic: str, publishers: int) -> dict[str, bool]:
+    def _silence_reports(self, now: float, topic: str, publishers: int) -> dict[str, Severity]:
         """Report a silent publisher, or that there is none yet."""
         check = f'check the publisher (ros2 topic info {topic}) and ROS_DOMAIN_ID'
         if publishers and self._publisher_due == math.inf:
             self._publisher_due = now + SILENCE_TIMEOUT
         begun = self._publisher_due < math.inf
         if now >= (self._publisher_due if begun else self._start_due):
-            return {f'no message on {topic}, so no /tf of moving joints; {check}': True}
+            text = f'no message on {topic}, so no /tf of moving joints; {check}'
+            return {text: Severity.WARNING}
         if begun:
             return {}
         why = 'as nobody publishes it: fine while the robot starts'
-        return {f'no message on {topic} yet, {why}; else {check}': False}
+        return {f'no message on {topic} yet, {why}; else {check}': Severity.NOTE}

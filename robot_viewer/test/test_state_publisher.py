@@ -13,7 +13,7 @@ import pytest
 from urdf_reader import read_urdf
 from urdf_robots import ARM, POSITIONS
 
-from robot_viewer import JointWatch, MessageProblem, Settings, StatePublisher
+from robot_viewer import JointWatch, MessageProblem, Settings, Severity, StatePublisher
 from robot_viewer.state_publisher import SILENCE_TIMEOUT, START_TIMEOUT, Update
 
 MS = 1_000_000
@@ -223,13 +223,13 @@ def test_a_silent_publisher_is_reported_with_what_to_look_at(watch: JointWatch) 
 def test_a_start_that_takes_long_is_no_reason_to_warn(watch: JointWatch) -> None:
     """It is a note, once; and a warning when it is too long for a start."""
     assert not watch.reports(SOON, TOPIC, 0)
-    ((note, wrong),) = watch.reports(LATE, TOPIC, 0).items()
+    ((note, severity),) = watch.reports(LATE, TOPIC, 0).items()
     assert 'nobody publishes it: fine while the robot starts' in note
-    assert not wrong
+    assert severity is Severity.NOTE
     assert not watch.reports(LATE, TOPIC, 0)
-    ((text, wrong),) = watch.reports(START_TIMEOUT + 0.1, TOPIC, 0).items()
+    ((text, severity),) = watch.reports(START_TIMEOUT + 0.1, TOPIC, 0).items()
     assert f'ros2 topic info {TOPIC}' in text
-    assert wrong
+    assert severity is Severity.WARNING
 
 
 def test_a_robot_without_moving_joints_needs_no_messages() -> None:

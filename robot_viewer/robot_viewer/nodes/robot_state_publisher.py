@@ -38,6 +38,7 @@ from ..state_publisher import (
     JointWatch,
     MessageProblem,
     Settings,
+    Severity,
     StatePublisher,
 )
 
@@ -132,8 +133,10 @@ class RobotStatePublisher(Node):
     def _watch_joints(self) -> None:
         topic = self._subscription.topic_name
         now, publishers = time.monotonic(), self.count_publishers(topic)
-        for text, wrong in self._watch.reports(now, topic, publishers).items():
-            if wrong:  # a line of its own for each severity: rclpy refuses another one
+        for text, severity in self._watch.reports(now, topic, publishers).items():
+            if (
+                severity is Severity.WARNING
+            ):  # a line of its own for each severity: rclpy refuses another one
                 self.get_logger().warning(text)
             else:
                 self.get_logger().info(text)
