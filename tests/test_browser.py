@@ -530,7 +530,10 @@ def test_a_fault_has_two_presses_to_motion(seen: Seen) -> None:
 
 
 def test_a_robot_that_stops_late(seen: Seen) -> None:
-    """The warning gives way to its answer, however often STOP was pressed until then."""
+    """The warning gives way to its answer, however often STOP was pressed until then.
+
+    One that was pressed without contact is said to be lost when contact is back.
+    """
     answers, stands = list[Future[Stop]](), threading.Event()
     answer = Stop(stands=True, text='stopped: legs')
 
@@ -542,11 +545,13 @@ def test_a_robot_that_stops_late(seen: Seen) -> None:
 
     def show() -> None:
         while not over.wait(0.2):  # of a page that says nothing the overlay says NO CONTACT
+            if silent.is_set():
+                continue
             stage = 'stopped' if stands.is_set() else 'braking' if answers else ''
             state = RobotState('READY', Level.WELL, '')
             served.show_state(state, {}, stop=stage, simulated=True, program='', listens='')
 
-    over = threading.Event()
+    over, silent = threading.Event(), threading.Event()
     with (
         closing(RobotPage('127.0.0.1', 8600, cast(Actions, SimpleNamespace(stop=stop)))) as served,
         ThreadPoolExecutor() as threads,
@@ -555,6 +560,15 @@ def test_a_robot_that_stops_late(seen: Seen) -> None:
         try:
             page = chromium.open_page(seen.browser, served.url, robot='')
             words_of_stop(page, 'Space').wait_for()
+            silent.set()
+            words_of_stop(page, 'does NOT reach the robot').wait_for()
+            page.route('**/stop', lambda route: route.abort())
+            with page.expect_event('requestfailed'):
+                page.keyboard.press('Space')
+            words_of_stop(page, 'does NOT reach the robot').wait_for()
+            silent.clear()
+            words_of_stop(page, 'the last STOP was NOT received').wait_for()
+            page.unroute('**/stop')
             for _ in range(9):  # more than a browser sends at once
                 page.keyboard.press('Space')
             words_of_stop(page, 'NOT confirmed: use the emergency stop').wait_for()
