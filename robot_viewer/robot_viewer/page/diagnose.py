@@ -59,7 +59,7 @@ class _Entry:
 
 
 class Log:
-    """The last entries; what is said again is counted.
+    """The last entries; what is said again is counted. Thread-safe.
 
     Attributes:
         html: All of it, the last entry first.
@@ -68,22 +68,23 @@ class Log:
     def __init__(self) -> None:
         """Begin with none."""
         self._entries: deque[_Entry] = deque(maxlen=KEPT)
-        self._html: str | None = ''
+        self._html, self._changed = '', False
 
     def add(self, at: float, who: str, text: str, mark: Mark) -> None:
         """Keep an entry."""
-        self._html = None
         last = self._entries[-1] if self._entries else None
         if last is not None and (last.who, last.text) == (who, text):
             last.at, last.count = at, last.count + 1
         else:
             self._entries.append(_Entry(at, who, text, mark))
+        self._changed = True
 
     @property
     def html(self) -> str:
         """All of it, the last entry first."""
-        if self._html is None:
-            self._html = ''.join(map(_line, reversed(self._entries)))
+        if self._changed:
+            self._changed = False  # first: another thread may add an entry meanwhile
+            self._html = ''.join(map(_line, reversed(tuple(self._entries))))
         return self._html
 
 

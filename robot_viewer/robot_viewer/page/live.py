@@ -213,8 +213,8 @@ class Deadman:
     A caller that moves something sends one command for each heartbeat that counts, and nothing
     else: a page that is gone sends none, and the robot's own time-out stops the motion. Of what a
     slow connection has held up and delivers at once, one counts. After a stop a button that was
-    held has to be let go, however its heartbeats pause; so has one that was refused, as it would
-    move the robot when that ends, under a finger that waits.
+    held has to be let go, however its heartbeats pause. A refused press has to be released, too;
+    otherwise the robot would start when the reason for the refusal ends.
 
     One page has control: the first that holds a button, until it is closed or another takes it.
 
@@ -236,7 +236,8 @@ class Deadman:
 
     def end(self, button: Hashable) -> None:
         """Ignore a button that is held until it is released: what it did has ended."""
-        ended = {press for press in self._pressed if press[1] == button}
+        pressed = tuple(self._pressed)  # another thread may add to it
+        ended = {press for press in pressed if press[1] == button}
         self._barred |= ended
         if ended:
             self._last = -math.inf
@@ -259,7 +260,7 @@ class Deadman:
     def leave(self, page: Hashable) -> None:
         """Forget a page that was closed."""
         for presses in (self._pressed, self._barred):
-            presses.difference_update([press for press in presses if press[0] == page])
+            presses.difference_update([press for press in tuple(presses) if press[0] == page])
         self._released = {press: at for press, at in self._released.items() if press[0] != page}
         if self.holder == page:
             self.holder = None
