@@ -281,6 +281,25 @@ def test_an_execution_goes_on_as_long_as_its_button_is_held(planner: Planner, ho
     assert not live.held
 
 
+def test_a_move_group_that_has_gone_ends_the_press_and_its_reasons(planner: Planner) -> None:
+    """Why its execution was canceled is no reason of the next one's failure."""
+    plan, live = planner.viewer._planning, planner.viewer.page.live
+    planner.plan()
+    planner.do('execute')
+    planner.spin_until(lambda: bool(planner.execute.goals), 'an execution')
+    assert live._deadman.beat(1, planner.panel.hold, time.monotonic())
+    plan.order(plan.let_go)
+    plan.order(partial(plan.look, {}))  # in the same turn
+    planner.spin_until(lambda: 'move_group is gone' in planner.said, 'its end')
+    assert not live._deadman.beat(1, planner.panel.hold, time.monotonic() + 1.0)
+    planner.plan()
+    planner.do('execute')
+    planner.spin_until(lambda: len(planner.execute.goals) == 2, 'an execution')
+    planner.execute.answer(MoveItErrorCodes.CONTROL_FAILED)
+    planner.spin_until(lambda: 'CONTROL_FAILED' in planner.said, 'a failure')
+    assert 'ended, as' not in planner.said
+
+
 def test_a_press_that_waited_too_long_executes_nothing(planner: Planner) -> None:
     """A node that was held up learns of it when the button may be up already."""
     planner.plan()

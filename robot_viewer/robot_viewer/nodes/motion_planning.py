@@ -133,6 +133,8 @@ class MotionPlanning:
                 self._connect()
         elif not there and self._execution is not None:
             self._execution = None
+            if self.panel is not None:
+                self._page.live.end(self.panel.hold)
             self.say('move_group is gone; what it executed may go on: STOP', failed=True)
         if self.panel is None and self._semantic and self._page.robot is not None:
             self._offer(self._page.robot)
@@ -357,6 +359,7 @@ class MotionPlanning:
         goal = import_module('moveit_msgs.action').ExecuteTrajectory.Goal()
         goal.trajectory = self._trajectory
         self._trajectory, self._shown_since, self._held_at = None, None, at
+        self._canceled_as = ''
         self._executed_goal = self._goal, self._joints
         self.panel.allow(execute=False)
         if self._motion is not None:
@@ -374,7 +377,6 @@ class MotionPlanning:
         reason = why or refusal(result.error_code)
         if reason and self._canceled_as:
             reason = f'ended, as {self._canceled_as} ({reason})'
-        self._canceled_as = ''
         if self.panel is not None:
             self._page.live.end(self.panel.hold)
         if not reason and self._executed_goal == (self._goal, self._joints):
