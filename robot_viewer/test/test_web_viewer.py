@@ -426,6 +426,12 @@ def test_a_gripper_is_opened_closed_and_stopped(robot: Robot, said: list[str]) -
     panel._grip('Open gripper', '/hand', 2.0)
     assert said[-1] == f'Open gripper: stopped; press {ALLOW} first'
     assert len(goals) == 4
+    robot.viewer.grip('/hand', 2.0)
+    robot.spin_until(lambda: len(goals) == 5, 'a goal')
+    assert robot.viewer._grippers.busy
+    robot.viewer._grippers.look({}, {})  # its server died before the result
+    assert not robot.viewer._grippers.busy
+    assert said[-1].startswith('/hand: its action is gone')
 
 
 def test_the_page_keeps_what_the_robot_warns_of(robot: Robot) -> None:
@@ -517,6 +523,15 @@ def test_after_stop_the_page_moves_nothing_until_that_is_allowed(robot: Robot) -
     robot.success = False
     page._stop()
     robot.spin_until(lambda: answers[-1].startswith('STOP NOT CONFIRMED: '), 'no confirmation')
+
+
+def test_a_request_that_no_service_serves_is_refused(robot: Robot, said: list[str]) -> None:
+    """A drive may lack what another one has; it does not run for ever."""
+    answers: list[bool] = []
+    robot.viewer._triggers.call_all('Home joint1', [], answers.append)
+    assert said == ['Home joint1: is not offered']
+    assert answers == [False]
+    assert not robot.viewer._triggers.running
 
 
 def test_the_action_calls_one_group_of_services_after_the_other(robot: Robot) -> None:
@@ -643,6 +658,29 @@ def test_a_target_moves_its_joint_alone(robot: Robot, monkeypatch: pytest.Monkey
         assert not live.held, 'it has to be let go before it moves again'
         live._deadman.release(1, target.hold, time.monotonic() - 1.0)
         robot.viewer.let_go()
+
+
+@pytest.mark.parametrize(('target', 'end'), [(0.5, 'reached'), (1.0, 'not reached')])
+def test_a_press_lasts_until_all_controllers_are_done(
+    robot: Robot, said: list[str], monkeypatch: pytest.MonkeyPatch, target: float, end: str
+) -> None:
+    """The joints of a further arm go on when those of the first have arrived, or have not."""
+    monkeypatch.setattr(controllers_module, 'RELEASED_AFTER', math.inf)
+    monkeypatch.setattr(controllers_module, 'SETTLING_TIMEOUT', 0.1)
+    monkeypatch.setattr(controllers_module, 'motion_time', lambda p, *_: 0.1 if 'a' in p else 60.0)
+    _, controller, panel = targets_of(robot)
+    further = Controller(controller.commands, ('c',), {'c': 0.0})
+    robot.viewer._controllers.found['/further_controller'] = further
+    deadman, hold = robot.viewer.page.live._deadman, panel.hold
+    assert deadman.beat(1, hold, time.monotonic())
+    robot.viewer.aim({'a': target, 'c': 1.0}, 1.0)
+    robot.spin_until(lambda: any(each.startswith(f'target: {end}') for each in said), 'an end')
+    assert not controller.busy
+    assert further.busy
+    assert deadman.beat(1, hold, time.monotonic() + 1.0), 'it is still held'
+    further.positions['c'] = 1.0
+    robot.spin_until(lambda: not further.busy, 'the other end')
+    assert not deadman.beat(1, hold, time.monotonic() + 2.0)
 
 
 @pytest.mark.parametrize('way', ['let go', 'lost'])

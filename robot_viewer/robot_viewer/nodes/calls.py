@@ -73,6 +73,11 @@ class TriggerCalls:
             services: Their full names.
             done: Takes whether all have succeeded.
         """
+        if not services:
+            self._report(what, 'is not offered', failed=True)
+            if done is not None:
+                done(False)
+            return
         answers: dict[str, tuple[bool, str]] = {}
 
         def take(service: str, call: Future | None) -> None:

@@ -109,7 +109,7 @@ class Controllers:
     def __init__(
         self, node: Node, listening: Listening, report: Report, ended: Callable[[], None]
     ) -> None:
-        """Find none yet; ``ended`` is called when a motion has ended whose button is held."""
+        """Find none yet; ``ended`` is called when all joints of a held button are done."""
         self._node, self._listening, self._report = node, listening, report
         self._ended = ended
         self.found: dict[str, Controller] = {}
@@ -198,12 +198,16 @@ class Controllers:
                 controller.commands.publish(_trajectory(controller, duration))
             elif controller.busy and controller.arrived:
                 self._conclude(controller, 'target: reached', failed=False)
-                self._ended()
+                self._end_press()
             elif controller.busy and now > controller.ends + SETTLING_TIMEOUT:
                 why = 'target: not reached; are the drives enabled? /rosout has the reason'
                 self._conclude(controller, why, failed=True)
                 controller.lets_go = True
-                self._ended()
+                self._end_press()
+
+    def _end_press(self) -> None:
+        if not self.busy:  # the joints of another controller go on
+            self._ended()
 
     def _conclude(self, controller: Controller, text: str, *, failed: bool) -> None:
         controller.targets = {}

@@ -25,6 +25,7 @@ SINGLE_TYPE = 'control_msgs/action/GripperCommand_SendGoal'
 
 @dataclass(frozen=True, slots=True)
 class _Gripper:
+    service: str
     client: ActionClient
     joint: str
 
@@ -53,11 +54,17 @@ class Grippers:
         self._ends = {joint.name: travel(joint) for joint in tree.movable()}
         for name in [n for n, each in self._found.items() if each.joint not in self._ends]:
             self._found.pop(name).client.destroy()
+            self._calls.pop(name, None)
 
     def look(
         self, services: Mapping[str, Sequence[str]], controllers: Mapping[str, Controller]
     ) -> None:
-        """Find those of one joint."""
+        """Find those of one joint; expect no result of a server that is gone."""
+        for name, gripper in self._found.items():
+            call = self._calls.get(name)
+            if gripper.service not in services and call is not None and not call.ended:
+                del self._calls[name]
+                self._report(f'{name}: its action is gone; what it moved may go on: STOP', True)
         for service, kinds in services.items():
             action = service.removesuffix(SEND_GOAL)
             name = action.rpartition('/')[0]
@@ -71,7 +78,7 @@ class Grippers:
             ):
                 kind = import_module('control_msgs.action').GripperCommand
                 client = ActionClient(self._node, kind, action)
-                self._found[name] = _Gripper(client, controller.joints[0])
+                self._found[name] = _Gripper(service, client, controller.joints[0])
 
     def grip(self, name: str, position: float) -> None:
         """Move one to a position of its joint in [m] or [rad]."""
