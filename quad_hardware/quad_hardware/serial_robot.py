@@ -17,7 +17,6 @@ from .estimation import Estimator, EstimatorSettings
 from .exceptions import CommandError
 from .joints import JointCommander, JointMap, LimiterSettings, LossReaction
 from .joints.command import NOMINAL_PERIOD
-from .letting_go import judge, Letting
 from .link import Driver, LinkOptions, LinkState, LinkStatus, Session, STALE_TIME
 from .recording import (
     FaultWatch,
@@ -28,6 +27,7 @@ from .recording import (
     StateEntered,
 )
 from .report import Report
+from .torque_off import check_torque_off, TorqueOffResult
 
 LINK, ROBOT, COMMANDS = 'serial link', 'robot', 'joint commands'
 """What a fault is of; diagnostics have the same names."""
@@ -237,11 +237,11 @@ class SerialRobot(ObservedRobot):
             self._commander.let_go()
         return sent
 
-    def look_at_loads(self) -> Letting | None:
-        """Return whether the servos have let go since they were asked to; None for look again."""
+    def check_torque_off(self) -> TorqueOffResult | None:
+        """Return what became of torque off; None while a later report may show it."""
         motors = [servo.motor for servo in self._joints.servos]
         sent_at, now = self._driver.released_at, time.monotonic()
-        return judge(self._seen, motors, self._let_go_at, sent_at, now)
+        return check_torque_off(self._seen, motors, self._let_go_at, sent_at, now)
 
     # -- for the black box
 

@@ -158,7 +158,7 @@ class ControllerNode(Node):
         self._gait = settings.gait
         self.add_on_set_parameters_callback(self._tune)
         self.create_timer(settings.diagnostics_period, self._diagnose)
-        self._types = self.create_timer(TYPE_PERIOD, self._look_for_stamped)
+        self._types = self.create_timer(TYPE_PERIOD, self._check_for_stamped)
         robot = settings.robot
         self.get_logger().info(
             f'{len(robot.names)} joints, {robot.mass:.2f} kg; waiting for joint_states'
@@ -317,7 +317,7 @@ class ControllerNode(Node):
         # its age counts from its arrival: clocks of two machines need not agree
         self._take_twist(message.twist)
 
-    def _look_for_stamped(self) -> None:
+    def _check_for_stamped(self) -> None:
         """Receive TwistStamped on cmd_vel, too, as soon as something publishes it."""
         topic = self.resolve_topic_name('cmd_vel')
         kinds = {info.topic_type for info in self.get_publishers_info_by_topic(topic)}

@@ -68,14 +68,16 @@ class HardwareNode(Node):
         self._reader = FastReader(JointCommand, 'position', 'velocity', 'effort')
         self.create_subscription(JointCommand, 'joint_command', self._take, COMMAND_QOS, raw=True)
         create_deferred_service(self, SetBool, '~/torque', self._set_torque)
-        self._letting_go: list[Future[SetBool.Response]] = []  # to be answered
+        self._torque_off_requests: list[Future[SetBool.Response]] = []  # to be answered
         self.create_timer(settings.diagnostics_period, self._diagnose)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         timeout = self._robot.timeout
         self._silence = self.create_timer(timeout, self._miss_commands, clock=steady)
         self._descent = self.create_timer(NOMINAL_PERIOD, self._go_down, clock=steady)
-        self._looks = self.create_timer(NOMINAL_PERIOD, self._look_at_loads, clock=steady)
-        for timer in (self._silence, self._descent, self._looks):
+        self._torque_timer = self.create_timer(
+            NOMINAL_PERIOD, self._check_torque_off, clock=steady
+        )
+        for timer in (self._silence, self._descent, self._torque_timer):
             timer.cancel()
         count, path = len(self._robot.names), settings.robot.link.path
         self.get_logger().info(f'{count} joints; looking for the robot on {path}')
@@ -87,7 +89,7 @@ class HardwareNode(Node):
 
     def end(self) -> None:
         """Close the port; the servos hold their last target, at rest."""
-        for future in self._letting_go:
+        for future in self._torque_off_requests:
             future.cancel()
         self._robot.end(self.get_logger().error)
 
@@ -138,23 +140,23 @@ class HardwareNode(Node):
             detail = self._robot.status().detail
             future.set_result(SetBool.Response(success=False, message=detail))
         elif on:
-            self._answer_letting_go(False, 'torque was switched on again meanwhile')
+            self._answer_torque_off(False, 'torque was switched on again meanwhile')
             self.get_logger().info('the servos hold')
             future.set_result(SetBool.Response(success=True, message='the servos hold'))
         else:
-            self._letting_go.append(future)
-            self._looks.reset()
+            self._torque_off_requests.append(future)
+            self._torque_timer.reset()
         return future
 
-    def _look_at_loads(self) -> None:
+    def _check_torque_off(self) -> None:
         """Answer requests for torque off as soon as reports show what became of it."""
-        found = self._robot.look_at_loads()
+        found = self._robot.check_torque_off()
         if found is not None:
-            self._answer_letting_go(found.succeeded, found.value)
+            self._answer_torque_off(found.succeeded, found.value)
 
-    def _answer_letting_go(self, success: bool, message: str) -> None:
-        self._looks.cancel()
-        futures, self._letting_go = self._letting_go, []
+    def _answer_torque_off(self, success: bool, message: str) -> None:
+        self._torque_timer.cancel()
+        futures, self._torque_off_requests = self._torque_off_requests, []
         if futures:
             self.get_logger().info(f'torque off: {message}')
         for future in futures:

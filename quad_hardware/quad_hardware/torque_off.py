@@ -15,7 +15,7 @@ NO_LOAD = 1.0  # [%] of the stall torque
 DELAY = 0.04
 
 
-class Letting(Enum):
+class TorqueOffResult(Enum):
     """What became of torque off, in words."""
 
     LIMP = 'the servos are without torque'
@@ -30,16 +30,16 @@ class Letting(Enum):
     @property
     def succeeded(self) -> bool:
         """Whether nothing that is reported speaks against it."""
-        return self in {Letting.LIMP, Letting.NOT_REPORTED}
+        return self in {TorqueOffResult.LIMP, TorqueOffResult.NOT_REPORTED}
 
 
-def judge(
+def check_torque_off(
     report: Report | None,
     motors: Collection[int],
     asked_at: float,
     sent_at: float | None,
     now: float,
-) -> Letting | None:
+) -> TorqueOffResult | None:
     """Return what became of torque off; None while a later report may show it.
 
     Args:
@@ -49,15 +49,15 @@ def judge(
         sent_at: When it was given to the line [s]; None before.
         now: When this is asked [s].
     """
-    found = Letting.UNSENT if sent_at is None else Letting.UNKNOWN
+    found = TorqueOffResult.UNSENT if sent_at is None else TorqueOffResult.UNKNOWN
     if sent_at is not None and report is not None and _made_at(report) >= sent_at + DELAY:
         if not report.loads:
-            return Letting.NOT_REPORTED
+            return TorqueOffResult.NOT_REPORTED
         known = [abs(report.loads[motor]) for motor in motors if motor in report.loads]
         if max(known, default=0.0) > NO_LOAD:
-            found = Letting.PULLS
+            found = TorqueOffResult.PULLS
         elif len(known) == len(motors):
-            return Letting.LIMP
+            return TorqueOffResult.LIMP
     return found if now - asked_at >= TIMEOUT else None
 
 

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from quad_hardware.letting_go import DELAY, judge, Letting, NO_LOAD, TIMEOUT
 from quad_hardware.protocol import LEG_MOTORS
 from quad_hardware.report import Report
+from quad_hardware.torque_off import check_torque_off, DELAY, NO_LOAD, TIMEOUT, TorqueOffResult
 
 ASKED, SENT = 10.0, 10.01  # [s]
 LATE = ASKED + TIMEOUT
@@ -31,37 +31,40 @@ def report_of(loads: Mapping[int, float] | None, arrival: float) -> Report:
 @pytest.mark.parametrize(
     ('loads', 'found', 'in_the_end'),
     [
-        (LIMP, Letting.LIMP, Letting.LIMP),
-        ({**LIMP, 11: -NO_LOAD}, Letting.LIMP, Letting.LIMP),
-        ({**LIMP, 11: -12.0}, None, Letting.PULLS),
-        ({**LIMP, 99: 12.0}, Letting.LIMP, Letting.LIMP),
-        ({motor: 0.0 for motor in LEG_MOTORS if motor != 11}, None, Letting.UNKNOWN),
-        ({motor: 12.0 for motor in LEG_MOTORS if motor != 11}, None, Letting.PULLS),
-        (None, Letting.NOT_REPORTED, Letting.NOT_REPORTED),
-        ({}, Letting.NOT_REPORTED, Letting.NOT_REPORTED),
+        (LIMP, TorqueOffResult.LIMP, TorqueOffResult.LIMP),
+        ({**LIMP, 11: -NO_LOAD}, TorqueOffResult.LIMP, TorqueOffResult.LIMP),
+        ({**LIMP, 11: -12.0}, None, TorqueOffResult.PULLS),
+        ({**LIMP, 99: 12.0}, TorqueOffResult.LIMP, TorqueOffResult.LIMP),
+        ({motor: 0.0 for motor in LEG_MOTORS if motor != 11}, None, TorqueOffResult.UNKNOWN),
+        ({motor: 12.0 for motor in LEG_MOTORS if motor != 11}, None, TorqueOffResult.PULLS),
+        (None, TorqueOffResult.NOT_REPORTED, TorqueOffResult.NOT_REPORTED),
+        ({}, TorqueOffResult.NOT_REPORTED, TorqueOffResult.NOT_REPORTED),
     ],
 )
 def test_a_report_after_torque_off_shows_what_became_of_it(
-    loads: Mapping[int, float] | None, found: Letting | None, in_the_end: Letting
+    loads: Mapping[int, float] | None, found: TorqueOffResult | None, in_the_end: TorqueOffResult
 ) -> None:
     """Servos that pull may still let go; one that is not reported is not known to have."""
     report = report_of(loads, SENT + DELAY + 2.0 * WIRE)
-    assert judge(report, LEG_MOTORS, ASKED, SENT, report.arrival) is found
-    assert judge(report, LEG_MOTORS, ASKED, SENT, LATE) is in_the_end
+    assert check_torque_off(report, LEG_MOTORS, ASKED, SENT, report.arrival) is found
+    assert check_torque_off(report, LEG_MOTORS, ASKED, SENT, LATE) is in_the_end
 
 
 @given(st.floats(-1.0, DELAY + 0.5 * WIRE), st.sampled_from([LIMP, None]))
 def test_a_report_of_before_shows_nothing(after: float, loads: Mapping[int, float] | None) -> None:
     """It was made while the servos held, or may have been on its way when they let go."""
     report = report_of(loads, SENT + after)
-    assert judge(report, LEG_MOTORS, ASKED, SENT, SENT + 0.1) is None
-    assert judge(report, LEG_MOTORS, ASKED, SENT, LATE) is Letting.UNKNOWN
+    assert check_torque_off(report, LEG_MOTORS, ASKED, SENT, SENT + 0.1) is None
+    assert check_torque_off(report, LEG_MOTORS, ASKED, SENT, LATE) is TorqueOffResult.UNKNOWN
 
 
 def test_what_was_not_sent_let_nobody_go() -> None:
     """Whatever is reported meanwhile."""
     report = report_of(LIMP, ASKED + 0.3)
-    assert judge(report, LEG_MOTORS, ASKED, None, ASKED + 0.3) is None
-    assert judge(report, LEG_MOTORS, ASKED, None, LATE) is Letting.UNSENT
-    assert judge(None, LEG_MOTORS, ASKED, SENT, LATE) is Letting.UNKNOWN
-    assert [each for each in Letting if each.succeeded] == [Letting.LIMP, Letting.NOT_REPORTED]
+    assert check_torque_off(report, LEG_MOTORS, ASKED, None, ASKED + 0.3) is None
+    assert check_torque_off(report, LEG_MOTORS, ASKED, None, LATE) is TorqueOffResult.UNSENT
+    assert check_torque_off(None, LEG_MOTORS, ASKED, SENT, LATE) is TorqueOffResult.UNKNOWN
+    assert [each for each in TorqueOffResult if each.succeeded] == [
+        TorqueOffResult.LIMP,
+        TorqueOffResult.NOT_REPORTED,
+    ]
