@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 import math
 from pathlib import Path
+import re
 from types import SimpleNamespace
 from typing import Any
 
@@ -223,8 +224,9 @@ def test_the_node_serves_others_while_it_waits_for_servos_to_let_go(rig: NodeRig
     answers = [rig.client.call_async(SetBool, name, off) for _ in range(2)]
     assert rig.client.call(SetBool, name, SetBool.Request(data=True)).success
     rig.client.spin_until(lambda: all(a.done() for a in answers), TIMEOUT, 'answers')
-    found = [(a.result().success, a.result().message) for a in answers]
-    assert found == [(False, 'torque was switched on again meanwhile')] * 2
+    assert not any(each.result().success for each in answers)
+    for each in answers:  # on a busy machine the time for letting go may be over first
+        assert re.search('switched on again meanwhile|still report load', each.result().message)
     rig.client.spin_until(lambda: rig.peer.torque, TIMEOUT, 'torque on')
     rig.peer.behaviour.limp_load = 0.0
     assert rig.client.call(SetBool, name, off).success
