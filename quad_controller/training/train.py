@@ -19,6 +19,7 @@ import time
 
 from progress import Progress
 
+from quad_controller.policy_check.main import MAX_DURATION, MIN_DURATION
 from quad_controller.policy_check.main import run as check_policy
 from quad_description import run_command
 
@@ -93,7 +94,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--environments', type=int, default=64, help='at once')
     parser.add_argument('--rounds', type=int, default=6, help='of the imitation')
-    parser.add_argument('--way', type=_positive, default=4.0, help='of each command compared [s]')
+    parser.add_argument('--way', type=_duration, default=4.0, help='of each command compared [s]')
     parser.add_argument('--output', type=Path, metavar='FOLDER', help='for policy and curves')
     return parser
 
@@ -102,6 +103,17 @@ def _positive(text: str) -> float:
     value = float(text)
     if not 0.0 < value < math.inf:
         raise argparse.ArgumentTypeError(f'{text} is not above 0')
+    return value
+
+
+def _duration(text: str) -> float:
+    value = float(text)
+    if (
+        not MIN_DURATION <= value <= MAX_DURATION
+    ):  # check_policy would refuse it after the training
+        raise argparse.ArgumentTypeError(
+            f'{text} is not a time in [s]: it must be {MIN_DURATION:g} to {MAX_DURATION:g}'
+        )
     return value
 
 
