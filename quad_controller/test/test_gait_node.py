@@ -205,6 +205,20 @@ def test_from_lying_to_walking_and_back(robot: Robot) -> None:
     assert float(figures['feedback_to_command_p50']) > 0.0
 
 
+def test_stop_ends_a_walk_while_velocities_come(robot: Robot) -> None:
+    """The service that STOP of every view calls; the robot stands."""
+    robot.begin()
+    robot.until_ready()
+    assert robot.mode('walk').success
+    ahead = Twist()
+    ahead.linear.x = 0.2
+    robot.client.node.create_timer(0.1, lambda: robot.twist.publish(ahead))
+    robot.until_state('walk')
+    answer = robot.client.trigger('stop')
+    assert (answer.success, answer.message) == (True, 'stopped: walk; the mode is stand')
+    robot.until_state('stand')
+
+
 def test_a_shipped_policy_is_found_checked_watched_and_recorded(
     isolation: Isolation, tmp_path: Path
 ) -> None:
