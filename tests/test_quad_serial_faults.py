@@ -93,7 +93,11 @@ HELD = ('controller', 'fault, .*(joint states|attitude|imu)|joint states are .* 
 def test_a_broken_line_is_reported_and_survived(
     quad: SimulatedQuad, fault: str, settings: list[str], reasons: list[tuple[str, str]]
 ) -> None:
-    """Upright, without a jump, and walking again when the line is good again."""
+    """No jump, and walking again when the line is good again.
+
+    It does not fall, but leans: while reports are missing, be it for all of the fault or, of a
+    corrupt or lossy line, between two that come through, the legs are held in mid-trot.
+    """
     diagnostics = quad.client.listen(DiagnosticArray, '/diagnostics')
     counts = [said(quad, speaker, reason) for speaker, reason in reasons]
     inject(quad, fault, *settings)
