@@ -437,9 +437,11 @@ class AxisState:
             if not isinstance(value, int) or reader.source.count != count:
                 continue  # a TPDO that came meanwhile is newer, or as new
             if reader.value not in (None, value):
-                reader.correct(value, self._scheduler.now)
-                self._estimate.clear()  # the way between both was not seen
+                reader.correct(value)
                 differs = True
+                if reader is self._position:  # the way between both was not seen
+                    reader.source.timestamp = self._scheduler.now
+                    self._estimate.clear()
         return differs
 
     @contextmanager

@@ -238,11 +238,11 @@ class InputReader:
         """Its TPDO."""
         return self._source
 
-    def correct(self, value: Number, now: float) -> None:
-        """Replace the value by one that was read by SDO at a steady time, as its TPDO got lost."""
+    def correct(self, value: Number) -> None:
+        """Replace the value by one that was read by SDO, as its TPDO got lost."""
         values = [*(self._source.values or ())]
         values[self._position : self._position + 1] = [value]
-        self._source.values, self._source.timestamp = tuple(values), now
+        self._source.values = tuple(values)
 
 
 class OutputWriter:
