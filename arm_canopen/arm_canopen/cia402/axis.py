@@ -736,8 +736,12 @@ class Axis:
             margin=min(margin, window),
             window=window,
             error=shown,
+            received=view.positions_received,
         )
         if following is Following.FOLLOWS:
+            return
+        if following is Following.UNDECIDED:
+            self.node.image.skip_cycle()
             return
         self._following.clear()
         where = f'commanded to {setpoint:g}, it is at {position:g}'

@@ -18,6 +18,7 @@ class Following(Enum):
     """What the positions of the last half second show."""
 
     FOLLOWS = 'it follows'
+    UNDECIDED = 'it is seen again, where it was before'
     LEFT_BEHIND = 'the set-points moved, and it did not'
     LASTING_ERROR = 'it has been beside its set-points for too long'
 
@@ -35,6 +36,7 @@ class FollowingWatch:
         self._samples: deque[tuple[float, float, float]] = deque()
         self._beside_since: float | None = None
         self._unseen_from: float | None = None  # set-point when the axis was seen last
+        self._received = 0  # positions, in the cycle in which it was seen again
 
     def clear(self) -> None:
         """Forget the set-points: the axis is not led by them any more."""
@@ -42,7 +44,13 @@ class FollowingWatch:
         self._beside_since = self._unseen_from = None
 
     def lose_sight(self) -> None:
-        """The axis is led on, but its positions are too old to be judged."""
+        """The axis is led on, but its positions are too old to be judged.
+
+        The first that comes again may be old, too. Where frames were lost, the axis stands there,
+        and the set-point that is due would make it jump. Where they were late, several positions
+        come in a cycle: the axis is led on, and a set-point at the first would make it jump back.
+        Thus none leaves in the first cycle.
+        """
         if self._samples:
             setpoint = self._samples[0][1]  # positions count as too old after some time only
             self.clear()
@@ -57,6 +65,7 @@ class FollowingWatch:
         margin: float,
         window: float,
         error: bool,
+        received: int,
     ) -> Following:
         """Judge by set-point and position of this cycle whether the axis follows.
 
@@ -69,17 +78,23 @@ class FollowingWatch:
             window: How far one that moves, or is pulled by a load, may lastingly be beside them
                 in user units; not below the margin.
             error: The drive itself shows a following error.
+            received: Number of positions received from the axis so far.
         """
-        samples, unseen_from = self._samples, self._unseen_from
-        self._unseen_from = None
+        samples = self._samples
         samples.append((now, setpoint, position))
         while samples[0][0] < now - WINDOW:
             samples.popleft()
         if not error and abs(position - setpoint) <= margin:
-            self._beside_since = None
+            self._beside_since = self._unseen_from = None
             return Following.FOLLOWS
+        unseen_from, cycles = self._unseen_from, len(samples) - 1
         if unseen_from is not None and abs(setpoint - unseen_from) > MOVED_SHARE * margin:
-            return Following.LEFT_BEHIND
+            if not cycles:
+                self._received = received
+                return Following.UNDECIDED
+            if received - self._received <= cycles:
+                return Following.LEFT_BEHIND
+        self._unseen_from = None
         setpoints = [sample[1] for sample in samples]
         low, high = min(setpoints), max(setpoints)
         beside = max(low - position, position - high)

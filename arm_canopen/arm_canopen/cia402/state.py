@@ -235,6 +235,11 @@ class AxisState:
         return self._scheduler.now - self._position.source.timestamp
 
     @property
+    def positions_received(self) -> int:
+        """How many TPDOs with 0x6064 have come."""
+        return self._position.source.count
+
+    @property
     def velocity(self) -> float:
         """Actual velocity; from the positions where no PDO has it."""
         reported = self.velocity_dev

@@ -151,6 +151,7 @@ class SentRpdo:
         self.due = False  # it was published, and leaves with the next cycle
         # axes that are commanded by SDO; while there are any, it does not leave
         self.kept_back_by: set[object] = set()
+        self.skips = False  # it does not leave in this cycle
         self._repeat_time = REPEAT_SHARE * (config.event_time or 0.0)
         self._left_at: float | None = None
         self.codec = PdoCodec(config.mapping)  # its compiled mapping
@@ -169,6 +170,9 @@ class SentRpdo:
 
         One with a deadline is repeated within it, once somebody has published it.
         """
+        if self.skips:
+            self.skips = False
+            return False
         if self.cyclic:
             return not self.kept_back_by
         repeat = self._left_at is not None and 0.0 < self._repeat_time <= now - self._left_at
@@ -324,6 +328,11 @@ class ProcessImage:
             entry.clear()
         for output in self.rpdos:
             output.reset()
+
+    def skip_cycle(self) -> None:
+        """Send no RPDO in this cycle."""
+        for output in self.rpdos:
+            output.skips = True
 
     def store(self, index: int, subindex: int, value: Number) -> list[SentRpdo]:
         """Write a value of an object to the RPDOs that carry it; return those."""

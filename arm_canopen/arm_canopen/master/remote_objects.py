@@ -62,6 +62,8 @@ def start_value(config: NodeConfig, mapped: MappedObject) -> Number:
 class BackgroundReader:
     """An object that no TPDO carries; it is polled by SDO."""
 
+    count = 0  # of TPDOs with it
+
     def __init__(self, stale_after: float) -> None:
         self.value: Number | None = None  # the value, None while unknown
         self.timestamp = 0.0  # steady time of its last answer in [s]

@@ -129,6 +129,10 @@ class VirtualWire:
         if not self.loses(sender, frame):
             self._way.append((self._free_at, sender, self.alters(sender, frame)))
 
+    def stall(self, now: float, duration: float) -> None:
+        """Keep all frames from now on for a duration in [s], as a gateway or a full CPU does."""
+        self._free_at = max(now, self._free_at) + duration
+
     @property
     def next_arrival(self) -> float:
         """When the next frame arrives in [s]."""

@@ -234,7 +234,7 @@ def judged(
     for cycle in range(round(duration / PERIOD)):
         now = cycle * PERIOD
         where = setpoint(now), position(now)
-        verdict = watch.judge(now, *where, margin=0.1, window=0.1, error=False)
+        verdict = watch.judge(now, *where, margin=0.1, window=0.1, error=False, received=cycle)
         if verdict is not Following.FOLLOWS:
             return verdict, now
     return Following.FOLLOWS, duration
@@ -275,18 +275,32 @@ def test_verdicts(
     ],
     ids=['stuck', 'followed', 'droop'],
 )
-def test_an_axis_that_was_led_on_unseen_is_judged_by_its_first_position(
+def test_an_axis_that_was_led_on_unseen_is_judged_by_its_first_positions(
     setpoint: float, position: float, verdict: Following
 ) -> None:
     """Set-points that moved meanwhile have left it behind; a droop may pass."""
     watch = FollowingWatch()
     limits = {'margin': 0.1, 'window': 0.1}
     for cycle in range(10):
-        seen = watch.judge(cycle * PERIOD, 0.0, 0.0, error=False, **limits)
+        seen = watch.judge(cycle * PERIOD, 0.0, 0.0, error=False, received=cycle, **limits)
         assert seen is Following.FOLLOWS
     watch.lose_sight()
     watch.lose_sight()
-    assert watch.judge(1.0, setpoint, position, error=False, **limits) is verdict
+    stuck = verdict is Following.LEFT_BEHIND
+    first = watch.judge(1.0, setpoint, position, error=False, received=10, **limits)
+    assert first is (Following.UNDECIDED if stuck else verdict)
+    second = watch.judge(1.01, setpoint, position, error=False, received=11, **limits)
+    assert second is verdict
+
+
+@STREAMED
+def test_frames_that_were_late_are_not_taken_for_lost(mode: OperationMode) -> None:
+    """The first position that comes is old, and a set-point there would make the axis jump."""
+    config = replace(with_window(0xFFFF_FFFF), heartbeat_producer=0.0, heartbeat_timeout=0.0)
+    led = Led(mode, Leader(), config)
+    led.net.wire.stall(led.net.now, TIME_OUT + 0.05)
+    assert min(led.velocities()) > -0.02
+    assert not led.net.reported(Severity.ERROR)
 
 
 def on_change(transmission: int = 255, *, timer: bool = True) -> NodeConfig:
