@@ -5,54 +5,28 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from servo_commands import SteppedWorker
 from servo_drives import Drives
+from servo_goals import GoalNode
 
 from arm_servo.core.motion_queue import MotionCommand
 from arm_servo.ros.trajectory.action import TrajectoryAction
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
 
 
-class Server:
-    """What the action does with rclpy's server and its goals."""
-
-    def __init__(self) -> None:
-        self.concluded: list[Any] = []
-        self.logged: list[str] = []
-
-    def notify_execute(self, handle: object, _callback: object) -> None:
-        """Note the end of a goal."""
-        self.concluded.append(handle)
-
-    def get_logger(self) -> Any:
-        """Return what takes log messages."""
-        return SimpleNamespace(error=self.logged.append, warning=self.logged.append)
+def action(monkeypatch: pytest.MonkeyPatch, drives: Drives, follow: Any) -> GoalNode:
+    """Return the node of an action whose goals have trajectories for requests."""
+    node: Any = GoalNode(monkeypatch)
+    TrajectoryAction(node, drives.gateway, 20.0, lambda request: follow(request.goal))
+    return cast('GoalNode', node)
 
 
-def action(drives: Drives, follow: Any) -> tuple[TrajectoryAction, Server]:
-    """Return the action without its ROS server."""
-    server = Server()
-    made: Any = object.__new__(TrajectoryAction)
-    made._node, made._server, made._gateway, made._goals = server, server, drives.gateway, {}
-    made._convert = lambda request: request.goal
-    made._follow = follow
-    return made, server
-
-
-def handle(goal: object) -> Any:
-    """Return the handle of a goal that was accepted."""
-    return SimpleNamespace(
-        goal_id=SimpleNamespace(uuid=bytes(16)),
-        request=SimpleNamespace(goal=goal, trajectory=SimpleNamespace(points=[])),
-        is_cancel_requested=False,
-        publish_feedback=lambda _feedback: None,
-        abort=lambda: None,
-        succeed=lambda: None,
-        canceled=lambda: None,
-    )
+def message(goal: object) -> Any:
+    """Return a goal message."""
+    return SimpleNamespace(goal=goal, trajectory=SimpleNamespace(points=[]))
 
 
 def ready(worker: SteppedWorker | None = None) -> Drives:
@@ -63,22 +37,20 @@ def ready(worker: SteppedWorker | None = None) -> Drives:
     return drives
 
 
-def test_an_unexpected_error_at_the_start_of_a_goal_is_its_result() -> None:
+def test_an_unexpected_error_at_the_start_of_a_goal_is_its_result(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """It does not leave the callback, where it would end the master and all drives with it."""
-    drives = ready()
 
     def follow(_goal: TrajectoryGoal) -> MotionCommand:
         raise ZeroDivisionError('no such luck')
 
-    made, server = action(drives, follow)
-    goal = handle(None)
-    made._start(goal)
-    made._watch()
-    assert server.concluded == [goal]
-    result = made._conclude(goal)
-    assert result.error_code == GoalCode.INVALID_GOAL
-    assert 'ZeroDivisionError' in result.error_string
-    assert server.logged
+    node = action(monkeypatch, ready(), follow)
+    goal = node.send(message(None))
+    assert goal.ending == 'aborted'
+    assert goal.result.error_code == GoalCode.INVALID_GOAL
+    assert 'ZeroDivisionError' in goal.result.error_string
+    assert node.logged
 
 
 def test_an_unexpected_error_of_the_planning_is_its_result(
@@ -86,43 +58,37 @@ def test_an_unexpected_error_of_the_planning_is_its_result(
 ) -> None:
     """The next goal is planned as ever."""
     drives = ready()
-    made, server = action(drives, drives.gateway.request)
+    node = action(monkeypatch, drives, drives.gateway.request)
     there = [axis.setpoint + 0.05 for axis in drives.axes]
     goal = TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(2.0, there)])
     with monkeypatch.context() as patch:
         patch.setattr(drives.gateway._core, 'prepare', lambda *_: 1 // 0)
-        bad = handle(goal)
-        made._start(bad)
+        bad = node.send(message(goal))
         drives.run(5)
-        made._watch()
-        assert server.concluded == [bad]
-        assert made._conclude(bad).error_code == GoalCode.INVALID_GOAL
-    good = handle(goal)
-    made._start(good)
+        node.watch()
+        assert bad.result.error_code == GoalCode.INVALID_GOAL
+    good = node.send(message(goal))
     drives.run(300)
-    made._watch()
-    assert made._conclude(good).error_code == GoalCode.SUCCESSFUL
+    node.watch()
+    assert good.ending == 'succeeded'
+    assert good.result.error_code == GoalCode.SUCCESSFUL
 
 
-def test_a_cancel_in_the_middle_of_the_planning_ends_the_goal() -> None:
+def test_a_cancel_in_the_middle_of_the_planning_ends_the_goal(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """As canceled, and nothing moves."""
     worker = SteppedWorker()
     drives = ready(worker)
-    made, server = action(drives, drives.gateway.request)
+    node = action(monkeypatch, drives, drives.gateway.request)
     before = drives.path[-1].tolist()
-    goal = handle(
-        TrajectoryGoal(
-            drives.gateway.model.joints,
-            [GoalPoint(2.0, [axis.setpoint + 0.05 for axis in drives.axes])],
-        )
-    )
-    made._start(goal)
+    there = [axis.setpoint + 0.05 for axis in drives.axes]
+    goal = node.send(message(TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(2.0, there)])))
     drives.run(1)
-    goal.is_cancel_requested = True
-    made._cancel(goal)
+    node.cancel(goal)
     worker.run()
     drives.run(20)
-    made._watch()
-    assert server.concluded == [goal]
-    assert made._conclude(goal).error_code == GoalCode.SUCCESSFUL
+    node.watch()
+    assert goal.ending == 'canceled'
+    assert goal.result.error_code == GoalCode.SUCCESSFUL
     assert drives.path[-1].tolist() == before

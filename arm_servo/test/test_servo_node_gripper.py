@@ -10,10 +10,13 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from sensor_msgs.msg import JointState
 from servo_drives import Drives, PERIOD
+from servo_goals import GoalNode
 
 from arm_model import CommandError
 from arm_servo import NotReadyError, PauseRequest, SpeedRequest, TargetRequest
+from arm_servo.ros import motion_goals
 from arm_servo.ros.gripper import controller
 from arm_servo.ros.gripper.controller import GripperController
 from arm_servo.ros.gripper.interfaces import PARALLEL, SINGLE
@@ -31,8 +34,6 @@ class Gripper:
 
     Attributes:
         drives: The drives.
-        ended: How the goals ended, by their names.
-        warnings: What was warned of.
     """
 
     def __init__(self, clock: Any, *, allow_stalling: bool = False) -> None:
@@ -40,23 +41,25 @@ class Gripper:
         self.drives.attach()
         self.drives.run(2)
         clock.monotonic = lambda: self.drives.now
-        self.ended: dict[str, str] = {}
-        self._made: Any = object.__new__(GripperController)
-        self.warnings: list[str] = []
-        logger = SimpleNamespace(warning=self.warnings.append)
-        node: Any = SimpleNamespace(get_logger=lambda: logger)
-        self._made._node = node
-        self._made._gateway = self.drives.gateway
-        self._made._parameters = GripperParameters(0.002, 0.001, 1.0, allow_stalling)
-        self._made._joints = self.drives.gateway.model.joints
-        self._made._goals = {}
-        self._made._newest = self._made._abandoned = None
-        self._made._has_warned = False
-        self._made._prepare = self._made._check_active = lambda: None
-        conclude: Any = SimpleNamespace(
-            notify_execute=lambda handle, _: self._made._conclude(handle)
+        self._node = clock.node
+        self._goals: dict[str, Any] = {}
+        GripperController(
+            self._node,
+            self.drives.gateway,
+            GripperParameters(0.002, 0.001, 1.0, allow_stalling),
+            lambda: None,
+            lambda: None,
         )
-        self._made._servers = {'': conclude}
+
+    @property
+    def ended(self) -> dict[str, str]:
+        """How the goals ended, by their names."""
+        return {name: goal.ending for name, goal in self._goals.items() if goal.ending}
+
+    @property
+    def warnings(self) -> list[str]:
+        """What was warned of."""
+        return list(self._node.logged)
 
     @property
     def position(self) -> float:
@@ -65,33 +68,14 @@ class Gripper:
 
     def send(self, name: str, position: float, *, effort: bool = False) -> Any:
         """Send a goal; return its handle."""
-        interface: Any = SimpleNamespace(
-            name='',
-            request=lambda *_: TargetRequest({JOINT: position}, 0.1),
-            asks_effort=lambda _: effort,
-            feedback=lambda state: state,
-            result=lambda state: state,
-        )
-
-        def end(how: str) -> None:
-            self.ended[name] = how
-
-        handle = SimpleNamespace(
-            goal_id=SimpleNamespace(uuid=name.ljust(16).encode()),
-            request=None,
-            is_cancel_requested=False,
-            publish_feedback=lambda _: None,
-            abort=lambda: end('aborted'),
-            succeed=lambda: end('succeeded'),
-            canceled=lambda: end('canceled'),
-        )
-        self._made._start(interface, handle)
-        return handle
+        command = JointState(name=[JOINT], position=[position], velocity=[0.1])
+        command.effort = [5.0] * effort
+        self._goals[name] = self._node.send(PARALLEL.action.Goal(command=command))
+        return self._goals[name]
 
     def cancel(self, handle: Any) -> None:
-        """Ask for the end of a goal."""
-        handle.is_cancel_requested = True
-        self._made._cancel(handle)
+        """Cancel a goal."""
+        self._node.cancel(handle)
 
     def run(self, duration: float, *, blocked: bool = False) -> None:
         """Advance the time by a duration in [s]."""
@@ -103,14 +87,15 @@ class Gripper:
                     replace(now, position=was.position, velocity=0.0)
                     for now, was in zip(self.drives.axes, before, strict=True)
                 ]
-            self._made._watch()
+            self._node.watch()
 
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """Give the controller the clock of the drives."""
-    made = SimpleNamespace(monotonic=lambda: 0.0)
+    """Give the controller the clock of the drives, and a node."""
+    made = SimpleNamespace(monotonic=lambda: 0.0, node=GoalNode(monkeypatch))
     monkeypatch.setattr(controller, 'time', made)
+    monkeypatch.setattr(motion_goals, 'time', made)
     return made
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import closing
+from dataclasses import dataclass
 from functools import partial
 import math
 import time
@@ -17,7 +18,6 @@ from moveit_msgs.action import ExecuteTrajectory, MoveGroup
 from moveit_msgs.msg import MoveItErrorCodes, PlanningScene
 from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene, GetPositionIK
 import pytest
-from rclpy.action.server import CancelResponse
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -28,12 +28,20 @@ from urdf_robots import ARM
 from viewer_rig import in_domain, ViewerRig
 
 from node_runner import LATCHED
-from node_runner.action_goals import serve_goals
+from node_runner.action_goals import Ending, GoalServer, ServedGoal
 from robot_viewer.nodes.motion_planning import ANSWER_TIME, DRAGGED, NO_GOAL, PlanPanel
 from robot_viewer.nodes.planning_messages import changed, SceneObject
 from robot_viewer.page.robot_page import RobotPage
 
 pytestmark = pytest.mark.scenario
+
+
+@dataclass(slots=True, eq=False)
+class Goal(ServedGoal):
+    """A goal and its result."""
+
+    result: Any = None
+    is_good: bool = False
 
 
 class Server:
@@ -42,42 +50,34 @@ class Server:
     def __init__(self, node: Node, action: Any, name: str) -> None:
         """Offer it."""
         self.action = action
-        self.goals: list[Any] = []
-        self.canceled: list[Any] = []
-        self._results: dict[bytes, tuple[Any, bool]] = {}
-        self._server = serve_goals(
+        self.goals: list[Goal] = []
+        self.canceled: list[Goal] = []
+        self._server = GoalServer(
             node,
             action,
             name,
+            accept=Goal,
             start=self.goals.append,
-            conclude=self._conclude,
             cancel=self._cancel,
+            conclude=lambda goal: (
+                Ending.SUCCEEDED if goal.is_good else Ending.CANCELED,
+                goal.result,
+            ),
         )
 
     def answer(self, code: int, message: str = '', **others: object) -> None:
         """End the last goal."""
         self._end(self.goals[-1], code, message, **others)
 
-    def _end(self, goal: Any, code: int, message: str, **others: object) -> None:
+    def _end(self, goal: Goal, code: int, message: str, **others: object) -> None:
         error = MoveItErrorCodes(val=code, message=message)
-        result = self.action.Result(error_code=error, **others)
-        self._results[bytes(goal.goal_id.uuid)] = result, code == MoveItErrorCodes.SUCCESS
-        self._server.notify_execute(goal, None)
+        goal.result = self.action.Result(error_code=error, **others)
+        goal.is_good = code == MoveItErrorCodes.SUCCESS
+        self._server.end(goal)
 
-    def _cancel(self, goal: Any) -> CancelResponse:
+    def _cancel(self, goal: Goal) -> None:
         self.canceled.append(goal)
         self._end(goal, MoveItErrorCodes.PREEMPTED, 'canceled')
-        return CancelResponse.ACCEPT
-
-    def _conclude(self, goal: Any) -> Any:
-        result, good = self._results.pop(bytes(goal.goal_id.uuid))
-        if good:
-            goal.succeed()
-        elif goal.is_cancel_requested:
-            goal.canceled()
-        else:
-            goal.abort()
-        return result
 
 
 class Planner(ViewerRig):

@@ -11,10 +11,8 @@ import math
 import time
 from typing import Any, TYPE_CHECKING
 
-from rclpy.action.server import CancelResponse
-
 from arm_msgs.action import Home
-from node_runner.action_goals import serve_goals
+from node_runner.action_goals import Ending, GoalServer, ServedGoal
 
 from ..cia402.commands import AxisCommands
 from ..cia402.homing import HomingProgress
@@ -28,8 +26,8 @@ if TYPE_CHECKING:
 FEEDBACK_PERIOD = 0.1  # [s]
 
 
-@dataclass(slots=True)
-class _Homing:
+@dataclass(slots=True, eq=False)
+class _Homing(ServedGoal):
     """A goal from its acceptance to its end."""
 
     phase: str = HomingProgress.ENABLING.value
@@ -40,11 +38,7 @@ class _Homing:
 
 
 class HomeAction:
-    """The action ``~/home`` of one axis.
-
-    rclpy runs a goal in a callback or coroutine, which would keep the executor from everything
-    else; here the goal ends when the sequence in the thread of the network has ended.
-    """
+    """The action ``~/home`` of one axis: a goal ends when the network's thread has homed it."""
 
     def __init__(
         self,
@@ -59,22 +53,20 @@ class HomeAction:
         self._commands = commands
         self._thread = thread
         self._output = output
-        self._goals: dict[bytes, _Homing] = {}
-        self._server = serve_goals(
+        self._server = GoalServer(
             node,
             Home,
             name,
+            accept=_Homing,
             start=self._start,
             conclude=self._conclude,
             cancel=self._cancel,
         )
 
-    def _start(self, goal: Any) -> None:  # noqa: ANN401  # rclpy has no types here
-        homing = _Homing()
-        self._goals[bytes(goal.goal_id.uuid)] = homing
+    def _start(self, homing: _Homing) -> None:
         # made and destroyed in the executor only: it may be about to run the timer
         homing.timer = self._node.create_timer(
-            FEEDBACK_PERIOD, partial(self._publish_feedback, goal, homing)
+            FEEDBACK_PERIOD, partial(self._publish_feedback, homing)
         )
 
         def notify(progress: HomingProgress) -> None:
@@ -82,30 +74,27 @@ class HomeAction:
 
         def run() -> Promise[str]:
             self._node.admit()
-            method = goal.request.method or None
+            method = homing.request.method or None
             homing.task = self._commands.run('home', self._commands.home(method, notify))
             return homing.task
 
         def finished(future: Future[str]) -> None:
-            self._output.post(partial(self._finish, goal, homing, future))
+            self._output.post(partial(self._finish, homing, future))
 
         self._thread.run(run).add_done_callback(finished)
 
-    def _cancel(self, goal: Any) -> CancelResponse:  # noqa: ANN401
-        homing = self._goals.get(bytes(goal.goal_id.uuid))
-
+    def _cancel(self, homing: _Homing) -> None:
         def cancel() -> None:
             # only its own command; another one may run by now
-            if homing is not None and homing.task is not None and not homing.task.done:
+            if homing.task is not None and not homing.task.done:
                 self._commands.cancel('homing was cancelled')
 
         self._thread.call(cancel)
-        return CancelResponse.ACCEPT
 
-    def _publish_feedback(self, goal: Any, homing: _Homing) -> None:  # noqa: ANN401
-        if homing.result is None and goal.is_active:
+    def _publish_feedback(self, homing: _Homing) -> None:
+        if not homing.has_ended:
             elapsed = time.monotonic() - homing.begin
-            goal.publish_feedback(
+            homing.handle.publish_feedback(
                 Home.Feedback(phase=homing.phase, position=self._position(), elapsed=elapsed)
             )
 
@@ -113,23 +102,16 @@ class HomeAction:
         view = self._commands.axis.view
         return view.position if view.fresh else math.nan
 
-    def _finish(self, goal: Any, homing: _Homing, future: Future[str]) -> None:  # noqa: ANN401
+    def _finish(self, homing: _Homing, future: Future[str]) -> None:
         error = future.exception()
         homing.result = Home.Result(
             success=error is None,
             message=future.result() if error is None else str(error),
             position=self._position(),
         )
-        self._server.notify_execute(goal, None)  # leads to _conclude, in the executor
+        self._server.end(homing)
 
-    def _conclude(self, goal: Any) -> Home.Result:  # noqa: ANN401
-        homing = self._goals.pop(bytes(goal.goal_id.uuid))
+    def _conclude(self, homing: _Homing) -> tuple[Ending, Home.Result]:
         self._node.destroy_timer(homing.timer)
-        result = homing.result
-        if result.success:
-            goal.succeed()
-        elif goal.is_cancel_requested:
-            goal.canceled()
-        else:
-            goal.abort()
-        return result
+        ending = Ending.SUCCEEDED if homing.result.success else Ending.CANCELED
+        return ending, homing.result

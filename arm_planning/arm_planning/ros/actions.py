@@ -11,12 +11,11 @@ from typing import Any
 
 from moveit_msgs.action import ExecuteTrajectory, MoveGroup, MoveGroupSequence
 from moveit_msgs.msg import MoveItErrorCodes, RobotState
-from rclpy.action.server import CancelResponse
 from rclpy.node import Node
 from rclpy.timer import Timer
 from std_msgs.msg import String
 
-from node_runner.action_goals import serve_goals
+from node_runner.action_goals import Ending, GoalServer, ServedGoal
 
 from ..exceptions import PlanningCode, PlanningError
 from ..planner import CANCELED
@@ -34,55 +33,53 @@ Prepare = Callable[[Any, bool, Callable[[], bool]], Callable[[], PlannedMotion]]
 Answer = Callable[[MoveItErrorCodes, PlannedMotion | None, bool], Any]
 
 
+@dataclass(slots=True, eq=False)
+class _Goal(ServedGoal):
+    """A goal from its acceptance to its end."""
+
+    execution: Execution | None = None
+    outcome: tuple[PlanningCode, str] = (PlanningCode.SUCCESS, '')
+
+
 class ExecuteAction:
     """Executes trajectories that clients have planned."""
 
     def __init__(self, node: Node, execution: TrajectoryExecution) -> None:
         self._node, self._execution = node, execution
-        self._running: dict[bytes, Execution] = {}
-        self._outcomes: dict[bytes, tuple[PlanningCode, str]] = {}
-        self._server = serve_goals(
+        self._server = GoalServer(
             node,
             ExecuteTrajectory,
             'execute_trajectory',
+            accept=_Goal,
             start=self._start,
-            conclude=self._conclude,
+            refuse=self._refuse,
             cancel=self._cancel,
+            conclude=self._conclude,
         )
         node.create_subscription(String, 'trajectory_execution_event', self._event, 10)
 
-    def _start(self, handle: Any) -> None:  # noqa: ANN401  # rclpy has no types here
-        key = bytes(handle.goal_id.uuid)
-
+    def _start(self, goal: _Goal) -> None:
         def done(code: PlanningCode, reason: str) -> None:
-            self._running.pop(key, None)
-            self._outcomes[key] = code, reason
-            self._server.notify_execute(handle, None)  # leads to _conclude
+            goal.outcome = code, reason
+            self._server.end(goal)
 
-        goal = handle.request
-        try:
-            self._running[key] = self._execution.start(
-                goal.trajectory.joint_trajectory, done, list(goal.controller_names)
-            )
-        except Exception as error:  # noqa: BLE001  # a goal must not end the program
-            refusal = as_refusal(error)
-            done(refusal.code, str(refusal))
-            return
-        handle.publish_feedback(ExecuteTrajectory.Feedback(state='MONITOR'))
+        goal.execution = self._execution.start(
+            goal.request.trajectory.joint_trajectory, done, list(goal.request.controller_names)
+        )
+        goal.handle.publish_feedback(ExecuteTrajectory.Feedback(state='MONITOR'))
 
-    def _cancel(self, handle: Any) -> CancelResponse:  # noqa: ANN401
-        running = self._running.get(bytes(handle.goal_id.uuid))
-        if running is not None:
-            self._execution.stop(running, reason='canceled')
-        return CancelResponse.ACCEPT
+    def _refuse(self, goal: _Goal, error: Exception) -> None:
+        refusal = as_refusal(error)
+        goal.outcome = refusal.code, str(refusal)
 
-    def _conclude(self, handle: Any) -> ExecuteTrajectory.Result:  # noqa: ANN401
-        code, reason = self._outcomes.pop(bytes(handle.goal_id.uuid))
-        handle.publish_feedback(ExecuteTrajectory.Feedback(state='IDLE'))
-        if code is not PlanningCode.SUCCESS:
-            self._node.get_logger().warning(f'execute_trajectory: {code.name}: {reason}')
-        _conclude(handle, code)
-        return ExecuteTrajectory.Result(error_code=error_code(code, reason))
+    def _cancel(self, goal: _Goal) -> None:
+        if goal.execution is not None:
+            self._execution.stop(goal.execution, reason='canceled')
+
+    def _conclude(self, goal: _Goal) -> tuple[Ending, ExecuteTrajectory.Result]:
+        goal.handle.publish_feedback(ExecuteTrajectory.Feedback(state='IDLE'))
+        ending, code = _ending(self._node, 'execute_trajectory', goal)
+        return ending, ExecuteTrajectory.Result(error_code=code)
 
     def _event(self, message: String) -> None:
         if message.data == STOP:
@@ -161,16 +158,13 @@ def sequence(planning: PlanningThreads) -> MotionKind:
 
 
 @dataclass(slots=True, eq=False)
-class _Goal:
-    """A goal from its acceptance to its end; why it was stopped before it is planned anew."""
+class _MotionGoal(_Goal):
+    """A goal of which a plan is executed; why it was stopped before it is planned anew."""
 
-    handle: Any
-    stops: int
+    stops: int = 0
     work: Future[Any] | None = None
     planned: PlannedMotion | None = None
-    execution: Execution | None = None
     begun: int = 0
-    outcome: tuple[PlanningCode, str] = (PlanningCode.SUCCESS, '')
     is_canceled: bool = False
     replans: int = 0
     stop: str = ''
@@ -191,26 +185,22 @@ class MotionAction:
     ) -> None:
         self._node, self._kind, self._planning = node, kind, planning
         self._background, self._execution = background, execution
-        self._goals: dict[bytes, _Goal] = {}
-        self._server = serve_goals(
+        self._server = GoalServer(
             node,
             kind.action,
             kind.name,
-            start=self._start,
-            conclude=self._conclude,
+            accept=lambda handle: _MotionGoal(handle, stops=execution.stops),
+            start=self._begin_planning,
             cancel=self._cancel,
+            conclude=self._conclude,
         )
 
-    def _start(self, handle: Any) -> None:  # noqa: ANN401  # rclpy has no types here
-        goal = self._goals[bytes(handle.goal_id.uuid)] = _Goal(handle, self._execution.stops)
-        self._begin_planning(goal)
-
-    def _begin_planning(self, goal: _Goal) -> None:
+    def _begin_planning(self, goal: _MotionGoal) -> None:
         goal.state_waits = 0
         self._publish(goal, 'PLANNING')
         self._plan(goal)
 
-    def _plan(self, goal: _Goal) -> None:
+    def _plan(self, goal: _MotionGoal) -> None:
         executes = not goal.handle.request.planning_options.plan_only
         lane = self._kind.group(goal.handle.request)
         if executes and goal.state_waits < STATE_WAITS and self._planning.is_moving(lane):
@@ -232,12 +222,12 @@ class MotionAction:
             return
         goal.work = self._background.submit(work, lambda done: self._planned(goal, done), lane)
 
-    def _refuse(self, goal: _Goal, refusal: PlanningError) -> None:
+    def _refuse(self, goal: _MotionGoal, refusal: PlanningError) -> None:
         """End a goal that has no plan; one that was on its way has stopped there."""
         before = f'; the arm was stopped on its way: {goal.stop}' if goal.stop else ''
         self._end(goal, refusal.code, f'{refusal}{before}')
 
-    def _planned(self, goal: _Goal, done: Future[Any]) -> None:
+    def _planned(self, goal: _MotionGoal, done: Future[Any]) -> None:
         if goal.is_canceled or done.cancelled():
             self._end(goal, PlanningCode.PREEMPTED, CANCELED)
             return
@@ -253,7 +243,7 @@ class MotionAction:
         self._publish(goal, 'MONITOR')
         self._follow(goal, planned)
 
-    def _follow(self, goal: _Goal, planned: PlannedMotion) -> None:
+    def _follow(self, goal: _MotionGoal, planned: PlannedMotion) -> None:
         """Execute the next trajectory of a plan, or end the goal after the last."""
         if goal.stops != self._execution.stops:
             self._end(goal, PlanningCode.PREEMPTED, 'everything was stopped meanwhile')
@@ -272,7 +262,7 @@ class MotionAction:
         else:
             goal.begun += 1
 
-    def _executed(self, goal: _Goal, code: PlanningCode, reason: str) -> None:
+    def _executed(self, goal: _MotionGoal, code: PlanningCode, reason: str) -> None:
         """Continue, end, or plan anew where the scene has changed and the options ask for it."""
         if code is PlanningCode.SUCCESS and goal.planned is not None:
             if goal.is_canceled and goal.begun < len(goal.planned.trajectories):
@@ -293,7 +283,7 @@ class MotionAction:
         goal.execution = goal.work = goal.planned = None
         self._after(goal, max(options.replan_delay, 0.0), self._begin_planning)
 
-    def _after(self, goal: _Goal, delay: float, plan: Callable[[_Goal], None]) -> None:
+    def _after(self, goal: _MotionGoal, delay: float, plan: Callable[[_MotionGoal], None]) -> None:
         """Continue with a goal later, unless it is canceled."""
 
         def go_on() -> None:
@@ -304,48 +294,43 @@ class MotionAction:
 
         timer = goal.delay = self._node.create_timer(delay, go_on)
 
-    def _end_delay(self, goal: _Goal) -> None:
+    def _end_delay(self, goal: _MotionGoal) -> None:
         if goal.delay is not None:
             self._node.destroy_timer(goal.delay)
             goal.delay = None
 
-    def _cancel(self, handle: Any) -> CancelResponse:  # noqa: ANN401
-        goal = self._goals.get(bytes(handle.goal_id.uuid))
-        if goal is not None:
-            goal.is_canceled = True
-            if goal.execution is not None:
-                self._execution.stop(goal.execution, reason='canceled')
-            elif goal.work is not None:
-                goal.work.cancel()
-            elif goal.delay is not None:
-                self._end_delay(goal)
-                self._end(goal, PlanningCode.PREEMPTED, 'canceled before it was planned')
-        return CancelResponse.ACCEPT
+    def _cancel(self, goal: _MotionGoal) -> None:
+        goal.is_canceled = True
+        if goal.execution is not None:
+            self._execution.stop(goal.execution, reason='canceled')
+        elif goal.work is not None:
+            goal.work.cancel()
+        elif goal.delay is not None:
+            self._end_delay(goal)
+            self._end(goal, PlanningCode.PREEMPTED, 'canceled before it was planned')
 
-    def _end(self, goal: _Goal, code: PlanningCode, reason: str) -> None:
+    def _end(self, goal: _MotionGoal, code: PlanningCode, reason: str) -> None:
         goal.outcome = code, reason
-        self._server.notify_execute(goal.handle, None)  # leads to _conclude
+        self._server.end(goal)
 
-    def _conclude(self, handle: Any) -> Any:  # noqa: ANN401
-        goal = self._goals.pop(bytes(handle.goal_id.uuid))
-        code, reason = goal.outcome
+    def _conclude(self, goal: _MotionGoal) -> tuple[Ending, Any]:
         self._publish(goal, 'IDLE')
-        if code is not PlanningCode.SUCCESS:
-            self._node.get_logger().warning(f'{self._kind.name}: {code.name}: {reason}')
-        _conclude(handle, code)
+        ending, code = _ending(self._node, self._kind.name, goal)
         execution = goal.execution
         is_begun = goal.begun > 1 or (execution is not None and execution.is_sent)
-        return self._kind.answer(error_code(code, reason), goal.planned, is_begun)
+        return ending, self._kind.answer(code, goal.planned, is_begun)
 
-    def _publish(self, goal: _Goal, state: str) -> None:
+    def _publish(self, goal: _MotionGoal, state: str) -> None:
         goal.handle.publish_feedback(self._kind.action.Feedback(state=state))
 
 
-def _conclude(handle: Any, code: PlanningCode) -> None:  # noqa: ANN401
-    """Set the status of a goal by its outcome, as MoveIt does."""
-    if code is PlanningCode.SUCCESS:
-        handle.succeed()
-    elif code is PlanningCode.PREEMPTED and handle.is_cancel_requested:
-        handle.canceled()
-    else:
-        handle.abort()
+def _ending(node: Node, name: str, goal: _Goal) -> tuple[Ending, MoveItErrorCodes]:
+    """Return status, as MoveIt's, and code of a goal that has ended; a failure is logged."""
+    code, reason = goal.outcome
+    if code is not PlanningCode.SUCCESS:
+        node.get_logger().warning(f'{name}: {code.name}: {reason}')
+    endings = {
+        PlanningCode.SUCCESS: Ending.SUCCEEDED,
+        PlanningCode.PREEMPTED: Ending.CANCELED,
+    }
+    return endings.get(code, Ending.ABORTED), error_code(code, reason)

@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any, Generic, TypeVar
 
 from rclpy.action.server import ActionServer, CancelResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -52,40 +54,116 @@ class _Server(ActionServer):
         self._node.destroy_timer(timer)
 
 
-def serve_goals(
-    node: Node,
-    action: Any,  # noqa: ANN401  # rclpy has no types here
-    name: str,
-    *,
-    start: Callable[[Any], None],
-    conclude: Callable[[Any], Any],
-    cancel: Callable[[Any], CancelResponse],
-) -> ActionServer:
-    """Offer an action.
+class Ending(Enum):
+    """Status with which a goal ends."""
 
-    Args:
-        node: Of the server.
-        action: Its type.
-        name: Its name.
-        start: Begins with a goal that was accepted: a ``ServerGoalHandle``.
-        conclude: Ends a goal, in the executor after the server's ``notify_execute(goal, None)``;
-            returns the result.
-        cancel: Answers the request to cancel a goal.
-    """
+    SUCCEEDED = 'succeeded'
+    CANCELED = 'canceled'  # aborted, unless a client has asked for it
+    ABORTED = 'aborted'
 
-    def begin(goal: Any) -> None:  # noqa: ANN401
-        # goal.execute() would end the goal when its callback returns, which is now
-        goal._update_state(rclpy_implementation.GoalEvent.EXECUTE)  # noqa: SLF001
-        start(goal)
 
-    return _Server(
-        node,
-        action,
-        name,
-        execute_callback=conclude,
-        handle_accepted_callback=begin,
-        cancel_callback=cancel,
-        result_timeout=RESULT_TIMEOUT,
-        # an executor that heeds groups would wait in one for the timer of the same
-        callback_group=ReentrantCallbackGroup(),
-    )
+@dataclass(slots=True, eq=False)
+class ServedGoal:
+    """A goal from its acceptance to its result; servers derive from it what they remember."""
+
+    handle: Any  # rclpy's ``ServerGoalHandle``
+    has_ended: bool = field(default=False, init=False)  # whether its result is on the way
+
+    @property
+    def request(self) -> Any:  # noqa: ANN401
+        """The goal message."""
+        return self.handle.request
+
+    @property
+    def is_cancel_requested(self) -> bool:
+        """Whether a client has asked to cancel it."""
+        return bool(self.handle.is_cancel_requested)
+
+
+GoalT = TypeVar('GoalT', bound=ServedGoal)
+
+
+class GoalServer(Generic[GoalT]):
+    """Accepts every goal of an action and answers it when :meth:`end` is called for it."""
+
+    def __init__(
+        self,
+        node: Node,
+        action: Any,  # noqa: ANN401  # rclpy has no types here
+        name: str,
+        *,
+        accept: Callable[[Any], GoalT],
+        start: Callable[[GoalT], None],
+        refuse: Callable[[GoalT, Exception], None] | None = None,
+        cancel: Callable[[GoalT], None],
+        conclude: Callable[[GoalT], tuple[Ending, Any]],
+    ) -> None:
+        """Offer the action; all callbacks run in the executor.
+
+        Args:
+            node: Node of the server.
+            action: Type of the action.
+            name: Name of the action.
+            accept: Makes the record of a goal from its handle.
+            start: Begins with a goal.
+            refuse: Notes what ``start`` has raised; the goal ends then. By default it is raised.
+            cancel: Begins to end a goal that a client cancels.
+            conclude: Returns status and result message of a goal that has ended.
+        """
+        self._goals: dict[bytes, GoalT] = {}
+        self._accept, self._start, self._refuse = accept, start, refuse
+        self._cancel, self._conclude = cancel, conclude
+        self._server = _Server(
+            node,
+            action,
+            name,
+            execute_callback=self._answer,
+            handle_accepted_callback=self._begin,
+            cancel_callback=self._end_early,
+            result_timeout=RESULT_TIMEOUT,
+            # an executor that heeds groups would wait in one for the timer of the same
+            callback_group=ReentrantCallbackGroup(),
+        )
+
+    @property
+    def running(self) -> list[GoalT]:
+        """The goals that have not ended."""
+        return [goal for goal in self._goals.values() if not goal.has_ended]
+
+    def end(self, goal: GoalT) -> None:
+        """Answer a goal with what ``conclude`` returns; once, from any thread."""
+        if not goal.has_ended:
+            goal.has_ended = True
+            self._server.notify_execute(goal.handle, None)  # leads to _answer
+
+    def destroy(self) -> None:
+        """Withdraw the action; goals are answered no more."""
+        self._server.destroy()
+
+    def _begin(self, handle: Any) -> None:  # noqa: ANN401
+        # handle.execute() would end the goal when its callback returns, which is now
+        handle._update_state(rclpy_implementation.GoalEvent.EXECUTE)  # noqa: SLF001
+        goal = self._goals[bytes(handle.goal_id.uuid)] = self._accept(handle)
+        try:
+            self._start(goal)
+        except Exception as error:
+            if self._refuse is None:
+                raise
+            self._refuse(goal, error)
+            self.end(goal)
+
+    def _end_early(self, handle: Any) -> CancelResponse:  # noqa: ANN401
+        goal = self._goals.get(bytes(handle.goal_id.uuid))
+        if goal is not None and not goal.has_ended:
+            self._cancel(goal)
+        return CancelResponse.ACCEPT
+
+    def _answer(self, handle: Any) -> Any:  # noqa: ANN401
+        ending, result = self._conclude(self._goals.pop(bytes(handle.goal_id.uuid)))
+        if ending is Ending.SUCCEEDED:
+            handle.succeed()
+        elif ending is Ending.CANCELED and handle.is_cancel_requested:
+            handle.canceled()
+        else:
+            handle.abort()
+        return result

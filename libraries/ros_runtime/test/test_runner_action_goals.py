@@ -14,7 +14,6 @@ from action_msgs.msg import GoalStatus
 from isolation import Isolation
 import pytest
 import rclpy
-from rclpy.action.server import CancelResponse
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from ros_client import RosClient
@@ -22,30 +21,29 @@ from std_srvs.srv import Trigger
 from tf2_msgs.action import LookupTransform
 
 from node_runner import action_goals, create_deferred_service
+from node_runner.action_goals import Ending, GoalServer, ServedGoal
 
 TIMEOUT = 20.0  # [s]
 
 
 def serve(
-    node: Node,
-    start: Callable[[Any], None],
-    conclude: Callable[[Any], LookupTransform.Result] = lambda _: LookupTransform.Result(),
-) -> Any:
-    """Serve goals of an action; none is cancelled."""
-    return action_goals.serve_goals(
+    node: Node, start: Callable[[ServedGoal], None], ending: Ending = Ending.SUCCEEDED
+) -> GoalServer[ServedGoal]:
+    """Serve goals of an action; a cancel ends them."""
+
+    def cancel(goal: ServedGoal) -> None:
+        server.end(goal)
+
+    server = GoalServer(
         node,
         LookupTransform,
         'look_up',
+        accept=ServedGoal,
         start=start,
-        conclude=conclude,
-        cancel=lambda _: CancelResponse.REJECT,
+        cancel=cancel,
+        conclude=lambda _: (ending, LookupTransform.Result()),
     )
-
-
-def succeed(goal: Any) -> LookupTransform.Result:
-    """Conclude a goal well."""
-    goal.succeed()
-    return LookupTransform.Result()
+    return server
 
 
 @pytest.mark.slow
@@ -54,10 +52,10 @@ def test_a_goal_goes_on_after_its_callback_and_is_forgotten_after_its_end(
 ) -> None:
     """Rclpy would keep each for 15 minutes: a busy server grew by 5 MB an hour."""
     monkeypatch.setattr(action_goals, 'RESULT_TIMEOUT', 1.0)
-    begun: list[Any] = []
+    begun: list[ServedGoal] = []
 
     with RosClient(isolation.domain_id) as client:
-        server = serve(client.node, begun.append, succeed)
+        server = serve(client.node, begun.append)
         caller = client.action(LookupTransform, 'look_up')
         assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
 
@@ -70,12 +68,46 @@ def test_a_goal_goes_on_after_its_callback_and_is_forgotten_after_its_end(
         client.spin_until(sent.done, TIMEOUT, 'acceptance')
         goal = sent.result()
         client.spin_until(lambda: bool(begun), TIMEOUT, 'the start')
-        assert begun[0].status == GoalStatus.STATUS_EXECUTING
-        server.notify_execute(begun[0], None)
+        assert begun[0].handle.status == GoalStatus.STATUS_EXECUTING
+        server.end(begun[0])
         assert result_of(goal).status == GoalStatus.STATUS_SUCCEEDED
         client.spin_until(
             lambda: result_of(goal).status == GoalStatus.STATUS_UNKNOWN, TIMEOUT, 'its end'
         )
+        server.destroy()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ('ending', 'is_canceled', 'status'),
+    [
+        (Ending.SUCCEEDED, True, GoalStatus.STATUS_SUCCEEDED),
+        (Ending.CANCELED, True, GoalStatus.STATUS_CANCELED),
+        (Ending.CANCELED, False, GoalStatus.STATUS_ABORTED),
+        (Ending.ABORTED, True, GoalStatus.STATUS_ABORTED),
+    ],
+)
+def test_a_goal_ends_once_with_the_status_of_its_server(
+    isolation: Isolation, ending: Ending, is_canceled: bool, status: int
+) -> None:
+    """It is canceled only where a client has asked for that."""
+    begun: list[ServedGoal] = []
+    with RosClient(isolation.domain_id) as client:
+        server = serve(client.node, begun.append, ending)
+        caller = client.action(LookupTransform, 'look_up')
+        assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
+        sent = caller.send_goal_async(LookupTransform.Goal())  # type: ignore[no-untyped-call]
+        client.spin_until(lambda: sent.done() and bool(begun), TIMEOUT, 'acceptance')
+        assert server.running == begun
+        if is_canceled:
+            sent.result().cancel_goal_async()
+        else:
+            server.end(begun[0])
+            server.end(begun[0])
+        result = sent.result().get_result_async()
+        client.spin_until(result.done, TIMEOUT, 'a result')
+        assert result.result().status == status
+        assert not server.running
         server.destroy()
 
 
@@ -127,11 +159,11 @@ class _SlowClient:
 def test_no_answer_is_lost_that_a_client_expects_too_late(isolation: Isolation) -> None:
     """Rclpy drops an answer that one thread gets before another has noted the request."""
 
-    def start(goal: Any) -> None:
-        server.notify_execute(goal, None)
+    def start(goal: ServedGoal) -> None:
+        server.end(goal)
 
     with RosClient(isolation.domain_id) as serving, RosClient(isolation.domain_id) as client:
-        server = serve(serving.node, start, succeed)
+        server = serve(serving.node, start)
         caller = client.action(LookupTransform, 'look_up')
         caller._client_handle = _SlowClient(caller._client_handle)
         ended = threading.Event()

@@ -8,26 +8,24 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 import time
-import traceback
 from typing import Any
 
 import numpy as np
-from rclpy.action.server import ActionServer, CancelResponse
 from rclpy.node import Node
 
-from arm_model import ArmError, RobotState
+from arm_model import RobotState
 from arm_trajectory import GoalCode
-from node_runner.action_goals import serve_goals
+from node_runner.action_goals import Ending
 
-from ...controllers.controller import CONTINUED, Source
+from ...controllers.controller import CONTINUED, Outcome, Source
 from ...core.gateway import CommandGateway
 from ...core.motion_queue import MotionCommand
 from ...core.requests import TargetRequest
+from ..motion_goals import MotionGoal, MotionGoals
 from .interfaces import GripperInterface, GripperState, PARALLEL, SINGLE
 from .parameters import GripperParameters
 
 WATCH_RATE = 20.0  # rate of feedback in [Hz]
-START_TIMEOUT = 5.0  # time in which the cycle must begin with a goal in [s]
 
 NO_EFFORT_LIMIT = (
     'the effort of the goal limits nothing: drives get positions only; '
@@ -35,18 +33,13 @@ NO_EFFORT_LIMIT = (
 )
 
 
-@dataclass(slots=True)
-class _Goal:
+@dataclass(slots=True, eq=False)
+class _Goal(MotionGoal):
     """A goal from its acceptance to its end."""
 
-    handle: Any
-    interface: GripperInterface
-    command: MotionCommand | None = None  # None for a goal that is refused at once
-    problem: str = ''
-    begin: float = field(default_factory=time.monotonic)
+    problem: str = ''  # why it cannot go on; empty while it can
     last_motion: float = field(default_factory=time.monotonic)
     state: GripperState | None = None
-    is_concluded: bool = False
 
 
 class GripperController:
@@ -73,64 +66,52 @@ class GripperController:
         self._parameters = parameters
         self._check_active, self._prepare = check_active, prepare
         self._joints = gateway.model.joints
-        self._goals: dict[bytes, _Goal] = {}
         self._newest: MotionCommand | None = None  # of those that have begun
         self._abandoned: MotionCommand | None = None  # drives still have its set-points
         self._has_warned = False
         interfaces = [PARALLEL, SINGLE] if len(self._joints) == 1 else [PARALLEL]
-        self._servers: dict[str, ActionServer] = {
-            interface.name: serve_goals(
-                node,
-                interface.action,
-                interface.name,
-                start=partial(self._start, interface),
-                conclude=self._conclude,
-                cancel=self._cancel,
+        self._servers: list[tuple[GripperInterface, MotionGoals[_Goal]]] = [
+            (
+                interface,
+                MotionGoals(
+                    node,
+                    gateway,
+                    interface.action,
+                    interface.name,
+                    accept=_Goal,
+                    request=partial(self._request, interface),
+                    canceled='canceled',
+                    conclude=partial(self._conclude, interface),
+                ),
             )
             for interface in interfaces
-        }
+        ]
         node.create_timer(1.0 / WATCH_RATE, self._watch)
 
-    def _start(self, interface: GripperInterface, handle: Any) -> None:  # noqa: ANN401  # rclpy has no types here
-        goal = self._goals[bytes(handle.goal_id.uuid)] = _Goal(handle, interface)
-        try:
-            request = interface.request(handle.request, self._joints)
-            self._check_active()
-            if interface.asks_effort(handle.request) and not self._has_warned:
-                self._has_warned = True
-                self._node.get_logger().warning(NO_EFFORT_LIMIT)
-            goal.command = self._gateway.request(request, self._prepare)
-        except ArmError as error:
-            goal.problem = str(error)
-        except Exception as error:  # noqa: BLE001  # a goal must not end the program
-            goal.problem = f'{type(error).__name__}: {error}'
-            self._node.get_logger().error(traceback.format_exc())
-
-    def _cancel(self, handle: Any) -> CancelResponse:  # noqa: ANN401
-        goal = self._goals.get(bytes(handle.goal_id.uuid))
-        if goal is not None and goal.command is not None:
-            self._gateway.cancel(goal.command, 'canceled')
-        return CancelResponse.ACCEPT
+    def _request(self, interface: GripperInterface, goal: _Goal) -> MotionCommand:
+        request = interface.request(goal.request, self._joints)
+        self._check_active()
+        if interface.asks_effort(goal.request) and not self._has_warned:
+            self._has_warned = True
+            self._node.get_logger().warning(NO_EFFORT_LIMIT)
+        return self._gateway.request(request, self._prepare)
 
     def _watch(self) -> None:
         measured = self._gateway.snapshot.measured
-        for goal in list(self._goals.values()):
-            if goal.is_concluded:
-                continue
-            self._note_begin(goal.command)
-            if measured is not None:
-                goal.state = self._look(goal, measured)
-            goal.problem = goal.problem or self._problem(goal)
-            state = goal.state
-            if goal.problem or (state is not None and (state.reached or state.stalled)):
-                goal.is_concluded = True
-                if goal.command is not None and not self._succeeds(goal):
-                    self._gateway.cancel(goal.command, 'stalled')  # nothing moves after the end
-                    self._abandoned = goal.command
-                server = self._servers[goal.interface.name]
-                server.notify_execute(goal.handle, None)  # leads to _conclude
-            elif state is not None:
-                goal.handle.publish_feedback(goal.interface.feedback(state))
+        for interface, goals in self._servers:
+            for goal in goals.running:
+                self._note_begin(goal.command)
+                if measured is not None:
+                    goal.state = self._look(goal, measured)
+                goal.problem = self._problem(goal, goals.outcome(goal))
+                state = goal.state
+                if goal.problem or (state is not None and (state.reached or state.stalled)):
+                    if goal.command is not None and not self._succeeds(goal):
+                        self._gateway.cancel(goal.command, 'stalled')  # nothing moves after it
+                        self._abandoned = goal.command
+                    goals.end(goal)
+                elif state is not None:
+                    goal.handle.publish_feedback(interface.feedback(state))
         self._hold()
 
     def _note_begin(self, command: MotionCommand | None) -> None:
@@ -204,33 +185,26 @@ class GripperController:
         tolerance = self._parameters.goal_tolerance
         return all(abs(positions[name] - target) <= tolerance for name, target in targets.items())
 
-    def _problem(self, goal: _Goal) -> str:
+    def _problem(self, goal: _Goal, outcome: Outcome | None) -> str:
         """Return why a goal cannot go on; empty while it can."""
-        command = goal.command
-        if command is None:
-            return 'it was refused'
-        if command.ended.done():
-            outcome = command.ended.result()
-            if outcome is CONTINUED:
-                return 'a newer goal took over'
-            if outcome.code is not GoalCode.SUCCESSFUL or outcome.canceled:
-                return outcome.reason
-            return 'canceled' if goal.handle.is_cancel_requested else ''
-        if command.motion is None and time.monotonic() - goal.begin > START_TIMEOUT:
-            self._gateway.cancel(command, 'the cycle does not run')
-            return 'the cycle does not run; is the bus up?'
-        return ''
+        if outcome is None:
+            return ''
+        if outcome is CONTINUED:
+            return 'a newer goal took over'
+        if outcome.code is not GoalCode.SUCCESSFUL or outcome.canceled:
+            return outcome.reason
+        return 'canceled' if goal.is_cancel_requested else ''
 
-    def _conclude(self, handle: Any) -> Any:  # noqa: ANN401
-        goal = self._goals.pop(bytes(handle.goal_id.uuid))
-        nothing = RobotState.at_rest(np.full(len(self._joints), np.nan))
-        state = goal.state or GripperState(self._joints, nothing)
-        if goal.problem and handle.is_cancel_requested:
-            handle.canceled()
-        elif self._succeeds(goal):
-            handle.succeed()
-        else:
+    def _conclude(self, interface: GripperInterface, goal: _Goal) -> tuple[Ending, Any]:
+        measured = self._gateway.snapshot.measured
+        measured = measured or RobotState.at_rest(np.full(len(self._joints), np.nan))
+        state = goal.state or GripperState(self._joints, measured)
+        if goal.command is None and goal.outcome is not None:
+            goal.problem = goal.outcome.reason
+        if self._succeeds(goal):
+            return Ending.SUCCEEDED, interface.result(state)
+        if not (goal.problem and goal.is_cancel_requested):
             reason = goal.problem or 'stalled in front of the goal (allow_stalling is false)'
             self._node.get_logger().warning(f'goal aborted: {reason}')
-            handle.abort()
-        return goal.interface.result(state)
+            return Ending.ABORTED, interface.result(state)
+        return Ending.CANCELED, interface.result(state)

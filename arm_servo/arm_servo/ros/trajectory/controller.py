@@ -132,9 +132,7 @@ class TrajectoryController:
         node.create_service(QueryTrajectoryState, '~/query_state', self._query)
         TrajectoryPause(node, gateway)
         node.create_timer(1.0 / parameters.state_rate, self._publish_state)
-        self._action = TrajectoryAction(
-            node, gateway, parameters.monitor_rate, self._convert, self._follow
-        )
+        self._action = TrajectoryAction(node, gateway, parameters.monitor_rate, self._follow)
         if parameters.speed != 1.0:
             self._override(parameters.speed)
 
@@ -150,10 +148,8 @@ class TrajectoryController:
     def _now(self) -> float:
         return float(self._node.get_clock().now().nanoseconds) * 1e-9
 
-    def _convert(self, request: Any) -> TrajectoryGoal:  # noqa: ANN401  # goals have no type
-        return goal_of_action(request, self._now, self._parameters)
-
-    def _follow(self, goal: TrajectoryGoal) -> MotionCommand:
+    def _follow(self, request: Any) -> MotionCommand:  # noqa: ANN401  # goals have no type
+        goal = goal_of_action(request, self._now, self._parameters)
         return self._request(goal, self._prepare)
 
     def _request(self, goal: TrajectoryGoal, get_ready: Callable[[], object]) -> MotionCommand:

@@ -1,0 +1,109 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Action goals that are motions of an arm: every goal becomes a command, and ends with a reason.
+
+rclpy runs a goal in a callback or coroutine, which would keep the executor from everything else;
+here timers watch the commands. A goal that cannot be carried out is accepted and aborted at once,
+since a rejection could carry neither code nor reason.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+import time
+import traceback
+from typing import Any, TypeVar
+
+from rclpy.node import Node
+
+from arm_model import ArmError
+from arm_trajectory import GoalCode
+from node_runner.action_goals import Ending, GoalServer, ServedGoal
+
+from ..controllers.controller import Outcome, refused
+from ..core.gateway import CommandGateway
+from ..core.motion_queue import MotionCommand
+
+START_TIMEOUT = 5.0  # time in which a goal must be planned and taken by the cycle in [s]
+
+
+@dataclass(slots=True, eq=False)
+class MotionGoal(ServedGoal):
+    """A goal from its acceptance to its end."""
+
+    command: MotionCommand | None = None  # None for a goal that is refused at once
+    begin: float = field(default_factory=time.monotonic)
+    outcome: Outcome | None = None  # how it ended; None while it goes on
+
+
+GoalT = TypeVar('GoalT', bound=MotionGoal)
+
+
+class MotionGoals(GoalServer[GoalT]):
+    """The goals of one action of one arm."""
+
+    def __init__(
+        self,
+        node: Node,
+        gateway: CommandGateway,
+        action: Any,  # noqa: ANN401  # rclpy has no types here
+        name: str,
+        *,
+        accept: Callable[[Any], GoalT],
+        request: Callable[[GoalT], MotionCommand],
+        canceled: str,
+        conclude: Callable[[GoalT], tuple[Ending, Any]],
+    ) -> None:
+        """Offer the action.
+
+        Args:
+            node: Node of the server.
+            gateway: Commands to the core of the arm.
+            action: Type of the action.
+            name: Name of the action.
+            accept: Makes the record of a goal from its handle.
+            request: Requests the motion of a goal; raises an ArmError where it is refused.
+            canceled: Reason of an outcome that a client has asked for.
+            conclude: Returns status and result message of a goal that has ended.
+        """
+        self._log, self._gateway = node.get_logger(), gateway
+        self._request, self._canceled = request, canceled
+        super().__init__(
+            node,
+            action,
+            name,
+            accept=accept,
+            start=self._order,
+            refuse=self._note_refusal,
+            cancel=self._end_motion,
+            conclude=conclude,
+        )
+
+    def outcome(self, goal: GoalT, timeout: float = START_TIMEOUT) -> Outcome | None:
+        """Return how the motion of a goal ended; None while it goes on.
+
+        Args:
+            goal: A goal whose motion was requested.
+            timeout: Time in which the cycle must begin with it in [s]; it is canceled then.
+        """
+        command = goal.command
+        if command is None or command.ended.done():
+            return goal.outcome if command is None else command.ended.result()
+        if command.motion is not None or time.monotonic() - goal.begin <= timeout:
+            return None
+        reason = 'the cycle does not run; is the bus up?'
+        self._gateway.cancel(command, reason)
+        return Outcome(GoalCode.INVALID_GOAL, reason)
+
+    def _order(self, goal: GoalT) -> None:
+        goal.command = self._request(goal)
+
+    def _note_refusal(self, goal: GoalT, error: Exception) -> None:
+        goal.outcome = refused(error)
+        if not isinstance(error, ArmError):
+            self._log.error(''.join(traceback.format_exception(error)))
+
+    def _end_motion(self, goal: GoalT) -> None:
+        if goal.command is not None:
+            self._gateway.cancel(goal.command, self._canceled)
