@@ -11,7 +11,6 @@ from itertools import product
 import math
 from pathlib import Path
 import re
-from threading import Event
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -351,11 +350,11 @@ def test_the_other_links_are_checked_all_the_same() -> None:
 
 
 def test_a_hull_that_is_far_too_large_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """A shell fills little of its hull, and CoACD takes too long for it: give convex parts."""
     monkeypatch.setattr(pieces, 'TIME_LIMIT', 0.01)
-    monkeypatch.setattr(pieces, 'BUSY', Event())
+    monkeypatch.setattr(pieces, '_watch', pieces.Stopwatch())
     ring = '\n'.join(f'v {x} {y} {z}' for scale in (1, 0.9) for x, y, z in _scaled(scale))
     outside = [f'f {a + 1} {b + 1} {c + 1}' for a, b, c in TRIANGLES]
     inside = [f'f {c + 9} {b + 9} {a + 9}' for a, b, c in TRIANGLES]
@@ -366,7 +365,9 @@ def test_a_hull_that_is_far_too_large_is_named(
     folder = meshes.cache_folder()
     assert folder is not None
     assert not list(folder.glob('*.npz'))  # the next start, when others are done, cuts it
-    assert pieces.BUSY.is_set()
+    assert [record.getMessage() for record in caplog.records] == [
+        'cutting meshes into convex pieces, 0.01 s at most; kept for the next start'
+    ]
 
 
 def _extruded(outline: list[tuple[int, int]], flat: list[tuple[int, int, int]]) -> str:

@@ -81,8 +81,8 @@ def _loose(fullness: Mapping[str, float]) -> Sequence[str]:
     links = ', '.join(f'{link} ({100 * share:.0f} %)' for link, share in fullness.items())
     note = (
         f'meshes are checked as convex hulls, which these links fill in part only: {links}, and'
-        ' which could not be cut into pieces (not closed, hollow, too intricate, or the computer'
-        ' too busy);'
+        ' which could not be cut into pieces (not closed, hollow, too intricate, or not in the'
+        ' time of one start: the next one goes on);'
         ' where that refuses too much, give them several <collision> of convex parts'
     )
     return (note,)

@@ -220,7 +220,9 @@ def _around_triangles(triangles: Array, pieces: Sequence[Array]) -> Sequence[Nat
     far = FAR_OUT * np.ptp(triangles.reshape(-1, 3), axis=0).max()
     parts: list[list[Array]] = [[] for _ in walls]
     for halvings in range(MAX_HALVINGS + 1 if walls else 0):
-        beyond = np.array([(triangles @ n.T + d).max(axis=(1, 2)) for n, d in walls])
+        corners, same = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+        depths = np.array([(corners @ n.T + d).max(axis=1) for n, d in walls])
+        beyond = depths[:, same.reshape(-1, 3)].max(axis=2)
         nearest = beyond.argmin(axis=0)
         if halvings == MAX_HALVINGS:
             far = np.inf

@@ -9,22 +9,24 @@ be stopped nor be trusted with every mesh.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+import logging
 from pathlib import Path
 import resource
 import subprocess
 import sys
 from tempfile import TemporaryDirectory
-from threading import Event
+import time
 
 import numpy as np
 
 from ..arrays import Array, Places
 
-CPU_LIMIT, TIME_LIMIT = 20, 60.0
-"""Seconds of a processor, and by the clock, for one body: those of arms take 0.2 to 9."""
+CPU_LIMIT = 20
+"""Seconds of a processor for one body: those of arms take 0.2 to 9."""
 
-BUSY = Event()
-"""Set when a body was not cut in time: the others of this process are left to the next start."""
+TIME_LIMIT = 30.0
+"""Seconds by the clock for all bodies of a process; the next start goes on with the others."""
 
 MANY_TRIANGLES = 5000
 """A body of more is remeshed first: CoACD's time grows with their number."""
@@ -44,19 +46,36 @@ SETTINGS = {
 is 11 s, a third of the time of CoACD's defaults, for as many pieces of L, fork and ring."""
 
 
+@dataclass(slots=True)
+class Stopwatch:
+    """How long a process has cut bodies, in [s]."""
+
+    spent: float = 0.0
+
+
+_watch = Stopwatch()
+
+
 def cut(corners: Array, triangles: Places) -> Sequence[Array]:
     """Return the corners of each piece; nothing for a body that is open or too intricate.
+
+    The log says once that it begins.
 
     Args:
         corners: Those of the body (n, 3), each once.
         triangles: Indices of their corners (m, 3).
 
     Raises:
-        TimeoutError: The computer is too busy; another attempt may do it.
+        TimeoutError: `TIME_LIMIT` is over; the next start may do it.
     """
     if not _closed(triangles):
         return ()
-    if BUSY.is_set():
+    if not _watch.spent:
+        logging.getLogger(__name__).warning(
+            'cutting meshes into convex pieces, %g s at most; kept for the next start', TIME_LIMIT
+        )
+    left, begin = TIME_LIMIT - _watch.spent, time.monotonic()
+    if left <= 0.0:
         raise TimeoutError
     with TemporaryDirectory(prefix='arm_model-') as folder:
         body, pieces = Path(folder, 'body.npz'), Path(folder, 'pieces.npz')
@@ -66,15 +85,16 @@ def cut(corners: Array, triangles: Places) -> Sequence[Array]:
                 [sys.executable, '-m', __name__, body, pieces],
                 capture_output=True,
                 check=True,
-                timeout=TIME_LIMIT,
+                timeout=left,
             )
             with np.load(pieces) as stored:
                 return [stored[name] for name in stored.files]
         except subprocess.TimeoutExpired as error:
-            BUSY.set()
             raise TimeoutError from error
         except (OSError, ValueError, subprocess.SubprocessError):
             return ()
+        finally:
+            _watch.spent += time.monotonic() - begin
 
 
 def _closed(triangles: Places) -> bool:

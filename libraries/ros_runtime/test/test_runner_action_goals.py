@@ -136,27 +136,31 @@ def test_a_goal_is_answered_by_an_executor_that_heeds_groups(isolation: Isolatio
 
 
 class _SlowClient:
-    """The handle of a client whose thread is held up for 3 ms after it has sent a request."""
+    """The handle of a client whose thread pauses [s] after it has sent a request."""
 
-    def __init__(self, handle: Any) -> None:
+    def __init__(self, handle: Any, pause: float) -> None:
         self._handle = handle
+        self._pause = pause
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._handle, name)
 
     def send_goal_request(self, request: Any) -> Any:
         number = self._handle.send_goal_request(request)
-        time.sleep(0.003)
+        time.sleep(self._pause)
         return number
 
     def send_result_request(self, request: Any) -> Any:
         number = self._handle.send_result_request(request)
-        time.sleep(0.003)
+        time.sleep(self._pause)
         return number
 
 
 @pytest.mark.slow
-def test_no_answer_is_lost_that_a_client_expects_too_late(isolation: Isolation) -> None:
+@pytest.mark.parametrize(('pause', 'goals'), [(0.003, 10), (0.06, 3)], ids=['quiet', 'busy'])
+def test_no_answer_is_lost_that_a_client_expects_too_late(
+    isolation: Isolation, pause: float, goals: int
+) -> None:
     """Rclpy drops an answer that one thread gets before another has noted the request."""
 
     def start(goal: ServedGoal) -> None:
@@ -165,14 +169,14 @@ def test_no_answer_is_lost_that_a_client_expects_too_late(isolation: Isolation) 
     with RosClient(isolation.domain_id) as serving, RosClient(isolation.domain_id) as client:
         server = serve(serving.node, start)
         caller = client.action(LookupTransform, 'look_up')
-        caller._client_handle = _SlowClient(caller._client_handle)
+        caller._client_handle = _SlowClient(caller._client_handle, pause)
         ended = threading.Event()
         with ThreadPoolExecutor(2) as threads:
             for each in (serving, client):
                 threads.submit(each.spin_until, ended.is_set, 60.0, 'the end')
             try:
                 assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
-                for _ in range(10):
+                for _ in range(goals):
                     goal = caller.send_goal_async(LookupTransform.Goal())  # type: ignore[no-untyped-call]
                     assert eventually(goal.done)
                     assert eventually(goal.result().get_result_async().done)
