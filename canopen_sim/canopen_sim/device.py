@@ -27,6 +27,7 @@ from .deviations import Service
 from .drive.axis import ServoModel
 from .drive.drive import Drive
 from .injector import FaultInjector
+from .io_devices import make_application
 from .line import FaultLine, Traffic
 from .objects.object_store import ObjectStore
 from .objects.parameter_storage import ParameterMemory, ParameterStorage
@@ -112,6 +113,7 @@ class Device:
             )
             for axis in (drive_axes(dictionary) if is_drive(dictionary) else ())
         )
+        self._application = make_application(self.store)
         self._build_services()
         # its deviations, which :class:`FaultInjector` begins and ends
         self.faults = FaultInjector(self, self._line)
@@ -299,6 +301,7 @@ class Device:
     def _connection_lost(self, now: float) -> None:
         for drive in self.drives:
             drive.connection_lost(now)
+        self._application.connection_lost()
 
     def _subscribe(self) -> None:
         """Offer the services of the present NMT state."""
@@ -350,6 +353,7 @@ class Device:
         """Update the objects to the values of this time."""
         for drive in self.drives:
             drive.advance(now)
+        self._application.refresh(now)
 
     def _on_remote(self, frame: Frame, now: float) -> None:
         if frame.can_id == CobId.HEARTBEAT + self.node_id:

@@ -6,13 +6,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+import logging
 
-from canopen_core import DriveError
+from canopen_core import DriveError, ObjectError
 from canopen_core.standard import (
     decode,
     DriveState,
     encode,
+    find_object,
     NmtCommand,
+    Number,
     object_address,
     ObjectEntry,
     OperationMode,
@@ -23,9 +26,12 @@ from ..cia402.commands import AxisCommands, Sequence
 from ..cia402.modes import Move
 from ..cia402.state import DriveStatus
 from ..config.model import NodeConfig
+from ..master.process_image import ReceivedTpdo
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
 from ..master.status import node_status, NodeStatus
+
+logger = logging.getLogger('arm_canopen')
 
 MOVE_TIMEOUT = 60.0  # [s]
 POSITION_MODES = (
@@ -46,42 +52,54 @@ class DeviceSdo:
         self._device = device
         self._thread = thread
 
-    def read(self, target: int | str, subindex: int = 0) -> Value:
+    def read(self, target: int | str, subindex: int = 0, *, timeout: float | None = None) -> Value:
         """Read an object by its name, or by its index and sub-index.
 
+        Each answer may take the ``timeout`` in [s], by default the SDO time-out of bus.yml.
+
         Raises:
-            ObjectError: The EDS has no such object.
-            SdoError: The device refused, or did not answer within the SDO time-out of bus.yml.
+            ObjectError: The EDS has no such object, or several; the message names them.
+            SdoError: The device refused, or did not answer in time.
             BusError: The master has ended.
         """
-        upload = partial(self._device.objects.upload, _path(target, subindex))
+        upload = partial(self._device.objects.upload, _path(target, subindex), timeout)
         entry, data = self._thread.run_coroutine(upload).result()
         return decode(entry.data_type, data)
 
-    def write(self, target: int | str, value: Value, subindex: int = 0) -> None:
+    def write(
+        self,
+        target: int | str,
+        value: Value,
+        subindex: int = 0,
+        *,
+        timeout: float | None = None,
+    ) -> None:
         """Write an object by its name, or index and sub-index; return when the device has it.
 
+        Each answer may take the ``timeout`` in [s], by default the SDO time-out of bus.yml.
+
         Raises:
-            ObjectError: The EDS has no such object.
+            ObjectError: The EDS has no such object, or several; the message names them.
             CodecError: The value does not fit the type.
             DriveError: The master writes the object itself in each cycle.
-            SdoError: The device refused, or did not answer within the SDO time-out of bus.yml.
+            SdoError: The device refused, or did not answer in time.
             BusError: The master has ended.
         """
 
         def to_bytes(entry: ObjectEntry) -> bytes:
             return encode(entry.data_type, value)
 
-        download = partial(self._device.objects.download, _path(target, subindex), to_bytes)
+        path = _path(target, subindex)
+        download = partial(self._device.objects.download, path, to_bytes, timeout)
         self._thread.run_coroutine(download).result()
 
 
 class CanopenDevice:
-    """A device of bus.yml.
+    """A device of bus.yml; an I/O module or an encoder needs nothing else.
 
     Attributes:
         name: Its name in bus.yml.
-        sdo: Its objects.
+        sdo: Its objects, by SDO in any case.
     """
 
     def __init__(self, device: RemoteNode, thread: NetworkThread) -> None:
@@ -102,6 +120,79 @@ class CanopenDevice:
             BusError: The master has ended.
         """
         return self._thread.call(lambda: node_status(self._device, self._thread.now())).result()
+
+    def read(self, target: int | str, subindex: int = 0, *, timeout: float | None = None) -> Value:
+        """Return the value of an object: from its TPDO while that comes, else by SDO.
+
+        Arguments and errors are those of :meth:`DeviceSdo.read`.
+        """
+        path = _path(target, subindex)
+        entry = find_object(self.config.dictionary, path)
+
+        def received() -> Value | None:
+            reader = self._device.image.reader(*entry.address)
+            stale = reader is None or reader.source.stale(self._thread.now())
+            return None if stale or reader is None else reader.value
+
+        value = self._thread.call(received).result()
+        return self.sdo.read(path, timeout=timeout) if value is None else value
+
+    def write(
+        self,
+        target: int | str,
+        value: Value,
+        subindex: int = 0,
+        *,
+        timeout: float | None = None,
+    ) -> None:
+        """Write an object: by the RPDOs that carry it, which no device confirms, else by SDO.
+
+        The other objects of such an RPDO keep what they have. Arguments and errors are those of
+        :meth:`DeviceSdo.write`; an RPDO needs a device that is operational.
+
+        Raises:
+            CanopenError: The device is not operational, or the bus does not take the RPDO.
+        """
+        path = _path(target, subindex)
+        objects, address = self._device.objects, find_object(self.config.dictionary, path).address
+        if objects.image.mapped_output(*address) is None:
+            self.sdo.write(path, value, timeout=timeout)
+            return
+        objects.check_owner(address[0])
+        values = {address: objects.check_output(*address, value)}
+        publish = partial(self._thread.network.publish_objects, self._device, values)
+        self._thread.call(publish).result()
+
+    def subscribe(
+        self, target: int | str, callback: Callable[[Number], None], subindex: int = 0
+    ) -> Callable[[], None]:
+        """Call back with the value of an object whenever a TPDO has brought it.
+
+        The callback runs in the thread of the cycle, so it must not wait: no call of this master.
+        What it raises is logged.
+
+        Returns:
+            A function that ends it.
+
+        Raises:
+            ObjectError: The EDS has no such object, or several; or no TPDO carries it.
+        """
+        entry = find_object(self.config.dictionary, _path(target, subindex))
+        reader = self._device.image.reader(*entry.address)
+        if reader is None:
+            raise ObjectError(
+                f'no TPDO of {self.name} carries {entry}; map it in bus.yml, or read it'
+            )
+
+        def received(_: ReceivedTpdo) -> None:
+            try:
+                if (value := reader.value) is not None:
+                    callback(value)
+            except Exception:
+                logger.exception('%s: the callback for %s failed', self.name, entry)
+
+        reader.source.listen(received)
+        return partial(reader.source.ignore, received)
 
     def send_nmt(self, command: NmtCommand) -> None:
         """Send an NMT command to the device; return when the bus has taken it.

@@ -8,7 +8,7 @@ a function. See ``runner.py`` for the thread that does so on a real bus.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import datetime, timezone
 from functools import partial
 from traceback import walk_tb
@@ -298,28 +298,34 @@ class Network:
     async def _all(self, sent: Sequence[Promise[None]]) -> None:
         await self.scheduler.gather(sent)
 
-    def publish_object(self, node: RemoteNode, index: int, subindex: int, value: Number) -> None:
-        """Send an object by the RPDOs that carry it.
+    def publish_objects(self, node: RemoteNode, values: Mapping[tuple[int, int], Number]) -> None:
+        """Send objects by the RPDOs that carry them, each RPDO once.
 
         An event-driven RPDO leaves at once, one that waits for SYNC with the next cycle, and those
         of a drive in every cycle anyway.
 
         Raises:
-            CanopenError: The device or the master is not operational, no RPDO carries it, or the
-                bus does not take it.
+            CanopenError: The device or the master is not operational, no RPDO carries one of
+                them, or the bus does not take it.
         """
         if not node.online or self.state is not NmtState.OPERATIONAL:
             what = node.name if not node.online else 'the master'
             raise CanopenError(f'{what} is not operational, so no RPDO is sent')
-        before = node.image.commanded(index, subindex)
-        outputs = node.image.store(index, subindex, value)
-        if not outputs:
-            raise CanopenError(f'{object_address(index, subindex)} is in no RPDO of {node.name}')
-        for output in outputs:
+        before = {address: node.image.commanded(*address) for address in values}
+        for address, value in before.items():
+            if value is None:
+                raise CanopenError(f'{object_address(*address)} is in no RPDO of {node.name}')
+        outputs = {
+            id(output): output
+            for address, value in values.items()
+            for output in node.image.store(*address, value)
+        }
+        for output in outputs.values():
             if output.cyclic or output.synchronous:
                 output.due = True
             elif (refusal := self.send(output.frame())) is not None:
-                node.image.store(index, subindex, before or 0)  # none may leave with another one
+                for address, value in before.items():  # none may leave with another one
+                    node.image.store(*address, value or 0)
                 raise refusal
             else:
                 output.left(self.scheduler.now)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 import math
+import threading
 from typing import Protocol, TypeAlias
 
 from canopen_core import CodecError
@@ -34,6 +35,7 @@ IN_THE_IMAGE = completed()
 
 StartValue: TypeAlias = Callable[[MappedObject], Number]
 Limits: TypeAlias = tuple[Number, Number]
+Listener: TypeAlias = 'Callable[[ReceivedTpdo], None]'
 
 
 def limits_of(data_type: DataType) -> Limits:
@@ -79,7 +81,8 @@ class ReceivedTpdo:
         self.timestamp = 0.0  # steady time of arrival of the last in [s]
         self.count = 0  # number of PDOs received
         self.length_errors = 0  # number of PDOs that were too short
-        self.listener: Callable[[ReceivedTpdo], None] | None = None
+        self._listeners: tuple[Listener, ...] = ()  # replaced as a whole, by any thread
+        self._listening = threading.Lock()
         # called with this input and the length when one is too short
         self.on_short: Callable[[ReceivedTpdo, int], None] = lambda entry, length: None
         self.awaited = False  # it was expected after the last SYNC and has not come
@@ -113,6 +116,16 @@ class ReceivedTpdo:
         silence = longest_silence(self.config, self._sync.period)
         self.stale_after = silence if taken else math.inf
 
+    def listen(self, listener: Listener) -> None:
+        """Call a listener with this TPDO whenever it came, in the thread of the cycle."""
+        with self._listening:
+            self._listeners = (*self._listeners, listener)
+
+    def ignore(self, listener: Listener) -> None:
+        """Call a listener no more."""
+        with self._listening:
+            self._listeners = tuple(each for each in self._listeners if each != listener)
+
     def clear(self) -> None:
         """Forget the values, because the device restarted or went away."""
         self.values = None
@@ -133,8 +146,7 @@ class ReceivedTpdo:
             return
         self.timestamp = frame.timestamp
         self.count += 1
-        listener = self.listener  # read once: a ROS thread sets and clears it
-        if listener is not None:
+        for listener in self._listeners:
             listener(self)
         if self.awaited:
             self.awaited = False

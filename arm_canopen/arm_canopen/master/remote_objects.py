@@ -16,6 +16,7 @@ from canopen_core.standard import (
     decode,
     encode,
     find_object,
+    integer_range,
     is_controlword,
     MappedObject,
     Number,
@@ -372,8 +373,35 @@ class RemoteObjects:
 
         end.when_done(set_back)
 
-    async def upload(self, path: str) -> tuple[ObjectEntry, bytes]:
+    def check_output(self, index: int, subindex: int, value: Value) -> Number:
+        """Return a value for an RPDO; the device would not answer to one that it cannot hold.
+
+        Raises:
+            CodecError: It is no number, or beyond the type or the limits of the EDS.
+        """
+        mapped = self.image.mapped_output(index, subindex)
+        data_type = self.entry(index, subindex).data_type if mapped is None else mapped.data_type
+        low, high = limits_of(data_type)
+        entry = self.config.dictionary.get(index, subindex)
+        if entry is not None:
+            low = low if entry.low_limit is None else max(low, entry.low_limit)
+            high = high if entry.high_limit is None else min(high, entry.high_limit)
+        whole = integer_range(data_type) is not None
+        if (
+            not isinstance(value, (int, float))
+            or not low <= value <= high
+            or (whole and value != int(value))
+        ):
+            raise CodecError(
+                f'{object_address(index, subindex)} of {self.name} cannot hold {value!r} '
+                f'({data_type.name}: {low:g} to {high:g})'
+            )
+        return int(value) if whole else float(value)
+
+    async def upload(self, path: str, timeout: float | None = None) -> tuple[ObjectEntry, bytes]:
         """Read an object by its name or number, see :func:`.find_object`.
+
+        Each answer may take the ``timeout`` in [s], by default that of bus.yml.
 
         Raises:
             ObjectError: The EDS has no such object.
@@ -381,14 +409,19 @@ class RemoteObjects:
         """
         entry = find_object(self.config.dictionary, path)
         block = entry.data_type is DataType.DOMAIN
-        return entry, await self.sdo.read(*entry.address, self.config.sdo_timeout, block=block)
+        limit = self.config.sdo_timeout if timeout is None else timeout
+        return entry, await self.sdo.read(*entry.address, limit, block=block)
 
     async def download(
-        self, path: str, to_bytes: Callable[[ObjectEntry], bytes]
+        self,
+        path: str,
+        to_bytes: Callable[[ObjectEntry], bytes],
+        timeout: float | None = None,
     ) -> tuple[ObjectEntry, bytes]:
         """Write an object by its name or number.
 
-        ``to_bytes`` encodes the value for its entry.
+        ``to_bytes`` encodes the value for its entry. Each answer may take the ``timeout`` in [s],
+        by default what bus.yml allows this object.
 
         Raises:
             ObjectError: The EDS has no such object.
@@ -399,7 +432,8 @@ class RemoteObjects:
         entry = find_object(self.config.dictionary, path)
         self.check_owner(entry.index)
         data = to_bytes(entry)
-        await self.sdo.write(*entry.address, data, self.config.write_timeout(*entry.address))
+        limit = self.config.write_timeout(*entry.address) if timeout is None else timeout
+        await self.sdo.write(*entry.address, data, limit)
         return entry, data
 
     def forget(self, reason: str) -> None:

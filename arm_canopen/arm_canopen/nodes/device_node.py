@@ -117,11 +117,9 @@ class DeviceNode(Node):
             self.get_logger().warning(f'~/tpdo: {place}: {error}')
             return
         publish = partial(
-            self._thread.network.publish_object,
+            self._thread.network.publish_objects,
             self.device,
-            message.index,
-            message.subindex,
-            value,
+            {(message.index, message.subindex): value},
         )
         sent = self._thread.call(publish)
         sent.add_done_callback(self._log_unsent)

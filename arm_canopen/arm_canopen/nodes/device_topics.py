@@ -48,6 +48,7 @@ class DeviceTopics:
         self._output = output
         self._nmt_state = node.create_publisher(String, '~/nmt_state', LATCHED)
         self._rpdo = node.create_publisher(COData, '~/rpdo', 10)
+        self._listened = False
 
     def take_event(self, event: Event) -> None:
         """Publish the NMT state where an event changes it."""
@@ -59,9 +60,10 @@ class DeviceTopics:
     def update_listeners(self) -> None:
         """Publish each received object on ~/rpdo while somebody listens, and only then."""
         listened = self._rpdo.get_subscription_count() > 0
-        listener = self._received if listened else None
-        for entry in self._device.image.tpdos:
-            entry.listener = listener
+        if listened != self._listened:
+            self._listened = listened
+            for entry in self._device.image.tpdos:
+                (entry.listen if listened else entry.ignore)(self._received)
 
     def _received(self, entry: ReceivedTpdo) -> None:
         values = entry.values or ()

@@ -56,6 +56,7 @@ from .drive import (
     TARGET_OBJECTS,
 )
 from .emcy import Emergency, error_code_text, error_register_text
+from .io_profiles import ANALOG_EVENTS, EncoderObject, ERROR_OBJECTS, IO_GROUPS, IoGroup
 from .lss import BIT_RATES_KBIT, UNCONFIGURED
 from .nmt import (
     ALL_NODES,
@@ -100,6 +101,7 @@ from .time_of_day import decode_time_of_day, encode_time_of_day
 
 __all__ = [
     'ALL_NODES',
+    'ANALOG_EVENTS',
     'AXIS_OFFSET',
     'BIT_RATES_KBIT',
     'CAN_ID_MASK',
@@ -108,8 +110,10 @@ __all__ = [
     'COMMANDED_STATES',
     'COMMANDS',
     'CYCLIC_MODES',
+    'ERROR_OBJECTS',
     'EVENT_DRIVEN',
     'FIXED_BITS',
+    'IO_GROUPS',
     'MAPPED_LENGTH_MASK',
     'NODE_ID_MAX',
     'NODE_ID_MIN',
@@ -140,7 +144,9 @@ __all__ = [
     'DeviceProfile',
     'DriveState',
     'Emergency',
+    'EncoderObject',
     'Index',
+    'IoGroup',
     'MappedObject',
     'NmtCommand',
     'NmtState',

@@ -613,7 +613,7 @@ def test_a_device_in_operation_is_taken_over_without_a_word() -> None:
     assert device.commands == []
     assert {index for index, _, _ in device.writes} == {0x1017}
     assert network.net.frames(0x205) == []
-    network.net.network.publish_object(node, 0x6060, 0, 9)
+    network.net.network.publish_objects(node, {(0x6060, 0): 9})
     assert network.net.frames(0x205) == [b'\x0f\x00\x09']
     assert any('taken over' in text and 'error L' in text for text in network.net.reported())
 
@@ -772,11 +772,11 @@ def test_a_master_that_shall_not_start_waits_for_its_command() -> None:
     assert network.net.frames(0x080) == []
     node = network.node
     with pytest.raises(CanopenError, match='the master is not operational'):
-        network.net.network.publish_object(node, 0x6060, 0, 1)
+        network.net.network.publish_objects(node, {(0x6060, 0): 1})
     network.net.network.send_nmt(NmtCommand.START, network.net.network.config.master.node_id)
     network.net.run(0.1)
     assert network.net.frames(0x080)
-    network.net.network.publish_object(node, 0x6060, 0, 1)
+    network.net.network.publish_objects(node, {(0x6060, 0): 1})
     assert network.net.frames(0x205)
 
 

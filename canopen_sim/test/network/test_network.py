@@ -478,9 +478,7 @@ def test_a_time_out_that_begins_with_a_frame_counts_from_it() -> None:
     net.run(0.3)  # until nothing else waits
     node = net.network.nodes['a']
     begin = net.network.scheduler.now
-    node.image.tpdos[0].listener = lambda entry: promises.append(
-        node.sdo.write(0x2000, 0, b'', 0.02)
-    )
+    node.image.tpdos[0].listen(lambda entry: promises.append(node.sdo.write(0x2000, 0, b'', 0.02)))
     promises: list[object] = []
     net.network.receive(Frame(0x182, bytes(3), timestamp=begin + 0.5))
     assert len(promises) == 1

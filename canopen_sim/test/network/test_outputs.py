@@ -68,7 +68,7 @@ def read(net: VirtualNetwork, place: tuple[int, int]) -> int:
 
 def publish(net: VirtualNetwork, place: tuple[int, int], value: int) -> None:
     """Publish an object as ``~/tpdo`` does."""
-    net.network.publish_object(net.network.nodes[MODULE], *place, value)
+    net.network.publish_objects(net.network.nodes[MODULE], {place: value})
 
 
 def test_nothing_leaves_before_somebody_publishes() -> None:
@@ -236,7 +236,7 @@ def test_a_value_published_meanwhile_outlives_a_write_that_is_refused() -> None:
     inject(net, Fault.SDO_SILENCE)
     promise = node.objects.write_object(0x6081, 0, 2_000)
     net.run(0.05)
-    net.network.publish_object(node, 0x6081, 0, 3_000)
+    net.network.publish_objects(node, {(0x6081, 0): 3_000})
     net.run_until(lambda: promise.done)
     assert promise.error is not None
     begin = net.now
