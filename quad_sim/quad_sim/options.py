@@ -65,6 +65,7 @@ def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:
     add('--slope', type=float, default=0.0, metavar='DEG', help='of the ground, uphill ahead')
     add('--friction', type=float, default=0.8, help='of the ground (%(default)s)')
     add('--start', choices=[pose.value for pose in Pose], default='lie', help='how it begins')
+    add('--held', action='store_true', help='the trunk is on a stand, legs hang free')
     add('--noise', choices=_NOISE, default='board', help='of its sensors (%(default)s)')
     add('--battery', type=float, default=100.0, metavar='PERCENT', help='charge at the start')
     add(
@@ -169,6 +170,7 @@ def _make_plant(options: argparse.Namespace, urdf: str) -> Plant:
         options.seed,
         pose=pose,
         noise=noise,
+        held=options.held,
     )
 
 

@@ -1,21 +1,23 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run quad_hardware calibrate``: joints, IMU or odometry, into a parameter file."""
+"""``ros2 run quad_hardware calibrate``: joints, IMU or odometry into a parameter file; servos."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 import math
 from pathlib import Path
+from typing import Any, cast
 
-from quad_description import movable_joints, PRESETS, robot_urdf, run_command
+from quad_description import LEGS, movable_joints, PRESETS, robot_urdf, run_command
 
 from ..exceptions import CommandError, HardwareError
 from ..joints import servo_of
 from ..link import AUTO, DEFAULT_PORT, LinkOptions, MODEL_CHOICES, PROTOCOL_CHOICES
 from .imu import calibrate_imu
-from .parameter_file import imu_parameters, servo_parameters, write_parameters
+from .parameter_file import imu_parameters, read_parameters, servo_parameters, write_parameters
 from .robot import limp_robot
 from .wizard import calibrate_joints, CancelledError, Console, zero_all
 
@@ -33,6 +35,8 @@ def run_calibrate(argv: Sequence[str], console: Console) -> int:
     except (HardwareError, CancelledError) as error:
         console.write(str(error))
         return 1
+    if options.what == 'servos':
+        return 0
     console.write(f'written to {options.output}; use it with:')
     console.write(
         f'  ros2 run quad_hardware hardware_node --ros-args --params-file {options.output}'
@@ -87,7 +91,20 @@ def _odometry(options: argparse.Namespace, console: Console) -> None:
     write_parameters(options.output, {'odometry': {f'scale_{options.axis}': found}})
 
 
-_PARTS = {'joints': _joints, 'imu': _imu, 'odometry': _odometry}
+def _servos(options: argparse.Namespace, console: Console) -> None:
+    from .servos import calibrate_servos
+
+    urdf = robot_urdf(options.preset, options.arm)
+    known = {} if options.calibration is None else read_parameters(options.calibration)
+    joints = cast('Mapping[str, Mapping[str, Any]]', known.get('joints', {}))
+    servos = [
+        replace(servo_of(joint), **joints.get(joint.name, {})) for joint in movable_joints(urdf)
+    ]
+    with limp_robot(_link(options), [servo.motor for servo in servos]) as robot:
+        calibrate_servos(console, robot, servos, urdf, options.leg, repeat=options.repeat)
+
+
+_PARTS = {'joints': _joints, 'imu': _imu, 'odometry': _odometry, 'servos': _servos}
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -99,7 +116,10 @@ def _parser() -> argparse.ArgumentParser:
     imu = kinds.add_parser(
         'imu', help='how the IMU is mounted; tilts the robot by hand', allow_abbrev=False
     )
-    for kind in (joints, imu):
+    servos = kinds.add_parser(
+        'servos', help='stiffness, play and delay; one leg swings', allow_abbrev=False
+    )
+    for kind in (joints, imu, servos):
         kind.add_argument('--port', default=DEFAULT_PORT, help='of the robot (%(default)s)')
         kind.add_argument(
             '--protocol',
@@ -113,8 +133,14 @@ def _parser() -> argparse.ArgumentParser:
             default=AUTO,
             help='ranges of protocol v1 (%(default)s)',
         )
-    joints.add_argument('--preset', choices=PRESETS, default='lite', help='(%(default)s)')
-    joints.add_argument('--arm', action='store_true', help='with the arm on its back')
+    for kind in (joints, servos):
+        kind.add_argument('--preset', choices=PRESETS, default='lite', help='(%(default)s)')
+        kind.add_argument('--arm', action='store_true', help='with the arm on its back')
+    servos.add_argument('--calibration', type=Path, help='file of calibrate joints')
+    servos.add_argument('--leg', choices=LEGS, default=LEGS[0], help='(%(default)s)')
+    servos.add_argument(
+        '--repeat', type=int, choices=range(1, 6), default=1, help='of the motion (%(default)s)'
+    )
     joints.add_argument('--joint', action='append', default=[], help='only this one; repeatable')
     joints.add_argument('--limits', action='store_true', help='record the ends of the travel, too')
     joints.add_argument('--zero-only', action='store_true', help='all offsets at once, in a jig')

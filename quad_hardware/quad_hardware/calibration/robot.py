@@ -1,25 +1,28 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A robot whose servos are read while someone moves them by hand."""
+"""A robot whose servos are read while someone moves them by hand, or while they are commanded."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 import math
 from statistics import fmean, median
 import threading
+import time
 
 from quad_description.rotations import from_rpy, normalized, roll_pitch_yaw, Vector
 
 from ..exceptions import NoAnswerError
-from ..link import Driver, LinkOptions, LinkState
+from ..link import Driver, LinkOptions, LinkState, Session
+from ..protocol import Span
 from ..report import Report
 
 SAMPLES = 15  # reports that one reading is the median of
 MAX_REPORTS = 6000  # reports between two readings, the newest; two minutes
+SEND_TIMEOUT = 2.0  # [s] for a command to leave
 REPORT_TIMEOUT = 4.0  # [s] for a robot to report
 
 
@@ -40,7 +43,8 @@ class LimpRobot:
         self._motors = frozenset(motors)
         self._reports: deque[Report] = deque(maxlen=MAX_REPORTS)  # since the reading before
         self._changed = threading.Condition()
-        self.driver = Driver(options, self._take, self._forget)
+        self._spans: Mapping[int, Span] = {}
+        self.driver = Driver(options, self._take, self._forget, self._opened)
 
     def angles(self) -> dict[int, float]:
         """Return the servo angles [deg] by motor, as they are from now on.
@@ -71,6 +75,40 @@ class LimpRobot:
         x, y, z = map(fmean, zip(*forces, strict=True))
         return ImuReading(attitude, (x, y, z), way)
 
+    def reports(self) -> tuple[Report, ...]:
+        """Return the reports since the reading before, MAX_REPORTS at most."""
+        with self._changed:
+            reports = tuple(self._reports)
+            self._reports.clear()
+            return reports
+
+    def command(self, angles: Mapping[int, float]) -> float:
+        """Command angles [deg] by motor; return when they had left the line [s].
+
+        Raises:
+            NoAnswerError: They were not sent; the message has the reason.
+        """
+        begun = time.monotonic()
+        if self.driver.command(angles):
+            while time.monotonic() < begun + SEND_TIMEOUT:
+                if self.driver.commanded_at >= begun:
+                    return self.driver.commanded_at
+                time.sleep(0.001)
+        raise NoAnswerError(self.driver.status().detail)
+
+    def rounded(self, motor: int, angle: float) -> float:
+        """Return an angle [deg] as the line brings it to a motor."""
+        span = self._spans.get(motor)
+        return angle if span is None else span.decode(span.encode(angle))
+
+    def now(self) -> float:
+        """Return the time on the clock of reports and commands [s]."""
+        return time.monotonic()
+
+    def wait_until(self, moment: float) -> None:
+        """Wait for a moment on that clock [s]."""
+        time.sleep(max(moment - time.monotonic(), 0.0))
+
     @contextmanager
     def limp(self) -> Iterator[None]:
         """Switch the torque off, and on again at the end, where the servos are then.
@@ -96,6 +134,9 @@ class LimpRobot:
             if not self._changed.wait_for(lambda: len(self._reports) >= SAMPLES, REPORT_TIMEOUT):
                 raise NoAnswerError(self.driver.status().detail)
             return way, tuple(self._reports)
+
+    def _opened(self, session: Session) -> None:
+        self._spans = session.dialect.spans
 
     def _take(self, report: Report) -> str:
         with self._changed:

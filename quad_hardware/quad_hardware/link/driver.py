@@ -40,6 +40,7 @@ class Driver:
 
     Attributes:
         released_at: When the last order to let go was given to the line [s], None before.
+        commanded_at: When the last command had left, its bytes considered [s].
     """
 
     def __init__(
@@ -70,6 +71,7 @@ class Driver:
         self._released = False  # by the last change of torque that was accepted
         self._limp = False  # from the first byte of an order to let go to the last of one to hold
         self.released_at: float | None = None
+        self.commanded_at = -float('inf')
         self._status = LinkStatus(detail='not started')
         self._session: Session | None = None
         self._received_at = self._reported_at = -float('inf')
@@ -221,9 +223,12 @@ class Driver:
             if now - self._reported_at > STALE_TIME:
                 self._fall_silent(dialect, now)
             self._post(dialect)
+            commanding = dialect.pending
             step = dialect.step(now)
             if step.send:
                 port.write(step.send)
+            if commanding and not dialect.pending:
+                self.commanded_at = now + dialect.protocol.wire_time(len(step.send))
             if self._torque_unsent is not None and not dialect.torque_pending:
                 self._limp, self._torque_unsent = not self._torque_unsent, None
                 self.released_at = time.monotonic() if self._limp else None

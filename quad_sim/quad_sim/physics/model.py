@@ -28,6 +28,8 @@ IMU: Final = 'imu_link'
 FLOOR, BUMPS = 'floor', 'bumps'
 ACCELEROMETER, GYRO = 'accelerometer', 'gyro'
 
+HELD_MASS = 1e4  # [kg], [kg m2] of a trunk that nothing moves
+
 _TOUCH_MARGIN = 0.002  # [m] how far the region that feels the ground reaches beyond the foot
 
 _ALL, _FEET_ONLY = 1, 2
@@ -44,13 +46,14 @@ def _pass_over(_text: str) -> None:
 
 
 def build_model(
-    urdf: str, servo: ServoParameters, terrain: Terrain, timestep: float
+    urdf: str, servo: ServoParameters, terrain: Terrain, timestep: float, *, held: bool = False
 ) -> mujoco.MjModel:
     """Make the model.
 
     Args:
         urdf: The robot, with base_link as root, imu_link and feet.
         timestep: Of the integration [s].
+        held: The trunk stays where it is, in the air.
 
     Returns:
         A model whose actuators are the movable joints in the order of the URDF.
@@ -58,7 +61,7 @@ def build_model(
     Raises:
         SetupError: The URDF is no such robot.
     """
-    return _compiled(urdf, servo, terrain, timestep)[1]
+    return _compiled(urdf, servo, terrain, timestep, held=held)[1]
 
 
 def mjcf(
@@ -98,7 +101,12 @@ def _with_position_servos(text: str) -> str:
 
 
 def _compiled(
-    urdf: str, servo: ServoParameters, terrain: Terrain | None, timestep: float
+    urdf: str,
+    servo: ServoParameters,
+    terrain: Terrain | None,
+    timestep: float,
+    *,
+    held: bool = False,
 ) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
     if mujoco.get_mju_user_warning() is None:  # else it writes a MUJOCO_LOG.TXT where it runs
         mujoco.set_mju_user_warning(_pass_over)
@@ -106,6 +114,8 @@ def _compiled(
         spec = _load(urdf)
         _set_options(spec, timestep)
         _add_base(spec)
+        if held:
+            _hold(spec)
         if terrain is not None:
             _add_floor(spec, terrain)
         for joint in movable_joints(urdf):
@@ -144,6 +154,13 @@ def _add_base(spec: mujoco.MjSpec) -> None:
     _body(spec, BASE).add_freejoint(name='base')
     for geom in spec.geoms:
         geom.contype, geom.conaffinity = 0, _ALL
+
+
+def _hold(spec: mujoco.MjSpec) -> None:
+    """Make the trunk too heavy to be moved by its legs, and spare it gravity."""
+    base = _body(spec, BASE)
+    base.mass, base.gravcomp = HELD_MASS, 1.0
+    base.fullinertia = [*[HELD_MASS] * 3, 0.0, 0.0, 0.0]
 
 
 def _add_floor(spec: mujoco.MjSpec, terrain: Terrain) -> None:

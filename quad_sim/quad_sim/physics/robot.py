@@ -28,6 +28,7 @@ from .variation import AS_MADE, Variation, VariedModel
 TIMESTEP: Final = 0.002  # [s]
 STRONGEST: Final = 200.0  # [N] of a push; the robot weighs 7 N
 MAX_KICK: Final = 10.0  # [m/s] of a kick
+HELD_HEIGHT: Final = 0.3  # [m] above the ground of a robot that is held
 MAX_DROP: Final = 10.0  # [m] above the ground at the start
 UNSTABLE: Final = [
     int(mujoco.mjtWarning.mjWARN_BADQPOS),
@@ -53,6 +54,7 @@ class Robot:
         timestep: float = TIMESTEP,
         pose: Mapping[str, float] | None = None,
         noise: Noise = NONE,
+        held: bool = False,
     ) -> None:
         """Put the robot on the ground.
 
@@ -60,6 +62,7 @@ class Robot:
             timestep: Of the integration [s].
             pose: Joint positions at the start [rad]; the standing pose for those left out.
             noise: What :meth:`measure` adds to the truth.
+            held: The trunk is held in the air, level, and the legs hang free.
 
         Raises:
             SetupError: The URDF cannot be simulated, or the pose names joints that it lacks.
@@ -68,7 +71,8 @@ class Robot:
             raise SetupError(f'timestep {timestep} s: give more than 0 and at most 0.01')
         self._servo = servo.parameters if isinstance(servo, ServoModel) else servo
         self._urdf, self._terrain, self._noise = urdf, terrain, noise
-        self._model = build_model(urdf, self._servo, terrain, timestep)
+        self._model = build_model(urdf, self._servo, terrain, timestep, held=held)
+        self._height = HELD_HEIGHT if held else 0.0
         self._data = mujoco.MjData(self._model)
         joints = movable_joints(urdf)
         # the movable joints in the order of the URDF; all arrays have this order
@@ -127,7 +131,7 @@ class Robot:
         start = start_positions(self.joint_names, pose or {})
         self._data.qpos[self._qpos] = start
         self._ramp.jump(start)
-        place(self._model, self._data, self._terrain, normalized(orientation), drop)
+        place(self._model, self._data, self._terrain, normalized(orientation), self._height + drop)
         mujoco.mj_forward(self._model, self._data)
         self._inertial.rest()
 

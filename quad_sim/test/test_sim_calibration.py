@@ -1,0 +1,158 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``calibrate servos`` finds the hidden servos of a simulated board through its serial line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+from sim_serial import serve
+from sim_virtual import TICK, VirtualRobot
+
+from quad_description import movable_joints, robot_urdf
+from quad_hardware import CommandError
+from quad_hardware.calibration.main import run_calibrate
+from quad_hardware.calibration.servo_fit import ServoFit
+from quad_hardware.calibration.servos import calibrate_servos
+from quad_hardware.calibration.wizard import Console
+from quad_hardware.joints import servo_of
+from quad_hardware.link.v1_dialect import V1Dialect
+from quad_hardware.link.v2_dialect import V2Dialect
+from quad_hardware.protocol import Protocol, V1, V2
+from quad_hardware.report import Report
+from quad_sim.plant.servo import parse_servo
+
+pytestmark = pytest.mark.slow
+
+URDF = robot_urdf()
+SERVOS = [servo_of(joint) for joint in movable_joints(URDF)]
+HIDDEN = 'kp={},kv={},damping={},deadband=0.0015,backlash={},delay={},interpolation=0.02'
+
+
+class Person(Console):
+    """Someone who agrees, and remembers what was printed."""
+
+    def __init__(self) -> None:
+        self.said: list[str] = []
+
+    def write(self, text: str) -> None:
+        """Listen."""
+        self.said.append(text)
+
+    def prompt(self, question: str) -> str:
+        """Agree."""
+        self.said.append(question)
+        return ''
+
+
+class Line:
+    """A robot on its serial line, bytes and all, in virtual time."""
+
+    def __init__(self, *arguments: str, protocol: Protocol) -> None:
+        self.robot = VirtualRobot(*arguments, protocol=protocol)
+        self.dialect = (V1Dialect if protocol is V1 else V2Dialect)(0.0)
+        self._reports: list[Report] = []
+
+    def now(self) -> float:
+        """Return the virtual time [s]."""
+        return self.robot.now
+
+    def wait_until(self, moment: float) -> None:
+        """Let the time pass."""
+        while self.robot.now < moment:
+            self._pass()
+
+    def _pass(self) -> float:
+        sent = -1.0
+        now, commanding = self.robot.now, self.dialect.pending
+        if data := self.dialect.step(now).send:
+            self.robot.line.receive(data, now)
+            if commanding and not self.dialect.pending:
+                sent = now + self.dialect.protocol.wire_time(len(data))
+        for frame in self.robot.run(TICK):
+            if report := self.dialect.handle_frame(frame, self.robot.now):
+                self._reports.append(report)
+        return sent
+
+    def command(self, angles: Mapping[int, float]) -> float:
+        """Send angles [deg]; return when they had left."""
+        self.dialect.command(angles)
+        while (sent := self._pass()) < 0.0:
+            pass
+        return sent
+
+    def rounded(self, motor: int, angle: float) -> float:
+        """Return an angle as the line brings it [deg]."""
+        span = self.dialect.spans.get(motor)
+        return angle if span is None else span.decode(span.encode(angle))
+
+    def reports(self) -> list[Report]:
+        """Return the reports since."""
+        reports, self._reports = self._reports, []
+        return reports
+
+    def angles(self) -> dict[int, float]:
+        """Return the angles of now [deg]."""
+        self.wait_until(self.robot.now + 0.1)
+        return dict(self._reports[-1].positions)
+
+
+def calibrate(servo: str, protocol: Protocol, *arguments: str) -> tuple[ServoFit, list[str]]:
+    """Identify the servos of a robot on a stand."""
+    person = Person()
+    line = Line('--held', '--start', 'stand', '--servo', servo, *arguments, protocol=protocol)
+    return calibrate_servos(person, line, SERVOS, URDF, 'fl'), person.said
+
+
+@pytest.mark.parametrize(
+    ('protocol', 'servo'),
+    [(V1, (3.4, 0.06, 0.04, 0.024, 0.045)), (V2, (2.45, 0.042, 0.05, 0.015, 0.02))],
+    ids=['v1', 'v2'],
+)
+def test_hidden_servos_are_found(protocol: Protocol, servo: tuple[float, ...]) -> None:
+    """Stiffness, gain, torque-speed line, free width and delay within 10 %, from bytes alone."""
+    hidden = parse_servo(HIDDEN.format(*servo))
+    found, said = calibrate(HIDDEN.format(*servo), protocol)
+    assert found.stiffness == pytest.approx(hidden.stiffness, rel=0.1)
+    assert found.damping == pytest.approx(hidden.damping, rel=0.1)
+    assert found.velocity_gain == pytest.approx(hidden.velocity_gain, rel=0.2)
+    assert found.free_width == pytest.approx(hidden.free_width, rel=0.1)
+    assert found.delay == pytest.approx(hidden.delay, rel=0.1)
+    (argument,) = (text.split()[-1] for text in said if '--servo kp' in text)
+    printed = parse_servo(argument)
+    assert printed.stiffness == pytest.approx(found.stiffness, rel=0.01)
+    assert printed.free_width == pytest.approx(found.free_width, rel=0.01)
+    assert any(f'servo_compensation.kp:={found.stiffness:.3g}' in text for text in said)
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'reason'),
+    [
+        (('--fault', 'silence,at=15,for=0.4'), 'no report for 0.4'),
+        (('--fault', 'limp,motor=12,at=12'), 'from those of any servo'),
+    ],
+    ids=['gap', 'let go on the way'],
+)
+def test_a_poor_recording_is_refused(arguments: tuple[str, ...], reason: str) -> None:
+    """With what is wrong with it, instead of numbers."""
+    with pytest.raises(CommandError, match=reason):
+        calibrate('nominal', V2, *arguments)
+
+
+def test_the_command_asks_first_and_swings_one_joint(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Through a real port: the thigh goes and comes back; a motion too short shows no servo."""
+    monkeypatch.setattr('quad_hardware.calibration.servos.STEPS', 2)
+    monkeypatch.setattr('quad_hardware.calibration.servos.SWEEP_TIME', 0.2)
+    person = Person()
+    with serve(tmp_path / 'xgo', '--held', '--start', 'stand') as served:
+        plant = served.simulation.plant
+        before = plant.joint_targets
+        assert run_calibrate(['servos', '--port', str(served.path)], person) == 1
+        turned = abs(plant.joint_targets - before)
+    assert turned.max() < 0.05, person.said
+    assert 'keep hands away' in person.said[1]
+    assert '300 are needed' in person.said[-1]
