@@ -270,11 +270,11 @@ def rl_sar() -> Tool:
             'dof_vel_scale': 0.05,
             'commands_scale': [2.0, 2.0, 0.25],
             'default_dof_pos': DEFAULTS.tolist(),
-            'ang_vel_axis': 'body',
+            'joint_mapping': order,
         }
     }
     base = {'xgo': {'dt': 0.005, 'decimation': 4, 'joint_names': list(ROBOT.names),
-                    'joint_mapping': order}}  # fmt: skip
+                    'joint_mapping': list(range(12))}}  # fmt: skip
     return Tool(
         files={
             'config.yaml': yaml.safe_dump(config, sort_keys=False),

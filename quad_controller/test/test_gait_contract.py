@@ -209,6 +209,60 @@ def test_the_output_of_the_actions_is_named(tmp_path: Path) -> None:
     assert load(path).contract.action.output == 'actions'
 
 
+@pytest.mark.parametrize('half', [True, False], ids=['fp16', 'all sizes open'])
+def test_an_input_that_cannot_be_fed_is_named(tmp_path: Path, half: bool) -> None:
+    """Half precision, and sizes that are all open: refused with type and shape of the port."""
+    tool = TOOLS['rl_sar']()
+    path = tmp_path / 'policy.onnx'
+    write_network(tool, path)
+    model = onnx.load(path)
+    port = model.graph.input[0]
+    if half:
+        for node in model.graph.node:
+            node.input[:] = ['fed' if name == port.name else name for name in node.input]
+        cast = onnx.helper.make_node('Cast', [port.name], ['fed'], to=onnx.TensorProto.FLOAT)
+        model.graph.node.insert(0, cast)
+        port.type.tensor_type.elem_type = onnx.TensorProto.FLOAT16
+    else:
+        port.type.tensor_type.shape.dim[1].dim_param = 'width'
+    onnx.save_model(model, path)
+    assert run(attached(tool, tmp_path)) == 0
+    words = rf'{port.name} tensor\(float16\)' if half else rf"{port.name} .*'width'"
+    with pytest.raises(PolicyError, match=words):
+        load(path)
+
+
+@pytest.mark.parametrize('order', [1, -1], ids=['base.yaml last', 'base.yaml first'])
+def test_the_mapping_of_a_policy_counts_before_that_of_its_robot(
+    tmp_path: Path, order: int
+) -> None:
+    """rl_sar reads base.yaml, then config.yaml over it; left and right would be swapped."""
+    tool = TOOLS['rl_sar']()
+    write_network(tool, tmp_path / 'policy.onnx')
+    model, *files = attached(tool, tmp_path)
+    assert run([model, *files[::order]]) == 0
+    assert list(load(tmp_path / 'policy.onnx').contract.joint_names) == JOINTS
+
+
+def test_a_clip_of_scaled_values_is_undone(tmp_path: Path) -> None:
+    """unitree_rl_lab's scale_first; without one scale for a term it is refused."""
+    deploy = {
+        'step_dt': 0.02,
+        'actions': {'JointPositionAction': {'scale': 0.25}},
+        'observations': {
+            'base_ang_vel': {'scale': [0.2] * 3, 'clip': [-1.0, 1.0], 'scale_first': True}
+        },
+    }
+    path = tmp_path / 'deploy.yaml'
+    path.write_text(yaml.safe_dump(deploy))
+    term = read_contract_file(path).values['observation']['terms']['base_ang_vel']
+    assert term['clip'] == pytest.approx([-5.0, 5.0])
+    deploy['observations']['base_ang_vel']['scale'] = [0.2, 0.2, 0.4]  # type: ignore[index]
+    path.write_text(yaml.safe_dump(deploy))
+    with pytest.raises(PolicyError, match='one scale above 0'):
+        read_contract_file(path)
+
+
 def test_the_table_has_values_and_origins(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -29,17 +29,29 @@ class ContractDocument:
     # why a path is open that the reader could not fill
     hints: Mapping[str, str] = field(default_factory=dict)
     refusals: tuple[str, ...] = ()  # what stands in the file and cannot be run here
+    # of files that name joints and permute them in different places: names, mapping (rl_sar), and
+    # the mapping of a policy, which counts before that of its robot
+    joint_order: Mapping[str, Any] = field(default_factory=dict)
 
     def over(self, base: ContractDocument) -> ContractDocument:
         """Return this one laid over another: its values count, the other's order stays."""
         terms = self.values.get('observation', {}).get('terms', {})
         if terms and all(isinstance(t, dict) and 'source' in t for t in terms.values()):
             base = base.without_terms()  # these are all of them, in their order
+        order = {**base.joint_order, **self.joint_order}
+        values, refusals = _merged(base.values, self.values), (*base.refusals, *self.refusals)
+        names, mapping = order.get('names'), order.get('policy_mapping', order.get('mapping'))
+        if self.joint_order and names and mapping:
+            try:
+                values['joints'] = [names[index] for index in mapping]
+            except (IndexError, TypeError):
+                refusals += (f'joint_mapping {mapping} does not fit {len(names)} joint_names',)
         return ContractDocument(
-            _merged(base.values, self.values),
+            values,
             {**base.origins, **self.origins},
             {**base.hints, **self.hints},
-            (*base.refusals, *self.refusals),
+            refusals,
+            order,
         )
 
     def without_terms(self) -> ContractDocument:

@@ -148,10 +148,19 @@ def _term(kind: str, term: Mapping[str, Any]) -> Values:
     usual = dict(ISAAC_LAB.get(kind, {}))
     if kind == 'gait_phase':
         usual['phase_period'] = _mapping(term, 'params').get('period')
+    scale, clip = term.get('scale'), term.get('clip')
+    if term.get('scale_first') and clip and scale:  # unitree_rl_lab: the clip is of scaled values
+        factors = set(scale) if isinstance(scale, (list, tuple)) else {scale}
+        if len(factors) > 1 or min(factors) <= 0.0:
+            raise PolicyError(
+                f'scale_first with clip {clip} and scale {scale} cannot be run here: one scale '
+                'above 0 is needed for all numbers of a term'
+            )
+        clip = [end / min(factors) for end in clip]
     return known(
         **usual,
-        scale=term.get('scale'),
-        clip=term.get('clip'),
+        scale=scale,
+        clip=clip,
         history=max(int(term.get('history_length') or 1), 1),
     )
 

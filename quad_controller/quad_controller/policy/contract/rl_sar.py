@@ -4,12 +4,15 @@
 
 Each file has one key (``go2``, ``go2/himloco``) above all others. Observations are scaled, then
 clipped as a whole; actions are clipped before they are scaled, and remembered so. In
-``observations_history`` 0 is the newest step.
+``observations_history`` 0 is the newest step. A ``joint_mapping`` of the policy's file counts
+before that of its robot. Which axes an angular velocity has stands in rl_sar's code, not in its
+files: on a robot those of the body.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from .document import ContractDocument, document_of, known, Values
@@ -42,6 +45,10 @@ def read_config(values: Mapping[str, Any], origin: str) -> ContractDocument:
     if isinstance(joints, list) and isinstance(mapping, list):
         joints = [joints[index] for index in mapping]
     low, high = config.get('clip_actions_lower'), config.get('clip_actions_upper')
+    order = known(
+        names=config.get('joint_names'),
+        **{'policy_mapping' if 'observations' in config else 'mapping': mapping},
+    )
     contract = known(
         robot=str(robot) or None,
         period=period,
@@ -55,7 +62,7 @@ def read_config(values: Mapping[str, Any], origin: str) -> ContractDocument:
     )
     if 'observations' in config:
         contract['observation'] = _observation(config, origin, refusals)
-    return document_of(contract, origin, HINTS, refusals)
+    return replace(document_of(contract, origin, HINTS, refusals), joint_order=order)
 
 
 HINTS = {
@@ -83,9 +90,9 @@ def _term(name: str, config: Mapping[str, Any], origin: str, refusals: list[str]
         term['scale'] = config[SCALES[name]]
     if term.get('source') == Source.ANGULAR_VELOCITY.value:
         axis = config.get('ang_vel_axis', config.get('ang_vel_type'))
-        if axis is not None and str(axis).endswith('body'):
+        if axis is None or str(axis).endswith('body'):
             term['frame'] = 'base'
-        elif axis is not None:
+        else:
             refusals.append(f'{origin}: an angular velocity of {axis!r} cannot be run here')
     return term
 
