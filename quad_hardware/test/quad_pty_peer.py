@@ -25,6 +25,7 @@ from quad_hardware.protocol import (
     HOST_KINDS,
     Kind,
     Model,
+    model_of_firmware,
     MOTOR_OF_REGISTER,
     MOTOR_ORDER,
     Protocol,
@@ -239,7 +240,7 @@ class PtyPeer:
             self._set({int(m): a for m, a in zip(values['motor'], values['angle'], strict=True)})
 
     def _old(self, frame: Frame) -> None:
-        spans = ANGLE_SPANS[Model.LITE]
+        spans = ANGLE_SPANS[model_of_firmware(self.firmware) or Model.LITE]
         if frame.kind is Kind.WRITE and frame.address == Register.TORQUE:
             self.torque = frame.payload[0] == Torque.LOAD_ALL
         elif frame.kind is Kind.WRITE and frame.address in MOTOR_OF_REGISTER:
