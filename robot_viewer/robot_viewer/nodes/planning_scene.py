@@ -13,7 +13,6 @@ import numpy as np
 from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.task import Future
-import trimesh
 from urdf_reader import Transform
 from viser import (
     FrameHandle,
@@ -288,7 +287,9 @@ def _draw_shape(
         case shape.CYLINDER, (height, radius):
             return scene.add_cylinder(path, radius, height, color, opacity=OPACITY)
         case shape.CONE, (height, radius):
-            cone = trimesh.creation.cone(radius, height)
+            from trimesh.creation import cone as cone_of  # a third of the start of a page
+
+            cone = cone_of(radius, height)
             vertices = np.asarray(cone.vertices) - (0.0, 0.0, height / 2.0)  # as MoveIt has it
             faces = np.asarray(cone.faces)
             return scene.add_mesh_simple(path, vertices, faces, color=color, opacity=OPACITY)

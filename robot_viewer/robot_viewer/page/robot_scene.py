@@ -8,10 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-import trimesh
 from urdf_reader import (
     DescriptionError,
     find_mesh,
@@ -26,6 +25,9 @@ from urdf_reader import (
     UrdfShape,
 )
 from viser import FrameHandle, SceneApi, SceneNodeHandle
+
+if TYPE_CHECKING:
+    import trimesh
 
 ROOT = '/robot'
 Tint: TypeAlias = tuple[float, float, float, float]
@@ -271,6 +273,8 @@ class Meshes:
             OSError: The file cannot be read.
             ValueError: It has no triangles, or is of an unknown format.
         """
+        import trimesh  # a third of the start of a page, and a robot without meshes needs none
+
         path = find_mesh(shape.attributes.get('filename', ''), self._folder)
         mesh = self._read.get(path) or _load(path)
         if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
@@ -283,6 +287,8 @@ class Meshes:
 
 
 def _load(path: Path) -> object:
+    import trimesh
+
     try:
         return trimesh.load(path, force='mesh')
     except ModuleNotFoundError as error:
