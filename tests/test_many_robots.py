@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import ExitStack
+import os
 from pathlib import Path
 import shutil
 import signal
@@ -15,7 +16,7 @@ from ament_index_python.packages import get_package_share_directory
 from control_msgs.msg import JointJog
 from isolation import Isolation
 from nav_msgs.msg import Odometry
-from processes import executable, RunningProcess
+from processes import executable, find_children, RunningProcess
 import pytest
 from rclpy.qos import qos_profile_sensor_data
 from ros_client import RosClient
@@ -37,12 +38,14 @@ class Robot:
 
     Attributes:
         name: The namespace.
+        cycles: Programs of it that own a cycle.
         client: The test's own node.
         bringup: Its processes.
     """
 
     package: str
     ready: str
+    cycles: tuple[str, str]
 
     def __init__(self, name: str, isolation: Isolation, client: RosClient, *command: str) -> None:
         """Start the bring-up."""
@@ -64,6 +67,7 @@ class Arm(Robot):
     """The Panda, whose first joint is jogged."""
 
     package, ready = 'arm_bringup', 'are enabled'
+    cycles = ('fake_slaves', 'motion_node')
 
     def __init__(self, name: str, isolation: Isolation, client: RosClient, folder: Path) -> None:
         """Copy the robot with a slower cycle, so that two leave the machine time."""
@@ -93,6 +97,7 @@ class Dog(Robot):
     """The quadruped, lying, which stands up."""
 
     package, ready = 'quad_bringup', 'all is ready'
+    cycles = ('hardware_node', 'controller_node')
 
     def __init__(self, name: str, isolation: Isolation, client: RosClient, _: Path) -> None:
         """Find its mode and where its body is, in physics."""
@@ -110,6 +115,7 @@ class Dog(Robot):
         self._modes.call_async(SetMode.Request(mode='stand'))
 
 
+REFUSED = 'has no real-time priority'
 FAR = 0.01
 """Further than this has moved [m] or [rad]."""
 
@@ -135,6 +141,21 @@ def moves_alone(robot: Robot, others: Sequence[Robot]) -> None:
         robot.client.node.destroy_timer(timer)
     for other in others:
         assert distance(other.place(), before[other.name]) < FAR
+
+
+def real_time_threads(pid: int) -> list[int]:
+    """Return the threads of a process that have real-time priority."""
+    threads = [int(task.name) for task in Path(f'/proc/{pid}/task').iterdir()]
+    mask = ~os.SCHED_RESET_ON_FORK
+    return [each for each in threads if os.sched_getscheduler(each) & mask == os.SCHED_FIFO]
+
+
+def cycles_have_priority(robot: Robot) -> None:
+    """One thread of each program with a cycle; where it is refused, a line says how to get it."""
+    for program in robot.cycles:
+        (process,) = find_children(robot.bringup.pid, f'/{program}')
+        refused = any(REFUSED in line and program in line for line in robot.bringup.lines)
+        assert len(real_time_threads(process.pid)) == (0 if refused else 1), program
 
 
 def frames_of(client: RosClient, robots: Sequence[Robot]) -> None:
@@ -175,6 +196,8 @@ def test_robots_of_one_domain(isolation: Isolation, tmp_path: Path) -> None:
             stack.enter_context(robot.bringup)
         for robot in robots:
             robot.bringup.wait_for(robot.ready, STARTING)
+        for robot in robots:
+            cycles_have_priority(robot)
         client.spin_until(lambda: all(each.place() for each in robots), 20.0, 'all robots')
         assert outside(client, robots) == set()
         frames_of(client, robots)

@@ -20,7 +20,7 @@ from simulated_quad import SimulatedQuad
 
 pytestmark = [pytest.mark.scenario, pytest.mark.slow]
 
-DURATION = 20.0  # [s] of walking
+DURATION = 10.0  # [s] of walking
 RATE = 30.0  # [1/s]; what a topic of a cycle has at least
 SEVERAL = {'/rosout', '/parameter_events', '/diagnostics', '/tf', '/tf_static'}
 """Topics that several nodes publish."""
