@@ -6,8 +6,10 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+import time
 from typing import Any, TYPE_CHECKING
 
+from action_msgs.msg import GoalStatus
 from ament_index_python.packages import get_package_share_directory
 from control_msgs.action import FollowJointTrajectory
 from processes import executable, RunningProcess
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
 READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
 """A pose of the Panda from which it can move in every direction in [rad]."""
 
+REACHING = 20.0
+"""Longest time in [s] after which a goal is sent once more."""
 CONTROLLER = '/panda_arm_controller'
 
 
@@ -85,6 +89,10 @@ class MovingArm(SimulatedArm):
         """Send a goal; it is accepted."""
         return GoalRun(self.client, goal)
 
+    def reach(self, positions: Sequence[float], seconds: float) -> None:
+        """Go to a pose in [rad], once more where a stall of the machine has ended the goal."""
+        reach(self.client, goal_to(positions, seconds))
+
 
 def trajectory_client(client: RosClient, controller: str = CONTROLLER) -> ActionClient:
     """Return the client of a trajectory controller."""
@@ -128,6 +136,18 @@ class GoalRun:
         self._client.spin_until(self._result.done, timeout, 'end of the goal')
         answer = self._result.result()
         return answer.status, answer.result
+
+
+def reach(
+    client: RosClient, goal: FollowJointTrajectory.Goal, controller: str = CONTROLLER
+) -> None:
+    """Send a goal until it is reached: drives that a busy machine keeps from answering end one."""
+    deadline = time.monotonic() + REACHING
+    while True:
+        status, result = GoalRun(client, goal, controller).wait()
+        if status == GoalStatus.STATUS_SUCCEEDED:
+            return
+        assert time.monotonic() < deadline, result.error_string
 
 
 def goal_to(

@@ -5,8 +5,11 @@
 from __future__ import annotations
 
 from contextlib import ExitStack, suppress
+from functools import partial
 import math
 from pathlib import Path
+import re
+import signal
 import time
 from typing import TYPE_CHECKING
 
@@ -42,6 +45,10 @@ ANSWER = 1.0
 """Longest time in [s] for one answer."""
 STARTING = 60.0
 """Longest time in [s] for a process to be ready on a busy machine."""
+LATE = re.compile('fault, (pause|joint states: none|attitude: none)')
+"""Faults of a controller that did not run, or did not receive the reports of the robot."""
+STALLS = 5
+"""How often a busy machine may keep the controller from running while the robot stands up."""
 UPRIGHT = math.radians(15.0)
 """Tilt in [rad] of a robot that stands or walks."""
 LEANING = math.radians(20.0)
@@ -109,6 +116,14 @@ class SimulatedQuad:
         process.wait_until_ready(STARTING)
         return process
 
+    def start_ended(self) -> None:
+        """Start anew what a test has killed, and continue what it has stopped."""
+        for name, process in [*self.processes.items()]:
+            if process.is_running():
+                process.signal(signal.SIGCONT)
+            else:
+                self.start(name)
+
     def set_mode(self, mode: str) -> None:
         """Ask for a mode until it is accepted: what it needs may not be received yet."""
         words = 'no answer'
@@ -155,19 +170,42 @@ class SimulatedQuad:
         return tilt_of((turn.x, turn.y, turn.z, turn.w))
 
     def stand(self) -> None:
-        """Make it stand up, and wait until it does.
+        """Make it stand up, and wait until it does, as :meth:`reach`."""
+        self.reach('stand')
+
+    def reach(self, mode: str) -> None:
+        """Request a mode, and wait until it is reached.
+
+        A busy machine keeps the controller from running, or reports from arriving, and that is
+        a fault, as it should be: then it is asked once more.
 
         Raises:
-            AssertionError: It does not, or a fault stops it on its way.
+            AssertionError: It is not, or another fault stops it on its way.
         """
-        self.set_mode('stand')
-        asked = len(self.states)
+        for _ in range(STALLS):
+            self.set_mode(mode)
+            asked = len(self.states)
+            self.client.spin_until(partial(self._has_ended, mode, asked), TIMEOUT, mode)
+            if self.state != 'fault' or not LATE.search(self._last_fault):
+                break
+            self.clear_fault()
+        last = self.processes['controller'].lines[-1]
+        assert self.state == mode, f'no {mode}, but {self.state}: {last}'
 
-        def ended() -> bool:
-            return self.state == 'stand' or any(s.data == 'fault' for s in self.states[asked:])
+    def _has_ended(self, mode: str, since: int) -> bool:
+        """Whether a mode is reached, or a fault has come since a number of states."""
+        return self.state == mode or any(s.data == 'fault' for s in self.states[since:])
 
-        self.client.spin_until(ended, TIMEOUT, 'standing')
-        assert self.state == 'stand', f'does not stand: {self.processes["controller"].lines[-1]}'
+    @property
+    def stalled(self) -> bool:
+        """Whether it is in fault, as the controller itself did not run for a while."""
+        return self.state == 'fault' and 'fault, pause' in self._last_fault
+
+    @property
+    def _last_fault(self) -> str:
+        """What the controller said of its last fault."""
+        lines = [line for line in self.processes['controller'].lines if 'fault, ' in line]
+        return lines[-1] if lines else ''
 
     def walk(self, seconds: float, velocity: Velocity = AHEAD) -> None:
         """Command a velocity, ten times a second, for so long."""

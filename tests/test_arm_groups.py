@@ -13,6 +13,7 @@ from controller_manager_msgs.srv import ListControllers
 from isolation import Isolation, reserve
 from moveit_msgs.action import ExecuteTrajectory
 from moveit_msgs.msg import RobotTrajectory
+from moving_arm import goal_to, reach
 from processes import RunningProcess
 import pytest
 from ros_client import RosClient
@@ -100,8 +101,7 @@ def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
 def robot(started: Robot) -> Robot:
     """Bring both arms and the gripper to 0, one after the other."""
     for arm, joints in ARMS.items():
-        (done,) = started.results([started.follow(arm, 4, [0.0] * len(joints))])
-        assert done.status == SUCCEEDED, done.result
+        reach(started.client, goal_to([0.0] * len(joints), 2.0, joints), f'/{arm}_controller')
     (hand,) = started.results([started.grip(0.0)])
     assert hand.status == SUCCEEDED, hand.result
     return started
@@ -115,7 +115,7 @@ def test_both_arms_and_the_gripper_move_at_the_same_time(robot: Robot) -> None:
     )
     names = {each.name for each in listing.controller}
     assert {'left_controller', 'right_controller', 'hand_controller'} <= names
-    runs = [robot.follow('left', 4), robot.follow('right', 4), robot.grip(0.03)]
+    runs = [robot.follow('left', 2), robot.follow('right', 2), robot.grip(0.03)]
     left, right, hand = robot.results(runs)
     assert [left.status, right.status, hand.status] == [SUCCEEDED] * 3, (left, right, hand)
     assert hand.result.reached_goal
@@ -194,7 +194,7 @@ def test_a_trajectory_of_arm_and_gripper_is_split(robot: Robot) -> None:
     """move_group has the arm follow it, and the gripper close where it ends."""
     moved, target = [*ARMS['left'], GRIPPER], [*TARGETS['left'], 0.03]
     trajectory = JointTrajectory(joint_names=moved)
-    for places, seconds in (([robot.at[name] for name in moved], 0), (target, 4)):
+    for places, seconds in (([robot.at[name] for name in moved], 0), (target, 2)):
         point = JointTrajectoryPoint(positions=places)
         point.time_from_start.sec = seconds
         trajectory.points.append(point)

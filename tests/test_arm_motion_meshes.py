@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
 from control_msgs.action import FollowJointTrajectory
-from moving_arm import goal_to, GoalRun, READY
+from moving_arm import goal_to, GoalRun, reach, READY
 from processes import executable
 import pytest
 from topic_arm import TopicArm
@@ -74,6 +74,5 @@ def test_a_goal_in_which_meshes_meet_is_refused(isolation: Isolation, folder: Pa
         assert 'would collide at' in refused.error_string
         assert 'panda_link' in refused.error_string
         assert arm.at == READY
-        reached = GoalRun(arm.client, goal_to(FREE, 2.0)).wait()[1]
-        assert reached.error_code == 0, reached.error_string
+        reach(arm.client, goal_to(FREE, 2.0))
         assert arm.at[0] == pytest.approx(FREE[0], abs=1e-6)

@@ -111,7 +111,7 @@ def test_an_arm_is_jogged_in_every_way(isolation: Isolation, tmp_path: Path) -> 
     """Twists in links and TF frames, joints, displacements, poses; refusals, pause, time-out."""
     with MovingArm(isolation, tmp_path) as arm:
         arm.follow()
-        assert arm.send(goal_to(READY, 2.0)).wait()[1].error_code == 0
+        arm.reach(READY, 2.0)
         jogger = Jogger(arm)
         arm.client.spin_until(lambda: bool(jogger.words and jogger.states), 10.0, 'status')
         _jogs(jogger)

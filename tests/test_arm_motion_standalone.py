@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from control_msgs.action import FollowJointTrajectory
 from control_msgs.msg import JointJog, JointTrajectoryControllerState
 from controller_manager_msgs.srv import ListControllers, SwitchController
-from moving_arm import CONTROLLER, goal_to, GoalRun, READY
+from moving_arm import CONTROLLER, goal_to, GoalRun, reach, READY
 from processes import RunningProcess
 import pytest
 from topic_arm import standalone, TopicArm
@@ -41,8 +41,7 @@ def test_trajectories_go_out_as_arrays(isolation: Isolation, tmp_path: Path) -> 
 
 def _reaches_a_goal_while_it_is_active(arm: TopicArm) -> None:
     """The controller is listed, switched off and on."""
-    reached = GoalRun(arm.client, goal_to([0.3, *READY[1:]], 1.0)).wait()[1]
-    assert reached.error_code == RESULT.SUCCESSFUL, reached.error_string
+    reach(arm.client, goal_to([0.3, *READY[1:]], 1.0))
     _comes_to(arm, 0.3)
     listed = arm.client.call(
         ListControllers, '/controller_manager/list_controllers', ListControllers.Request()
@@ -139,8 +138,7 @@ def test_one_program_is_chosen_by_its_back_end(isolation: Isolation, tmp_path: P
     """motion_node jogs and follows trajectories; a second program is an error that it logs."""
     command = standalone(tmp_path, 'motion_node', 'backend:=topics')
     with TopicArm(isolation, command, READY_WORDS) as arm:
-        result = GoalRun(arm.client, goal_to([0.3, *READY[1:]], 1.0)).wait()[1]
-        assert result.error_code == RESULT.SUCCESSFUL, result.error_string
+        reach(arm.client, goal_to([0.3, *READY[1:]], 1.0))
         assert '/servo_node' in _names(arm)
         assert 'another program' not in arm.process.output
         assert 'without effect' not in arm.process.output

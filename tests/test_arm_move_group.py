@@ -30,7 +30,7 @@ from moveit_msgs.srv import (
     GetPlanningScene,
     GetPositionFK,
 )
-from moving_arm import goal_to, MovingArm, READY, robot_parameters
+from moving_arm import MovingArm, READY, robot_parameters
 from planning_messages import panda
 from planning_scenes import distances
 from processes import executable
@@ -243,8 +243,7 @@ def _cancels_and_stops(arm: MovingArm) -> None:
 
 
 def _back_to_ready(arm: MovingArm) -> None:
-    status, result = arm.send(goal_to(READY, 3.0)).wait()
-    assert (status, result.error_code) == (GoalStatus.STATUS_SUCCEEDED, 0), result.error_string
+    arm.reach(READY, 3.0)
 
 
 def _sequence(arm: MovingArm, *radii: float) -> MotionSequenceRequest:
