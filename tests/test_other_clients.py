@@ -27,8 +27,14 @@ pytestmark = [pytest.mark.scenario, pytest.mark.slow, pytest.mark.timeout(600)]
 
 PAGE = CHECKOUT / 'docs' / 'other_clients.md'
 TIMEOUT = 180.0  # [s] of a command, on a busy machine
-NO_NETWORK = ('Temporary failure in name resolution', 'Connection refused', 'No matching')
-NO_NETWORK += ('EAI_AGAIN', 'ENOTFOUND', 'ECONNREFUSED')  # as npm says it
+NO_NETWORK = (  # in the words of pip and npm
+    'Temporary failure in name resolution',
+    'Connection refused',
+    'No matching',
+    'EAI_AGAIN',
+    'ENOTFOUND',
+    'ECONNREFUSED',
+)
 
 
 def test_the_page_is_typed_from_top_to_end(isolation: Isolation, tmp_path: Path) -> None:
@@ -149,8 +155,8 @@ def installed(command: Sequence[str | Path], folder: Path) -> Path:
 
 def from_pypi(package: str, folder: Path) -> dict[str, str]:
     """Install a package without what it requires; return what finds it."""
-    pip = [sys.executable, '-m', 'pip', 'install', '--quiet', '--no-deps', '--target', folder]
-    installed([*pip, package], folder)
+    pip = f'{sys.executable} -m pip install --quiet --no-deps --target'.split()
+    installed([*pip, folder, package], folder)
     return {'PYTHONPATH': f'{folder}:{os.environ.get("PYTHONPATH", "")}'}
 
 

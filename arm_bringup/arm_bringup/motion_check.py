@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 import difflib
 from typing import Any, TYPE_CHECKING
 
-from urdf_reader import find_group, KinematicTree, SemanticDescription
+from urdf_reader import DescriptionError, find_group, KinematicTree, SemanticDescription
 
 from process_supervisor import parameters_by_node, StartError
 
@@ -68,7 +68,7 @@ def check_motion(
         return [error(robot.limits.name, str(problem), 'write it as robots/gp110/limits.yaml is')]
     except RobotError as problem:
         return [error(robot.semantic.name, str(problem), f'see {SETTINGS} in README')]
-    findings = list(_limits(robot, limits, tree))
+    findings = [*_limits(robot, limits, tree), *_not_executed(robot, groups, semantic, tree)]
     text, notes, models = read_semantic(robot), {}, {}
     arms = {name: find_group(tree, semantic, name).joints for name in groups.arms}
     for group in groups.names:
@@ -95,6 +95,28 @@ def check_motion(
         findings += _poses(robot, model)
     findings += [warning(*_note(robot, note)) for note in notes]
     return findings + list(_controllers(robot, groups, models))
+
+
+def _not_executed(
+    robot: Robot, groups: MovedGroups, semantic: SemanticDescription, tree: KinematicTree
+) -> Iterable[Finding]:
+    """Find parts of a group that is moved as a whole, such as an arm on its rail."""
+    moved = {joint: arm for arm in groups.arms for joint in find_group(tree, semantic, arm).joints}
+    others = [] if robot.groups else [arm for arm in semantic.arms if arm not in groups.names]
+    for name in others:
+        try:
+            joints = find_group(tree, semantic, name).joints
+        except DescriptionError:  # reported with the names of the SRDF
+            continue
+        whole = {moved[joint] for joint in joints if joint in moved}
+        if whole:
+            yield warning(
+                robot.semantic.name,
+                f'group {name} shares joints with {min(whole)}, which is moved: plans for {name} '
+                'are not executed',
+                f'plan for {min(whole)}; or name the groups to move in {SETTINGS}, as group: '
+                f'[{name}, ...]',
+            )
 
 
 def _limits_remedy(robot: Robot) -> str:

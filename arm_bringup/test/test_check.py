@@ -71,6 +71,7 @@ def test_nothing_is_wrong_with_our_robots(name: str, warnings: list[str]) -> Non
     ('file', 'old', 'new', 'expected'),
     [
         ('bus.yml', ' joint_2_l:', ' joint_x:', [(ERROR, 'joint_x'), (WARNING, 'joint_2_l')]),
+        ('bus.yml', ' joint_2_l:', ' joint 2:', [(ERROR, 'rename a joint in its URDF, SRDF')]),
         ('bus.yml', 'cia402_slave.eds', 'lost.eds', [(ERROR, 'lost.eds')]),
         ('bus.yml', 'value: 500000', 'value: 200000', [(WARNING, 'up to 2 (0x607F')]),
         (
@@ -99,6 +100,12 @@ def test_nothing_is_wrong_with_our_robots(name: str, warnings: list[str]) -> Non
             '</robot>',
             '<group name="hand"><joint name="finger_1"/><joint name="finger_2"/></group></robot>',
             [(WARNING, 'group hand: the description has no joint or link of it')],
+        ),
+        (
+            'gp110.srdf',
+            '</robot>',
+            '<group name="lift"><joint name="joint_2_l"/></group></robot>',
+            [(WARNING, 'group lift shares joints with gp110_arm, which is moved')],
         ),
         (
             'gp110.srdf',

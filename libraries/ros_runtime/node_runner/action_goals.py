@@ -31,7 +31,7 @@ several of them, or on a busy computer, it takes some switches. Cancel requests 
 because the motion would go on meanwhile.
 """
 
-REPEATS = (0.25, 1.0)
+REPEATS = (0.5, 2.0)
 """Times in [s] after which acceptance is sent again while no result has been requested.
 
 A client that requests the result has the acceptance. On a busy computer its thread may pause

@@ -40,7 +40,8 @@ def check_node_name(name: str, place: Place, findings: Findings) -> None:
         findings.error(
             place,
             f'{name!r} is no name for a ROS node',
-            'take letters, digits and underscores, and begin with a letter',
+            'take letters, digits and underscores, and begin with a letter; rename a joint in its'
+            ' URDF, SRDF and limits, too',
         )
 
 
