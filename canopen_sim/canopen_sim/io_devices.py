@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from canopen_core.standard import (
     DeviceProfile,
+    DIGITAL_OUTPUTS,
     EncoderObject,
     ERROR_OBJECTS,
     IO_GROUPS,
@@ -56,7 +57,7 @@ class IoModule(Application):
             if not (isinstance(output, Scalar) and isinstance(mode, Scalar)):
                 continue
             after = value.value if isinstance(value, Scalar) else 0
-            if output.entry.index == IO_GROUPS[1].indices[0]:  # a bit for each output
+            if output.entry.index == DIGITAL_OUTPUTS.indices[0]:  # a bit for each output
                 mask = int(mode.value)
                 output.value = (int(output.value) & ~mask) | (int(after) & mask)
             elif mode.value:

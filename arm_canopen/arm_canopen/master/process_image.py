@@ -193,6 +193,11 @@ class SentRpdo:
         self.left(now)
         return True
 
+    @property
+    def was_sent(self) -> bool:
+        """Whether it has left since the device booted."""
+        return self._left_at is not None
+
     def left(self, now: float) -> None:
         """It was sent because it was published, at a time in [s]."""
         self.due, self._left_at = False, now
@@ -386,6 +391,13 @@ class ProcessImage:
         """Return what the RPDOs carry for an object, None when none carries it."""
         for entry, position in self._places.get((index, subindex), ()):
             return entry.values[position]
+        return None
+
+    def sent(self, index: int, subindex: int) -> Number | None:
+        """Return what an RPDO has brought of an object since the device booted, else None."""
+        for entry, position in self._places.get((index, subindex), ()):
+            if entry.was_sent:
+                return entry.values[position]
         return None
 
     def mapped_output(self, index: int, subindex: int = 0) -> MappedObject | None:

@@ -7,7 +7,7 @@ And services that read and write objects of any type by name or number.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Mapping
 from concurrent.futures import Future
 from functools import partial
 from typing import Any
@@ -21,7 +21,7 @@ from std_srvs.srv import Trigger
 from arm_msgs.srv import ReadObject, WriteObject
 from canopen_core import CanopenError, ObjectError, SdoError
 from canopen_core.eds import bytes_from_text, text_from_bytes
-from canopen_core.standard import NmtCommand, object_address, object_path, ObjectEntry
+from canopen_core.standard import NmtCommand, Number, object_address, object_path, ObjectEntry
 from node_runner import create_deferred_service, destroyed_when_refused
 
 from ..master.object_access import bytes_from_raw, number_from_raw, raw_from_bytes
@@ -99,35 +99,39 @@ class DeviceNode(Node):
 
         self.offer(Trigger, name, lambda request: handler(), respond)
 
-    def _write_pdo(self, message: COData) -> None:
+    def publish_objects(
+        self, topic: str, values: Callable[[], Mapping[tuple[int, int], Number]]
+    ) -> None:
+        """Send the objects of a message by RPDO, or log why they are refused."""
         try:
             self.admit()
+            objects = values()
         except CanopenError as error:
-            self.get_logger().warning(f'~/tpdo: {error}')
+            self.get_logger().warning(f'{topic}: {error}')
             return
-        place = object_address(message.index, message.subindex)
-        mapped = self.device.image.mapped_output(message.index, message.subindex)
-        if mapped is None:
-            self.get_logger().warning(f'~/tpdo: {place} is in no RPDO of the device; map it')
-            return
-        try:
-            self.device.objects.check_owner(message.index)
-            value = number_from_raw(mapped, message.data)
-        except CanopenError as error:
-            self.get_logger().warning(f'~/tpdo: {place}: {error}')
-            return
-        publish = partial(
-            self._thread.network.publish_objects,
-            self.device,
-            {(message.index, message.subindex): value},
-        )
-        sent = self._thread.call(publish)
-        sent.add_done_callback(self._log_unsent)
+        network = self._thread.network
+        sent = self._thread.call(partial(network.publish_objects, self.device, objects))
 
-    def _log_unsent(self, sent: Future[None]) -> None:
-        error = sent.exception()
-        if error is not None:
-            self.get_logger().warning(f'~/tpdo: {error}')
+        def log_unsent(sent: Future[None]) -> None:
+            if (error := sent.exception()) is not None:
+                self.get_logger().warning(f'{topic}: {error}')
+
+        sent.add_done_callback(log_unsent)
+
+    def _write_pdo(self, message: COData) -> None:
+        def values() -> Mapping[tuple[int, int], Number]:
+            address = message.index, message.subindex
+            place = object_address(*address)
+            mapped = self.device.image.mapped_output(*address)
+            if mapped is None:
+                raise CanopenError(f'{place} is in no RPDO of the device; map it')
+            try:
+                self.device.objects.check_owner(message.index)
+                return {address: number_from_raw(mapped, message.data)}
+            except CanopenError as error:
+                raise CanopenError(f'{place}: {error}') from error
+
+        self.publish_objects('~/tpdo', values)
 
     def _offer_nmt(self, name: str, command: NmtCommand) -> None:
         node_id = self.device.config.node_id

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 import time
+from typing import Protocol
 
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -17,15 +18,38 @@ from std_msgs.msg import String
 from canopen_core import CanopenError
 from node_runner import LATCHED
 
-from ..cia402.state import AxisState
 from ..joints import JointAggregator, Joints, JointSample, JointSet, movable_joints
 from .output_thread import OutputThread
+
+
+class Measured(Protocol):
+    """An axis of a drive or an encoder, as of the last cycle, in user units."""
+
+    @property
+    def name(self) -> str:
+        """Name of the joint."""
+
+    @property
+    def fresh(self) -> bool:
+        """Whether the values are young enough to be published."""
+
+    @property
+    def position(self) -> float:
+        """Actual position."""
+
+    @property
+    def velocity(self) -> float:
+        """Actual velocity."""
+
+    @property
+    def effort(self) -> float:
+        """Actual effort."""
 
 
 class DriveJointStates:
     """``~/joint_states`` of a drive, and of each of its channels where it has several."""
 
-    def __init__(self, node: Node, axes: Sequence[AxisState]) -> None:
+    def __init__(self, node: Node, axes: Sequence[Measured]) -> None:
         self.axes = list(axes)  # the state of each axis
         self.listened = False  # somebody listens to one of the topics
         names = [axis.name for axis in axes]

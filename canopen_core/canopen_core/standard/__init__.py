@@ -56,7 +56,15 @@ from .drive import (
     TARGET_OBJECTS,
 )
 from .emcy import Emergency, error_code_text, error_register_text
-from .io_profiles import ANALOG_EVENTS, EncoderObject, ERROR_OBJECTS, IO_GROUPS, IoGroup
+from .io_profiles import (
+    ANALOG_EVENTS,
+    ANALOG_INPUTS,
+    DIGITAL_OUTPUTS,
+    EncoderObject,
+    ERROR_OBJECTS,
+    IO_GROUPS,
+    IoGroup,
+)
 from .lss import BIT_RATES_KBIT, UNCONFIGURED
 from .nmt import (
     ALL_NODES,
@@ -102,6 +110,7 @@ from .time_of_day import decode_time_of_day, encode_time_of_day
 __all__ = [
     'ALL_NODES',
     'ANALOG_EVENTS',
+    'ANALOG_INPUTS',
     'AXIS_OFFSET',
     'BIT_RATES_KBIT',
     'CAN_ID_MASK',
@@ -110,6 +119,7 @@ __all__ = [
     'COMMANDED_STATES',
     'COMMANDS',
     'CYCLIC_MODES',
+    'DIGITAL_OUTPUTS',
     'ERROR_OBJECTS',
     'EVENT_DRIVEN',
     'FIXED_BITS',

@@ -37,6 +37,11 @@ class IoGroup:
     is_output: bool
     is_digital: bool
 
+    @property
+    def direction(self) -> str:
+        """Key of bus.yml below which its PDOs stand."""
+        return 'rpdo' if self.is_output else 'tpdo'
+
     def entries(
         self, dictionary: ObjectDictionary, mapped: Container[tuple[int, int]] = ()
     ) -> Sequence[ObjectEntry]:
@@ -50,10 +55,16 @@ class IoGroup:
         return next(carried, widths[0] if widths else [])
 
 
+DIGITAL_OUTPUTS = IoGroup(
+    'digital_outputs', (0x6200, 0x6300, 0x6320), is_output=True, is_digital=True
+)
+ANALOG_INPUTS = IoGroup(
+    'analog_inputs', (0x6400, 0x6401, 0x6402, 0x6403), is_output=False, is_digital=False
+)
 IO_GROUPS = (
     IoGroup('digital_inputs', (0x6000, 0x6100, 0x6120), is_output=False, is_digital=True),
-    IoGroup('digital_outputs', (0x6200, 0x6300, 0x6320), is_output=True, is_digital=True),
-    IoGroup('analog_inputs', (0x6400, 0x6401, 0x6402, 0x6403), is_output=False, is_digital=False),
+    DIGITAL_OUTPUTS,
+    ANALOG_INPUTS,
     IoGroup('analog_outputs', (0x6410, 0x6411, 0x6412, 0x6413), is_output=True, is_digital=False),
 )
 ERROR_OBJECTS = {0x6200: (0x6206, 0x6207), 0x6411: (0x6443, 0x6444)}
