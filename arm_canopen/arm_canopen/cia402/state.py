@@ -178,6 +178,7 @@ class AxisState:
         self._scheduler = scheduler
         self._looked: tuple[int, float] | None = None  # statusword and position, by SDO
         self._looked_at = -math.inf
+        self._unconfirmed: int | None = None  # positions received, of which the last may be old
         objects, image = node.objects, node.image
         self._statusword = objects.reader(self.at(Index.STATUSWORD))
         self._mode = objects.reader(self.at(Index.MODE_OF_OPERATION_DISPLAY))
@@ -270,7 +271,8 @@ class AxisState:
     @property
     def speed_known(self) -> bool:
         """Whether it was seen for long enough to distinguish motion from rest."""
-        return self.seen and self._estimate.known
+        unconfirmed = self._unconfirmed == self.positions_received
+        return self.seen and self._estimate.known and not unconfirmed
 
     @property
     def rest_speed(self) -> float:
@@ -439,6 +441,8 @@ class AxisState:
                 value = await self.node.objects.read_object(self.at(index))
             except (SdoError, CodecError):
                 continue
+            if reader is self._position:
+                self._unconfirmed = None
             if not isinstance(value, int) or reader.source.count != count:
                 continue  # a TPDO that came meanwhile is newer, or as new
             if reader.value not in (None, value):
@@ -451,7 +455,13 @@ class AxisState:
 
     @contextmanager
     def looking(self) -> Iterator[None]:
-        """Read by SDO periodically while TPDOs do not show the state, or may have got lost."""
+        """Read by SDO periodically while TPDOs do not show the state, or may have got lost.
+
+        Where the loss of its position goes unnoticed, an axis is seen to stand by SDO only.
+        """
+        position = self._position
+        if isinstance(position, InputReader) and position.source.loss_unnoticed:
+            self._unconfirmed = position.source.count
         task = self._scheduler.background(self._look_on())
         try:
             yield

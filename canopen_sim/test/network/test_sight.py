@@ -387,6 +387,29 @@ def test_a_stop_is_seen_by_sdo_where_its_tpdos_get_lost(config: NodeConfig, verb
 
 
 @UNNOTICED
+def test_a_stop_that_cannot_be_seen_at_all_is_not_answered_as_one(config: NodeConfig) -> None:
+    """Neither TPDO nor SDO shows that it moves, and its last position stood."""
+    state, position = config.tpdos[:2]
+    unseen = replace(position, mapping=position.mapping[:1])  # without 0x606C
+    config = replace(
+        config,
+        tpdos=(state, unseen, *config.tpdos[2:]),
+        heartbeat_producer=0.0,
+        heartbeat_timeout=0.0,
+    )
+    net = enabled(config, OperationMode.PROFILE_VELOCITY)
+    net.run(1.0)
+    net.wire.loses = lambda sender, frame: frame.can_id in (*TPDOS, 0x580 + NODE_ID)
+    net.target(1.0)
+    net.run(1.5)
+    assert net.speed() == pytest.approx(1.0, abs=1e-2)
+    halt = net.begin(JOINT, 'halt', preempt=True)
+    net.run_until(lambda: halt.done, 20.0)
+    with pytest.raises(DriveError, match='standstill'):
+        halt.result()
+
+
+@UNNOTICED
 def test_a_fault_that_got_lost_is_reset_at_once(config: NodeConfig) -> None:
     """By recover and init; enable names it."""
     net = enabled(config, OperationMode.PROFILE_POSITION)
