@@ -1,19 +1,25 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The action: a goal that nobody foresaw ends with a code, and the program goes on."""
+"""The trajectory controller: unforeseen goals end with a code; what a pause does, in words."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
 import pytest
-from servo_commands import SteppedWorker
+from servo_commands import jog, SteppedWorker
 from servo_drives import Drives
 from servo_goals import GoalNode
+from std_srvs.srv import Trigger
 
+from arm_servo import SpeedRequest, TargetRequest
 from arm_servo.core.motion_queue import MotionCommand
+from arm_servo.ros.trajectory import controller
 from arm_servo.ros.trajectory.action import TrajectoryAction
+from arm_servo.ros.trajectory.controller import TrajectoryPause
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
 
 
@@ -92,3 +98,57 @@ def test_a_cancel_in_the_middle_of_the_planning_ends_the_goal(
     assert goal.ending == 'canceled'
     assert goal.result.error_code == GoalCode.SUCCESSFUL
     assert drives.path[-1].tolist() == before
+
+
+def trajectory(drives: Drives) -> None:
+    """Follow a trajectory."""
+    there = [axis.setpoint + 0.5 for axis in drives.axes]
+    drives.gateway.request(TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(5.0, there)]))
+
+
+def jogging(drives: Drives) -> None:
+    """Jog a joint."""
+    jog(drives.gateway, {'panda_joint1': 0.1}, drives.now, 5.0)
+
+
+def target(drives: Drives) -> None:
+    """Move a joint to a place."""
+    drives.gateway.request(TargetRequest({'panda_joint1': 0.5}, 0.1))
+
+
+@pytest.mark.parametrize(
+    ('begin', 'paused', 'resumed'),
+    [
+        (lambda _: None, 'nothing is under way', 'takes commands again'),
+        (jogging, 'the jog ends', 'takes commands again'),
+        (trajectory, 'the trajectory comes to rest on its path', 'the trajectory goes on'),
+        (target, 'the single target comes to rest on its path', 'the single target goes on'),
+    ],
+)
+def test_a_pause_says_what_becomes_of_what_moves_the_arm(
+    monkeypatch: pytest.MonkeyPatch, begin: Callable[[Drives], None], paused: str, resumed: str
+) -> None:
+    """Each answer is of what the arm does at the call; a second call changes nothing."""
+    drives, services = ready(), dict[str, Any]()
+    monkeypatch.setattr(controller, 'time', SimpleNamespace(monotonic=lambda: drives.now))
+    node: Any = SimpleNamespace(
+        create_service=lambda _, name, callback: services.update({name: callback})
+    )
+    TrajectoryPause(node, drives.gateway)
+
+    def call(name: str) -> str:
+        answer: Trigger.Response = services[name](None, Trigger.Response())
+        drives.run(100)
+        assert answer.success
+        return str(answer.message)
+
+    begin(drives)
+    drives.run(20)
+    assert paused in call('~/pause')
+    assert not np.ptp(np.array(drives.path[-10:]), axis=0).any()
+    assert 'is paused already' in call('~/pause')
+    assert resumed in call('~/resume')
+    assert 'was not paused' in call('~/resume')
+    drives.gateway.command(SpeedRequest(0.0))
+    call('~/pause')
+    assert 'the speed override is 0' in call('~/resume')

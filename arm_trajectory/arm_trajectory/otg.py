@@ -130,6 +130,15 @@ class OnlineTrajectoryGenerator:
         demand.target_velocity = target
         return self._plan(demand)
 
+    def step(self, state: RobotState, velocity: Array, period: float) -> RobotState:
+        """Return the state after a period on the way to a velocity, as :meth:`to_velocity`."""
+        plan = self.to_velocity(state, velocity)
+        if plan is None:
+            return hard_brake(state, self.limits, period)
+        if period >= plan.duration and not velocity.any():
+            return RobotState.at_rest(plan.at(plan.duration).position)
+        return plan.at(period)
+
     def brake(self, state: RobotState) -> Plan | None:
         """Plan the shortest way to a standstill, each joint for itself.
 

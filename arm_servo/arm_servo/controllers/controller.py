@@ -8,8 +8,8 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from enum import Enum
 
-from arm_model import ArmError, Array, RobotState
-from arm_trajectory import GoalCode, GoalError, hard_brake, OnlineTrajectoryGenerator
+from arm_model import ArmError, RobotState
+from arm_trajectory import GoalCode, GoalError
 
 from ..report import MotionReport
 
@@ -101,15 +101,3 @@ class Controller(ABC):
     def end(self, outcome: Outcome) -> None:
         """End at once, unless it has ended: something else moves the arm now, or nothing."""
         self.outcome = self.outcome or outcome
-
-
-def toward(
-    generator: OnlineTrajectoryGenerator, state: RobotState, velocity: Array, period: float
-) -> RobotState:
-    """Return the next state on the way to a velocity, the joints in step."""
-    plan = generator.to_velocity(state, velocity)
-    if plan is None:
-        return hard_brake(state, generator.limits, period)
-    if period >= plan.duration and not velocity.any():
-        return RobotState.at_rest(plan.at(plan.duration).position)
-    return plan.at(period)

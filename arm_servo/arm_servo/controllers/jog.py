@@ -18,7 +18,7 @@ from arm_trajectory import OnlineTrajectoryGenerator
 
 from ..jog.velocity_ik import BASE, IkAnswer, IkSettings, TwistTask, VelocityIk
 from ..report import Cause, Limiter, MotionReport
-from .controller import ArmState, Controller, Source, toward
+from .controller import ArmState, Controller, Source
 
 NO_AXES: Mask = np.zeros(6, dtype=np.bool_)  # mask of no axis of a twist
 
@@ -234,7 +234,7 @@ class Jog(Controller):
             answer = self._servo.step(state, command, cycles * period)
             self._velocity, self.report = answer.velocity, answer.report
             self._solved, self._due = command, arm.now + cycles * period
-        return toward(self._generator, state, self._velocity, period)
+        return self._generator.step(state, self._velocity, period)
 
     def conclude(self, arm: ArmState, state: RobotState) -> bool:
         """Return whether it is over: it ends where the arm rests without a command."""

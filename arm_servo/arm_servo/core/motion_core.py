@@ -36,7 +36,6 @@ from ..controllers.controller import (
     Outcome,
     SetPoint,
     Source,
-    toward,
 )
 from ..controllers.jog import Jog
 from ..controllers.target import SingleTarget
@@ -46,6 +45,7 @@ from ..report import Cause, Limiter, MotionReport
 from .moving_arms import Neighbours
 from .preparation import CommandBasis, CoreSettings, Motion, Preparation, Prepared, PreparedScene
 from .requests import (
+    check_request,
     ImmediateRequest,
     in_base,
     JogRequest,
@@ -253,7 +253,12 @@ class MotionCore:
         Raises:
             CommandError: The request is refused.
         """
-        return self._preparation.prepare(request, basis)
+        if isinstance(request, ImmediateRequest):
+            check_request(self.model, request)
+            return Prepared(request)
+        if basis is None:
+            raise ValueError('a motion is prepared from a state of the arm: MotionCore.basis')
+        return Prepared(request, self._preparation.prepare(request, basis), basis)
 
     def commit(
         self, prepared: Prepared, now: float, elapsed: float = 0.0, *, in_any_scene: bool = False
@@ -310,7 +315,7 @@ class MotionCore:
         wanted = None if active is None else active.update(arm, period)
         report = MotionReport() if active is None else active.report
         if wanted is None:
-            wanted = toward(self._generator, state, self._still, period)
+            wanted = self._generator.step(state, self._still, period)
         if active is None or active is self._jog:
             self._jogged = True
         else:  # a jog counts until the arm rests after it

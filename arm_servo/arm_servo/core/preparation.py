@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The first half of the command contract: requests planned and checked, beside the cycle.
+"""The first half of the command contract: motions planned and checked, beside the cycle.
 
-``prepare(request, basis) -> Prepared`` moves nothing, and takes as long as it needs.
+``MotionCore.prepare(request, basis) -> Prepared`` moves nothing, and takes as long as it needs.
 ``MotionCore.commit(prepared)`` lets it count in the cycle, and refuses what was prepared for
 another state or before another command.
 """
@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-import math
 
 import numpy as np
 
@@ -38,15 +37,7 @@ from ..controllers.controller import Source
 from ..controllers.jog import ServoSettings
 from ..controllers.target import SingleTarget
 from ..controllers.trajectory import Execution, ExecutionSettings
-from .requests import (
-    by_joint,
-    check_command,
-    DisplacementRequest,
-    ImmediateRequest,
-    JogRequest,
-    MotionRequest,
-    SpeedRequest,
-)
+from .requests import by_joint, DisplacementRequest, ImmediateRequest, MotionRequest
 
 Motion = Execution | SingleTarget  # what has a goal, and an outcome once it ended
 
@@ -145,30 +136,15 @@ class Preparation:
             model.limits
         )  # that of the cycle is for the cycle
 
-    def prepare(
-        self, request: MotionRequest | ImmediateRequest, basis: CommandBasis | None
-    ) -> Prepared:
-        """Check a request; plan a motion, and check its path.
+    def prepare(self, request: MotionRequest, basis: CommandBasis) -> Motion | None:
+        """Plan a motion from a state of the arm, and check its path.
 
-        Args:
-            basis: The arm where a motion begins; None where nothing is planned.
+        Returns:
+            None for a displacement by nothing.
 
         Raises:
             CommandError: The request is refused.
         """
-        if isinstance(request, JogRequest):
-            check_command(self._model, request.command)
-            if not math.isfinite(request.expires):
-                raise CommandError(f'a jog expires at {request.expires} s: it must be finite')
-        elif isinstance(request, SpeedRequest) and not 0.0 <= request.speed <= 1.0:
-            raise CommandError(f'speed override {request.speed}: it must be between 0 and 1')
-        if isinstance(request, ImmediateRequest):
-            return Prepared(request)
-        if basis is None:
-            raise ValueError('a motion is prepared from a state of the arm: MotionCore.basis')
-        return Prepared(request, self._motion(request, basis), basis)
-
-    def _motion(self, request: MotionRequest, basis: CommandBasis) -> Motion | None:
         if isinstance(request, TrajectoryGoal):
             return self._trajectory(request, basis)
         if isinstance(request, DisplacementRequest):

@@ -122,13 +122,18 @@ def by_joint(model: RobotModel, values: Mapping[str, float], what: str) -> tuple
     return ordered, mask
 
 
-def check_command(model: RobotModel, command: Command) -> None:
-    """Check a jog.
+def check_request(model: RobotModel, request: ImmediateRequest) -> None:
+    """Check a request for which nothing is planned.
 
     Raises:
-        CommandError: A number is not finite, the count is wrong, the link is unknown, or the axes
-            are no rotation.
+        CommandError: A number is not finite or out of its range, the count is wrong, the link is
+            unknown, or the axes are no rotation.
     """
+    if isinstance(request, SpeedRequest) and not 0.0 <= request.speed <= 1.0:
+        raise CommandError(f'speed override {request.speed}: it must be between 0 and 1')
+    if not isinstance(request, JogRequest):
+        return
+    command = request.command
     if isinstance(command, TwistCommand):
         checked(command.twist, 6, 'twist')
         model.check_link(command.link)
@@ -139,6 +144,8 @@ def check_command(model: RobotModel, command: Command) -> None:
         _check_rotation(command.pose.rotation, 'rotation')
     else:
         checked(command.velocity, len(model), 'velocities')
+    if not math.isfinite(request.expires):
+        raise CommandError(f'a jog expires at {request.expires} s: it must be finite')
 
 
 def in_base(model: RobotModel, positions: Array, request: JogRequest) -> Command:
