@@ -248,22 +248,17 @@ def test_objects_are_read_and_written_by_name(arm: SimulatedArm) -> None:
 
 def test_nmt_commands_reach_one_device_or_all(arm: SimulatedArm) -> None:
     """Each service of a device, the master's for any, and a state that says what was received."""
-    states = arm.client.listen(String, f'{JOINT}/nmt_state', LATCHED)
-
-    def expect(state: str) -> None:
-        arm.client.spin_until(lambda: bool(states) and states[-1].data == state, 5.0, state)
-
-    expect('START')
+    _expect_nmt(arm, JOINT, 'START')
     for service, state in (
         ('nmt_stop_node', 'STOP'),
         ('nmt_start_node', 'START'),
         ('nmt_enter_pre_operational', 'PREOP'),
     ):
         assert arm.client.trigger(f'{JOINT}/{service}').success
-        expect(state)
+        _expect_nmt(arm, JOINT, state)
     everybody = CONmtID.Request(nmtcommand=1, nodeid=0)
     assert arm.client.call(CONmtID, '/master/set_nmt', everybody).success
-    expect('START')
+    _expect_nmt(arm, JOINT, 'START')
     nonsense = CONmtID.Request(nmtcommand=7, nodeid=0)
     assert not arm.client.call(CONmtID, '/master/set_nmt', nonsense).success
     arm.master.wait_for('nmtcommand 7 is none of 1 START')
@@ -272,7 +267,7 @@ def test_nmt_commands_reach_one_device_or_all(arm: SimulatedArm) -> None:
         count = len([line for line in arm.master.lines if booted in line])
         assert arm.client.trigger(f'{JOINT}/{service}').success
         arm.master.wait_for(booted, count=count + 1)
-        expect('START')
+        _expect_nmt(arm, JOINT, 'START')
 
 
 def test_the_master_publishes_the_joints_of_its_bus(arm: SimulatedArm) -> None:

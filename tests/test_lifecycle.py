@@ -70,13 +70,13 @@ def test_the_manager_brings_up_and_deactivation_disables(
 
         assert change(arm, 'panda_joint2', 'deactivate')
         off = 'Switch on disabled'
-        arm.client.spin_until(lambda: recorder.last_states()[3] == off, 5.0, 'the last frame')
+        arm.client.spin_until(lambda: recorder.last_states()[3] == off, 20.0, 'the last frame')
         assert recorder.last_states()[2] == 'Operation enabled'
         assert not arm.client.trigger('/panda_joint2/enable').success
         assert change(arm, 'lifecycle_manager', 'deactivate')
         assert states(arm) == {'unconfigured'}
         all_off = dict.fromkeys(range(2, 9), off)
-        arm.client.spin_until(lambda: recorder.last_states() == all_off, 5.0, 'the last frames')
+        arm.client.spin_until(lambda: recorder.last_states() == all_off, 20.0, 'the last frames')
 
         assert change(arm, 'lifecycle_manager', 'activate')
         arm.init_all()
