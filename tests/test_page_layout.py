@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import combinations
 import re
 import threading
 from types import SimpleNamespace
@@ -49,6 +50,7 @@ STATES = (
 )
 LONG = 'all drives: ' + 'panda_joint3: 0x2310 continuous over current at output; ' * 11
 TOUCHED = '#robot-stop, #rv-view button, .rv-hold, .mantine-Button-root, [role=tab]'
+IS_STOP = '([x, y]) => document.elementFromPoint(x, y).closest("#robot-stop") !== null'
 BOXES = """selector => Object.fromEntries([...document.querySelectorAll(selector)].map(e =>
   [e.innerText, e.getBoundingClientRect()]).filter(([, b]) => b.width > 0).map(([text, b], n) =>
   [n + text, [b.left, b.top, b.width, b.height]]))"""
@@ -89,11 +91,13 @@ class Shown:
         page: What is served.
         state: What it shows, again and again.
         stops: How often STOP was pressed.
+        jogs: What was jogged.
     """
 
     page: RobotPage
     state: RobotState = READY
     stops: int = 0
+    jogs: list[tuple[object, ...]] = field(default_factory=list)
 
     def show(self, over: threading.Event) -> None:
         """Show it until the end."""
@@ -126,13 +130,17 @@ def shown() -> Iterator[Shown]:
         made.stops += 1
         return answer
 
-    actions: Any = SimpleNamespace(stop=stop, jog_joint=print, jog=print, aim=print, let_go=print)
+    def jog(*what: object) -> None:
+        made.jogs.append(what)
+
+    actions: Any = SimpleNamespace(stop=stop, jog_joint=jog, jog=jog, aim=print, let_go=print)
     with closing(RobotPage('127.0.0.1', 8650, cast(Actions, actions))) as page:
         made, over = Shown(page), threading.Event()
         tree = read_urdf(example_files().urdf.read_text())
         page.show_robot(tree)
         arm = tuple(f'panda_joint{number}' for number in range(1, 8))
         page.offer_drive(Offered(arm, True, (), arm))
+        page.velocity = lambda share: 0.4 * share
         page.offer_drives({f'/{joint}': ('enable', 'recover', 'halt', 'disable') for joint in arm})
         thread = threading.Thread(target=made.show, args=[over])
         thread.start()
@@ -142,7 +150,9 @@ def shown() -> Iterator[Shown]:
 
 
 def opened(browser: Browser, shown: Shown, size: str) -> Page:
-    """Open the page at a size."""
+    """Open the page at a size; what a test that failed has left open would draw on."""
+    for context in browser.contexts:
+        context.close()
     width, height = SIZES[size]
     return chromium.open_page(
         browser,
@@ -164,39 +174,61 @@ def boxes(page: Page, selector: str) -> dict[str, list[float]]:
     return cast('dict[str, list[float]]', page.evaluate(BOXES, selector))
 
 
+def overlapping(areas: list[tuple[float, ...]]) -> list[tuple[tuple[float, ...], ...]]:
+    """Return pairs of boxes that have more than 1 px in common."""
+    return [
+        (one, two)
+        for one, two in combinations(areas, 2)
+        if all(
+            min(one[i] + one[i + 2], two[i] + two[i + 2]) - max(one[i], two[i]) > 1 for i in (0, 1)
+        )
+    ]
+
+
+def check_reach(page: Page, size: str) -> None:
+    """STOP, name, picture and panel are in their places, and nothing overlaps."""
+    width, height = SIZES[size]
+    (left, top, wide, high), *_ = boxes(page, '#robot-stop').values()
+    if size in PHONES:
+        assert wide >= 0.9 * width
+        assert high >= 60
+        assert top >= height - 100
+    else:
+        assert (left < 20, top < 20) == (True, True)
+        assert (wide >= 140, high >= 58) == (True, True)
+    middle = [left + wide / 2, top + high / 2]
+    assert page.evaluate(IS_STOP, middle)
+    name = page.locator('#rv-robot')
+    assert (name.inner_text().split(), name.is_visible()) == (['simulated', 'panda'], True)
+    picture = boxes(page, 'canvas')
+    x, y, seen, tall = next(iter(picture.values()))
+    areas = boxes(page, 'canvas, #rv-bar, #rv-foot, .mantine-Paper-root:has([role=tab])')
+    assert not overlapping(list(dict.fromkeys(map(tuple, areas.values()))))
+    if size in PHONES:
+        assert (seen >= 390, tall >= 200) == (True, True)
+        assert boxes(page, '.mantine-Paper-root:has([role=tab])').popitem()[1][2] == width, (
+            'the panel'
+        )
+        assert (
+            page.evaluate(
+                '([x, y]) => document.elementFromPoint(x, y).tagName',
+                [x + seen / 2, y + tall / 2],
+            )
+            == 'CANVAS'
+        )
+
+
 @pytest.mark.parametrize('size', SIZES)
 def test_stop_is_in_reach_and_nothing_overlaps_or_moves(
     browser: Browser, shown: Shown, size: str
 ) -> None:
     """In each group and state, with an answer of 600 characters."""
     page = opened(browser, shown, size)
-    width, height = SIZES[size]
     see(page, shown, READY)
     assert page.locator('[role=tab]').all_inner_texts()[:4] == GROUPS
     for group in GROUPS:
         chromium.show(page, group)
-        (left, top, wide, high), *_ = boxes(page, '#robot-stop').values()
-        if size in PHONES:
-            assert wide >= 0.9 * width
-            assert high >= 60
-            assert top >= height - 100
-        else:
-            assert (left < 20, top < 20) == (True, True)
-            assert (wide >= 140, high >= 58) == (True, True)
-        middle = [left + wide / 2, top + high / 2]
-        at = '([x, y]) => document.elementFromPoint(x, y).closest("#robot-stop") !== null'
-        assert page.evaluate(at, middle)
-        picture = boxes(page, 'canvas')
-        x, y, seen, tall = next(iter(picture.values()))
-        if size in PHONES:
-            assert (seen >= 390, tall >= 200) == (True, True)
-            assert (
-                page.evaluate(
-                    '([x, y]) => document.elementFromPoint(x, y).tagName',
-                    [x + seen / 2, y + tall / 2],
-                )
-                == 'CANVAS'
-            )
+        check_reach(page, size)
     chromium.show(page, 'Drive')
     page.locator('.rv-hold:visible').nth(JOG_BUTTONS - 1).wait_for()
     before = boxes(page, '#robot-stop, .rv-hold, [role=tab], #rv-view button')
@@ -221,6 +253,8 @@ def test_stop_is_in_reach_and_nothing_overlaps_or_moves(
         touched = boxes(page, TOUCHED).items()
         small = {name: box for name, box in touched if min(box[2:]) < 43.5}
         assert not small
+        holds = boxes(page, '.rv-hold').values()
+        assert not overlapping([(x - 3.9, y - 3.9, w + 7.8, h + 7.8) for x, y, w, h in holds])
     if size not in PHONES:
         tab = boxes(page, '[role=tab]')
         x, y, *_ = next(iter(tab.values()))
@@ -229,7 +263,63 @@ def test_stop_is_in_reach_and_nothing_overlaps_or_moves(
         page.mouse.move(x - 300, y + 200, steps=5)
         page.mouse.up()
         assert boxes(page, '[role=tab]') == tab, 'a tab is not torn out'
-    page.close()
+
+
+def test_stop_is_in_reach_of_what_viser_opens(browser: Browser, shown: Shown) -> None:
+    """Above a dialogue and a notification, on each size."""
+    see(page := opened(browser, shown, 'desk'), shown, READY)
+    (client,) = shown.page.server.get_clients().values()
+    client.add_notification('a notification', 'of viser')
+    with client.gui.add_modal('a dialogue of viser'):
+        client.gui.add_button('close')
+    page.get_by_text('a dialogue of viser').wait_for()
+    for width, height in SIZES.values():
+        page.set_viewport_size({'width': width, 'height': height})
+        ((left, top, wide, high),) = boxes(page, '#robot-stop').values()
+        assert page.evaluate(IS_STOP, [left + wide / 2, top + high / 2]), (width, height)
+
+
+def test_keys_move_the_robot_where_that_is_ticked(browser: Browser, shown: Shown) -> None:
+    """Those of the terminal program, as long as they are held; what is typed moves nothing."""
+    see(page := opened(browser, shown, 'desk'), shown, READY)
+    chromium.show(page, 'Drive')
+    held = page.locator('.rv-held')
+    shown.jogs.clear()
+    page.keyboard.press('ArrowUp', delay=400)
+    assert not shown.jogs, 'it is not ticked'
+    page.locator('.rv-speed input').check(force=True)
+    x = (0.2, 0.0, 0.0, 0.0, 0.0, 0.0), ''
+    for key, jog in (('ArrowUp', x), ('3', ('panda_joint3', 0.2)), ('3', ('panda_joint3', -0.2))):
+        shown.jogs.clear()
+        page.keyboard.down(key)
+        held.first.wait_for(state='attached')
+        page.wait_for_timeout(200)
+        page.keyboard.down('r')  # any other key lets go; this one turns the direction of joints
+        held.first.wait_for(state='detached')
+        page.keyboard.up('r')
+        page.keyboard.up(key)
+        assert set(shown.jogs[:-1]) == {jog}
+        if key == 'ArrowUp':
+            page.keyboard.press('r')
+    shown.jogs.clear()
+    page.locator('input[inputmode=decimal]:visible').first.click(force=True)
+    page.keyboard.press('3', delay=400)
+    assert not shown.jogs, 'a number is typed'
+    assert page.locator('.rv-speed span').inner_text() == 'Tool: 80 mm/s'
+
+
+def test_the_log_is_copied_as_text(browser: Browser, shown: Shown) -> None:
+    """All of it, the last entry first."""
+    see(page := opened(browser, shown, 'desk'), shown, READY)
+    page.context.grant_permissions(['clipboard-read'])
+    chromium.show(page, 'Diagnose')
+    shown.page.say('first')
+    shown.page.say('<second>')
+    page.get_by_text('<second>').last.wait_for()
+    chromium.press(page.locator('.rv-copy'))
+    page.get_by_text('Log is copied').wait_for()
+    copied = str(page.evaluate('navigator.clipboard.readText()')).splitlines()
+    assert copied[1:4:2] == ['<second>', 'first']
 
 
 @pytest.mark.parametrize('size', ['desk', 'phone'])
@@ -254,7 +344,6 @@ def test_a_press_of_a_button_that_does_nothing_says_why(
         assert size == 'desk' or top + high <= above
     shown.page.live.off.clear()
     why.wait_for(state='hidden')
-    page.close()
 
 
 def test_the_card_has_the_commands_of_the_readme(browser: Browser, shown: Shown) -> None:
@@ -271,4 +360,3 @@ def test_the_card_has_the_commands_of_the_readme(browser: Browser, shown: Shown)
         assert command in manual, command
     see(page, shown, READY)
     card.wait_for(state='hidden')
-    page.close()

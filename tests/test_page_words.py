@@ -1,14 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Words that the page reads in /diagnostics, beside those that the nodes of a robot publish."""
+"""Words that the page reads in /diagnostics, beside those of a robot's nodes, and its keys."""
 
 from __future__ import annotations
 
 from arm_canopen.master.remote_node import BootPhase
+from arm_servo.teleop.keyboard_teleop import TOOL
 from canopen_core.standard import DriveState, OperationMode
 from quad_controller import MODES as QUAD_MODES
 from quad_controller.states.modes import MOVING_STATES
-from robot_viewer.page.robot_page import GAITS, MODES
+from quad_teleop.key_map import MOVES
+from robot_viewer.page.jog_panel import TWISTS
+from robot_viewer.page.robot_page import GAITS, MODES, WALKS
 from robot_viewer.robot_state import (
     BOOTING,
     ENABLED,
@@ -36,3 +39,18 @@ def test_words_of_legs() -> None:
     """Modes that the page requests are modes; those with velocities are all of them."""
     assert {state.value for state in MOVING_STATES} == FOLLOWS
     assert {*POSTURES, *MODES.values(), *(f'gait:{gait}' for gait in GAITS)} <= set(QUAD_MODES)
+
+
+def test_keys_are_those_of_the_terminals() -> None:
+    """They move the same way."""
+    for key, twist in TWISTS.values():
+        jog = TOOL[key.removeprefix('Arrow').lower()]
+        assert (*jog.linear, *jog.angular) == twist
+    for key, velocity in WALKS.values():
+        move = MOVES[key]
+        assert [*map(signum, velocity)] == [move.x, move.y, move.yaw]
+
+
+def signum(value: float) -> int:
+    """Return 1, 0 or -1."""
+    return (value > 0.0) - (value < 0.0)

@@ -128,6 +128,7 @@ class RobotState:
         sentence: The reason, and what to do.
         action: Label of the one action that is wanted now; empty for none.
         calls: Services of that action; each group is called when the one before has succeeded.
+        faulty: Drives that report a fault.
     """
 
     word: str
@@ -135,6 +136,7 @@ class RobotState:
     sentence: str
     action: str = ''
     calls: tuple[tuple[str, ...], ...] = ()
+    faulty: tuple[str, ...] = ()
 
     @property
     def movable(self) -> bool:
@@ -201,6 +203,7 @@ def _fault(seen: Seen, drives: Mapping[str, Status], legs: Sequence[Status]) -> 
                 f'{first}: {reason}. Remove the cause, then recover.',
                 f'Recover {which}' if calls else '',
                 (calls,),
+                tuple(faulty),
             ),
         )
     for status in legs:

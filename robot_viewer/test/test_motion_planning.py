@@ -201,6 +201,10 @@ def test_what_is_planned_is_executed_once(planner: Planner) -> None:
     planner.do('execute')
     planner.spin_until(lambda: 'nothing is planned' in planner.said, 'a refusal')
     assert len(planner.execute.goals) == len(planner.move.goals) == 1
+    planner.plan()
+    planner.viewer.page._command('cancel', '')  # by Esc
+    planner.do('execute')
+    planner.spin_until(lambda: 'nothing is planned' in planner.said, 'no plan any more')
 
 
 def test_a_goal_that_is_chosen_meanwhile_stays(planner: Planner) -> None:
@@ -353,6 +357,9 @@ def test_boxes_come_move_and_go(planner: Planner) -> None:
     assert planner.objects['box1'].pose.translation[0] == 2.0
     planner.do('add_box', (0.1, 0.2, 0.4))
     planner.spin_until(lambda: planner.viewer._planning.scene.chosen.value == 'box2', 'the choice')
+    planner.do('show_objects', False)
+    drawn = planner.viewer._planning.scene._drawn
+    planner.spin_until(lambda: not any(each.visible for _, each in drawn.values()), 'no object')
     planner.do('choose', 'box1')
     planner.do('remove_chosen')
     planner.spin_until(lambda: set(planner.objects) == {'box2'}, 'the end of it')

@@ -53,6 +53,9 @@ URDF = """
 </robot>
 """
 
+SHAPES = ('/shape0', '/arm/shape1', '/arm/hand/shape3')
+"""Of base, arm and hand, below the base."""
+
 
 @pytest.fixture
 def server() -> Iterator[ViserServer]:
@@ -84,6 +87,24 @@ def test_joints_move_what_hangs_on_them(server: ViserServer, tmp_path: Path) -> 
     assert frames['turn'].wxyz.tolist() == pytest.approx(turn)
     scene.place_base(Transform((1.0, 2.0, 3.0)))
     assert scene._base.position.tolist() == [1.0, 2.0, 3.0]
+
+
+def test_links_of_faulty_joints_are_red_until_they_are_well(server: ViserServer) -> None:
+    """Those of the page alone, not those of a ghost."""
+    scene = RobotScene(server.scene, read_urdf(URDF.format(mesh='')))
+
+    def colors() -> list[tuple[int, ...]]:
+        nodes = (server.scene.get_handle_by_name(f'/robot/base{path}') for path in SHAPES)
+        return [tuple(getattr(node, 'color', ())) for node in nodes]
+
+    before = colors()
+    scene.ghost('ghost', frozenset(scene.tree.links), (0.4, 0.3, 0.9, 0.3))
+    scene.mark(['turn', 'another'])
+    assert colors() == [before[0], (201, 41, 41), before[2]]
+    scene.mark(['follow'])
+    assert colors() == [*before[:2], (201, 41, 41)]
+    scene.mark([])
+    assert colors() == before
 
 
 def test_a_robot_that_walks_away_stays_in_view(server: ViserServer) -> None:

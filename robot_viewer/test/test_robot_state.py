@@ -18,6 +18,7 @@ GOOD = Status('j1: drive', 0, 'enabled', ON)
 FAULT = Status('j1: drive', 2, 'x', {'state': 'Fault', 'error_code': '0x2310 over current'})
 OTHER_FAULT = replace(FAULT, name='j2: drive')
 LOST = Status('j1: drive', 2, 'offline, waiting for the device', {'online': 'False'})
+FAULTS = (FAULT, OTHER_FAULT, LOST)
 BOOTS = Status(
     'j1: drive', 2, 'offline, configuring', {'online': 'False', 'boot_phase': 'configuring'}
 )
@@ -127,6 +128,7 @@ def test_the_state_is_one_word_with_one_action(
     assert part in state.sentence
     assert sum(map(len, state.calls)) == calls
     assert not any('/xj1/' in service for group in state.calls for service in group)
+    assert len(state.faulty) == sum(each in FAULTS for each in seen.statuses)
 
 
 @given(

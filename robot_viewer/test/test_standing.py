@@ -232,6 +232,8 @@ def test_the_page_shows_how_it_stands(dog: Dog) -> None:
     feet = dog.panel._feet
     dog.spin_until(lambda: tuple(feet['rr_foot'].color) == DOWN_COLOR, 'marks of contacts')
     assert tuple(feet['fl_foot'].color) != DOWN_COLOR
+    dog.panel.show_marks(False)
+    assert not any(mark.visible for mark in dog.panel._marks)
     dog.sends_contacts = False
     dog.spin_until(lambda: tuple(feet['rr_foot'].color) != DOWN_COLOR, 'the end of old contacts')
     dog.spin_until(lambda: len(dog.panel._sliders) == 3, 'sliders')

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio
 import pytest
-from urdf_reader import about, joint_transform, KinematicTree, multiply, read_urdf, rotate
+from urdf_reader import joint_transform, KinematicTree, read_urdf
 from urdf_robots import random_urdfs
 
 from robot_viewer import (
@@ -82,24 +82,6 @@ def test_every_link_is_where_pinocchio_has_it(urdf: str, values: list[float]) ->
         np.testing.assert_allclose(
             pose_in_root(link, model.root, frames), expected, atol=1e-9, err_msg=link
         )
-
-
-@given(angle, st.tuples(angle, angle, angle))
-def test_a_rotation_keeps_lengths_and_its_axis(turn: float, vector: tuple[float, ...]) -> None:
-    """And the inverse rotation takes it back."""
-    rotation = about((0.6, 0.0, 0.8), turn)
-    there = rotate(rotation, vector)  # type: ignore[arg-type]
-    assert math.dist(there, (0, 0, 0)) == pytest.approx(math.dist(vector, (0, 0, 0)))
-    back = rotate(about((0.6, 0.0, 0.8), -turn), there)
-    assert back == pytest.approx(vector, abs=1e-9)
-    assert rotate(rotation, (0.6, 0.0, 0.8)) == pytest.approx((0.6, 0.0, 0.8))
-
-
-def test_quaternions_multiply_as_rotations_follow_each_other() -> None:
-    """A quarter about z and then one about x take x to z."""
-    quarter = math.pi / 2
-    both = multiply(about((1.0, 0.0, 0.0), quarter), about((0.0, 0.0, 1.0), quarter))
-    assert rotate(both, (1.0, 0.0, 0.0)) == pytest.approx((0.0, 0.0, 1.0))
 
 
 def test_a_fixed_joint_is_at_its_origin_whatever_its_position() -> None:

@@ -21,6 +21,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import TwistStamped
 from isolation import Isolation
 import pytest
+from rcl_interfaces.msg import ParameterValue
+from rcl_interfaces.srv import GetParameters
 import rclpy
 from rclpy.action.server import ActionServer, CancelResponse
 from rclpy.context import Context
@@ -365,6 +367,42 @@ def test_each_heartbeat_is_one_command(robot: Robot) -> None:
     robot.spin_times(20)
     assert len(robot.jogs) == 3
     assert len(joint_jogs) == 1
+
+
+@pytest.mark.parametrize(
+    ('scales', 'velocity'),
+    [
+        (('unitless', 0.4, 0.0), 0.2),
+        (('unitless', 0.4, 0.5), 0.1),
+        (('speed_units', 0.4, 0.0), 0.4),
+        (('unitless', 0.0, 0.0), None),
+    ],
+)
+def test_the_speed_of_the_tool_is_that_of_the_servo(
+    robot: Robot,
+    monkeypatch: pytest.MonkeyPatch,
+    scales: tuple[str, float, float],
+    velocity: float | None,
+) -> None:
+    """At half of it; of a servo that names none it is unknown."""
+    monkeypatch.setattr(RobotPage, 'watched', True)
+    asked: list[str] = []
+    units, scale, override = scales
+
+    def answer(request: GetParameters.Request, response: Any) -> Any:
+        asked[:] = request.names
+        response.values = [
+            ParameterValue(string_value=units),
+            ParameterValue(double_value=scale),
+            ParameterValue(double_value=override),
+        ]
+        return response
+
+    robot.node.create_service(GetParameters, 'servo_node/get_parameters', answer)
+    page = robot.viewer.page
+    robot.spin_until(lambda: bool(asked) and bool(page.velocity or not velocity), 'its scales')
+    assert asked[1] == 'moveit_servo.scale.linear'
+    assert (page.velocity and page.velocity(0.5)) == (velocity and pytest.approx(velocity))
 
 
 def test_a_gripper_is_opened_closed_and_stopped(robot: Robot, said: list[str]) -> None:

@@ -200,6 +200,8 @@ class BodyPanel:
             self._folder = self._gui.add_folder(None)
         with self._folder:
             self._html: GuiHtmlHandle = self._gui.add_html('')
+        page.offer_to_see('feet', self.show_marks)
+        self._seen = True
         self._sliders: list[GuiSliderHandle[float]] = []
         self._feet: dict[str, IcosphereHandle] = {}
         self._mass: IcosphereHandle | None = None
@@ -233,9 +235,19 @@ class BodyPanel:
 
     def remove(self) -> None:
         """Remove its marks from the view."""
-        for node in (*self._feet.values(), self._mass, self._line):
-            if node is not None:
-                node.remove()
+        for node in self._marks:
+            node.remove()
+
+    @property
+    def _marks(self) -> list[IcosphereHandle | LineSegmentsHandle]:
+        marks = (*self._feet.values(), self._mass, self._line)
+        return [mark for mark in marks if mark is not None]
+
+    def show_marks(self, seen: bool) -> None:
+        """Show or hide feet, support and centre of mass."""
+        self._seen = seen
+        for mark in self._marks:
+            mark.visible = seen
 
     def show(self, html: str) -> None:
         """Show attitude and battery."""
@@ -265,7 +277,7 @@ class BodyPanel:
             outside = support.margin is not None and support.margin < 0.0
             _paint(self._mass, OUTSIDE_COLOR if outside else MASS_COLOR)
         if self._mass is not None:
-            self._mass.visible = below is not None
+            self._mass.visible = below is not None and self._seen
         if self._line is not None and len(self._line.points) == len(ends):
             self._line.points = ends.astype(np.float32)
             return
@@ -279,11 +291,12 @@ class BodyPanel:
                 LINE_COLOR,
                 thickness=LINE_WIDTH,
                 thickness_units='screen',
+                visible=self._seen,
             )
 
     def _mark(self, name: str, radius: float) -> IcosphereHandle:
         path = f'{self._path}/{name}'
-        return self._scene.add_icosphere(path, radius, UP_COLOR, opacity=0.8)
+        return self._scene.add_icosphere(path, radius, UP_COLOR, opacity=0.8, visible=self._seen)
 
 
 def _paint(mark: IcosphereHandle, color: tuple[int, int, int]) -> None:

@@ -164,6 +164,7 @@ class MotionPlanning:
             self._semantic = ''
             return
         self.panel = PlanPanel(self._page, robot, list(self._groups), self)
+        self._page.cancel = partial(self.order, self._drop)
         self.choose_group(next(iter(self._groups)))
 
     # -- what people do

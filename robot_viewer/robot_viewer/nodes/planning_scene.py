@@ -45,7 +45,7 @@ WORLD_AND_ATTACHED = 16 | 4
 AHEAD = 0.6
 """How far before the root link a new box comes, in [m]."""
 NO_OBJECT = 'none'
-COLOR, ATTACHED_COLOR = (47, 158, 68), (112, 72, 232)
+COLOR, ATTACHED_COLOR = (73, 80, 87), (12, 133, 153)
 OPACITY = 0.6
 GIZMO_SIZE = 0.2
 """Of the arrows by which an object is dragged in [m]."""
@@ -79,6 +79,7 @@ class PlanningScene:
         self._name = NO_OBJECT
         self._grips = False  # the object is being dragged
         self._changed_since = False  # the whole scene was asked for
+        self._seen = True
         self.gizmo: TransformControlsHandle | None = None
 
     def connect(self) -> None:
@@ -94,7 +95,7 @@ class PlanningScene:
         self, page: RobotPage, robot: RobotScene, order: Callable[[Callable[[], object]], None]
     ) -> None:
         """Show the scene beside a robot, and offer to change it."""
-        self._page, self._robot, self._order = page, robot, order
+        self._page, self._robot, self._order, self._seen = page, robot, order, True
         gui = page.server.gui
         self.chosen: GuiDropdownHandle[str] = gui.add_dropdown('Object', (NO_OBJECT,))
         self._remove: GuiButtonHandle = gui.add_button('Remove object', color=NEUTRAL)
@@ -111,8 +112,15 @@ class PlanningScene:
         gui.add_button('Add box', color=NEUTRAL).on_click(
             lambda _: order(partial(self.add_box, size.value))
         )
+        page.offer_to_see('objects', lambda seen: order(partial(self.show_objects, seen)))
         self._show()
         self._ask()
+
+    def show_objects(self, seen: bool) -> None:
+        """Show or hide all objects."""
+        self._seen = seen
+        for _, frame in self._drawn.values():
+            frame.visible = seen
 
     def remove(self) -> None:
         """Show it no more."""
@@ -193,7 +201,9 @@ class PlanningScene:
                 frame.remove()
             self._count += 1  # names of objects may have what paths of nodes may not
             path = f'{self._robot.path_of(each.frame)}/object{self._count}'
-            self._drawn[name] = each, draw_object(self._page.server.scene, path, each)
+            frame = draw_object(self._page.server.scene, path, each)
+            frame.visible = self._seen
+            self._drawn[name] = each, frame
 
     async def _dragged(self, event: TransformControlsEvent) -> None:
         # coroutines keep their order

@@ -18,6 +18,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist as TwistMessage
 from geometry_msgs.msg import TwistStamped
 from rcl_interfaces.msg import Log
+from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
 from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.publisher import Publisher
@@ -44,7 +45,7 @@ from ..page.robot_scene import greatest_velocities
 from ..robot_state import Stop
 from ..robots import of_robot, SET_MODE_TYPE, stops_robot
 from .body import Body
-from .calls import TRIGGER, TriggerCalls
+from .calls import succeeded, text_of, TRIGGER, TriggerCalls
 from .controllers import Controllers
 from .first_motion import FirstMotion
 from .grippers import Grippers
@@ -62,6 +63,10 @@ LIST_PERIOD = 0.2
 """Time between two looks at numbers in [s]."""
 LIMIT_AGE = 1.0
 """Time in [s] for which a limit that the servo names is shown."""
+SCALES = ('command_in_type', 'scale.linear', 'override_velocity_scaling_factor')
+"""Parameters of a servo that say how fast the tool is at a share of its speed."""
+MIN_OVERRIDE = 0.01
+"""An override of the velocity below this is none, as in moveit_servo."""
 SERVO_STATUS_TYPE = 'moveit_msgs/msg/ServoStatus'
 GRAPH_PERIOD = 1.0
 """Time between two looks at what the robot offers in [s]."""
@@ -126,6 +131,7 @@ class WebViewer(Node):
         self._robot_publishes = False
         self._limit = ('', 0.0)  # in words of the servo, and when
         self._servo_listens = False
+        self._servo: Client | None = None
         self._set_mode: Client | None = None
         self._root = ''
         self._velocities: Mapping[str, float] = {}
@@ -329,6 +335,19 @@ class WebViewer(Node):
         topic = 'servo_node/delta_twist_cmds'
         if self._jogs is None and self.count_subscribers(topic):
             self._jogs = self.create_publisher(TwistStamped, topic, QoSProfile(depth=1))
+            self._servo = self.create_client(GetParameters, 'servo_node/get_parameters')
+        if self._servo is not None and self.page.watched and self._servo.service_is_ready():
+            request = GetParameters.Request(names=[f'moveit_servo.{name}' for name in SCALES])
+            self._servo.call_async(request).add_done_callback(self._take_scales)
+
+    def _take_scales(self, future: Future) -> None:
+        """Show how fast the tool is; of a servo that names no scales that is unknown."""
+        values = [] if future.exception() is not None else future.result().values
+        if len(values) == len(SCALES) and values[1].double_value > 0.0:
+            units, scale = values[0].string_value, values[1].double_value
+            full = scale if units == 'unitless' else 1.0
+            override = values[2].double_value if values[2].double_value >= MIN_OVERRIDE else 1.0
+            self.page.velocity = lambda share: override * min(share * full, scale)
 
     def _find_servo(self) -> None:
         topic = self.resolve_topic_name('servo_node/status')
@@ -491,11 +510,7 @@ class WebViewer(Node):
             future.add_done_callback(partial(self._answered, f'mode {mode}'))
 
     def _answered(self, what: str, future: Future) -> None:
-        if future.exception() is not None:
-            self._report(what, f'no answer: {future.exception()}', failed=True)
-            return
-        response = future.result()
-        self._report(what, response.message, failed=not response.success)
+        self._report(what, text_of(future), failed=not succeeded(future))
 
     def _say(self, text: str, failed: bool) -> None:
         self.page.say(text, failed=failed)
@@ -538,14 +553,10 @@ class _StopCalls:
 
     def _answered(self, service: str, call: Future) -> None:
         self._open.discard(service)
-        if call.exception() is not None:
-            self._fail(f'{service}: no answer: {call.exception()}')
+        if not succeeded(call):
+            self._fail(f'{service}: {text_of(call)}')
             return
-        response = call.result()
-        if not response.success:
-            self._fail(f'{service}: {response.message}')
-            return
-        self._texts.append(response.message)
+        self._texts.append(text_of(call))
         if not self._open and not self._answer.done():
             self._answer.set_result(Stop(stands=True, text='. '.join(self._texts)))
 

@@ -21,21 +21,21 @@ from .target_panel import TargetPanel
 
 Twist: TypeAlias = tuple[float, float, float, float, float, float]
 
-TWISTS: Mapping[str, Twist] = {
-    'X +': (1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    'Y +': (0.0, 1.0, 0.0, 0.0, 0.0, 0.0),
-    'Z +': (0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
-    'X −': (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    'Y −': (0.0, -1.0, 0.0, 0.0, 0.0, 0.0),
-    'Z −': (0.0, 0.0, -1.0, 0.0, 0.0, 0.0),
-    'Turn X +': (0.0, 0.0, 0.0, 1.0, 0.0, 0.0),
-    'Turn Y +': (0.0, 0.0, 0.0, 0.0, 1.0, 0.0),
-    'Turn Z +': (0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
-    'Turn X −': (0.0, 0.0, 0.0, -1.0, 0.0, 0.0),
-    'Turn Y −': (0.0, 0.0, 0.0, 0.0, -1.0, 0.0),
-    'Turn Z −': (0.0, 0.0, 0.0, 0.0, 0.0, -1.0),
+TWISTS: Mapping[str, tuple[str, Twist]] = {
+    'X +': ('ArrowUp', (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)),
+    'Y +': ('ArrowRight', (0.0, 1.0, 0.0, 0.0, 0.0, 0.0)),
+    'Z +': (';', (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)),
+    'X −': ('ArrowDown', (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0)),
+    'Y −': ('ArrowLeft', (0.0, -1.0, 0.0, 0.0, 0.0, 0.0)),
+    'Z −': ('.', (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)),
+    'Turn X +': ('s', (0.0, 0.0, 0.0, 1.0, 0.0, 0.0)),
+    'Turn Y +': ('d', (0.0, 0.0, 0.0, 0.0, 1.0, 0.0)),
+    'Turn Z +': ('f', (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)),
+    'Turn X −': ('x', (0.0, 0.0, 0.0, -1.0, 0.0, 0.0)),
+    'Turn Y −': ('c', (0.0, 0.0, 0.0, 0.0, -1.0, 0.0)),
+    'Turn Z −': ('v', (0.0, 0.0, 0.0, 0.0, 0.0, -1.0)),
 }
-"""Shares of the speed of jogging, along and about axes."""
+"""Keys of servo_keyboard_input, and shares of the speed of jogging along and about axes."""
 REST: Twist = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 BASE = 'base'
 """The frame that a command has which names none."""
@@ -91,6 +91,7 @@ class JogPanel:
         actions, live, self._speed = ways
         self._gui, self._actions, self._live = server.gui, actions, live
         self._numbers: list[int] = []
+        self._keyed: list[str] = []
         self._joints = {joint.name: joint for joint in robot.tree.movable()}
         self.target: TargetPanel | None = None
         with place(self):
@@ -116,6 +117,8 @@ class JogPanel:
                     self._add_gripper(gripper, self._joints[joint])
                 if not offered.grippers:
                     self._gui.add_html(sentence('This robot has no gripper.'))
+            # of tabs that are not shown there are no buttons; keys hold these
+            self._keys = self._gui.add_html(pad(self._keyed, 'rv-keyed'))
 
     def remove(self) -> None:
         """Remove all of it from the page."""
@@ -124,10 +127,13 @@ class JogPanel:
         if self.target is not None:
             self.target.remove()
         self._tabs.remove()
+        self._keys.remove()
 
     def _hold(self, hold: Hold) -> tuple[int, str]:
         number, html = self._live.button(hold)
         self._numbers.append(number)
+        if hold.key:
+            self._keyed.append(html)
         return number, html
 
     def _joint_rows(self, jogged: Sequence[str]) -> str:
@@ -148,6 +154,7 @@ class JogPanel:
                             f'{number} {sign}',
                             partial(self._jog_joint, joint.name, way),
                             partial(self._actions.jog_joint, joint.name, 0.0),
+                            key=f'{number}{sign}',
                         )
                     )[1]
                     for sign, way in (('−', -1.0), ('+', 1.0))
@@ -159,9 +166,11 @@ class JogPanel:
         axes = self._gui.add_dropdown('Along axes of', (BASE, *frames))
         buttons = [
             self._hold(
-                Hold(title, partial(self._jog, axes, twist), partial(self._jog, axes, REST))
+                Hold(
+                    title, partial(self._jog, axes, twist), partial(self._jog, axes, REST), key=key
+                )
             )[1]
-            for title, twist in TWISTS.items()
+            for title, (key, twist) in TWISTS.items()
         ]
         self._gui.add_html(pad(buttons))
 

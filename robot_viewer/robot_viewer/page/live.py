@@ -47,6 +47,7 @@ class Hold:
         rest: Called when it is let go.
         start: Called with the first heartbeat of a press.
         always: It counts whatever state the robot is in, but not after STOP.
+        key: The key that holds it, where keys move the robot; that of a joint with its direction.
     """
 
     label: str
@@ -54,6 +55,7 @@ class Hold:
     rest: Callable[[], None]
     start: Callable[[], None] | None = None
     always: bool = False
+    key: str = ''
 
 
 class Live:
@@ -87,11 +89,11 @@ class Live:
         number = next(self._numbers)
         self._holds[number] = hold
         kind = 'rv-hold rv-always' if hold.always else 'rv-hold'
-        label = f'<span>{escape(hold.label)}</span>'
-        return (
-            number,
-            f'<button class="{kind}" data-hold="{number}" tabindex="-1">{label}</button>',
+        html = (
+            f'<button class="{kind}" data-hold="{number}" data-key="{escape(hold.key)}"'
+            f' tabindex="-1"><span>{escape(hold.label)}</span></button>'
         )
+        return number, html
 
     def remove(self, number: int) -> None:
         """Disconnect a button."""
@@ -180,6 +182,8 @@ class Live:
                 word, _, rest = str(text).partition(' ')
                 if word in {'beat', 'free'} and rest.isdecimal():
                     (self._beat if word == 'beat' else self._release)(page, int(rest))
+                elif word == 'ping':
+                    await connection.send(f'{{"pong": {rest}}}')
                 elif word == 'hello':
                     self._pages[page] = connection, 'phone' if rest == 'phone' else kind
                 elif word == 'take':

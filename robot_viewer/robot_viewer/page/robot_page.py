@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager, redirect_stdout
 from functools import partial
@@ -60,15 +60,21 @@ ARM_SPEED, LEGS_SPEED = 20.0, 30.0
 """In the beginning, in [%]."""
 PANEL_WIDTH = 400
 """In [px]."""
-WALKS: Mapping[str, Velocity] = {
-    'Turn left': (0.0, 0.0, 1.5),
-    'Forward': (0.3, 0.0, 0.0),
-    'Turn right': (0.0, 0.0, -1.5),
-    'Left': (0.0, 0.15, 0.0),
-    'Back': (-0.3, 0.0, 0.0),
-    'Right': (0.0, -0.15, 0.0),
+WALKS: Mapping[str, tuple[str, Velocity]] = {
+    'Turn left': ('j', (0.0, 0.0, 1.5)),
+    'Forward': ('i', (0.3, 0.0, 0.0)),
+    'Turn right': ('l', (0.0, 0.0, -1.5)),
+    'Left': ('J', (0.0, 0.15, 0.0)),
+    'Back': (',', (-0.3, 0.0, 0.0)),
+    'Right': ('L', (0.0, -0.15, 0.0)),
+    'Forward to the left': ('u', (0.3, 0.0, 1.5)),
+    'Forward to the right': ('o', (0.3, 0.0, -1.5)),
+    'Back to the left': ('m', (-0.3, 0.0, -1.5)),
+    'Back to the right': ('.', (-0.3, 0.0, 1.5)),
 }
-"""Velocities at full speed: forwards and to the left in [m/s], of a turn in [rad/s]."""
+"""Keys of teleop_keyboard, and velocities at full speed: forwards and to the left in [m/s], of a
+turn in [rad/s]. The last four have no button."""
+WALK_BUTTONS = 6
 MODES: Mapping[str, str] = {
     'Stand': 'stand',
     'Walk': 'walk',
@@ -115,6 +121,12 @@ STATUS_BOX = 'margin:0 12px 0.5em 2.2em;height:2.5em;line-height:1.25em;overflow
 """Style of what a status says: no button below moves with its length."""
 LOW_PICTURE = 420
 """Height of a picture in [px] below which the camera is nearer."""
+KEYS_MOVE = (
+    '<div class="rv-speed"><span></span>'
+    '<label><input type="checkbox" tabindex="-1">Keys move the robot (? lists them)</label></div>'
+)
+"""The speed in words, and a box that each page has for itself."""
+COPY_LOG = '<button class="rv-copy">Copy log</button>'
 NOTHING: Mapping[str, str] = {
     'Drive': 'No robot is here yet.',
     'Plan': 'Start the bring-up with --plan.',
@@ -171,6 +183,8 @@ class RobotPage:
         live: Its buttons that are held, and what its overlay shows.
         speed: Share of the greatest velocity that is chosen, above 0 to 1.
         last: What was said last, with the time.
+        velocity: Of the tool or of walking forwards in [m/s], by the share; None where unknown.
+        cancel: Drops what is planned.
         before_log: Order of a folder before the log.
     """
 
@@ -205,6 +219,8 @@ class RobotPage:
         if self._tabs is not None:
             self._tabs.remove()
         self.live.clear()
+        self.velocity: Callable[[float], float] | None = None
+        self.cancel: Callable[[], object] = lambda: None
         gui = self.server.gui
         self._tabs = gui.add_tab_group()
         self._groups: dict[str, GuiTabHandle] = {}
@@ -223,9 +239,12 @@ class RobotPage:
         self._walk_holds: dict[int, Velocity] = {}
         with self._groups['Drive']:
             self.speed = add_speed(gui, ARM_SPEED if 'Plan' in groups else LEGS_SPEED)
+            gui.add_html(KEYS_MOVE)
         with self._groups['See']:
-            self._add_checkboxes()
             self._see: GuiFolderHandle = gui.add_folder(None)
+        if 'Plan' in groups:
+            self.offer_to_see('target', self._show_target)
+        self.offer_to_see('frames', self._show_frames, seen=False)
         with self._groups['Diagnose']:
             self._statuses: GuiHtmlHandle = gui.add_html('')
             self._drive_panel: GuiFolderHandle = gui.add_folder(None)
@@ -236,18 +255,17 @@ class RobotPage:
             with log:
                 self._log_html: GuiHtmlHandle = gui.add_html('')
 
-    def _add_checkboxes(self) -> None:
-        gui = self.server.gui
-        target = gui.add_checkbox('Show target', True)
-        frames = gui.add_checkbox('Show frames', False)
-        target.on_update(lambda _: self._show_target(seen=target.value))
-        frames.on_update(lambda _: self._show_frames(seen=frames.value))
+    def offer_to_see(self, what: str, show: Callable[[bool], None], *, seen: bool = True) -> None:
+        """Offer to show something in the picture, as long as this robot is shown."""
+        with self._groups['See']:
+            box = self.server.gui.add_checkbox(f'Show {what}', seen, order=self._see.order - 0.5)
+        box.on_update(lambda _: show(box.value))
 
-    def _show_target(self, *, seen: bool) -> None:
+    def _show_target(self, seen: bool) -> None:
         if self._jog is not None and self._jog.target is not None:
             self._jog.target.seen = seen
 
-    def _show_frames(self, *, seen: bool) -> None:
+    def _show_frames(self, seen: bool) -> None:
         if self.robot is not None:
             self.robot.show_frames(seen=seen)
 
@@ -338,6 +356,8 @@ class RobotPage:
             listens: Where the page looks for robots, in words.
         """
         self.live.movable = state.movable
+        if self.robot is not None:
+            self.robot.mark(state.faulty)
         faulty = state.level is Level.FAULT
         for mode, button in self._modes.items():
             able = state.movable or (faulty and mode in IN_FAULT)
@@ -356,9 +376,16 @@ class RobotPage:
                 'robot': '' if tree is None else tree.name,
                 'said': self.last,
                 'listens': listens,
+                'speed': self._velocity_text(),
                 'joints': {} if tree is None else joint_texts(tree, positions),
             }
         )
+
+    def _velocity_text(self) -> str:
+        if self.velocity is None:
+            return ''
+        what = 'Forward' if self.has('Body') else 'Tool'
+        return f'{what}: {1000.0 * self.velocity(self.speed()):.0f} mm/s'
 
     def show_mode(self, mode: str) -> None:
         """Show the mode of a walking robot, and which arrows move it then."""
@@ -506,12 +533,14 @@ class RobotPage:
                 self._modes['policy'].visible = policy
             return
         gui = self.server.gui
+        self.velocity = lambda share: share * WALKS['Forward'][1][0]
         self._notes['Drive'].visible = False
         with self._groups['Drive']:
             rest = partial(self._actions.walk, (0.0, 0.0, 0.0))
             holds = []
-            for title, velocity in WALKS.items():
-                number, html = self.live.button(Hold(title, partial(self._walk, velocity), rest))
+            for title, (key, velocity) in WALKS.items():
+                hold = Hold(title, partial(self._walk, velocity), rest, key=key)
+                number, html = self.live.button(hold)
                 self._walk_holds[number] = velocity
                 holds.append(html)
             with gui.add_folder('Posture'):
@@ -524,13 +553,15 @@ class RobotPage:
                 gait = gui.add_dropdown('Gait', GAITS)
                 gait.on_update(lambda _: self._request(f'gait:{gait.value}', None))
             with gui.add_folder('Hold to walk'):
-                gui.add_html(pad(holds))
+                gui.add_html(pad(holds[:WALK_BUTTONS]) + pad(holds[WALK_BUTTONS:], 'rv-keyed'))
 
     # -- what people do, in threads of the page
 
     def _command(self, word: str, rest: str) -> None:
         if word == 'act':
             self._actions.act(rest)
+        elif word == 'cancel':
+            self.cancel()
         elif word == 'say':
             self.say(rest, failed=True)
 
@@ -578,5 +609,6 @@ class RobotPage:
 
     def list_log(self) -> None:
         """Show what was said."""
-        if self._log_html.content != self._log.html:
-            self._log_html.content = self._log.html
+        html = f'{COPY_LOG}<div>{self._log.html}</div>'
+        if self._log_html.content != html:
+            self._log_html.content = html

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 import math
 from pathlib import Path
@@ -38,6 +38,8 @@ SECTION = 0.5
 """Between thick lines of the ground in [m]."""
 
 
+FAULTY: Tint = (0.79, 0.16, 0.16, 1.0)
+"""Of the links of joints whose drives report a fault."""
 PLAIN = (0.7, 0.72, 0.75, 1.0)
 """Color of what the description gives none: red, green, blue and opacity from 0 to 1."""
 
@@ -100,6 +102,8 @@ class RobotScene:
         self._frames: dict[str, FrameHandle] = {}
         self._paths = link_paths(tree, look.path)
         scene.add_frame(self._paths[tree.root], show_axes=False)
+        self._shapes: dict[str, list[tuple[str, UrdfShape]]] = {}  # of each link, by its path
+        self._marked: frozenset[str] = frozenset()
         self._add_joints()
         self._add_shapes()
         free = (joint for joint in self._movable.values() if joint.mimic is None)
@@ -136,6 +140,14 @@ class RobotScene:
         for frame in self._frames.values():
             frame.show_axes = seen
 
+    def mark(self, joints: Collection[str]) -> None:
+        """Show the links of these joints as faulty, and no others."""
+        links = frozenset(joint.child for joint in self.tree.joints if joint.name in joints)
+        for link in links ^ self._marked:
+            for name, shape in self._shapes.get(link, ()):
+                self._add_shape(name, shape, FAULTY if link in links else self._tint)
+        self._marked = links
+
     def path_of(self, frame: str) -> str:
         """Return the node of a frame; that of the world where it is no link."""
         return self._paths.get(frame, '')
@@ -166,8 +178,10 @@ class RobotScene:
         for number, shape in enumerate(shapes):
             if shape.note:
                 missing.setdefault(shape.note, []).append(shape.link)
+            name = f'{self._paths[shape.link]}/shape{number}'
             try:
-                self._add_shape(f'{self._paths[shape.link]}/shape{number}', shape)
+                self._add_shape(name, shape, self._tint)
+                self._shapes.setdefault(shape.link, []).append((name, shape))
             except ValueError as error:
                 missing.setdefault(str(error), []).append(shape.link)
             except Exception as error:  # noqa: BLE001  # readers of meshes; the others are shown
@@ -175,8 +189,8 @@ class RobotScene:
                 missing.setdefault(reason, []).append(shape.link)
         self.notes += [f'{", ".join(links)}: {reason}' for reason, links in missing.items()]
 
-    def _add_shape(self, name: str, shape: UrdfShape) -> None:
-        color = self._tint or shape.color or PLAIN
+    def _add_shape(self, name: str, shape: UrdfShape, tint: Tint | None) -> None:
+        color = tint or shape.color or PLAIN
         rgb = (round(255 * color[0]), round(255 * color[1]), round(255 * color[2]))
         opacity = None if color[3] >= 1.0 else color[3]
         node: SceneNodeHandle
@@ -191,22 +205,21 @@ class RobotScene:
                 (radius,) = shape.lengths('radius')
                 node = self._scene.add_icosphere(name, radius, rgb, opacity=opacity)
             case 'mesh':
-                node = self._add_mesh(name, shape, rgb, opacity)
+                mesh, whole = self._meshes.read(shape)
+                if not (tint or shape.color) and mesh.visual is not None and mesh.visual.defined:
+                    node = self._scene.add_mesh_trimesh(name, mesh, scale=whole)
+                else:
+                    node = self._scene.add_mesh_simple(
+                        name,
+                        np.asarray(mesh.vertices),
+                        np.asarray(mesh.faces),
+                        color=rgb,
+                        opacity=opacity,
+                        scale=whole,
+                    )
             case _:
                 raise MeshFileError(f'<{shape.shape}> is no box, cylinder, sphere or mesh')
         put(node, shape.origin)
-
-    def _add_mesh(
-        self, name: str, shape: UrdfShape, rgb: tuple[int, int, int], opacity: float | None
-    ) -> SceneNodeHandle:
-        mesh, whole = self._meshes.read(shape)
-        plain = shape.color is not None or self._tint is not None
-        if not plain and mesh.visual is not None and mesh.visual.defined:
-            return self._scene.add_mesh_trimesh(name, mesh, scale=whole)
-        vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
-        return self._scene.add_mesh_simple(
-            name, vertices, faces, color=rgb, opacity=opacity, scale=whole
-        )
 
 
 def travel(joint: Joint) -> tuple[float, float]:
