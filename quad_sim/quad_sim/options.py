@@ -63,6 +63,7 @@ def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:
     add('--physics', choices=('mujoco', 'none'), default='mujoco', help='none: in the air')
     add('--servo', default='nominal', help='nominal, firm, vendor_rl, or kp=2.45,delay=0.04,...')
     add('--slope', type=float, default=0.0, metavar='DEG', help='of the ground, uphill ahead')
+    add('--roughness', type=float, default=0.0, metavar='M', help='height of its highest bumps')
     add('--friction', type=float, default=0.8, help='of the ground (%(default)s)')
     add('--start', choices=[pose.value for pose in Pose], default='lie', help='how it begins')
     add('--held', action='store_true', help='the trunk is on a stand, legs hang free')
@@ -166,7 +167,12 @@ def _make_plant(options: argparse.Namespace, urdf: str) -> Plant:
     return Robot(
         urdf,
         parse_servo(options.servo),
-        Terrain(math.radians(options.slope), friction=options.friction),
+        Terrain(
+            math.radians(options.slope),
+            friction=options.friction,
+            roughness=options.roughness,
+            seed=options.seed,
+        ),
         options.seed,
         pose=pose,
         noise=noise,

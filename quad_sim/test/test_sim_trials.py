@@ -17,7 +17,9 @@ from sim_virtual import VirtualRobot
 from quad_description import robot_urdf
 from quad_hardware.protocol import Code, Frame, Kind
 from quad_sim import CommandTiming, ServedRobot, ServoModel, SimulationError, Terrain
+from quad_sim.env import WalkingEnv
 from quad_sim.line.command_times import CommandTimes
+from quad_sim.options import build, parse_arguments
 from quad_sim.physics import ImuBias, Meter, PhysicsBackend, Robot, Variation
 
 URDF = robot_urdf()
@@ -52,6 +54,17 @@ def test_rough_ground_has_bumps_but_where_the_robot_begins() -> None:
     assert (rises > 0.002).all()
     assert (rises < 0.021).all()
     assert not np.allclose(rough[1:-1], other[1:-1], atol=1e-3)
+
+
+def test_the_environment_and_the_served_robot_have_bumps_too() -> None:
+    """Their ground is that of a robot that was made with it."""
+    rough = Terrain(roughness=0.02, seed=1)
+    wanted = heights(Robot(URDF, terrain=rough), PLACES)
+    assert heights(WalkingEnv(terrain=rough).robot, PLACES) == wanted
+    robot = build(parse_arguments(['--roughness', '0.02', '--seed', '1', '--noise', 'none'])).plant
+    assert isinstance(robot, Robot)
+    served = heights(robot, PLACES)
+    assert served == pytest.approx(wanted, abs=1e-4)
 
 
 def test_the_friction_of_bumps_varies_too() -> None:

@@ -29,6 +29,7 @@ from quad_description.rotations import down_in_body, Vector
 from ..exceptions import SetupError, TargetError
 from ..physics import ImuBias, Robot
 from ..plant.servo import ServoModel, ServoParameters
+from ..plant.terrain import FLAT, Terrain
 from .randomization import check_range, NO_RANDOMIZATION, Randomization, Range
 from .rewards import Motion, RewardWeights
 
@@ -108,10 +109,12 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         weights: RewardWeights | None = None,
         period: float = PERIOD,
         duration: float = 20.0,
+        terrain: Terrain = FLAT,
     ) -> None:
         """Put the robot on the ground.
 
         Args:
+            terrain: The ground; the robot begins on a level part of it.
             duration: Longest time of an episode in [s].
 
         Raises:
@@ -123,7 +126,8 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
                 f'period {period} s, duration {duration} s: give 0 < period < duration'
             )
         urdf = robot_urdf(preset)
-        self.robot, self.period = Robot(urdf, servo, noise=randomization.noise), period
+        self.robot = Robot(urdf, servo, terrain, noise=randomization.noise)
+        self.period = period
         self.vary(randomization)
         limits = [joint.limits for joint in movable_joints(urdf)]
         stand = pose_positions(Pose.STAND)
