@@ -39,6 +39,8 @@ class JointSample:
     # places of the joints that no sensor measures; their positions are those that were commanded
     # last
     unmeasured: tuple[int, ...] = ()
+    # of velocities that were differentiated, rms in [rad/s]; 0 for those that the robot reports
+    velocity_error: float = 0.0
 
     def measured(self, names: Sequence[str]) -> dict[str, float]:
         """Return the positions that are measured, by joint."""

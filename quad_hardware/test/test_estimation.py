@@ -124,6 +124,22 @@ def test_after_a_gap_the_rate_begins_at_rest() -> None:
     assert joints.update(1.02, {'b': 1.0}) == {'b': 0.0}
 
 
+@pytest.mark.parametrize(('period', 'worst'), [(0.02, 0.2), (0.038, 0.35)], ids=['50 Hz', '26 Hz'])
+def test_differentiated_velocities_know_their_error(period: float, worst: float) -> None:
+    """A joint that swings at 2.5 Hz in bytes: near its velocity, and the error is no surprise."""
+    step, turn = math.radians(160.0) / 255, 5.0 * math.pi
+    rates, errors, speeds = JointRate(cutoff=25.0), [], []
+    for count in range(400):
+        time = count * period
+        place = round(0.3 * math.sin(turn * time) / step) * step
+        speeds.append(0.3 * turn * math.cos(turn * time))
+        errors.append(rates.update(time, {'a': place})['a'] - speeds[-1])
+    square = sum(error * error for error in errors[5:])
+    error = math.sqrt(square / len(errors[5:]))
+    assert error < worst * math.sqrt(sum(speed * speed for speed in speeds) / len(speeds))
+    assert 0.8 * error < rates.error < 1.6 * error
+
+
 @given(ROTATIONS)
 def test_both_directions_of_gravity_agree_at_rest(attitude: Quaternion) -> None:
     """An accelerometer at rest reads upwards, so gravity is its opposite."""

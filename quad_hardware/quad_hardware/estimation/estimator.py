@@ -45,7 +45,7 @@ class EstimatorSettings:
 
     rate_source: RateSource = RateSource.AUTO  # where the angular velocity is from
     rate_cutoff: float = 12.0  # of the low-pass of differentiated angular velocities [Hz]
-    joint_cutoff: float = 12.0  # of the low-pass of differentiated joint velocities [Hz]
+    joint_cutoff: float = 25.0  # of the low-pass of differentiated joint velocities [Hz]
     odometry: OdometrySettings = field(default_factory=OdometrySettings)  # how the legs are read
     mounting: ImuMounting = field(default_factory=ImuMounting)  # how the IMU sits on the body
 
@@ -138,18 +138,21 @@ class Estimator:
 
     def _joint_sample(self, report: Report, time: float) -> JointSample:
         positions = self._joints.positions(report.positions)
-        velocities = self._joints.velocities(report.velocities)
+        velocities, error = self._joints.velocities(report.velocities), 0.0
         if not velocities:
             velocities = self._joint_rate.update(time, positions)
+            error = self._joint_rate.error
         names = self._joints.names
         if len(positions) == len(velocities) == len(names):  # all of them, in their order
-            return JointSample(tuple(positions.values()), tuple(velocities.values()), time)
+            values = tuple(positions.values()), tuple(velocities.values())
+            return JointSample(*values, time, velocity_error=error)
         known = {**self._sent, **positions}
         return JointSample(
             tuple(known.get(name, 0.0) for name in names),
             tuple(velocities.get(name, 0.0) for name in names),
             time,
             tuple(place for place, name in enumerate(names) if name not in positions),
+            error,
         )
 
     def _imu_sample(self, report: Report, time: float) -> ImuSample:

@@ -134,8 +134,22 @@ class AttitudeRate:
         return self._rate
 
 
+SLOPE_SHARE = 0.75
+"""How much of a parabola's slope counts beside that of a line: found on a trot over protocol v1.
+
+The line lags by half a period; the parabola does not, and makes more of the rounding of bytes.
+"""
+ERROR_SHARE = 0.02  # weight of the newest report in the mean square of the error
+
+
 class JointRate:
-    """Joint velocities from differences, for the protocol that does not report them."""
+    """Joint velocities from the last three positions, where the robot does not report them.
+
+    Attributes:
+        error: Of the velocities [rad/s] rms, by those that the report after shows: the slope
+            between its neighbours. It contains the rounding of positions, so it is no smaller than
+            the true one as long as reports are frequent.
+    """
 
     def __init__(self, cutoff: float) -> None:
         """Begin at rest.
@@ -143,9 +157,12 @@ class JointRate:
         Args:
             cutoff: Of the low-pass [Hz].
         """
+        self.error = 0.0
         self._cutoff = cutoff
         self._time = -math.inf
+        self._elapsed = 0.0  # between the last two reports [s]
         self._last: dict[str, float] = {}
+        self._slopes: dict[str, float] = {}  # between the last two reports
         self._rates: dict[str, float] = {}
 
     def update(self, time: float, positions: Mapping[str, float]) -> dict[str, float]:
@@ -154,9 +171,20 @@ class JointRate:
         self._time, self._last = time, dict(positions)
         if last.keys() != positions.keys() or not 0.0 < elapsed <= MAX_GAP:
             self._rates = dict.fromkeys(positions, 0.0)
-        else:
-            share = low_pass_share(self._cutoff, elapsed)
-            for name, position in positions.items():
-                rate = self._rates[name]
-                self._rates[name] = rate + share * ((position - last[name]) / elapsed - rate)
+            self._slopes, self._elapsed = {}, 0.0
+            return dict(self._rates)
+        slopes = {name: (place - last[name]) / elapsed for name, place in positions.items()}
+        before, span = self._slopes or slopes, elapsed + self._elapsed
+        if self._slopes:
+            errors = [
+                (slopes[name] * elapsed + before[name] * self._elapsed) / span - rate
+                for name, rate in self._rates.items()
+            ]
+            square = sum(error * error for error in errors) / len(errors)
+            self.error = math.sqrt(self.error**2 + ERROR_SHARE * (square - self.error**2))
+        share, bend = low_pass_share(self._cutoff, elapsed), SLOPE_SHARE * elapsed / span
+        for name, slope in slopes.items():
+            newest = slope + bend * (slope - before[name])
+            self._rates[name] += share * (newest - self._rates[name])
+        self._slopes, self._elapsed = slopes, elapsed
         return dict(self._rates)

@@ -138,6 +138,9 @@ def robot_diagnostic(
         'faults': state.faults,
         'imu_signs_checked': signs_checked,
         'gravity_error': '' if gravity_error is None else f'{gravity_error:.3f}',
+        'joint_velocity_error': ''
+        if state.joints is None
+        else f'{state.joints.velocity_error:.2f}',
         'hottest_servo': max(state.temperatures.values(), default=0.0),
         'implausible_reports': status.refused,
         'last_implausible': status.refusal,

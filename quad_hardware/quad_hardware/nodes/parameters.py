@@ -199,7 +199,7 @@ def _estimator(read: ParameterReader) -> EstimatorSettings:
         ),
         rate_cutoff=read.number('rate_cutoff', 12.0, (0.5, 25.0), 'of its low-pass [Hz]'),
         joint_cutoff=read.number(
-            'joint_velocity_cutoff', 12.0, (0.5, 25.0), 'of differentiated velocities [Hz]'
+            'joint_velocity_cutoff', 25.0, (0.5, 25.0), 'of differentiated velocities [Hz]'
         ),
         odometry=OdometrySettings(
             delay=read.number('odometry.delay', default.delay, (0.0, 0.3), 'lag of servos [s]'),
