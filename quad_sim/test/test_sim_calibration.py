@@ -96,7 +96,8 @@ class Line:
     def angles(self) -> dict[int, float]:
         """Return the angles of now [deg]."""
         self.wait_until(self.robot.now + 0.1)
-        return dict(self._reports[-1].positions)
+        found = self._reports[-1].positions
+        return {servo.motor: found[servo.motor] for servo in SERVOS}
 
 
 def calibrate(servo: str, protocol: Protocol, *arguments: str) -> tuple[ServoFit, list[str]]:

@@ -139,7 +139,7 @@ def _parser() -> argparse.ArgumentParser:
     servos.add_argument('--calibration', type=Path, help='file of calibrate joints')
     servos.add_argument('--leg', choices=LEGS, default=LEGS[0], help='(%(default)s)')
     servos.add_argument(
-        '--repeat', type=int, choices=range(1, 6), default=1, help='of the motion (%(default)s)'
+        '--repeat', type=int, choices=range(1, 5), default=1, help='of the motion (%(default)s)'
     )
     joints.add_argument('--joint', action='append', default=[], help='only this one; repeatable')
     joints.add_argument('--limits', action='store_true', help='record the ends of the travel, too')

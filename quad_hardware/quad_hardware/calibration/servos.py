@@ -17,6 +17,7 @@ from quad_description import movable_joints
 
 from ..exceptions import CommandError
 from ..joints import JointServo
+from ..protocol import LEG_MOTORS
 from ..report import Report
 from .servo_fit import fit_servo, leg_load, Recording, ServoFit
 from .wizard import Console
@@ -73,8 +74,10 @@ def calibrate_servos(
         'Enter begins; Ctrl-C ends it'
     )
     limits = next(each.limits for each in movable_joints(urdf) if each.name == servo.joint)
-    held = {each.motor: angle for each, angle in _angles(robot, servos)}
-    positions = {each.joint: each.position(held[each.motor]) for each in servos}
+    held = robot.angles()  # without those that the protocol does not report: they stay
+    if missing := sorted(set(LEG_MOTORS) - held.keys()):
+        raise CommandError(f'motor {missing[0]} reports no angle; look at the robot with doctor')
+    positions = {s.joint: s.position(held[s.motor]) for s in servos if s.motor in held}
     load = leg_load(read_urdf(urdf), servo.joint, positions, limits.effort)
     centre = math.atan(-load.level / load.turned)  # where gravity turns it neither way
     centre = min(max(centre, limits.lower + AMPLITUDE), limits.upper - AMPLITUDE)
@@ -106,12 +109,6 @@ def calibrate_servos(
     kp = f'servo_compensation.kp:={found.stiffness:.3g}'
     console.write(f'  ros2 run quad_controller controller_node --ros-args -p {kp}')
     return found
-
-
-def _angles(robot: SwungRobot, servos: Sequence[JointServo]) -> list[tuple[JointServo, float]]:
-    angles = robot.angles()
-    # the yaw of an arm is not reported on v1: it is at zero, or nothing here turns it
-    return [(servo, angles.get(servo.motor, servo.angle(0.0))) for servo in servos]
 
 
 def _motion(centre: float, repeat: int) -> Iterator[tuple[float, float]]:
