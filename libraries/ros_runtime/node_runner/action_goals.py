@@ -31,8 +31,8 @@ several of them, or on a busy computer, it takes some switches. Cancel requests 
 because the motion would go on meanwhile.
 """
 
-REPEATS = (0.5, 2.0)
-"""Times in [s] after which acceptance is sent again while no result has been requested.
+REPEATS = (0.5, 1.5)
+"""Pauses in [s] after which acceptance is sent again while no result has been requested.
 
 A client that requests the result has the acceptance. On a busy computer its thread may pause
 for longer than ``ANSWER_DELAY`` between sending and noting. A client that has it and never
@@ -40,9 +40,8 @@ requests a result drops the repeats with a warning.
 """
 
 RESULT_PATIENCE, LONGEST_DELAY = 4.0, 0.5
-"""A result leaves so many times later than its request as the client took to answer the
-acceptance, [s] at most. Nothing shows that a result was noted; the client's pace shows how long
-its threads pause.
+"""A result leaves so many times later than its request as that came after its goal, less the
+delay; [s] at most. Nothing shows that a result was noted; this pace shows how long threads pause.
 """
 
 
@@ -50,56 +49,53 @@ class _Server(ActionServer):
     """Answers when the client has noted its request, see ``ANSWER_DELAY`` and ``REPEATS``."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:  # noqa: ANN401  # as of rclpy
-        self._accepted_at: dict[bytes, float] = {}
-        """When goals whose result was not yet requested were accepted [s]."""
+        self._came_at: dict[bytes, float] = {}
+        """When goals came whose result was not yet requested [s]."""
         super().__init__(*args, **kwargs)
 
     async def _execute_goal_request(self, request: Any) -> None:  # noqa: ANN401  # rclpy has no types
         header, goal = request
         uuid = bytes(goal.goal_id.uuid)
+        self._came_at[uuid] = time.monotonic()
         await self._delay(ANSWER_DELAY)
-        self._accepted_at[uuid] = time.monotonic()
-        for repeat in REPEATS:
-            self._after(repeat, lambda: self._accept_again(header, uuid))
+        self._node.executor.create_task(self._accept_again, header, uuid)
         await super()._execute_goal_request(request)
 
     async def _execute_get_result_request(self, request: Any) -> None:  # noqa: ANN401
         now = time.monotonic()
-        accepted = self._accepted_at.pop(bytes(request[1].goal_id.uuid), now)
-        paced = RESULT_PATIENCE * (now - accepted)
+        came = self._came_at.pop(bytes(request[1].goal_id.uuid), now)
+        paced = RESULT_PATIENCE * (now - came - ANSWER_DELAY)
         await self._delay(min(max(ANSWER_DELAY, paced), LONGEST_DELAY))
         await super()._execute_get_result_request(request)
 
     async def _execute_expire_goals(self, expired_goals: Any) -> None:  # noqa: ANN401
         for goal in expired_goals:
-            self._accepted_at.pop(bytes(goal.goal_id.uuid), None)
+            self._came_at.pop(bytes(goal.goal_id.uuid), None)
         await super()._execute_expire_goals(expired_goals)
 
-    def _accept_again(self, header: Any, uuid: bytes) -> None:  # noqa: ANN401
-        goal = self._goal_handles.get(uuid)
-        if goal is None or uuid not in self._accepted_at:
-            return
-        response = self.action_type.Impl.SendGoalService.Response(accepted=True)
-        response.stamp = goal._goal_info.stamp  # noqa: SLF001  # rclpy shows no other
-        with suppress(rclpy_implementation.RCLError):  # the client has gone
-            self._handle.send_goal_response(header, response)
+    async def _accept_again(self, header: Any, uuid: bytes) -> None:  # noqa: ANN401
+        for pause in REPEATS:
+            await self._delay(pause)
+            goal = self._goal_handles.get(uuid)
+            if goal is None or uuid not in self._came_at:
+                return
+            response = self.action_type.Impl.SendGoalService.Response(accepted=True)
+            response.stamp = goal._goal_info.stamp  # noqa: SLF001  # rclpy shows no other
+            with suppress(rclpy_implementation.RCLError):  # the client has gone
+                self._handle.send_goal_response(header, response)
 
     async def _delay(self, duration: float) -> None:
+        """Return later. A timer is not destroyed in its callback, which may be queued twice."""
         elapsed = Future()
-        self._after(duration, lambda: elapsed.set_result(None))
-        await elapsed
-
-    def _after(self, duration: float, action: Callable[[], None]) -> None:
-        """Call something once, after a duration in [s]."""
-
-        def call() -> None:
-            self._node.destroy_timer(timer)
-            action()
-
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # simulated time may stand still
         timer = self._node.create_timer(
-            duration, call, callback_group=self.callback_group, clock=steady
+            duration,
+            lambda: elapsed.set_result(None),
+            callback_group=self.callback_group,
+            clock=steady,
         )
+        await elapsed
+        self._node.destroy_timer(timer)
 
 
 class Ending(Enum):
