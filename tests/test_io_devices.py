@@ -68,8 +68,8 @@ def test_outputs_are_written_and_inputs_published(devices: SimulatedArm) -> None
     for refused in ([1], [2] + [0] * 15):
         lines.publish(UInt8MultiArray(data=refused))
     lines.publish(UInt8MultiArray(data=wanted))
-    for refused in ([40_000.0, 0.0], [0.5, 0.0], [math.nan, 0.0]):
-        values.publish(Float64MultiArray(data=refused))
+    for beyond in ([40_000.0, 0.0], [0.5, 0.0], [math.nan, 0.0]):
+        values.publish(Float64MultiArray(data=beyond))
     values.publish(Float64MultiArray(data=[-300.0, 7.0]))
     client.spin_until(lambda: list(digital[-1].data) == wanted, TIMEOUT, 'the inputs')
     client.spin_until(lambda: list(analog[-1].data)[:2] == [-300.0, 7.0], TIMEOUT, 'the values')
