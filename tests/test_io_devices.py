@@ -9,6 +9,7 @@ import math
 from pathlib import Path
 import re
 
+from canopen_interfaces.msg import COData
 from canopen_interfaces.srv import COTargetDouble
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from isolation import reserve
@@ -85,6 +86,21 @@ def test_outputs_are_written_and_inputs_published(devices: SimulatedArm) -> None
     assert _status(devices, 'io: device', DiagnosticStatus.OK)['digital_outputs'] == ''.join(
         map(str, wanted)
     )
+
+
+def test_any_object_is_published_and_received_as_with_ros2_canopen(devices: SimulatedArm) -> None:
+    """`~/tpdo` sends an RPDO, `~/rpdo` has each object of a TPDO."""
+    client = devices.client
+    received = client.listen(COData, '/io/rpdo')
+    sender = client.node.create_publisher(COData, '/io/tpdo', 10)
+    client.spin_until(lambda: bool(sender.get_subscription_count()), TIMEOUT, 'the master')
+    client.spin_for(0.5)  # in which it sees who listens
+    sender.publish(COData(index=0x6000, subindex=1, data=1))
+    sender.publish(COData(index=0x6200, subindex=1, data=9))
+    wanted = (0x6000, 1, 9)
+    shown = lambda: [(each.index, each.subindex, each.data) for each in received]  # noqa: E731
+    client.spin_until(lambda: wanted in shown(), TIMEOUT, 'the input')
+    devices.master.wait_for('~/tpdo: 0x6000:01 is in no RPDO of the device; map it', TIMEOUT)
 
 
 def test_a_lost_module_is_in_error_and_its_outputs_are_not_written_again(
