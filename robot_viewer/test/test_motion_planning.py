@@ -182,7 +182,7 @@ def planner(isolation: Isolation, monkeypatch: pytest.MonkeyPatch) -> Iterator[P
 def test_what_is_planned_is_executed_once(planner: Planner) -> None:
     """The goal is the state of the SRDF; nothing is executed before somebody says so."""
     planner.plan()
-    goal = planner.move.goals[-1].request
+    goal = planner.move.goals[-1].handle.request
     assert goal.planning_options.plan_only
     assert goal.request.group_name == 'whole'
     assert goal.request.max_velocity_scaling_factor == 0.2
@@ -193,7 +193,7 @@ def test_what_is_planned_is_executed_once(planner: Planner) -> None:
     planner.do('execute')
     planner.do('execute')
     planner.spin_until(lambda: bool(planner.execute.goals), 'an execution')
-    assert planner.execute.goals[-1].request.trajectory == _trajectory()
+    assert planner.execute.goals[-1].handle.request.trajectory == _trajectory()
     planner.do('plan')
     planner.spin_until(lambda: 'still executing' in planner.said, 'a refusal')
     planner.execute.answer(MoveItErrorCodes.SUCCESS)
@@ -328,7 +328,7 @@ def test_a_goal_is_dragged(planner: Planner) -> None:
     planner.spin_until(lambda: planning._pose is None, 'a solution')
     planner.do('plan')
     planner.spin_until(lambda: len(planner.move.goals) == 1, 'a goal')
-    (joints,) = planner.move.goals[-1].request.request.goal_constraints
+    (joints,) = planner.move.goals[-1].handle.request.request.goal_constraints
     places = {each.joint_name: each.position for each in joints.joint_constraints}
     assert places == {'shoulder': 0.7, 'lift': 0.8}
     planning._asked = time.monotonic() - ANSWER_TIME  # its answer was lost
@@ -337,7 +337,7 @@ def test_a_goal_is_dragged(planner: Planner) -> None:
     planner.spin_until(lambda: 'NO_IK_SOLUTION: out of reach' in planner.said, 'the words')
     planner.do('plan')
     planner.spin_until(lambda: len(planner.move.goals) == 2, 'a goal')
-    (pose,) = planner.move.goals[-1].request.request.goal_constraints
+    (pose,) = planner.move.goals[-1].handle.request.request.goal_constraints
     assert not pose.joint_constraints
     (place,) = pose.position_constraints
     assert place.constraint_region.primitive_poses[0].position.x == 9.0

@@ -74,7 +74,7 @@ class HomeAction:
 
         def run() -> Promise[str]:
             self._node.admit()
-            method = homing.request.method or None
+            method = homing.handle.request.method or None
             homing.task = self._commands.run('home', self._commands.home(method, notify))
             return homing.task
 

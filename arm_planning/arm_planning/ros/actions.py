@@ -63,8 +63,9 @@ class ExecuteAction:
             goal.outcome = code, reason
             self._server.end(goal)
 
+        asked = goal.handle.request
         goal.execution = self._execution.start(
-            goal.request.trajectory.joint_trajectory, done, list(goal.request.controller_names)
+            asked.trajectory.joint_trajectory, done, list(asked.controller_names)
         )
         goal.handle.publish_feedback(ExecuteTrajectory.Feedback(state='MONITOR'))
 

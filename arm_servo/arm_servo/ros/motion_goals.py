@@ -58,14 +58,8 @@ class MotionGoals(GoalServer[GoalT]):
         """Offer the action.
 
         Args:
-            node: Node of the server.
-            gateway: Commands to the core of the arm.
-            action: Type of the action.
-            name: Name of the action.
-            accept: Makes the record of a goal from its handle.
             request: Requests the motion of a goal; raises an ArmError where it is refused.
             canceled: Reason of an outcome that a client has asked for.
-            conclude: Returns status and result message of a goal that has ended.
         """
         self._log, self._gateway = node.get_logger(), gateway
         self._request, self._canceled = request, canceled

@@ -113,16 +113,6 @@ class ServedGoal:
     handle: Any  # rclpy's ``ServerGoalHandle``
     has_ended: bool = field(default=False, init=False)  # whether its result is on the way
 
-    @property
-    def request(self) -> Any:  # noqa: ANN401
-        """The goal message."""
-        return self.handle.request
-
-    @property
-    def is_cancel_requested(self) -> bool:
-        """Whether a client has asked to cancel it."""
-        return bool(self.handle.is_cancel_requested)
-
 
 GoalT = TypeVar('GoalT', bound=ServedGoal)
 
@@ -145,9 +135,6 @@ class GoalServer(Generic[GoalT]):
         """Offer the action; all callbacks run in the executor.
 
         Args:
-            node: Node of the server.
-            action: Type of the action.
-            name: Name of the action.
             accept: Makes the record of a goal from its handle.
             start: Begins with a goal.
             refuse: Notes what ``start`` has raised; the goal ends then. By default it is raised.

@@ -89,9 +89,9 @@ class GripperController:
         node.create_timer(1.0 / WATCH_RATE, self._watch)
 
     def _request(self, interface: GripperInterface, goal: _Goal) -> MotionCommand:
-        request = interface.request(goal.request, self._joints)
+        request = interface.request(goal.handle.request, self._joints)
         self._check_active()
-        if interface.asks_effort(goal.request) and not self._has_warned:
+        if interface.asks_effort(goal.handle.request) and not self._has_warned:
             self._has_warned = True
             self._node.get_logger().warning(NO_EFFORT_LIMIT)
         return self._gateway.request(request, self._prepare)
@@ -193,7 +193,7 @@ class GripperController:
             return 'a newer goal took over'
         if outcome.code is not GoalCode.SUCCESSFUL or outcome.canceled:
             return outcome.reason
-        return 'canceled' if goal.is_cancel_requested else ''
+        return 'canceled' if goal.handle.is_cancel_requested else ''
 
     def _conclude(self, interface: GripperInterface, goal: _Goal) -> tuple[Ending, Any]:
         measured = self._gateway.snapshot.measured
@@ -203,7 +203,7 @@ class GripperController:
             goal.problem = goal.outcome.reason
         if self._succeeds(goal):
             return Ending.SUCCEEDED, interface.result(state)
-        if not (goal.problem and goal.is_cancel_requested):
+        if not (goal.problem and goal.handle.is_cancel_requested):
             reason = goal.problem or 'stalled in front of the goal (allow_stalling is false)'
             self._node.get_logger().warning(f'goal aborted: {reason}')
             return Ending.ABORTED, interface.result(state)

@@ -36,8 +36,6 @@ class TrajectoryAction:
         """Offer ``~/follow_joint_trajectory``.
 
         Args:
-            node: Node of the server.
-            gateway: Commands to the core of the arm.
             rate: Rate of the feedback in [Hz].
             follow: Requests the trajectory of a goal message; raises an ArmError.
         """
@@ -48,7 +46,7 @@ class TrajectoryAction:
             FollowJointTrajectory,
             '~/follow_joint_trajectory',
             accept=MotionGoal,
-            request=lambda goal: follow(goal.request),
+            request=lambda goal: follow(goal.handle.request),
             canceled='canceled: at rest on the path',
             conclude=self._conclude,
         )
@@ -56,7 +54,7 @@ class TrajectoryAction:
 
     def _watch(self) -> None:
         for goal in self._goals.running:
-            count = len(goal.request.trajectory.points)
+            count = len(goal.handle.request.trajectory.points)
             timeout = START_TIMEOUT + START_TIMEOUT_PER_POINT * count
             goal.outcome = self._goals.outcome(goal, timeout)
             if goal.outcome is not None:
@@ -82,7 +80,7 @@ class TrajectoryAction:
         code = outcome.code
         if outcome.canceled:
             ending = Ending.CANCELED
-            code = code if goal.is_cancel_requested else GoalCode.INVALID_GOAL
+            code = code if goal.handle.is_cancel_requested else GoalCode.INVALID_GOAL
         else:
             ending = Ending.SUCCEEDED if code is GoalCode.SUCCESSFUL else Ending.ABORTED
         if code is not GoalCode.SUCCESSFUL:
