@@ -9,7 +9,7 @@ The model is that of quad_sim: a leg that hangs free turns about one joint by
 
 The largest torque, the inertia of the links and their weight come from the URDF, so the stiffness
 has a unit. The parameters minimize the squared error of all positions (Levenberg-Marquardt); their
-standard deviations follow from the Jacobian and tell whether the recording determines them.
+standard deviations follow from the Jacobian and show whether the recording determines them.
 """
 
 from __future__ import annotations
