@@ -7,6 +7,7 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
+    package_data=['can/*.c'],
     entry_points={
         # the name that `python -m can.viewer -i arm_canopen` uses
         'can.interface': ['arm_canopen = canopen_core.can.plugin:ArmCanopenBus'],

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The cycle beside the ROS nodes in one process, against the cycle in a process of its own.
+"""The cycle beside the ROS nodes, in a process of its own, and there without the C core.
 
 Seven simulated drives on the multicast bus; the second variant has no ROS at all, so that a real
 division in two processes, with the exchange between them, could only be worse.
@@ -9,6 +9,7 @@ division in two processes, with the exchange between them, could only be worse.
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 import subprocess
 import sys
@@ -50,6 +51,7 @@ def main() -> None:
                 show(scenario, 'with ROS', with_nodes(arm))
                 arm.master.stop()
                 show(scenario, 'alone', alone(bus, isolation))
+                show(scenario, 'no C core', alone(bus, isolation, CANOPEN_CORE_COMPILED='0'))
 
 
 def show(scenario: Scenario, variant: str, figures: dict[str, float]) -> None:
@@ -72,10 +74,11 @@ def with_nodes(arm: SimulatedArm) -> dict[str, float]:
     return {**figures, 'overruns': figures['overruns'] - float(first['overruns']), 'cpu': cpu}
 
 
-def alone(bus: Path, isolation: Isolation) -> dict[str, float]:
-    """Measure the cycle in a process without ROS."""
+def alone(bus: Path, isolation: Isolation, **variables: str) -> dict[str, float]:
+    """Measure the cycle in a process without ROS, with environment variables of its own."""
     command = [sys.executable, __file__, '--alone', str(bus), isolation.bus]
-    output = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    env = {**os.environ, **variables}
+    output = subprocess.run(command, check=True, capture_output=True, text=True, env=env).stdout
     figures: dict[str, float] = json.loads(output.splitlines()[-1])
     return figures
 

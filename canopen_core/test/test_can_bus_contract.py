@@ -35,6 +35,18 @@ def _open_multicast() -> Open:
     return lambda: open_bus(name)
 
 
+def _open_multicast_in_python() -> Open:
+    name = free_multicast()
+
+    def connect() -> Bus:
+        bus = open_bus(name)
+        assert isinstance(bus, SocketBus)
+        bus._reader = None  # as without a C compiler
+        return bus
+
+    return connect
+
+
 def _open_adapter() -> Open:
     channel = free_virtual()  # python-can's in-process interface, behind our adapter
     return lambda: AdapterBus(f'python-can {channel}', 'virtual', channel, None)
@@ -50,6 +62,7 @@ def _open_socketcan() -> Open:
 MAKERS = [
     pytest.param(_open_virtual, id='virtual'),
     pytest.param(_open_multicast, id='multicast'),
+    pytest.param(_open_multicast_in_python, id='multicast, without a compiler'),
     pytest.param(_open_adapter, id='adapter'),
     pytest.param(_open_socketcan, id='socketcan', marks=pytest.mark.vcan),
 ]

@@ -6,9 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import os
+from pathlib import Path
 import re
 import socket
-from threading import current_thread, Thread
+from threading import current_thread, Thread, Timer
 from time import monotonic, sleep, time_ns
 
 import can
@@ -22,7 +23,7 @@ import msgpack
 import pytest
 
 from canopen_core import BusError, CodecError
-from canopen_core.can import Bus, Frame, open_bus, STANDARD_ID_MAX
+from canopen_core.can import Bus, datagram_reader, Frame, open_bus, STANDARD_ID_MAX
 from canopen_core.can.adapter import from_message, to_message
 from canopen_core.can.multicast import _is_local, decode, encode, MulticastBus
 
@@ -321,3 +322,99 @@ def test_what_is_no_classic_frame_is_named(datagram: bytes, reason: str) -> None
     """Each way to be wrong has its own message."""
     with pytest.raises(CodecError, match=reason):
         decode(datagram, 0.0)
+
+
+@given(sent=st.lists(st.tuples(frames(), st.integers(-1, 170), st.binary(min_size=1, max_size=3))))
+def test_compiled_and_python_reader_receive_the_same(
+    sent: list[tuple[Frame, int, bytes]],
+) -> None:
+    """Whole frames, and datagrams of which bytes are replaced or that are cut short."""
+    name = free_multicast()
+    with open_bus(name) as compiled, open_bus(name) as reference:
+        assert isinstance(compiled, MulticastBus)
+        assert compiled._reader is not None  # machines for tests have a compiler
+        assert isinstance(reference, MulticastBus)
+        reference._reader = None
+        for frame, at, damage in sent:
+            datagram = encode(frame)
+            if at >= 0:
+                datagram = datagram[:at] + (damage + datagram[at + len(damage) :])[at % 5 * 60 :]
+            send_raw(name, datagram)
+        send_raw(name, encode(LAST))
+        both = [_until_last(bus) for bus in (compiled, reference)]
+        assert both[0] == both[1]
+        assert compiled.counters == reference.counters
+
+
+LAST = Frame(0x1FFF_FFF0, b'last', is_extended=True)
+
+
+def _until_last(bus: Bus) -> list[Frame]:
+    """Receive up to the last frame of a test; without time stamps, which may not go back."""
+    received: list[Frame] = []
+    while LAST not in unstamped(received[-1:]):
+        received += bus.receive(DEADLINE)
+    stamps = [frame.timestamp for frame in received]
+    assert stamps == sorted(stamps)
+    assert stamps[-1] == pytest.approx(monotonic(), abs=DEADLINE)
+    return unstamped(received)
+
+
+def test_a_batch_of_process_data_is_received_at_once(bus: Bus, name: str) -> None:
+    """Receiving waits for as many PDOs as are expected, at most its time-out."""
+    bus.batch = 3
+    with open_bus(name) as other:
+
+        def send() -> None:
+            for number in (0x181, 0x281, 0x381):
+                sleep(0.02)
+                other.send(Frame(number))
+
+        sender = Thread(target=send)
+        sender.start()
+        assert len(bus.receive(DEADLINE)) == 3
+        sender.join()
+        other.send(Frame(0x182))
+        begin = monotonic()
+        assert len(bus.receive(0.05)) == 1
+        assert monotonic() - begin >= 0.05
+        assert len(bus.receive(0.0)) == 0
+
+
+@pytest.mark.parametrize('urgent', [Frame(0x081), Frame(0x582), Frame(0x701), Frame(0x80)])
+def test_what_is_no_process_data_ends_a_batch(bus: Bus, name: str, urgent: Frame) -> None:
+    """EMCY, SDO, heartbeat and SYNC are received at once."""
+    bus.batch = 3
+    with open_bus(name) as other:
+        other.send(Frame(0x181))
+        other.send(urgent)
+        received = receive_count(bus, 2, deadline=DEADLINE / 2)
+        assert unstamped(received) == [Frame(0x181), urgent]
+
+
+def test_waking_ends_a_batch(bus: Bus, name: str) -> None:
+    """What has come by then is received."""
+    bus.batch = 3
+    with open_bus(name) as other:
+        other.send(Frame(0x181))
+        waker = Timer(0.05, bus.wake)
+        waker.start()
+        assert unstamped(bus.receive(DEADLINE)) == [Frame(0x181)]
+        waker.join()
+
+
+def test_without_a_compiler_there_is_one_warning(
+    name: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, tmp_path: Path
+) -> None:
+    """And frames are received in Python."""
+    monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path))
+    monkeypatch.setenv('CC', '/bin/false')
+    datagram_reader.library.cache_clear()
+    try:
+        with open_bus(name) as bus, open_bus(name) as other:
+            other.send(FRAMES[0])
+            assert unstamped(receive_count(bus, 1)) == FRAMES[:1]
+    finally:
+        datagram_reader.library.cache_clear()
+    (warning,) = caplog.records
+    assert 'CAN frames are read in Python' in warning.getMessage()

@@ -185,7 +185,7 @@ class Network:
 
     def cycle(self, now: float, period: float) -> None:
         """Begin the cycle whose SYNC has just been sent."""
-        if self._round_open:
+        if self._round_open and self._sync.pending:
             self._contain_each(lambda node: node.count_missed())
         self._round_open = self._syncs
         overdue = self.next_update < NEVER
@@ -349,6 +349,11 @@ class Network:
             self._unconfigured_clients[node_id] = client
             self._handlers[CobId.SDO_RESPONSE + node_id] = client.receive
         return client
+
+    @property
+    def pending_pdos(self) -> int:
+        """TPDOs of the last SYNC that :meth:`update` still waits for."""
+        return self._sync.pending if self.next_update < NEVER else 0
 
     @property
     def missed_pdos(self) -> int:

@@ -62,8 +62,12 @@ class PdoWatch:
     def look(self, now: float) -> None:
         """Report those that have come and then stopped, at a steady time in [s]."""
         stopped = [
-            entry for entry in self._inputs if entry.values is not None and entry.stale(now)
+            entry
+            for entry in self._inputs
+            if now - entry.timestamp > entry.stale_after and entry.values is not None
         ]
+        if not stopped and not self._stopped:
+            return
         numbers = {entry.config.number for entry in stopped}
         before, self._stopped = self._stopped, numbers
         if self._synchronous and self._synchronous <= numbers:

@@ -149,6 +149,8 @@ class NetworkThread(BusThread):
         """Receive until something is due, and do that; SYNC comes before all else."""
         now = self.now()
         if now < self._timer.deadline:
+            # TPDOs that answer SYNC act together, when the last has come
+            self._bus.batch = self.network.pending_pdos or 1
             self._take(self.receive(max(0.0, self.next_due - now)))
             now = self.now()
             if now < self._timer.deadline:

@@ -2,26 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The compiled core of motion checks: motions.c, built by the C compiler of the machine.
 
-It is built at its first use, in half a second, and kept in ``$XDG_CACHE_HOME/arm_model/compiled``
-(``~/.cache/arm_model/compiled``), one file for each source, compiler and processor. Where there
-is no compiler, or it fails, one warning says so, and the same checks run in Python, several times
-slower. ``ARM_MODEL_COMPILED=0`` asks for that.
+It is built at its first use, in half a second, and kept in ``~/.cache/arm_model/compiled``
+(:mod:`robot_primitives.c_library`). Where there is no compiler, or it fails, one warning says so,
+and the same checks run in Python, several times slower. ``ARM_MODEL_COMPILED=0`` asks for that.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-import contextlib
 import ctypes
 from functools import lru_cache
-import hashlib
-import logging
-import os
 from pathlib import Path
-import shlex
-import shutil
-import subprocess
-import tempfile
 import threading
 import weakref
 
@@ -30,24 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 import pinocchio as pin
 
+from robot_primitives import load_c_library
+
 from ..arrays import Array, Native
-from .meshes import cache_folder
 from .planning_scene import PlanningScene
 
 SOURCE = Path(__file__).with_name('motions.c')
-FLAGS = (
-    '-O3',
-    '-march=native',
-    '-fno-math-errno',
-    '-ffinite-math-only',
-    '-fno-signed-zeros',
-    '-fno-trapping-math',
-    '-std=gnu11',
-    '-shared',
-    '-fPIC',
-)
+FLAGS = ('-fno-math-errno', '-ffinite-math-only', '-fno-signed-zeros', '-fno-trapping-math')
 MUCH = 1e30  # what stands for infinity in [m]
-BUILD_TIME = 60.0  # time that the compiler is given in [s]
 LOADING = threading.Lock()  # several threads may need it first
 
 KINDS = {
@@ -213,15 +194,9 @@ def compiled_scene(scene: PlanningScene) -> CompiledScene | None:
 @lru_cache(maxsize=1)
 def library() -> Native | None:
     """Return the compiled core, which is built if need be; None where that is not possible."""
-    if os.environ.get('ARM_MODEL_COMPILED') == '0':
-        return None
-    try:
-        loaded = _load()
-    except (OSError, ValueError, subprocess.SubprocessError) as error:
-        logging.getLogger(__name__).warning(
-            'motions are checked in Python, several times slower: no C core: %s',
-            str(getattr(error, 'stderr', None) or error).strip(),
-        )
+    consequence = 'motions are checked in Python, several times slower'
+    loaded: Native | None = load_c_library('arm_model', SOURCE, consequence, FLAGS)
+    if loaded is None:
         return None
     for name in ('world_new', 'search_new'):
         getattr(loaded, name).restype = ctypes.c_void_p
@@ -242,57 +217,6 @@ def library() -> Native | None:
     }.items():
         getattr(loaded, name).argtypes = arguments
     return loaded
-
-
-def _load() -> Native:
-    """Load the shared library, which is built where it is not in the cache, or damaged there.
-
-    Raises:
-        OSError, ValueError, SubprocessError: It cannot be built, or not be loaded.
-    """
-    compiler = shlex.split(os.environ.get('CC', ''))
-    compiler = compiler or [each for each in ('cc', 'gcc') if shutil.which(each)][:1]
-    if not compiler:
-        raise OSError('there is no C compiler; install one (apt install gcc)')
-    command = [*compiler, *FLAGS]
-    key = (SOURCE.read_bytes(), *map(str.encode, (*command, _processor())))
-    digest = hashlib.sha256(b'\0'.join(key)).hexdigest()
-    hulls = cache_folder()
-    if hulls is None:
-        return _build(command)
-    kept = hulls.parent / 'compiled' / f'{digest}.so'
-    with contextlib.suppress(OSError):
-        return ctypes.CDLL(str(kept))
-    try:
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        return _build(command, kept)
-    except OSError:  # no room or no right there
-        return _build(command)
-
-
-def _build(command: Sequence[str], kept: Path | None = None) -> Native:
-    """Build the library and load it; keep it as a file, written whole or not at all."""
-    place = None if kept is None else kept.parent
-    with tempfile.TemporaryDirectory(prefix='arm_model-', dir=place) as folder:
-        made = Path(folder) / 'motions.so'
-        arguments = [*command, '-o', str(made), str(SOURCE), '-lm']
-        subprocess.run(arguments, check=True, capture_output=True, text=True, timeout=BUILD_TIME)
-        loaded = ctypes.CDLL(str(made))
-        if kept is not None:
-            with made.open('rb') as file:
-                os.fsync(file.fileno())
-            made.replace(kept)
-        return loaded
-
-
-def _processor() -> str:
-    """Return the kind of this processor: a home may serve several, whose programs differ."""
-    try:
-        lines = Path('/proc/cpuinfo').read_text(encoding='ascii', errors='replace').splitlines()
-    except OSError:
-        lines = []
-    features = next((line for line in lines if line.startswith(('flags', 'Features'))), '')
-    return f'{os.uname().machine} {features}'
 
 
 def _joints(scene: PlanningScene) -> Sequence[Array | Integers]:

@@ -24,6 +24,8 @@ import coal
 import numpy as np
 from urdf_reader import mesh_unit
 
+from robot_primitives import cache_folder
+
 from ..arrays import Array, frozen, Native, Places
 from .pieces import cut
 
@@ -82,10 +84,10 @@ def load_hulls(path: Path) -> Sequence[Hull]:
 
 @lru_cache(maxsize=256)
 def _hulls(digest: str, path: Path) -> Sequence[Hull]:
-    folder = cache_folder()
-    if folder is None:
+    cache = cache_folder('arm_model')
+    if cache is None:
         return hulls_of_file(path)
-    cached = folder / f'{digest}-{FORMAT}.npz'
+    cached = cache / 'hulls' / f'{digest}-{FORMAT}.npz'
     hulls = _stored(cached)
     if not hulls:
         hulls = hulls_of_file(path)
@@ -93,16 +95,6 @@ def _hulls(digest: str, path: Path) -> Sequence[Hull]:
             with contextlib.suppress(OSError):  # such as a full disk: made the next time, too
                 _store(cached, hulls)
     return hulls
-
-
-def cache_folder() -> Path | None:
-    """Return the folder of the hulls; None for a user without a home."""
-    cache = os.environ.get('XDG_CACHE_HOME')
-    try:
-        home = Path(cache) if cache else Path.home() / '.cache'
-    except RuntimeError:
-        return None
-    return home / 'arm_model' / 'hulls'
 
 
 def _stored(path: Path) -> Sequence[Hull]:

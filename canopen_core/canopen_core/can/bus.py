@@ -35,6 +35,9 @@ class Bus(AbstractContextManager['Bus']):
         # Name that it was opened by, e.g. ``vcan0`` or ``udp_multicast:239.74.163.2``.
         self.name = name
         self.counters = BusCounters()
+        # frames of process data that :meth:`receive` may wait for within its time-out, unless
+        # another frame comes; most interfaces return the first
+        self.batch = 1
 
     @abstractmethod
     def send(self, frame: Frame) -> None:

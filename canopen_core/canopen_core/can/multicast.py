@@ -17,8 +17,9 @@ import socket
 import msgpack
 
 from ..exceptions import BusError, CodecError
+from .datagram_reader import datagram_reader, Source
 from .frame import checked, Frame, PAYLOAD_MAX, STANDARD_ID_MAX
-from .socket_bus import ANCILLARY_SIZE, prepare_receiver, SocketBus
+from .socket_bus import prepare_receiver, SocketBus
 
 _ENTRIES = 11
 _MAP_HEADER = bytes((0x80 | _ENTRIES,))  # msgpack's of a map with fewer than 16 entries
@@ -55,6 +56,7 @@ _LENGTH_SIZE = len(_LENGTHS[0])
 _TAIL = _entries(is_fd=False, bitrate_switch=False, error_state_indicator=False)
 _TAIL_SIZE = len(_TAIL)
 _PLAIN_FLAGS = _flags(is_extended=False, is_remote=False, is_error=False)
+_LAYOUT = (_HEAD, _PLAIN_FLAGS, _LENGTHS[0][1:-1], _TAIL)  # for the compiled reader
 _PLAIN_HEADS = tuple(_HEAD + _pack(can_id) + _PLAIN_FLAGS for can_id in range(STANDARD_ID_MAX + 1))
 """Everything before the length of a data frame, by its 11-bit identifier."""
 _PLAIN_IDS = {head: can_id for can_id, head in enumerate(_PLAIN_HEADS)}
@@ -149,7 +151,6 @@ DEFAULT_PORT = 43113
 
 _LOOPBACK = '127.0.0.1'
 _IP_BLOCK_SOURCE = 38  # linux/in.h; Python's socket module does not name it
-_DATAGRAM_MAX = 384  # [byte] classic frames have up to 164, and a channel's name
 _SOURCE_PORT = 4313  # any fixed port: binding it fails when another bus has the address
 _SOURCE_TRIES = 16
 
@@ -169,15 +170,13 @@ class MulticastBus(SocketBus):
         except OSError as error:
             sender.close()
             raise _not_opened(name, error) from error
-        super().__init__(name, receiver, sender)
-        self._own_address = sender.getsockname()
+        self._own_address: Source = sender.getsockname()
+        super().__init__(name, receiver, sender, datagram_reader(_LAYOUT, self._own_address))
 
     def _encode(self, frame: Frame) -> bytes:
         return encode(frame)
 
-    def _read_one(self) -> Frame | None:
-        datagram, ancillary, _, source = self._receiver.recvmsg(_DATAGRAM_MAX, ANCILLARY_SIZE)
-        stamp = self._stamps.read(ancillary)
+    def _decode(self, datagram: bytes, stamp: float, source: Source) -> Frame | None:
         if source == self._own_address or not _is_local(source[0]):
             return None
         try:

@@ -17,6 +17,7 @@ from time import monotonic
 
 from ..exceptions import BusError
 from .bus import Bus, WallClock
+from .datagram_reader import DATAGRAM_MAX, DatagramReader, SLOTS, Source, WOKEN
 from .frame import Frame
 
 # of asm-generic/socket.h; Python's socket module does not name them
@@ -94,11 +95,19 @@ class TimestampReader:
 class SocketBus(Bus):
     """A bus that reads datagrams from a socket; subclasses define their content."""
 
-    def __init__(self, name: str, receiver: socket.socket, sender: socket.socket) -> None:
+    def __init__(
+        self,
+        name: str,
+        receiver: socket.socket,
+        sender: socket.socket,
+        reader: DatagramReader | None,
+    ) -> None:
+        """Read by the compiled reader, or in Python without one."""
         super().__init__(name)
         self._receiver, self._sender = receiver, sender
         self._send_lock = Lock()
-        self._stamps = TimestampReader()
+        self._reader = reader
+        self._stamps = TimestampReader()  # used without a compiled reader
         self._wake_fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._wake_lock = Lock()  # a closed descriptor may be somebody else's by the next moment
         self._closed = False
@@ -108,13 +117,8 @@ class SocketBus(Bus):
         """Return the datagram of a frame."""
 
     @abstractmethod
-    def _read_one(self) -> Frame | None:
-        """Read one datagram; None when it is none of ours to deliver.
-
-        Raises:
-            BlockingIOError: There is no more.
-            OSError: The interface went away.
-        """
+    def _decode(self, datagram: bytes, stamp: float, source: Source) -> Frame | None:
+        """Return the frame of a datagram; None when it is none of ours to deliver."""
 
     @abstractmethod
     def _explain(self, error: OSError) -> BusError:
@@ -149,19 +153,39 @@ class SocketBus(Bus):
         """Wait for frames; see :meth:`Bus.receive`."""
         if self._closed:
             raise BusError(f'{self.name} is closed')
-        if timeout > 0.0:
-            self._wait(timeout)
         try:
-            return self._drain()
+            if self._reader is not None:
+                frames = self._receive_compiled(self._reader, timeout)
+            else:
+                if timeout > 0.0:
+                    self._wait(timeout)
+                frames = self._drain()
+        except BusError:
+            raise
         except OSError as error:
             if self._closed:
                 raise BusError(f'{self.name} was closed') from error
             raise self._explain(error) from error
+        self.counters.received += len(frames)
+        self._note_losses((self._reader or self._stamps).lost)
+        return frames
+
+    def _receive_compiled(self, reader: DatagramReader, timeout: float) -> list[Frame]:
+        frames: list[Frame] = []
+        while True:
+            count = reader.receive(self._descriptors(), timeout, self.batch, frames, self._decode)
+            if len(frames) >= BATCH_MAX or not (count & WOKEN or count == SLOTS):
+                return frames
+            timeout = 0.0
+
+    def _descriptors(self) -> tuple[int, int]:
+        descriptors = (self._receiver.fileno(), self._wake_fd)
+        if min(descriptors) < 0 or self._closed:
+            raise BusError(f'{self.name} was closed')
+        return descriptors
 
     def _wait(self, timeout: float) -> None:
-        descriptors = (self._receiver.fileno(), self._wake_fd)
-        if min(descriptors) < 0:
-            raise BusError(f'{self.name} was closed')
+        descriptors = self._descriptors()
         if max(descriptors) < _FD_SETSIZE:
             # select waits by the microsecond where poll rounds up to a millisecond
             limit = None if math.isinf(timeout) else timeout
@@ -175,22 +199,25 @@ class SocketBus(Bus):
     def _drain(self) -> list[Frame]:
         frames: list[Frame] = []
         self._stamps.begin_batch()
-        read_one = self._read_one
+        receive = self._receiver.recvmsg
         try:
             for _ in range(BATCH_MAX):
-                frame = read_one()
+                datagram, ancillary, _, source = receive(DATAGRAM_MAX, ANCILLARY_SIZE)
+                frame = self._decode(datagram, self._stamps.read(ancillary), source)
                 if frame is not None:
                     frames.append(frame)
         except BlockingIOError:
             pass
-        self.counters.received += len(frames)
-        if self._stamps.lost != self.counters.lost:
-            if not self.counters.lost:
-                # the kernel doubles the size for its own bookkeeping, and returns the double
-                granted = self._receiver.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2
-                _log.warning('%s', loss_text(self.name, granted))
-            self.counters.lost = self._stamps.lost
         return frames
+
+    def _note_losses(self, lost: int) -> None:
+        if lost == self.counters.lost:
+            return
+        if not self.counters.lost:
+            # the kernel doubles the size for its own bookkeeping, and returns the double
+            granted = self._receiver.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2
+            _log.warning('%s', loss_text(self.name, granted))
+        self.counters.lost = lost
 
     def wake(self) -> None:
         """Wake a waiting :meth:`receive`."""

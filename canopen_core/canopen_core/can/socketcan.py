@@ -13,6 +13,7 @@ import socket
 import struct
 
 from ..exceptions import BusError
+from .datagram_reader import datagram_reader, Source
 from .frame import checked, EXTENDED_ID_MAX, Frame, STANDARD_ID_MAX
 from .interfaces import (
     bring_up_text,
@@ -20,7 +21,7 @@ from .interfaces import (
     is_interface_name,
     missing_interface_text,
 )
-from .socket_bus import ANCILLARY_SIZE, prepare_receiver, SocketBus
+from .socket_bus import prepare_receiver, SocketBus
 
 # linux/can.h and linux/can/raw.h
 _SOL_CAN_RAW = 101
@@ -47,7 +48,7 @@ class SocketCanBus(SocketBus):
             BusError: The kernel has no CAN, or the interface is missing or down.
         """
         receiver = _open_socket(name)
-        super().__init__(name, receiver, receiver)
+        super().__init__(name, receiver, receiver, datagram_reader())
         self._queue_limit = 0
         self._gone = False
 
@@ -70,13 +71,11 @@ class SocketCanBus(SocketBus):
             self._queue_limit = frames
             _limit_sending(self._receiver, frames)
 
-    def _read_one(self) -> Frame | None:
-        packed, ancillary, _, _ = self._receiver.recvmsg(_FRAME.size, ANCILLARY_SIZE)
-        stamp = self._stamps.read(ancillary)
-        if len(packed) != _FRAME.size:
+    def _decode(self, datagram: bytes, stamp: float, source: Source) -> Frame | None:
+        if len(datagram) != _FRAME.size:
             self.counters.malformed += 1
             return None
-        return unpack(packed, stamp)
+        return unpack(datagram, stamp)
 
     def _reopen(self) -> None:
         receiver = _open_socket(self.name)
@@ -86,7 +85,7 @@ class SocketCanBus(SocketBus):
             old, self._receiver, self._sender = self._receiver, receiver, receiver
             self._gone = False
         old.close()
-        self._stamps.reopened()
+        (self._reader or self._stamps).reopened()
         _log.warning('%s is back', self.name)  # as loud as its going was
 
     def _explain(self, error: OSError) -> BusError:

@@ -4,7 +4,15 @@
 
 from __future__ import annotations
 
+from .c_library import cache_folder, load_c_library
 from .joint_states import JointSample, JointStateStore
 from .stream_gate import StreamGate, StreamRules
 
-__all__ = ['JointSample', 'JointStateStore', 'StreamGate', 'StreamRules']
+__all__ = [
+    'JointSample',
+    'JointStateStore',
+    'StreamGate',
+    'StreamRules',
+    'cache_folder',
+    'load_c_library',
+]

@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Hot paths in C, built by the C compiler of the machine at their first use.
+
+A library is kept in ``$XDG_CACHE_HOME/<package>/compiled`` (``~/.cache/<package>/compiled``), one
+file for each source, compiler, flags and processor. Each has a reference in Python, which takes
+its place where there is no compiler, or it fails, or ``<PACKAGE>_COMPILED=0`` asks for that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import contextlib
+import ctypes
+import hashlib
+import logging
+import os
+from pathlib import Path
+import shlex
+import shutil
+import subprocess
+import tempfile
+
+FLAGS = ('-O3', '-march=native', '-std=gnu11', '-shared', '-fPIC')
+BUILD_TIME = 60.0  # time that the compiler is given in [s]
+
+
+def cache_folder(package: str) -> Path | None:
+    """Return the cache of a package; None for a user without a home."""
+    cache = os.environ.get('XDG_CACHE_HOME')
+    try:
+        return (Path(cache) if cache else Path.home() / '.cache') / package
+    except RuntimeError:
+        return None
+
+
+def load_c_library(
+    package: str, source: Path, consequence: str, flags: Sequence[str] = ()
+) -> ctypes.CDLL | None:
+    """Return the library of a C file; None, with one warning, where it cannot be built or loaded.
+
+    Not thread-safe, and not cached in the process.
+
+    Args:
+        package: Name of its package, of the cache and of the variable that switches it off.
+        source: The C file.
+        consequence: What the warning says about going without.
+        flags: Options of the compiler beside :data:`FLAGS`.
+    """
+    if os.environ.get(f'{package.upper()}_COMPILED') == '0':
+        return None
+    try:
+        return _load(package, source, flags)
+    except (OSError, ValueError, subprocess.SubprocessError) as error:
+        reason = str(getattr(error, 'stderr', None) or error).strip()
+        logging.getLogger(package).warning('%s: no C core: %s', consequence, reason)
+        return None
+
+
+def _load(package: str, source: Path, flags: Sequence[str]) -> ctypes.CDLL:
+    """Load the shared library, which is built where it is not in the cache, or damaged there.
+
+    Raises:
+        OSError, ValueError, SubprocessError: It cannot be built, or not be loaded.
+    """
+    compiler = shlex.split(os.environ.get('CC', ''))
+    compiler = compiler or [each for each in ('cc', 'gcc') if shutil.which(each)][:1]
+    if not compiler:
+        raise OSError('there is no C compiler; install one (apt install gcc)')
+    command = [*compiler, *FLAGS, *flags]
+    key = (source.read_bytes(), *map(str.encode, (*command, _processor())))
+    digest = hashlib.sha256(b'\0'.join(key)).hexdigest()
+    cache = cache_folder(package)
+    if cache is None:
+        return _build(command, source)
+    kept = cache / 'compiled' / f'{digest}.so'
+    with contextlib.suppress(OSError):
+        return ctypes.CDLL(str(kept))
+    try:
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        return _build(command, source, kept)
+    except OSError:  # no room or no right there
+        return _build(command, source)
+
+
+def _build(command: Sequence[str], source: Path, kept: Path | None = None) -> ctypes.CDLL:
+    """Build the library and load it; keep it as a file, written whole or not at all."""
+    place = None if kept is None else kept.parent
+    with tempfile.TemporaryDirectory(prefix='compiled-', dir=place) as folder:
+        made = Path(folder) / 'made.so'
+        arguments = [*command, '-o', str(made), str(source), '-lm']
+        subprocess.run(arguments, check=True, capture_output=True, text=True, timeout=BUILD_TIME)
+        loaded = ctypes.CDLL(str(made))
+        if kept is not None:
+            with made.open('rb') as file:
+                os.fsync(file.fileno())
+            made.replace(kept)
+        return loaded
+
+
+def _processor() -> str:
+    """Return the kind of this processor: a home may serve several, whose programs differ."""
+    try:
+        lines = Path('/proc/cpuinfo').read_text(encoding='ascii', errors='replace').splitlines()
+    except OSError:
+        lines = []
+    features = next((line for line in lines if line.startswith(('flags', 'Features'))), '')
+    return f'{os.uname().machine} {features}'
