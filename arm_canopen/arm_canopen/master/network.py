@@ -400,8 +400,11 @@ class Network:
     def note_pause(self, late: float, now: float) -> None:
         """Report that a cycle came so many [s] late, before its consequences show.
 
-        On a busy computer once in a while, with what there was since.
+        On a busy computer once in a while, with what there was since. Devices are not blamed for
+        what no SYNC asked of them.
         """
+        for node in self.nodes.values():
+            node.pdos.excuse(late)
         watched = self.config.master.heartbeat_timeout
         if now - self._pause_reported < DEFECT_PERIOD and not 0 < watched < late:
             self._pauses.append(late)

@@ -55,6 +55,12 @@ class PdoWatch:
         for entry in self._every_sync:
             entry.expect()
 
+    def excuse(self, late: float) -> None:
+        """Await those that answer SYNC so many [s] longer, as it was not sent meanwhile."""
+        for entry in self._inputs:
+            if entry.synchronous:
+                entry.excused += late
+
     def count_missed(self) -> None:
         """Count those that did not answer the last SYNC."""
         self.missed += sum(entry.awaited for entry in self._every_sync)
@@ -64,7 +70,7 @@ class PdoWatch:
         stopped = [
             entry
             for entry in self._inputs
-            if now - entry.timestamp > entry.stale_after and entry.values is not None
+            if entry.values is not None and entry.stale(now)
         ]
         if not stopped and not self._stopped:
             return

@@ -79,6 +79,7 @@ class ReceivedTpdo:
         # last values in mapping order, None before the first
         self.values: tuple[Number, ...] | None = None
         self.timestamp = 0.0  # steady time of arrival of the last in [s]
+        self.excused = 0.0  # time since then in [s] in which no SYNC asked for it
         self.count = 0  # number of PDOs received
         self.length_errors = 0  # number of PDOs that were too short
         self._listeners: tuple[Listener, ...] = ()  # replaced as a whole, by any thread
@@ -104,7 +105,7 @@ class ReceivedTpdo:
 
     def stale(self, now: float) -> bool:
         """Return whether its values are missing, or too old to act on, at a steady time in [s]."""
-        return self.values is None or now - self.timestamp > self.stale_after
+        return self.values is None or now - self.timestamp - self.excused > self.stale_after
 
     @property
     def loss_unnoticed(self) -> bool:
@@ -144,7 +145,7 @@ class ReceivedTpdo:
             self.length_errors += 1
             self.on_short(self, len(frame.data))
             return
-        self.timestamp = frame.timestamp
+        self.timestamp, self.excused = frame.timestamp, 0.0
         self.count += 1
         for listener in self._listeners:
             listener(self)

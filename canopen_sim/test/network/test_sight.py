@@ -294,6 +294,18 @@ def test_an_axis_that_was_led_on_unseen_is_judged_by_its_first_positions(
 
 
 @STREAMED
+def test_drives_are_not_blamed_for_a_pause_of_the_master(mode: OperationMode) -> None:
+    """No SYNC asked them meanwhile; the motion goes on where it was."""
+    config = replace(with_window(0xFFFF_FFFF), heartbeat_producer=0.0, heartbeat_timeout=0.0)
+    led = Led(mode, Leader(), config)
+    led.net.now += TIME_OUT + 0.2  # nothing of the master runs
+    found = led.velocities(1.0)
+    assert -0.02 < min(found) <= max(found) < 1.5
+    assert not led.source.losses
+    assert 'has not answered' not in str(led.net.reported(Severity.WARNING))
+
+
+@STREAMED
 def test_frames_that_were_late_are_not_taken_for_lost(mode: OperationMode) -> None:
     """The first position that comes is old, and a set-point there would make the axis jump."""
     config = replace(with_window(0xFFFF_FFFF), heartbeat_producer=0.0, heartbeat_timeout=0.0)
