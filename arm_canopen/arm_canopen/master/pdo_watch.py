@@ -68,9 +68,7 @@ class PdoWatch:
     def look(self, now: float) -> None:
         """Report those that have come and then stopped, at a steady time in [s]."""
         stopped = [
-            entry
-            for entry in self._inputs
-            if entry.values is not None and entry.stale(now)
+            entry for entry in self._inputs if entry.values is not None and entry.stale(now)
         ]
         if not stopped and not self._stopped:
             return
