@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from model_robots import chain_texts
 import numpy as np
 import pytest
+from robot_primitives import cache_folder
 
 from arm_model import (
     Array,
@@ -362,7 +363,7 @@ def test_a_hull_that_is_far_too_large_is_named(
     model = arm('<mesh filename="hollow.obj" scale="0.1 0.1 0.1"/>', tmp_path)
     assert any('link_1 (27 %)' in note and 'convex parts' in note for note in model.notes)
     assert not all(hull.final for hull in meshes.load_hulls(tmp_path / 'hollow.obj'))
-    folder = meshes.cache_folder('arm_model')
+    folder = cache_folder('arm_model')
     assert folder is not None
     # the next start, when others are done, cuts it
     assert not list((folder / 'hulls').glob('*.npz'))
