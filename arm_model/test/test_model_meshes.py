@@ -17,7 +17,6 @@ from hypothesis import strategies as st
 from model_robots import chain_texts
 import numpy as np
 import pytest
-from robot_primitives import cache_folder
 
 from arm_model import (
     Array,
@@ -30,6 +29,7 @@ from arm_model import (
     Sphere,
 )
 from arm_model.scene import meshes, pieces
+from robot_primitives import cache_folder
 
 CORNERS = list(product((-0.5, 0.5), repeat=3))
 """Of a cube with edges of one, in the order of their coordinates."""

@@ -53,6 +53,23 @@ def test_all_that_is_handed_over_around_the_end_is_answered(
         running.result(TIMEOUT)
 
 
+def test_the_thread_does_not_wait_for_itself() -> None:
+    """It would stand still for good, with all that it keeps going."""
+
+    def serve() -> None:
+        while not thread.stopping:
+            thread.do_work()
+
+    thread = BusThread(VirtualBus('here', VirtualWire()), 'owner', serve, 'the owner')
+    thread.start()
+    try:
+        waits = thread.call(lambda: thread.call(lambda: None).result(TIMEOUT))
+        with pytest.raises(BusError, match='cannot wait for itself'):
+            waits.result(TIMEOUT)
+    finally:
+        thread.stop()
+
+
 class DefectiveBus(VirtualBus):
     """A bus whose receiving fails twice."""
 

@@ -9,6 +9,7 @@ from canopen_core.standard import (
     DIGITAL_OUTPUTS,
     EncoderObject,
     ERROR_OBJECTS,
+    integer_range,
     IO_GROUPS,
     profile_number,
 )
@@ -68,7 +69,11 @@ class IoModule(Application):
 
 def _wire(output: Variable, place: Variable) -> None:
     def copy(_: float) -> None:
-        place.value = output.value
+        limits = integer_range(place.entry.data_type)
+        if limits is None or not isinstance(output.value, int):
+            place.value = output.value
+        else:
+            place.value = min(max(output.value, limits[0]), limits[1])
 
     output.listener = copy
 

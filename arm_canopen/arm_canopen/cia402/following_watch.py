@@ -52,9 +52,11 @@ class FollowingWatch:
         Thus none leaves in the first cycle.
         """
         if self._samples:
-            setpoint = self._samples[0][1]  # positions count as too old after some time only
+            unseen_from = self._unseen_from  # of a sight that was too short to judge
+            if unseen_from is None:
+                unseen_from = self._samples[0][1]  # positions are too old after some time only
             self.clear()
-            self._unseen_from = setpoint
+            self._unseen_from = unseen_from
 
     def judge(
         self,

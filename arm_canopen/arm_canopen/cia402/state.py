@@ -178,7 +178,8 @@ class AxisState:
         self._scheduler = scheduler
         self._looked: tuple[int, float] | None = None  # statusword and position, by SDO
         self._looked_at = -math.inf
-        self._unconfirmed: int | None = None  # positions received, of which the last may be old
+        self._looking = 0  # how many look by SDO
+        self._confirmed: int | None = None  # positions received until SDO showed the last one
         objects, image = node.objects, node.image
         self._statusword = objects.reader(self.at(Index.STATUSWORD))
         self._mode = objects.reader(self.at(Index.MODE_OF_OPERATION_DISPLAY))
@@ -271,8 +272,19 @@ class AxisState:
     @property
     def speed_known(self) -> bool:
         """Whether it was seen for long enough to distinguish motion from rest."""
-        unconfirmed = self._unconfirmed == self.positions_received
-        return self.seen and self._estimate.known and not unconfirmed
+        return self.seen and self._estimate.known and not self._may_have_moved
+
+    @property
+    def _may_have_moved(self) -> bool:
+        """Whether it is looked at, and its last position neither came just now nor by SDO."""
+        position = self._position
+        return (
+            self._looking > 0
+            and isinstance(position, InputReader)
+            and position.source.loss_unnoticed
+            and self._confirmed != position.source.count
+            and self.position_age > WINDOW
+        )
 
     @property
     def rest_speed(self) -> float:
@@ -442,7 +454,7 @@ class AxisState:
             except (SdoError, CodecError):
                 continue
             if reader is self._position:
-                self._unconfirmed = None
+                self._confirmed = count if value == reader.value else None
             if not isinstance(value, int) or reader.source.count != count:
                 continue  # a TPDO that came meanwhile is newer, or as new
             if reader.value not in (None, value):
@@ -459,13 +471,13 @@ class AxisState:
 
         Where the loss of its position goes unnoticed, an axis is seen to stand by SDO only.
         """
-        position = self._position
-        if isinstance(position, InputReader) and position.source.loss_unnoticed:
-            self._unconfirmed = position.source.count
+        self._looking += 1
+        self._confirmed = None
         task = self._scheduler.background(self._look_on())
         try:
             yield
         finally:
+            self._looking -= 1
             task.cancel(SdoError('nothing more to see'))
 
     async def _look_on(self) -> None:

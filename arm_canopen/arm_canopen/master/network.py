@@ -308,8 +308,8 @@ class Network:
             CanopenError: The device or the master is not operational, no RPDO carries one of
                 them, or the bus does not take it.
         """
-        if not node.online or self.state is not NmtState.OPERATIONAL:
-            what = node.name if not node.online else 'the master'
+        if not node.operational or self.state is not NmtState.OPERATIONAL:
+            what = 'the master' if node.operational else node.name
             raise CanopenError(f'{what} is not operational, so no RPDO is sent')
         before = {address: node.image.commanded(*address) for address in values}
         for address, value in before.items():

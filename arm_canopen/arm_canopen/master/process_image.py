@@ -205,7 +205,7 @@ class SentRpdo:
 
     def reset(self) -> None:
         """The device is another one than before: nothing was published to it."""
-        self.due, self._left_at = False, None
+        self.due, self._left_at, self.skips = False, None, False
         self.kept_back_by.clear()
 
     def frame(self) -> Frame:

@@ -37,6 +37,7 @@ from .sdo_client import SdoClient
 WRITE_PAUSE = 0.05  # [s] between two writes of a value of which the newest counts
 REFUSED_PAUSE = 1.0  # [s] before a value that was refused is written again, doubled each time
 DOUBLED_MAX = 5  # times
+REAL32_MAX = (2.0 - 2.0**-23) * 2.0**127
 
 ReportOfDevice = Callable[[EventKind, Severity, str], None]
 
@@ -382,6 +383,8 @@ class RemoteObjects:
         mapped = self.image.mapped_output(index, subindex)
         data_type = self.entry(index, subindex).data_type if mapped is None else mapped.data_type
         low, high = limits_of(data_type)
+        if data_type is DataType.REAL32:
+            low, high = -REAL32_MAX, REAL32_MAX
         entry = self.config.dictionary.get(index, subindex)
         if entry is not None:
             low = low if entry.low_limit is None else max(low, entry.low_limit)
@@ -389,6 +392,7 @@ class RemoteObjects:
         whole = integer_range(data_type) is not None
         if (
             not isinstance(value, (int, float))
+            or not math.isfinite(value)
             or not low <= value <= high
             or (whole and value != int(value))
         ):

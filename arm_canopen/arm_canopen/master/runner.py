@@ -78,7 +78,8 @@ class Clock:
     """The time of a master, and what its callers wait with; tests have a time of their own."""
 
     now: Callable[[], float] = time.monotonic  # steady time in [s]
-    future: Callable[[], Future[Any]] = Future  # of what another thread hands over
+    # of what another thread hands over; None for one that waits in real time
+    future: Callable[[], Future[Any]] | None = None
 
 
 class NetworkThread(BusThread):

@@ -160,7 +160,7 @@ class IoTopics:
 
 def outputs_on_loss(config: NodeConfig, outputs: Sequence[ObjectEntry]) -> str:
     """Return in words what outputs do when their device loses the master, by bus.yml and EDS."""
-    if not config.heartbeat_consumer:
+    if not (config.heartbeat_consumer or config.life_guarding):
         return 'kept: the device does not watch the master (0x1016)'
     parts = []
     for entry in outputs:
@@ -211,7 +211,10 @@ class EncoderState:
     @property
     def velocity(self) -> float:
         """Velocity; NaN while no TPDO brings the speed (0x6030:01)."""
-        return _value(self._speed) * self._scales.scale_vel_from_dev
+        speed = self._speed
+        if speed is None or speed.source.stale(self._thread.now()):
+            return math.nan
+        return _value(speed) * self._scales.scale_vel_from_dev
 
 
 class EncoderTopics:
@@ -233,11 +236,11 @@ class EncoderTopics:
         scales, objects = device.config.drive, device.objects
         counts = (request.target - scales.offset_pos_from_dev) / scales.scale_pos_from_dev
         total = device.config.value_after_boot(EncoderObject.TOTAL_RANGE)
-        high = total if isinstance(total, int) and total else math.inf
+        high = total if isinstance(total, int) and total else 1 << 32
         if not (math.isfinite(counts) and 0 <= round(counts) < high):
             raise CodecError(
                 f'a position of {request.target:g} is {counts:g} measuring units; '
-                f'{device.name} has 0 to {high - 1:g} (0x6002)'
+                f'{device.name} has 0 to {high - 1} (0x6002)'
             )
         return self._thread.run(
             lambda: objects.write_object(EncoderObject.PRESET, 0, round(counts))

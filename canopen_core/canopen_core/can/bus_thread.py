@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
+from functools import partial
 import logging
 import threading
 import time
@@ -23,6 +24,23 @@ REOPEN_PAUSE = 0.1  # [s] between two attempts to read a bus that went away
 logger = logging.getLogger(__name__)
 
 
+class _Answer(Future[T]):
+    """A future that cannot be awaited where it is made."""
+
+    def __init__(self, maker: threading.Thread) -> None:
+        super().__init__()
+        self._maker = maker
+
+    def result(self, timeout: float | None = None) -> T:
+        """Wait; a BusError in the thread that would have to go on meanwhile."""
+        if not self.done() and threading.current_thread() is self._maker:
+            raise BusError(
+                f'{self._maker.name} cannot wait for itself: a callback must not wait for its '
+                'bus; hand the call to another thread'
+            )
+        return super().result(timeout)
+
+
 class BusThread:
     """Reads a bus, and runs what other threads hand over, between two steps of its owner.
 
@@ -35,7 +53,7 @@ class BusThread:
         name: str,
         serve: Callable[[], None],
         owner: str,
-        future: Callable[[], Future[Any]] = Future,
+        future: Callable[[], Future[Any]] | None = None,
     ) -> None:
         """Prepare; serve is the owner's loop until :attr:`stopping`. The caller closes the bus."""
         self.stopping = False
@@ -43,7 +61,6 @@ class BusThread:
         self._bus = bus
         self._loop = serve
         self._owner = owner
-        self._future = future
         self._work: deque[tuple[Future[Any], Callable[[], None]]] = deque()
         self._open: set[Future[Any]] = set()
         self._too_early = ''
@@ -52,6 +69,7 @@ class BusThread:
         self._failed = False
         self._begin: Callable[[], None] = lambda: None
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._future = future or partial(_Answer, self._thread)
 
     def refuse_before_start(self, reason: str) -> None:
         """Refuse what is handed over before the start, which otherwise waits for it."""

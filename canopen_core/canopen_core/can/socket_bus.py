@@ -160,6 +160,7 @@ class SocketBus(Bus):
                 if timeout > 0.0:
                     self._wait(timeout)
                 frames = self._drain()
+            self._note_losses((self._reader or self._stamps).lost)
         except BusError:
             raise
         except OSError as error:
@@ -167,14 +168,15 @@ class SocketBus(Bus):
                 raise BusError(f'{self.name} was closed') from error
             raise self._explain(error) from error
         self.counters.received += len(frames)
-        self._note_losses((self._reader or self._stamps).lost)
         return frames
 
     def _receive_compiled(self, reader: DatagramReader, timeout: float) -> list[Frame]:
         frames: list[Frame] = []
+        taken = 0
         while True:
             count = reader.receive(self._descriptors(), timeout, self.batch, frames, self._decode)
-            if len(frames) >= BATCH_MAX or not (count & WOKEN or count == SLOTS):
+            taken += count & ~WOKEN  # also of others than frames, so that a flood of them ends
+            if taken >= BATCH_MAX or not (count & WOKEN or count == SLOTS):
                 return frames
             timeout = 0.0
 

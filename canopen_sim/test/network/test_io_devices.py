@@ -24,6 +24,7 @@ from arm_canopen import (
     SdoTimeoutError,
 )
 from arm_canopen.config import check_bus
+from canopen_core.standard import NmtCommand
 from canopen_sim import Fault, FaultInjection
 
 BUS_YML = Path(__file__).parents[3] / 'arm_canopen' / 'eds' / 'io_bus.yml'
@@ -104,6 +105,32 @@ def test_what_an_output_cannot_hold_is_refused(
         net.master.device('io').write(name, value)  # type: ignore[arg-type]
     net.run(0.1)
     assert net.frames(DIGITAL) == net.frames(ANALOG) == []
+
+
+def test_what_was_commanded_before_a_boot_does_not_come_back(
+    net: VirtualNetwork, io: CanopenDevice
+) -> None:
+    """The module has booted with its outputs off, and another output is written."""
+    io.write('Digital outputs 2', 0xFF)
+    net.run(0.2)
+    net.power_off('io')
+    net.run(3.0)
+    net.power_on('io')
+    net.run(3.0)
+    io.write(OUTPUT, 1)
+    net.run(0.2)
+    store = net.devices['io'].store
+    assert [store.find(0x6200, number).value for number in (1, 2)] == [1, 0]
+
+
+def test_a_module_that_left_operational_is_not_written(
+    net: VirtualNetwork, io: CanopenDevice
+) -> None:
+    """It ignores RPDOs."""
+    net.network.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, 10)
+    net.run(0.5)
+    with pytest.raises(CanopenError, match='not operational'):
+        io.write(OUTPUT, 1)
 
 
 def test_an_output_is_no_input(io: CanopenDevice) -> None:

@@ -3,8 +3,9 @@
 """Hot paths in C, built by the C compiler of the machine at their first use.
 
 A library is kept in ``$XDG_CACHE_HOME/<package>/compiled`` (``~/.cache/<package>/compiled``), one
-file for each source, compiler, flags and processor. Each has a reference in Python, which takes
-its place where there is no compiler, or it fails, or ``<PACKAGE>_COMPILED=0`` asks for that.
+file for each source, compiler and its version, flags and processor. Each has a reference in
+Python, which takes its place where there is no compiler, or it fails, or
+``<PACKAGE>_COMPILED=0`` asks for that.
 """
 
 from __future__ import annotations
@@ -68,7 +69,10 @@ def _load(package: str, source: Path, flags: Sequence[str]) -> ctypes.CDLL:
     if not compiler:
         raise OSError('there is no C compiler; install one (apt install gcc)')
     command = [*compiler, *FLAGS, *flags]
-    key = (source.read_bytes(), *map(str.encode, (*command, _processor())))
+    program = Path(shutil.which(compiler[0]) or compiler[0]).resolve()
+    status = program.stat()  # another one after an upgrade
+    version = f'{program} {status.st_size} {status.st_mtime_ns}'
+    key = (source.read_bytes(), *map(str.encode, (*command, version, _processor())))
     digest = hashlib.sha256(b'\0'.join(key)).hexdigest()
     cache = cache_folder(package)
     if cache is None:

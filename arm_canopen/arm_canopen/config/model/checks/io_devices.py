@@ -48,7 +48,7 @@ def _check_module(subject: Subject) -> None:
                 f'no enabled {direction.title} carries {names}: they are not in ~/{group.name}',
                 f'map them below {direction.name}, or read and write them by SDO',
             )
-    if has_outputs and not node.heartbeat_consumer:
+    if has_outputs and not (node.heartbeat_consumer or node.life_guarding):
         subject.findings.warning(
             subject.place('heartbeat_consumer'),
             'the device does not watch the master (0x1016): its outputs stay as they are when the '
