@@ -230,7 +230,7 @@ def execute(page: Page) -> None:
         press(page, 'Plan motion')
         page.get_by_text('the motion takes').wait_for()
         chromium.hold(page, HOLD_EXECUTE)
-        ended = page.get_by_text(re.compile('executed|PREEMPTED: '))
+        ended = page.get_by_text(re.compile('executed$|PREEMPTED: '))
         ended.first.wait_for()
         late = 'PREEMPTED' in ended.first.inner_text()
         page.mouse.up()

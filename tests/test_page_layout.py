@@ -301,6 +301,13 @@ def test_keys_move_the_robot_where_that_is_ticked(browser: Browser, shown: Shown
         assert set(shown.jogs[:-1]) == {jog}
         if key == 'ArrowUp':
             page.keyboard.press('r')
+    for other in ('Control', 'Tab'):
+        page.keyboard.down('ArrowUp')
+        held.first.wait_for(state='attached')
+        page.keyboard.down(other)
+        held.first.wait_for(state='detached')
+        page.keyboard.up(other)
+        page.keyboard.up('ArrowUp')
     shown.jogs.clear()
     page.locator('input[inputmode=decimal]:visible').first.click(force=True)
     page.keyboard.press('3', delay=400)

@@ -72,7 +72,7 @@ def see_feet(url: str, dog: RunningProcess) -> None:
         assert names == ['Drive', 'Body', 'See', 'Diagnose']
         page.get_by_role('button', name='Stand', exact=True).click(force=True)
         chromium.state_is(page, 'STANDING')
-        page.locator('.rv-hold.rv-off').filter(has_text='Forward').wait_for()
+        page.locator('.rv-hold.rv-off').get_by_text('Forward', exact=True).wait_for()
         page.get_by_role('button', name='Walk', exact=True).click(force=True)
         chromium.state_is(page, 'READY')
         chromium.hold(page, 'Forward')

@@ -39,7 +39,7 @@ for longer than ``ANSWER_DELAY`` between sending and noting. A client that has i
 requests a result drops the repeats with a warning.
 """
 
-RESULT_PATIENCE, LONGEST_DELAY = 4.0, 0.5
+RESULT_PACE, LONGEST_DELAY = 4.0, 0.5
 """A result leaves so many times later than its request as that came after its goal, less the
 delay; [s] at most. Nothing shows that a result was noted; this pace shows how long threads pause.
 """
@@ -56,15 +56,18 @@ class _Server(ActionServer):
     async def _execute_goal_request(self, request: Any) -> None:  # noqa: ANN401  # rclpy has no types
         header, goal = request
         uuid = bytes(goal.goal_id.uuid)
-        self._came_at[uuid] = time.monotonic()
+        is_new = uuid not in self._came_at
+        if is_new:
+            self._came_at[uuid] = time.monotonic()
         await self._delay(ANSWER_DELAY)
-        self._node.executor.create_task(self._accept_again, header, uuid)
+        if is_new:
+            self._node.executor.create_task(self._accept_again, header, uuid)
         await super()._execute_goal_request(request)
 
     async def _execute_get_result_request(self, request: Any) -> None:  # noqa: ANN401
         now = time.monotonic()
         came = self._came_at.pop(bytes(request[1].goal_id.uuid), now)
-        paced = RESULT_PATIENCE * (now - came - ANSWER_DELAY)
+        paced = RESULT_PACE * (now - came - ANSWER_DELAY)
         await self._delay(min(max(ANSWER_DELAY, paced), LONGEST_DELAY))
         await super()._execute_get_result_request(request)
 
@@ -162,7 +165,7 @@ class GoalServer(Generic[GoalT]):
         return [goal for goal in self._goals.values() if not goal.has_ended]
 
     def end(self, goal: GoalT) -> None:
-        """Answer a goal with what ``conclude`` returns; once, from any thread."""
+        """Answer a goal with what ``conclude`` returns; once, always from the same thread."""
         if not goal.has_ended:
             goal.has_ended = True
             self._server.notify_execute(goal.handle, None)  # leads to _answer

@@ -96,6 +96,8 @@ def _servos(options: argparse.Namespace, console: Console) -> None:
 
     urdf = robot_urdf(options.preset, options.arm)
     known = {} if options.calibration is None else read_parameters(options.calibration)
+    if options.calibration is not None and not known:
+        raise CommandError(f'{options.calibration} is no file of calibrate joints')
     joints = cast('Mapping[str, Mapping[str, Any]]', known.get('joints', {}))
     servos = [
         replace(servo_of(joint), **joints.get(joint.name, {})) for joint in movable_joints(urdf)

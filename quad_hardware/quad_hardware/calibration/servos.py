@@ -71,7 +71,7 @@ def calibrate_servos(
     )
     console.prompt(
         'Put the trunk on a stand, level, so that all legs hang free, and keep hands away. '
-        'Enter begins; Ctrl-C ends it'
+        'Enter begins; Ctrl-C ends it: the leg goes back slowly, and at a second one stays'
     )
     limits = next(each.limits for each in movable_joints(urdf) if each.name == servo.joint)
     held = robot.angles()  # without those that the protocol does not report: they stay
@@ -80,11 +80,16 @@ def calibrate_servos(
     positions = {s.joint: s.position(held[s.motor]) for s in servos if s.motor in held}
     load = leg_load(read_urdf(urdf), servo.joint, positions, limits.effort)
     centre = math.atan(-load.level / load.turned)  # where gravity turns it neither way
-    centre = min(max(centre, limits.lower + AMPLITUDE), limits.upper - AMPLITUDE)
+    lower, upper = max(limits.lower, servo.lower), min(limits.upper, servo.upper)
+    if upper - lower < 2.0 * AMPLITUDE:
+        raise CommandError(
+            f'{servo.joint} has no room to swing between {lower:g} and {upper:g} rad'
+        )
+    centre = min(max(centre, lower + AMPLITUDE), upper - AMPLITUDE)
     start = positions[servo.joint]
     try:
         _go(robot, servo, held, start, centre)
-        offset = servo.position(robot.angles()[servo.motor]) - centre
+        offset = servo.position(_angle(robot, servo)) - centre
         if abs(offset) > MAX_OFFSET:
             raise CommandError(
                 f'{servo.joint} is {offset:+.2f} rad from where it was sent; is its torque on, '
@@ -93,7 +98,7 @@ def calibrate_servos(
         motion = list(_motion(centre, repeat))
         recording = _record(robot, servo, held, motion)
     finally:
-        _go(robot, servo, held, servo.position(robot.angles()[servo.motor]), start)
+        _go(robot, servo, held, servo.position(_angle(robot, servo)), start)
     found = fit_servo(recording, load)
     times = [time for time, _ in recording.positions]
     period = median(b - a for a, b in itertools.pairwise(times))
@@ -109,6 +114,13 @@ def calibrate_servos(
     kp = f'servo_compensation.kp:={found.stiffness:.3g}'
     console.write(f'  ros2 run quad_controller controller_node --ros-args -p {kp}')
     return found
+
+
+def _angle(robot: SwungRobot, servo: JointServo) -> float:
+    angle = robot.angles().get(servo.motor)
+    if angle is None:
+        raise CommandError(f'motor {servo.motor} reports no angle any more')
+    return angle
 
 
 def _motion(centre: float, repeat: int) -> Iterator[tuple[float, float]]:

@@ -168,6 +168,8 @@ class JointRate:
     def update(self, time: float, positions: Mapping[str, float]) -> dict[str, float]:
         """Add positions [rad]; return velocities [rad/s] of the same joints."""
         elapsed, last = time - self._time, self._last
+        if elapsed <= 0.0 and last.keys() == positions.keys():
+            return dict(self._rates)  # the same report
         self._time, self._last = time, dict(positions)
         if last.keys() != positions.keys() or not 0.0 < elapsed <= MAX_GAP:
             self._rates = dict.fromkeys(positions, 0.0)
@@ -183,6 +185,8 @@ class JointRate:
             square = sum(error * error for error in errors) / len(errors)
             self.error = math.sqrt(self.error**2 + ERROR_SHARE * (square - self.error**2))
         share, bend = low_pass_share(self._cutoff, elapsed), SLOPE_SHARE * elapsed / span
+        if not 0.5 < elapsed / (self._elapsed or elapsed) < 2.0:
+            bend = 0.0  # a report was late: one of both slopes is that of another time
         for name, slope in slopes.items():
             newest = slope + bend * (slope - before[name])
             self._rates[name] += share * (newest - self._rates[name])
