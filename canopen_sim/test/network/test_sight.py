@@ -296,14 +296,19 @@ def test_an_axis_that_was_led_on_unseen_is_judged_by_its_first_positions(
 def test_a_sight_that_is_too_short_to_judge_forgets_nothing() -> None:
     """One position, and silence again: where it was seen before still counts."""
     watch = FollowingWatch()
-    limits = {'margin': 0.1, 'window': 0.5, 'error': False}
+
+    def judge(now: float, setpoint: float, received: int) -> Following:
+        return watch.judge(
+            now, setpoint, 0.0, margin=0.1, window=0.5, error=False, received=received
+        )
+
     for cycle in range(10):
-        watch.judge(cycle * PERIOD, 0.0, 0.0, received=cycle, **limits)
+        judge(cycle * PERIOD, 0.0, cycle)
     watch.lose_sight()
-    assert watch.judge(1.0, 0.3, 0.0, received=10, **limits) is Following.UNDECIDED
+    assert judge(1.0, 0.3, 10) is Following.UNDECIDED
     watch.lose_sight()
-    assert watch.judge(2.0, 0.3, 0.0, received=11, **limits) is Following.UNDECIDED
-    assert watch.judge(2.01, 0.3, 0.0, received=12, **limits) is Following.LEFT_BEHIND
+    assert judge(2.0, 0.3, 11) is Following.UNDECIDED
+    assert judge(2.01, 0.3, 12) is Following.LEFT_BEHIND
 
 
 @STREAMED
