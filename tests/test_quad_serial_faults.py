@@ -44,13 +44,15 @@ def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimulatedQua
 def quad(processes: SimulatedQuad) -> SimulatedQuad:
     """Let it walk, if the test before has not left it so."""
     if processes.state != 'walk':
+        processes.start_ended()  # after a test that has failed
         walk_again(processes)
     return processes
 
 
 def walk_again(quad: SimulatedQuad) -> None:
-    """Clear the fault, if there is one, stand up and walk; start what a test has killed."""
-    quad.start_ended()
+    """Clear the fault, if there is one, stand up and walk; nothing has ended meanwhile."""
+    for name, process in quad.processes.items():
+        assert process.is_running(), f'{name} has ended'
     place = quad.truth[-1].pose.pose.position
     tries = 0
     while quad.state != 'walk' or far_from(quad, place) < WALKED:
