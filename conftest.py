@@ -20,6 +20,8 @@ import pytest
 
 from dds_network import restrict_dds
 
+pytest_plugins = ['stalls']
+
 SCENARIOS = Path(__file__).parent / 'tests'
 NICENESS = os.getpriority(os.PRIO_PROCESS, 0)
 OF_ROBOTS = -5  # beside it

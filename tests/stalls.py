@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Times in which this computer stood still: robots that are not computed fail for that alone.
+
+A process of its own sleeps all the time, so that it waits for a processor as little as any. When
+it wakes up late, simulated drives, master and test were not computed in time, either. A test that
+failed in such a time says nothing, and is run again; the closing line counts it as a rerun.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from contextlib import suppress
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+
+LATE = 0.15  # [s] masters and drives wait 0.1 to 0.5 s for each other
+RERUNS = 2  # of a test, at most
+WAKE = 0.05  # [s] in which it tells of a stall that has ended
+_WATCH = f"""
+import select, sys, time
+before = time.monotonic()
+print(before, before, flush=True)
+while not select.select([sys.stdin], [], [], 0.02)[0]:
+    now = time.monotonic()
+    if now - before > {LATE}:
+        print(before, now, flush=True)
+    before = now
+"""
+
+
+class StallWatch:
+    """Notes stalls from its start on.
+
+    Attributes:
+        process: The one that sleeps.
+    """
+
+    def __init__(self) -> None:
+        command = [sys.executable, '-S', '-c', _WATCH]
+        self._told, told = os.pipe()
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=told)
+        os.close(told)
+        self._lines = os.read(self._told, 1 << 20)  # it has begun
+        os.set_blocking(self._told, False)
+
+    def since(self, begin: float) -> list[float]:
+        """Return the stalls since then.
+
+        Args:
+            begin: On the monotonic clock [s].
+
+        Returns:
+            How long each was [s].
+        """
+        time.sleep(WAKE)
+        with suppress(BlockingIOError):
+            self._lines += os.read(self._told, 1 << 20)
+        pairs = (tuple(map(float, line.split())) for line in self._lines.splitlines())
+        return [end - start for start, end in pairs if end > begin]
+
+    def close(self) -> None:
+        """End the process."""
+        self.process.communicate()
+        os.close(self._told)
+
+
+WATCH = pytest.StashKey[StallWatch]()
+BEGIN = pytest.StashKey[float]()  # of a test, on the monotonic clock [s]
+
+
+def stalls_in(item: pytest.Item) -> list[float]:
+    """Return how long this computer stood still in a test, each time [s]."""
+    return item.config.stash[WATCH].since(item.stash.get(BEGIN, 0.0))
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Watch as long as tests run."""
+    watch = session.config.stash[WATCH] = StallWatch()
+    session.config.add_cleanup(watch.close)
+
+
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Mark each test; the condition is asked when it has failed."""
+
+    def stood_still() -> bool:
+        return bool(stalls_in(item))
+
+    item.add_marker(pytest.mark.flaky(reruns=RERUNS, condition=stood_still))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Note when a test begins."""
+    item.stash[BEGIN] = time.monotonic()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item,
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Report the stalls in a test that failed."""
+    report = yield
+    if report.failed and (stalls := stalls_in(item)):
+        told = ', '.join(f'{stall:.2f} s' for stall in stalls)
+        report.sections.append(('this computer stood still', told))
+    return report

@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What this project's own test runs do when the computer stands still."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+import pytest
+
+FAILS_ONCE = """
+import os, signal, time
+from stalls import WATCH
+runs = []
+def test_first(request):
+    runs.append(1)
+    if {stalls}:
+        watch = request.config.stash[WATCH].process
+        os.kill(watch.pid, signal.SIGSTOP)
+        time.sleep(0.3)
+        os.kill(watch.pid, signal.SIGCONT)
+    assert len(runs) == {passes}
+"""
+
+
+@pytest.mark.parametrize(
+    ('stalls', 'passes', 'closing', 'told'),
+    [
+        ('len(runs) == 1', 2, '1 passed, 1 rerun', False),
+        ('False', 2, '1 failed in', False),
+        ('True', 9, '1 failed, 2 rerun', True),
+    ],
+)
+def test_only_a_test_in_a_stall_is_run_again(
+    tmp_path: Path, *, stalls: str, passes: int, closing: str, told: bool
+) -> None:
+    """A failure without one stays a failure, and so does one that comes back."""
+    (tmp_path / 'test_once.py').write_text(FAILS_ONCE.format(stalls=stalls, passes=passes))
+    output = subprocess.run(
+        [sys.executable, '-m', 'pytest', '-q', '-p', 'stalls', str(tmp_path)],
+        env=os.environ | {'PYTHONPATH': str(Path(__file__).parent)},
+        capture_output=True,
+        text=True,
+        check=False,
+    ).stdout
+    assert closing in output, output
+    assert ('this computer stood still' in output) is told, output
