@@ -125,6 +125,7 @@ class SerialRobot(ObservedRobot):
             settings.command_loss,
             raised=self._estimator.raised_feet,
             send=self._send_angles,
+            waits=lambda: self._driver.waits,
             obstacle=self._obstacle,
             warn=self._warn,
         )

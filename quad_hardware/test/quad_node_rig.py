@@ -106,6 +106,16 @@ class Rig(ABC):
         self.client.spin_until(lambda: len(messages) >= until, TIMEOUT, f'{topic} {count} times')
         return messages[-1]
 
+    def receive_position(self, angle: float) -> None:
+        """Wait for joint states with all legs at an angle [rad]."""
+        states, first = self.received['/joint_states'], len(self.received['/joint_states'])
+
+        def is_there() -> bool:
+            legs = states[-1].position[:12] if len(states) > first else ()
+            return bool(legs) and all(abs(position - angle) < 0.02 for position in legs)
+
+        self.client.spin_until(is_there, TIMEOUT, f'joints at {angle:.2f} rad')
+
     def command(self, positions: list[float], **others: list[float]) -> None:
         """Publish a joint command."""
         self._commands.publish(JointCommand(position=positions, **others))

@@ -242,7 +242,7 @@ def test_torque_is_taken_and_given_by_service(rig: NodeRig) -> None:
     rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'without torque')
     assert rig.peer.commands == []
     rig.peer.angles.update(dict.fromkeys(rig.peer.angles, 20.0))
-    rig.receive('/joint_states', 5)
+    rig.receive_position(math.radians(20.0))
     assert rig.client.call(SetBool, '/hardware_node/torque', SetBool.Request(data=True)).success
     rig.client.spin_until(lambda: rig.peer.torque, TIMEOUT, 'torque on')
     assert rig.peer.commands[-1][11] == pytest.approx(20.0, abs=0.01)
@@ -259,7 +259,7 @@ def test_a_controller_that_goes_on_moves_no_servo_that_was_let_go(rig: NodeRig) 
     assert give(False).success
     rig.client.spin_until(lambda: not rig.peer.torque, TIMEOUT, 'torque off')
     rig.peer.angles.update(dict.fromkeys(rig.peer.angles, 20.0))
-    rig.receive('/joint_states', 5)
+    rig.receive_position(math.radians(20.0))
     before = len(rig.peer.commands)
     assert give(True).success
     rig.client.spin_until(lambda: rig.peer.torque, TIMEOUT, 'torque on')
@@ -290,7 +290,7 @@ def test_torque_comes_back_where_the_arm_is(
         assert rig.client.call(SetBool, torque, SetBool.Request(data=False)).success
         rig.client.spin_until(lambda: not rig.peer.torque, TIMEOUT, 'torque off')
         rig.peer.angles.update(dict.fromkeys(rig.peer.angles, 20.0))
-        rig.receive('/joint_states', 5)
+        rig.receive_position(math.radians(20.0))
         assert rig.client.call(SetBool, torque, SetBool.Request(data=True)).success
         rig.client.spin_until(lambda: rig.peer.torque, TIMEOUT, 'torque on')
         targets = {motor: angle for angles in rig.peer.commands for motor, angle in angles.items()}

@@ -198,7 +198,7 @@ class Line:
         self.obstacle = ''
         self.commander = JointCommander(
             JOINTS, LimiterSettings(), LossReaction.LIE,
-            raised=raised, send=self._send,
+            raised=raised, send=self._send, waits=lambda: False,
             obstacle=lambda: self.obstacle, warn=self.warned.append,
         )  # fmt: skip
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 import math
 from pathlib import Path
 import time
@@ -14,7 +15,8 @@ import pytest
 from quad_description import movable_joints, Pose, pose_positions, robot_urdf
 from quad_hardware import CommandError, NoAnswerError
 from quad_hardware.backend import SerialBackend
-from quad_hardware.joints import JointMap, servo_of
+from quad_hardware.joints import JointMap, LimiterSettings, servo_of
+from quad_hardware.joints.command import MAX_PERIOD
 from quad_hardware.link import LinkOptions
 from quad_hardware.protocol import LEG_MOTORS, Protocol, V1, V2
 from quad_hardware.serial_robot import RobotSettings, SerialRobot
@@ -57,6 +59,30 @@ def test_it_observes_and_commands_in_si_units(peer: PtyPeer) -> None:
         assert state.joints.positions == pytest.approx(STAND, abs=0.02)
     wanted = JOINTS.angles(STAND)
     assert {m: peer.angles[m] for m in LEG_MOTORS} == pytest.approx(wanted, abs=1.0)
+
+
+@pytest.mark.parametrize('peer', [V2], indirect=True)
+def test_commands_that_could_not_leave_add_up_to_no_jump(peer: PtyPeer) -> None:
+    """A computer that holds up only the thread of the line sends the newest, one step on."""
+    robot = SerialRobot(RobotSettings(LinkOptions(str(peer.link)), URDF, JOINTS))
+    robot.start()
+    deadline = time.monotonic() + 10.0
+    try:
+        while not robot.command([0.0] * 12):
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+        held = iter([0.4])
+        for tick in range(60):
+            if tick == 20:
+                robot.on_state = lambda _: time.sleep(next(held, 0.0))
+            robot.command([0.0, 0.0 if tick < 20 else 0.9, 0.0] * 4)
+            time.sleep(0.02)
+    finally:
+        robot.end(print)
+    angles = [command[12] for command in peer.commands]
+    assert angles[-1] == pytest.approx(math.degrees(0.9), abs=0.1)
+    steps = [abs(b - a) for a, b in pairwise(angles)]
+    assert max(steps) <= math.degrees(LimiterSettings().speed * MAX_PERIOD) + 0.01
 
 
 def test_what_is_no_command_is_refused(peer: PtyPeer) -> None:

@@ -56,6 +56,7 @@ class CommandLimiter:
         degree = math.pi / 180.0
         self._share = tuple(servo.gain / degree for servo in joints.servos)
         self._targets: list[float] = []
+        self._previous: list[float] = []  # targets before the last step
         self._began_at = 0.0
         self._last_at = -math.inf
         self._end = self._seen_end = object()  # replaced by reset(), whichever thread it is in
@@ -71,6 +72,10 @@ class CommandLimiter:
         Any thread may call it; it counts from the next :meth:`step` on.
         """
         self._end = object()
+
+    def withdraw(self) -> None:
+        """Go back to before the last :meth:`step`: its targets were replaced before they left."""
+        self._targets = list(self._previous)
 
     def step(
         self, positions: Sequence[float], measured: Sequence[float | None], now: float
@@ -92,6 +97,7 @@ class CommandLimiter:
             self._seen_end, self._last_at, self._targets = end, -math.inf, []
         if now - self._last_at > self._settings.stream_timeout:
             self._begin(measured, now)
+        self._previous = list(self._targets)
         elapsed = min(max(now - self._last_at, 0.0), MAX_PERIOD)
         self._last_at = now
         return self._approach(positions, self._speed(now) * elapsed)

@@ -164,6 +164,7 @@ class JointCommander(CommandLoss):
         *,
         raised: Callable[[Sequence[float]], Sequence[str]],
         send: Callable[[Mapping[int, float]], bool],
+        waits: Callable[[], bool],
         obstacle: Callable[[], str],
         warn: Callable[[str], None],
     ) -> None:
@@ -173,6 +174,7 @@ class JointCommander(CommandLoss):
             reaction: What the robot does when commands break off while its legs move.
             raised: Names the feet that are in the air at targets of the legs [rad].
             send: Has servo angles sent, by motor id [deg]; returns whether they are.
+            waits: Says whether the last angles have not left yet; newer ones replace them.
             obstacle: Says why nothing is sent.
             warn: Takes what is the matter with a command.
         """
@@ -180,7 +182,8 @@ class JointCommander(CommandLoss):
         self.counters = CommandCounters()  # what became of them
         self._limiter = CommandLimiter(joints, limiter)
         self._limits_descent = False  # the last command was one of the way down
-        self._send_angles, self._obstacle, self._warn = send, obstacle, warn
+        self._send_angles, self._waits = send, waits
+        self._obstacle, self._warn = obstacle, warn
         self._last_targets: tuple[float, ...] = ()
         self._moved_by = ''  # what took the legs from where the commands of before left them
 
@@ -272,6 +275,8 @@ class JointCommander(CommandLoss):
                 # the way down begins anew, and so does a stream that wakes after it
                 limiter.reset()
                 self._limits_descent = descent
+            elif self._waits():  # else the servos would see a jump
+                limiter.withdraw()
             measured = [place.get(name) for name in self._joints.names]
             command = limiter.step(positions, measured, now)
         except CommandError as error:

@@ -131,6 +131,11 @@ class Driver:
         return accepted
 
     @property
+    def waits(self) -> bool:
+        """Whether a command was accepted that the thread has not taken over yet."""
+        return self._angles is not None
+
+    @property
     def limp(self) -> bool:
         """Whether the servos were let go: from that order on, until they are known to hold."""
         return self._released or self._limp
