@@ -360,10 +360,10 @@ def test_a_contract_of_nothing_asks_for_everything() -> None:
         ('other.yaml', 'a: 1\nb: 2', 'its keys: a, b'),
         ('other.yaml', '- 1', 'not a mapping'),
         ('other.yaml', 'a: [', 'not valid YAML'),
-        (
-            'config.yaml',
-            'go2: {observations: [dof_pos], joint_names: [a], joint_mapping: [7]}',
-            'config.yaml',
+        *(
+            ('config.yaml', f'go2: {{dt: 1, joint_names: [a, b], joint_mapping: {each}}}', words)
+            for each in ('[0, 7]', '[0, -1]', '[1, 1]', '[x, 0]')
+            for words in (r'joint_mapping .* 0 to 1 are needed',)
         ),
         ('config.yaml', 'go2: {observations: 5}', 'config.yaml'),
         # Playground's Barkour, Go1 handstand, Spot

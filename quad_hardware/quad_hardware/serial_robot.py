@@ -162,7 +162,9 @@ class SerialRobot(ObservedRobot):
         Args:
             report_loss: Takes what :meth:`miss_commands` says, before the robot moves.
         """
-        if loss := self.miss_commands():
+        while (loss := self.miss_commands()) is None:
+            time.sleep(NOMINAL_PERIOD)
+        if loss:
             report_loss(loss)
         while self._commander.goes_down:
             self.go_down()
@@ -198,11 +200,12 @@ class SerialRobot(ObservedRobot):
         """Whether joint commands come."""
         return self._commander.is_commanded(time.monotonic())
 
-    def miss_commands(self) -> str:
+    def miss_commands(self) -> str | None:
         """Begin to lay the robot down when the end of its commands is a hazard.
 
         Returns:
-            What it does, or why not; empty when there is no hazard.
+            What it does, or why not; empty when there is no hazard; None to be called again,
+            for a report is awaited.
         """
         now, latest = time.monotonic(), self.latest
         imu = None if latest is None else latest.imu
@@ -211,13 +214,12 @@ class SerialRobot(ObservedRobot):
             self.fault(COMMANDS, loss)
         return loss
 
-    def go_down(self) -> bool:
-        """Send the next targets on the way down; return whether there were any."""
+    def go_down(self) -> None:
+        """Send the next targets on the way down, where a report shows the legs."""
         now = time.monotonic()
         command = self._commander.go_down(self._place(now), now)
         if command is not None:
             self._estimator.command(now, command.targets)
-        return command is not None
 
     @property
     def goes_down(self) -> bool:
@@ -313,5 +315,7 @@ class SerialRobot(ObservedRobot):
         """Return where the joints are [rad], [m]; empty when the robot was not seen lately."""
         latest = self.latest
         if latest is None or latest.joints is None or now - self._arrived_at > STALE_TIME:
+            return {}
+        if self._driver.status().state is not LinkState.RUNNING:  # a first report is on its way
             return {}
         return latest.joints.measured(self.names)

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 import math
 from pathlib import Path
 import re
+import signal
+import time
 from types import SimpleNamespace
 from typing import Any
 
@@ -171,13 +173,22 @@ def test_commands_that_end_at_rest_leave_the_posture(rig: NodeRig) -> None:
     assert len(rig.peer.commands) == count
 
 
+@pytest.mark.parametrize('stall', [0.0, 0.8])
 def test_a_node_that_ends_in_motion_folds_the_legs_first(
-    isolation: Isolation, tmp_path: Path
+    isolation: Isolation, tmp_path: Path, stall: float
 ) -> None:
-    """As when the controller has died and the rest of the bring-up is stopped."""
+    """As when the controller has died and the rest of the bring-up is stopped; after a stall."""
     with NodeRig(isolation, tmp_path) as rig:
         rig.swing(7)
-        assert rig.node.stop() == 0
+        if stall:
+            rig.peer.behaviour.silent = True  # the machine stalls, and what reports with it
+            rig.node.signal(signal.SIGSTOP)
+            time.sleep(stall)
+        rig.node.signal(signal.SIGINT)
+        rig.node.signal(signal.SIGCONT)
+        time.sleep(0.1)
+        rig.peer.behaviour.silent = False
+        assert rig.node.wait() == 0
         lying = [math.degrees(angle) for angle in pose_positions(Pose.LIE).values()]
         # on a busy machine the robot takes its last frames later than the node ends
         rig.client.spin_until(

@@ -19,6 +19,7 @@ START_BAND = 0.3  # [rad] between leg and target; a controller that is relaxed k
 MIN_STREAM = 0.5  # [s] a person who tries out a servo sends no stream
 SPEED = 1.0  # [rad/s] of the fastest joint on the way down
 MIN_DURATION = 1.0  # [s]
+REPORT_TIMEOUT = 0.4  # [s] for a report after commands broke off; a stall delays both
 
 
 class LossReaction(Enum):
@@ -56,6 +57,7 @@ class CommandLoss:
                        if s.joint in pose}  # fmt: skip
         self._raised, self._reaction = raised, reaction
         self._began_at = self._last_at = -math.inf
+        self._unseen_at = math.inf  # when they were missed and no report said where the legs are
         self._last: Sequence[float] = ()
         self._place: Mapping[str, float] | None = None  # where the way down began [rad]
         self._duration = self._elapsed = self._stepped_at = 0.0  # of the way down [s]
@@ -73,12 +75,12 @@ class CommandLoss:
         """Note targets that were sent [rad]; a command ends the way down."""
         if not self.is_commanded(now) and not (self.goes_down or self.hazard):
             self._began_at = now  # a pause with a foot in the air is part of a stream
-        self._place = None
+        self._place, self._unseen_at = None, math.inf
         self._last_at, self._last = now, targets[: len(self._legs)]
 
     def forget(self) -> None:
         """Forget the stream: the robot was lost or let go, and is not moved unasked."""
-        self._place = None
+        self._place, self._unseen_at = None, math.inf
         self._began_at = self._last_at = -math.inf
         self._last = ()
 
@@ -194,6 +196,7 @@ class JointCommander(CommandLoss):
     def lose(self) -> None:
         """Begin anew with the next command, for the robot was lost; any thread may call it."""
         self._limiter.reset()
+        self._last_targets = ()
 
     def let_go(self) -> None:
         """Send nothing more until a command begins where the legs are.
@@ -201,7 +204,8 @@ class JointCommander(CommandLoss):
         What a controller streams is where they were: the robot would rise unasked. A pause of
         the stream is no new request; a stalled process makes one, too.
         """
-        self._begin_anew()
+        self.lose()
+        self.forget()
         self._moved_by, self.counters.loss = 'the servos were let go', ''
 
     def refuse(self, error: CommandError) -> None:
@@ -225,16 +229,21 @@ class JointCommander(CommandLoss):
             self.counters.loss = ''
         return command
 
-    def miss(self, place: Mapping[str, float], tilt: float | None, now: float) -> str:
+    def miss(self, place: Mapping[str, float], tilt: float | None, now: float) -> str | None:
         """Bring the robot down, if the end of its commands is a hazard; return what it does.
 
         Args:
             place: As in :meth:`take`.
             tilt: Of the body [rad]; None when it is unknown.
+
+        Returns:
+            What the robot does; empty without a hazard; None while a report is awaited.
         """
         hazard = self.hazard
         if not hazard:
             return ''
+        if self._awaits_report(place, now):
+            return None
         reason = self.begin(place, tilt, now)
         if not reason:  # commands that only did not arrive raise no robot that lies, either
             self._limiter.reset()
@@ -246,7 +255,9 @@ class JointCommander(CommandLoss):
         return self.counters.loss
 
     def go_down(self, place: Mapping[str, float], now: float) -> Command | None:
-        """Send the next targets on the way down; None for nothing, at its end too."""
+        """Send the next targets on the way down; None for nothing, while it waits too."""
+        if self.goes_down and self._awaits_report(place, now):
+            return None
         positions = self.step(now)
         if positions is None:
             return None
@@ -254,6 +265,11 @@ class JointCommander(CommandLoss):
         if command is None:
             self.forget()
         return command
+
+    def _awaits_report(self, place: Mapping[str, float], now: float) -> bool:
+        """Return whether a report of the legs is missing, and not for long yet."""
+        self._unseen_at = math.inf if place else min(self._unseen_at, now)
+        return not place and now < self._unseen_at + REPORT_TIMEOUT
 
     def _send(
         self,
@@ -267,7 +283,7 @@ class JointCommander(CommandLoss):
         try:
             limiter.check(positions)
             if not place:
-                self._drop(self._obstacle())
+                self._drop(forget=False)  # a stall held up reports, too: it may yet be missed
                 return None
             if self._moved_by and not descent:
                 self._check_start(positions, place)
@@ -283,7 +299,7 @@ class JointCommander(CommandLoss):
             self.refuse(error)
             return None
         if not self._send_angles(self._joints.angles(command.targets)):
-            self._drop(self._obstacle())
+            self._drop()
             return None
         self._count(command)
         return command
@@ -314,15 +330,11 @@ class JointCommander(CommandLoss):
             default=(math.inf, ''),
         )
 
-    def _begin_anew(self) -> None:
-        """Begin anew with the next command, and do not miss it: the robot does not get it."""
+    def _drop(self, *, forget: bool = True) -> None:
         self.lose()
-        self.forget()
-        self._last_targets = ()
-
-    def _drop(self, reason: str) -> None:
-        self._begin_anew()
-        self._trouble(f'joint command not sent: {reason}')
+        if forget:
+            self.forget()
+        self._trouble(f'joint command not sent: {self._obstacle()}')
 
     def _count(self, command: Command) -> None:
         counters, legs = self.counters, self._joints.leg_count

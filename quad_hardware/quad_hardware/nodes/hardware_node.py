@@ -118,13 +118,17 @@ class HardwareNode(Node):
         """Bring the robot down when the end of its commands is a hazard, or log why not."""
         if self._robot.is_commanded:
             return  # a command came while the timer's event waited for the executor
+        loss = self._robot.miss_commands()
+        if loss is None:
+            return  # the timer calls again
         self._silence.cancel()
-        if loss := self._robot.miss_commands():
+        if loss:
             self.get_logger().error(loss)
             self._descent.reset()
 
     def _go_down(self) -> None:
-        if not self._robot.go_down():
+        self._robot.go_down()
+        if not self._robot.goes_down:
             self._descent.cancel()
 
     def _warn(self, reason: str) -> None:

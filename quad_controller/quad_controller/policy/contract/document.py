@@ -8,7 +8,7 @@ each other, later ones count, and what is still open then is asked for by name.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -34,23 +34,24 @@ class ContractDocument:
     joint_order: Mapping[str, Any] = field(default_factory=dict)
 
     def over(self, base: ContractDocument) -> ContractDocument:
-        """Return this one laid over another: its values count, the other's order stays."""
+        """Return this one laid over another: its values count, the other's order stays.
+
+        Raises:
+            PolicyError: The joint_mapping of one does not fit the joint_names of the other.
+        """
         terms = self.values.get('observation', {}).get('terms', {})
         if terms and all(isinstance(t, dict) and 'source' in t for t in terms.values()):
             base = base.without_terms()  # these are all of them, in their order
         order = {**base.joint_order, **self.joint_order}
-        values, refusals = _merged(base.values, self.values), (*base.refusals, *self.refusals)
+        values = _merged(base.values, self.values)
         names, mapping = order.get('names'), order.get('policy_mapping', order.get('mapping'))
         if self.joint_order and names and mapping:
-            try:
-                values['joints'] = [names[index] for index in mapping]
-            except (IndexError, TypeError):
-                refusals += (f'joint_mapping {mapping} does not fit {len(names)} joint_names',)
+            values['joints'] = permuted(names, mapping)
         return ContractDocument(
             values,
             {**base.origins, **self.origins},
             {**base.hints, **self.hints},
-            refusals,
+            (*base.refusals, *self.refusals),
             order,
         )
 
@@ -86,6 +87,21 @@ def flatten(values: Mapping[str, Any], prefix: str = '') -> Iterator[tuple[str, 
             yield from flatten(value, f'{path}.')
         else:
             yield path, value
+
+
+def permuted(names: Sequence[str], mapping: Any) -> list[str]:
+    """Return names in the order of their indices in a ``joint_mapping``.
+
+    Raises:
+        PolicyError: It is no list of indices from 0 on, each once.
+    """
+    indices = mapping if isinstance(mapping, list) else [mapping]
+    if sum(indices.count(place) == 1 for place in range(len(names))) < len(indices):
+        raise PolicyError(
+            f'joint_mapping {mapping} does not fit {len(names)} joint_names: '
+            f'whole numbers from 0 to {len(names) - 1} are needed, each once'
+        )
+    return [names[int(index)] for index in indices]
 
 
 def known(**values: object) -> Values:

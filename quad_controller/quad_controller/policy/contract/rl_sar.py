@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from .document import ContractDocument, document_of, known, Values
+from .document import ContractDocument, document_of, known, permuted, Values
 from .model import Source
 from .terms import RL_SAR
 
@@ -42,8 +42,8 @@ def read_config(values: Mapping[str, Any], origin: str) -> ContractDocument:
     if isinstance(step, (int, float)) and isinstance(decimation, int):
         period = step * decimation
     joints, mapping = config.get('joint_names'), config.get('joint_mapping')
-    if isinstance(joints, list) and isinstance(mapping, list):
-        joints = [joints[index] for index in mapping]
+    if isinstance(joints, list) and mapping is not None:
+        joints = permuted(joints, mapping)
     low, high = config.get('clip_actions_lower'), config.get('clip_actions_upper')
     order = known(
         names=config.get('joint_names'),
