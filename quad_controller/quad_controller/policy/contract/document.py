@@ -89,13 +89,13 @@ def flatten(values: Mapping[str, Any], prefix: str = '') -> Iterator[tuple[str, 
             yield path, value
 
 
-def permuted(names: Sequence[str], mapping: Any) -> list[str]:
+def permuted(names: Sequence[str], mapping: object) -> list[str]:
     """Return names in the order of their indices in a ``joint_mapping``.
 
     Raises:
         PolicyError: It is no list of indices from 0 on, each once.
     """
-    indices = mapping if isinstance(mapping, list) else [mapping]
+    indices: list[Any] = mapping if isinstance(mapping, list) else [mapping]
     if sum(indices.count(place) == 1 for place in range(len(names))) < len(indices):
         raise PolicyError(
             f'joint_mapping {mapping} does not fit {len(names)} joint_names: '
