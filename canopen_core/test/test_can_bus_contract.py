@@ -4,12 +4,14 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from functools import partial
 import math
 import socket
 from threading import Thread, Timer
-from time import monotonic
+from time import monotonic, sleep
 from typing import TypeAlias
 
 from can_addresses import free_multicast, free_virtual
@@ -238,3 +240,45 @@ def test_closing_twice_is_no_error_and_a_closed_bus_says_so(connect: Open) -> No
         bus.receive(0.0)
     other.send(Frame(2))
     assert unstamped(receive_count(third, 1)) == [Frame(2)]
+
+
+def use_until_closed(work: Callable[[], object]) -> None:
+    """Use a bus again and again; only its end may end that."""
+    with pytest.raises(BusError, match='closed'):
+        deque(iter(work, 'no end'), maxlen=0)
+
+
+def test_threads_may_close_and_open_buses_while_others_use_them(connect: Open) -> None:
+    """A descriptor that is closed is another's at once: none of theirs is read or written."""
+    served = []
+
+    def serve(pause: float) -> None:
+        bus = connect()
+        works = partial(bus.receive, math.inf), partial(bus.send, Frame(0x181, bytes(8)))
+        users = [Thread(target=use_until_closed, args=(work,)) for work in works]
+        for user in users:
+            user.start()
+        sleep(pause)
+        bus.close()
+        pairs = [socket.socketpair() for _ in range(4)]  # these get its numbers
+        for _, right in pairs:
+            right.send(b'untouched')
+        for user in users:
+            user.join(DEADLINE)
+            assert not user.is_alive()
+        for left, right in pairs:
+            assert left.recv(20, socket.MSG_DONTWAIT) == b'untouched'
+            left.close()
+            right.close()
+
+    def serve_often() -> None:
+        for number in range(60):
+            serve(number % 4 * 1e-3)
+        served.append(True)
+
+    servers = [Thread(target=serve_often) for _ in range(3)]
+    for server in servers:
+        server.start()
+    for server in servers:
+        server.join(10 * DEADLINE)
+    assert len(served) == len(servers)

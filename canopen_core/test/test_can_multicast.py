@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 import os
 from pathlib import Path
 import re
@@ -26,6 +27,7 @@ from canopen_core import BusError, CodecError
 from canopen_core.can import Bus, datagram_reader, Frame, open_bus, STANDARD_ID_MAX
 from canopen_core.can.adapter import from_message, to_message
 from canopen_core.can.multicast import _is_local, decode, encode, MulticastBus
+from canopen_core.can.socketcan import pack
 
 FRAMES = [
     Frame(0x000, b'\x01\x05'),
@@ -401,6 +403,36 @@ def test_waking_ends_a_batch(bus: Bus, name: str) -> None:
         waker.start()
         assert unstamped(bus.receive(DEADLINE)) == [Frame(0x181)]
         waker.join()
+
+
+def test_a_failure_within_a_batch_follows_the_frames_before_it() -> None:
+    """What has come is received; the next receive reports the error of the socket."""
+    reader = datagram_reader.datagram_reader()
+    assert reader is not None
+    frames: list[Frame] = []
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        peer = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        peer.bind(('127.0.0.1', 0))
+        sock.connect(peer.getsockname())
+        peer.connect(sock.getsockname())
+        peer.send(pack(FRAMES[2]))
+
+        def fail() -> None:
+            peer.close()
+            sock.send(b'refused')
+
+        failing = Timer(0.05, fail)
+        failing.start()
+        descriptors = sock.fileno(), os.eventfd(0)
+        receive = partial(reader.receive, descriptors, DEADLINE, 3, frames, lambda *_: None)
+        try:
+            assert receive() == 1
+            with pytest.raises(ConnectionRefusedError):
+                receive()
+        finally:
+            failing.join()
+            os.close(descriptors[1])
+    assert unstamped(frames) == [FRAMES[2]]
 
 
 def test_without_a_compiler_there_is_one_warning(

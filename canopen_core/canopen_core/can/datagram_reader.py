@@ -45,6 +45,7 @@ class _Reader(ctypes.Structure):
         ('last', ctypes.c_double),
         ('lost', ctypes.c_int64),
         ('drops', ctypes.c_uint32),
+        ('error', ctypes.c_int32),
         ('own', ctypes.c_uint32),
         ('own_port', ctypes.c_uint16),
         ('sizes', ctypes.c_uint16 * 4),
@@ -80,7 +81,7 @@ class DatagramReader:
 
     def reopened(self) -> None:
         """The datagrams come from another socket now, which counts its losses anew."""
-        self._state.drops = 0
+        self._state.drops = self._state.error = 0
 
     def receive(
         self,

@@ -32,6 +32,7 @@ typedef struct {
   double last;    /* time of the last datagram [s] */
   int64_t lost;   /* datagrams that the kernel has dropped */
   uint32_t drops; /* the same as this socket counts them */
+  int32_t error;  /* of the socket, which the frames that were read before it have put off */
   uint32_t own;   /* address that this bus sends from, whose echo is dropped; 0 for SocketCAN */
   uint16_t own_port;
   /* of a datagram of a multicast bus: sizes and bytes of what stands around identifier, length
@@ -126,7 +127,8 @@ static int decode_can(const uint8_t *at, int size, Record *out) {
 
 /* Read what is there; return the number of records with those before, or an error below 0. */
 static int drain(Reader *reader, int fd, int count, Record *records, uint8_t *raw, int *urgent) {
-  static __thread uint8_t datagrams[SLOTS][DATAGRAM_MAX], ancillary[SLOTS][ANCILLARY_MAX];
+  static __thread uint8_t datagrams[SLOTS][DATAGRAM_MAX];
+  static __thread _Alignas(struct cmsghdr) uint8_t ancillary[SLOTS][ANCILLARY_MAX];
   struct mmsghdr messages[SLOTS];
   struct iovec vectors[SLOTS];
   struct sockaddr_in sources[SLOTS];
@@ -140,7 +142,13 @@ static int drain(Reader *reader, int fd, int count, Record *records, uint8_t *ra
         .msg_control = ancillary[i], .msg_controllen = ANCILLARY_MAX};
   }
   int got = recvmmsg(fd, messages, room, MSG_DONTWAIT, 0);
-  if (got < 0) return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR ? count : -errno;
+  if (got < 0) {
+    if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR) return count;
+    if (!count) return -errno;
+    reader->error = errno;
+    *urgent = 1;
+    return count;
+  }
   double limit = (double)compare_clocks(reader) * 1e-9 + READ_AHEAD;
   for (int i = 0; i < got; i++) {
     Record *out = &records[count];
@@ -172,7 +180,9 @@ static int drain(Reader *reader, int fd, int count, Record *records, uint8_t *ra
    Without a time to wait, it reads what is there. */
 int reader_receive(Reader *reader, int fd, int wake_fd, double timeout, int expected,
                    Record *records, uint8_t *raw) {
-  int count = 0, urgent = 0;
+  int count = 0, urgent = 0, error = reader->error;
+  reader->error = 0;
+  if (error) return -error;
   if (timeout <= 0.0) return drain(reader, fd, 0, records, raw, &urgent);
   double deadline = (double)clock_ns(CLOCK_MONOTONIC) * 1e-9 + timeout;
   if (expected > SLOTS) expected = SLOTS;

@@ -188,11 +188,6 @@ class MulticastBus(SocketBus):
     def _explain(self, error: OSError) -> BusError:
         return BusError(f'{self.name}: {error.strerror or error}')
 
-    def close(self) -> None:
-        """Leave the group."""
-        super().close()
-        self._sender.close()
-
 
 def check_group(name: str, group: str) -> None:
     """Check the address of a multicast group.

@@ -12,7 +12,7 @@ import os
 import select
 import socket
 import struct
-from threading import Lock
+from threading import RLock
 from time import monotonic
 
 from ..exceptions import BusError
@@ -105,11 +105,14 @@ class SocketBus(Bus):
         """Read by the compiled reader, or in Python without one."""
         super().__init__(name)
         self._receiver, self._sender = receiver, sender
-        self._send_lock = Lock()
+        self._send_lock = RLock()
         self._reader = reader
         self._stamps = TimestampReader()  # used without a compiled reader
         self._wake_fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
-        self._wake_lock = Lock()  # a closed descriptor may be somebody else's by the next moment
+        # of the three below: a closed descriptor is another's by the next moment. A signal handler
+        # may wake the bus.
+        self._use_lock = RLock()
+        self._receiving = 0  # threads that are inside receive
         self._closed = False
 
     @abstractmethod
@@ -139,55 +142,61 @@ class SocketBus(Bus):
             ValueError: It is no classic CAN frame.
         """
         datagram = self._encode(frame)
-        try:
-            with self._send_lock:
-                self._sender.send(datagram)
-                self.counters.sent += 1
-        except OSError as error:
-            self.counters.send_errors += 1
+        with self._send_lock:
             if self._closed:
-                raise BusError(f'{self.name} is closed') from error
-            raise self._explain(error) from error
+                raise BusError(f'{self.name} is closed')
+            try:
+                self._sender.send(datagram)
+            except OSError as error:
+                self.counters.send_errors += 1
+                raise self._explain(error) from error
+            self.counters.sent += 1
 
     def receive(self, timeout: float) -> list[Frame]:
         """Wait for frames; see :meth:`Bus.receive`."""
-        if self._closed:
-            raise BusError(f'{self.name} is closed')
+        with self._use_lock:
+            if self._closed:
+                raise BusError(f'{self.name} is closed')
+            self._receiving += 1
         try:
-            if self._reader is not None:
-                frames = self._receive_compiled(self._reader, timeout)
-            else:
-                if timeout > 0.0:
-                    self._wait(timeout)
-                frames = self._drain()
-            self._note_losses((self._reader or self._stamps).lost)
+            frames = self._receive(timeout)
         except BusError:
             raise
         except OSError as error:
-            if self._closed:
-                raise BusError(f'{self.name} was closed') from error
             raise self._explain(error) from error
+        finally:
+            with self._use_lock:
+                self._receiving -= 1
+                if self._closed:
+                    self._release()
         self.counters.received += len(frames)
+        return frames
+
+    def _receive(self, timeout: float) -> list[Frame]:
+        if self._reader is not None:
+            frames = self._receive_compiled(self._reader, timeout)
+        else:
+            if timeout > 0.0:
+                self._wait(timeout)
+            frames = self._drain()
+        self._note_losses((self._reader or self._stamps).lost)
         return frames
 
     def _receive_compiled(self, reader: DatagramReader, timeout: float) -> list[Frame]:
         frames: list[Frame] = []
         taken = 0
         while True:
-            count = reader.receive(self._descriptors(), timeout, self.batch, frames, self._decode)
+            descriptors = self._receiver.fileno(), self._wake_fd
+            count = reader.receive(descriptors, timeout, self.batch, frames, self._decode)
             taken += count & ~WOKEN  # also of others than frames, so that a flood of them ends
+            if self._closed:
+                raise BusError(f'{self.name} was closed')
             if taken >= BATCH_MAX or not (count & WOKEN or count == SLOTS):
                 return frames
             timeout = 0.0
 
-    def _descriptors(self) -> tuple[int, int]:
-        descriptors = (self._receiver.fileno(), self._wake_fd)
-        if min(descriptors) < 0 or self._closed:
-            raise BusError(f'{self.name} was closed')
-        return descriptors
-
     def _wait(self, timeout: float) -> None:
-        descriptors = self._descriptors()
+        descriptors = self._receiver.fileno(), self._wake_fd
         if max(descriptors) < _FD_SETSIZE:
             # select waits by the microsecond where poll rounds up to a millisecond
             limit = None if math.isinf(timeout) else timeout
@@ -197,6 +206,8 @@ class SocketBus(Bus):
         if self._wake_fd in readable:
             with contextlib.suppress(BlockingIOError):
                 os.eventfd_read(self._wake_fd)
+        if self._closed:
+            raise BusError(f'{self.name} was closed')
 
     def _drain(self) -> list[Frame]:
         frames: list[Frame] = []
@@ -223,18 +234,26 @@ class SocketBus(Bus):
 
     def wake(self) -> None:
         """Wake a waiting :meth:`receive`."""
-        with self._wake_lock:
+        with self._use_lock:
             if not self._closed:
                 os.eventfd_write(self._wake_fd, 1)
 
     def close(self) -> None:
-        """Close the sockets; end a thread that waits in :meth:`receive` first."""
-        if self._closed:
-            return
-        self.wake()
-        with self._wake_lock:
+        """Close the sockets; a thread that waits in :meth:`receive` ends, and closes them."""
+        with self._use_lock:
+            if self._closed:
+                return
+            self.wake()
             self._closed = True
+            self._release()
+
+    def _release(self) -> None:
+        """Close the descriptors, when no thread is inside a call with one of them."""
+        if self._receiving:
+            return
+        with self._send_lock:
             self._receiver.close()
+            self._sender.close()
             os.close(self._wake_fd)
 
 

@@ -52,15 +52,11 @@ class SocketCanBus(SocketBus):
         self._queue_limit = 0
         self._gone = False
 
-    def receive(self, timeout: float) -> list[Frame]:
-        """Wait for frames; an interface that went away is opened again when it is back.
-
-        Raises:
-            BusError: The interface is down or gone.
-        """
-        if self._gone and not self._closed:
+    def _receive(self, timeout: float) -> list[Frame]:
+        """Wait for frames; an interface that went away is opened again when it is back."""
+        if self._gone:
             self._reopen()
-        return super().receive(timeout)
+        return super()._receive(timeout)
 
     def _encode(self, frame: Frame) -> bytes:
         return pack(frame)
