@@ -16,6 +16,7 @@ from servo_goals import GoalNode
 from std_srvs.srv import Trigger
 
 from arm_servo import SpeedRequest, TargetRequest
+from arm_servo.controllers.controller import Outcome
 from arm_servo.core.motion_queue import MotionCommand
 from arm_servo.ros.trajectory import controller
 from arm_servo.ros.trajectory.action import TrajectoryAction
@@ -57,6 +58,22 @@ def test_an_unexpected_error_at_the_start_of_a_goal_is_its_result(
     assert goal.result.error_code == GoalCode.INVALID_GOAL
     assert 'ZeroDivisionError' in goal.result.error_string
     assert node.logged
+
+
+def test_an_unexpected_error_at_the_end_of_a_goal_is_its_result(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Rclpy would answer with code 0, which is SUCCESSFUL, and no reason."""
+    drives = ready()
+    node = action(monkeypatch, drives, drives.gateway.request)
+    there = [axis.setpoint + 0.05 for axis in drives.axes]
+    goal = node.send(message(TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(2.0, there)])))
+    drives.run(300)
+    monkeypatch.setattr(Outcome, 'canceled', property(lambda _: 1 // 0))
+    node.watch()
+    assert goal.ending == 'aborted'
+    assert goal.result.error_code == GoalCode.INVALID_GOAL
+    assert 'ZeroDivisionError' in goal.result.error_string
 
 
 def test_an_unexpected_error_of_the_planning_is_its_result(

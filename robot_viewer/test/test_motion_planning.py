@@ -63,6 +63,7 @@ class Server:
                 Ending.SUCCEEDED if goal.is_good else Ending.CANCELED,
                 goal.result,
             ),
+            fail=lambda _, error: pytest.fail(str(error)),
         )
 
     def answer(self, code: int, message: str = '', **others: object) -> None:

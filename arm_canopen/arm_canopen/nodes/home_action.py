@@ -61,6 +61,7 @@ class HomeAction:
             start=self._start,
             conclude=self._conclude,
             cancel=self._cancel,
+            fail=self._fail,
         )
 
     def _start(self, homing: _Homing) -> None:
@@ -115,3 +116,9 @@ class HomeAction:
         self._node.destroy_timer(homing.timer)
         ending = Ending.SUCCEEDED if homing.result.success else Ending.CANCELED
         return ending, homing.result
+
+    def _fail(self, homing: _Homing, error: Exception) -> Home.Result:
+        if homing.timer is not None:
+            self._node.destroy_timer(homing.timer)
+        message = f'{type(error).__name__}: {error}'
+        return Home.Result(success=False, message=message, position=math.nan)

@@ -52,9 +52,10 @@ class ExecuteAction:
             'execute_trajectory',
             accept=_Goal,
             start=self._start,
-            refuse=self._refuse,
             cancel=self._cancel,
             conclude=self._conclude,
+            fail=self._fail,
+            refusals=(PlanningError,),
         )
         node.create_subscription(String, 'trajectory_execution_event', self._event, 10)
 
@@ -69,10 +70,6 @@ class ExecuteAction:
         )
         goal.handle.publish_feedback(ExecuteTrajectory.Feedback(state='MONITOR'))
 
-    def _refuse(self, goal: _Goal, error: Exception) -> None:
-        refusal = as_refusal(error)
-        goal.outcome = refusal.code, str(refusal)
-
     def _cancel(self, goal: _Goal) -> None:
         if goal.execution is not None:
             self._execution.stop(goal.execution, reason='canceled')
@@ -81,6 +78,10 @@ class ExecuteAction:
         goal.handle.publish_feedback(ExecuteTrajectory.Feedback(state='IDLE'))
         ending, code = _ending(self._node, 'execute_trajectory', goal)
         return ending, ExecuteTrajectory.Result(error_code=code)
+
+    def _fail(self, goal: _Goal, error: Exception) -> ExecuteTrajectory.Result:
+        code = _failure(self._node, 'execute_trajectory', goal, error)
+        return ExecuteTrajectory.Result(error_code=code)
 
     def _event(self, message: String) -> None:
         if message.data == STOP:
@@ -194,6 +195,7 @@ class MotionAction:
             start=self._begin_planning,
             cancel=self._cancel,
             conclude=self._conclude,
+            fail=self._fail,
         )
 
     def _begin_planning(self, goal: _MotionGoal) -> None:
@@ -321,6 +323,10 @@ class MotionAction:
         is_begun = goal.begun > 1 or (execution is not None and execution.is_sent)
         return ending, self._kind.answer(code, goal.planned, is_begun)
 
+    def _fail(self, goal: _MotionGoal, error: Exception) -> Any:  # noqa: ANN401
+        code = _failure(self._node, self._kind.name, goal, error)
+        return self._kind.answer(code, None, False)
+
     def _publish(self, goal: _MotionGoal, state: str) -> None:
         goal.handle.publish_feedback(self._kind.action.Feedback(state=state))
 
@@ -335,3 +341,10 @@ def _ending(node: Node, name: str, goal: _Goal) -> tuple[Ending, MoveItErrorCode
         PlanningCode.PREEMPTED: Ending.CANCELED,
     }
     return endings.get(code, Ending.ABORTED), error_code(code, reason)
+
+
+def _failure(node: Node, name: str, goal: _Goal, error: Exception) -> MoveItErrorCodes:
+    """Return the code of a goal that could not begin, or not be answered."""
+    refusal = as_refusal(error)
+    goal.outcome = refusal.code, str(refusal)
+    return _ending(node, name, goal)[1]

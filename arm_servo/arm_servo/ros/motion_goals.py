@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 import time
-import traceback
 from typing import Any, TypeVar
 
 from rclpy.node import Node
@@ -21,7 +20,7 @@ from arm_model import ArmError
 from arm_trajectory import GoalCode
 from node_runner.action_goals import Ending, GoalServer, ServedGoal
 
-from ..controllers.controller import Outcome, refused
+from ..controllers.controller import Outcome
 from ..core.gateway import CommandGateway
 from ..core.motion_queue import MotionCommand
 
@@ -54,6 +53,7 @@ class MotionGoals(GoalServer[GoalT]):
         request: Callable[[GoalT], MotionCommand],
         canceled: str,
         conclude: Callable[[GoalT], tuple[Ending, Any]],
+        fail: Callable[[GoalT, Exception], Any],
     ) -> None:
         """Offer the action.
 
@@ -61,7 +61,7 @@ class MotionGoals(GoalServer[GoalT]):
             request: Requests the motion of a goal; raises an ArmError where it is refused.
             canceled: Reason of an outcome that a client has asked for.
         """
-        self._log, self._gateway = node.get_logger(), gateway
+        self._gateway = gateway
         self._request, self._canceled = request, canceled
         super().__init__(
             node,
@@ -69,9 +69,10 @@ class MotionGoals(GoalServer[GoalT]):
             name,
             accept=accept,
             start=self._order,
-            refuse=self._note_refusal,
             cancel=self._end_motion,
             conclude=conclude,
+            fail=fail,
+            refusals=(ArmError,),
         )
 
     def outcome(self, goal: GoalT, timeout: float = START_TIMEOUT) -> Outcome | None:
@@ -82,8 +83,10 @@ class MotionGoals(GoalServer[GoalT]):
             timeout: Time in which the cycle must begin with it in [s]; it is canceled then.
         """
         command = goal.command
-        if command is None or command.ended.done():
-            return goal.outcome if command is None else command.ended.result()
+        if command is None:
+            return None
+        if command.ended.done():
+            return command.ended.result()
         if command.motion is not None or time.monotonic() - goal.begin <= timeout:
             return None
         reason = 'the cycle does not run; is the bus up?'
@@ -92,11 +95,6 @@ class MotionGoals(GoalServer[GoalT]):
 
     def _order(self, goal: GoalT) -> None:
         goal.command = self._request(goal)
-
-    def _note_refusal(self, goal: GoalT, error: Exception) -> None:
-        goal.outcome = refused(error)
-        if not isinstance(error, ArmError):
-            self._log.error(''.join(traceback.format_exception(error)))
 
     def _end_motion(self, goal: GoalT) -> None:
         if goal.command is not None:

@@ -9,6 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import Enum
 import time
+import traceback
 from typing import Any, Generic, TypeVar
 
 from rclpy.action.server import ActionServer, CancelResponse
@@ -115,6 +116,7 @@ class ServedGoal:
 
     handle: Any  # rclpy's ``ServerGoalHandle``
     has_ended: bool = field(default=False, init=False)  # whether its result is on the way
+    failure: Exception | None = field(default=None, init=False)  # why it could not be started
 
 
 GoalT = TypeVar('GoalT', bound=ServedGoal)
@@ -131,22 +133,28 @@ class GoalServer(Generic[GoalT]):
         *,
         accept: Callable[[Any], GoalT],
         start: Callable[[GoalT], None],
-        refuse: Callable[[GoalT, Exception], None] | None = None,
         cancel: Callable[[GoalT], None],
         conclude: Callable[[GoalT], tuple[Ending, Any]],
+        fail: Callable[[GoalT, Exception], Any],
+        refusals: tuple[type[Exception], ...] = (),
     ) -> None:
-        """Offer the action; all callbacks run in the executor.
+        """Offer the action; all callbacks run in the executor, and none of them ends it.
 
         Args:
             accept: Makes the record of a goal from its handle.
             start: Begins with a goal.
-            refuse: Notes what ``start`` has raised; the goal ends then. By default it is raised.
-            cancel: Begins to end a goal that a client cancels.
+            cancel: Begins to end a goal that a client cancels; where it raises, the client's
+                request is rejected.
             conclude: Returns status and result message of a goal that has ended.
+            fail: Returns the result message, with code and reason, of a goal that is aborted for
+                what ``start`` or ``conclude`` has raised.
+            refusals: What ``start`` raises for goals that cannot be carried out; anything else is
+                a defect, and has its traceback in the log.
         """
         self._goals: dict[bytes, GoalT] = {}
-        self._accept, self._start, self._refuse = accept, start, refuse
-        self._cancel, self._conclude = cancel, conclude
+        self._accept, self._start, self._cancel = accept, start, cancel
+        self._conclude, self._fail, self._refusals = conclude, fail, refusals
+        self._name, self._log = name, node.get_logger()
         self._server = _Server(
             node,
             action,
@@ -180,20 +188,23 @@ class GoalServer(Generic[GoalT]):
         goal = self._goals[bytes(handle.goal_id.uuid)] = self._accept(handle)
         try:
             self._start(goal)
-        except Exception as error:
-            if self._refuse is None:
-                raise
-            self._refuse(goal, error)
+        except Exception as error:  # noqa: BLE001  # the goal is answered with it
+            goal.failure = error
             self.end(goal)
 
     def _end_early(self, handle: Any) -> CancelResponse:  # noqa: ANN401
         goal = self._goals.get(bytes(handle.goal_id.uuid))
         if goal is not None and not goal.has_ended:
-            self._cancel(goal)
+            try:
+                self._cancel(goal)
+            except Exception as error:  # noqa: BLE001  # the goal goes on, and the client is told
+                self._log_defect(error)
+                return CancelResponse.REJECT
         return CancelResponse.ACCEPT
 
     def _answer(self, handle: Any) -> Any:  # noqa: ANN401
-        ending, result = self._conclude(self._goals.pop(bytes(handle.goal_id.uuid)))
+        goal = self._goals.pop(bytes(handle.goal_id.uuid))
+        ending, result = self._outcome(goal)
         if ending is Ending.SUCCEEDED:
             handle.succeed()
         elif ending is Ending.CANCELED and handle.is_cancel_requested:
@@ -201,3 +212,18 @@ class GoalServer(Generic[GoalT]):
         else:
             handle.abort()
         return result
+
+    def _outcome(self, goal: GoalT) -> tuple[Ending, Any]:
+        error = goal.failure
+        if error is None:
+            try:
+                return self._conclude(goal)
+            except Exception as defect:  # noqa: BLE001  # rclpy would answer with an empty result
+                error = defect
+                self._log_defect(error)
+        elif not isinstance(error, self._refusals):
+            self._log_defect(error)
+        return Ending.ABORTED, self._fail(goal, error)
+
+    def _log_defect(self, error: Exception) -> None:
+        self._log.error(f'{self._name}: {"".join(traceback.format_exception(error))}')

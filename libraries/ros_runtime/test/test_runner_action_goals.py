@@ -19,6 +19,7 @@ from rclpy.node import Node
 from ros_client import RosClient
 from std_srvs.srv import Trigger
 from tf2_msgs.action import LookupTransform
+from tf2_msgs.msg import TF2Error
 
 from node_runner import action_goals, create_deferred_service
 from node_runner.action_goals import Ending, GoalServer, ServedGoal
@@ -27,12 +28,22 @@ TIMEOUT = 20.0  # [s]
 
 
 def serve(
-    node: Node, start: Callable[[ServedGoal], None], ending: Ending = Ending.SUCCEEDED
+    node: Node, start: Callable[[ServedGoal], None], ending: Ending | None = Ending.SUCCEEDED
 ) -> GoalServer[ServedGoal]:
-    """Serve goals of an action; a cancel ends them."""
+    """Serve goals of an action; a cancel ends them; without an ending all callbacks raise."""
 
     def cancel(goal: ServedGoal) -> None:
         server.end(goal)
+        if ending is None:
+            raise RuntimeError('no cancel')
+
+    def conclude(_: ServedGoal) -> tuple[Ending, LookupTransform.Result]:
+        if ending is None:
+            raise RuntimeError('no end')
+        return ending, LookupTransform.Result()
+
+    def fail(_: ServedGoal, error: Exception) -> LookupTransform.Result:
+        return LookupTransform.Result(error=TF2Error(error=9, error_string=str(error)))
 
     server = GoalServer(
         node,
@@ -41,7 +52,9 @@ def serve(
         accept=ServedGoal,
         start=start,
         cancel=cancel,
-        conclude=lambda _: (ending, LookupTransform.Result()),
+        conclude=conclude,
+        fail=fail,
+        refusals=(ValueError,),
     )
     return server
 
@@ -109,6 +122,51 @@ def test_a_goal_ends_once_with_the_status_of_its_server(
         assert result.result().status == status
         assert not server.running
         server.destroy()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ('wrong', 'reason', 'is_logged'),
+    [
+        (ValueError('no such frame'), 'no such frame', False),
+        (RuntimeError('no start'), 'no start', True),
+        (None, 'no end', True),
+    ],
+    ids=['refused', 'at the start', 'at the end'],
+)
+def test_a_goal_that_fails_is_aborted_with_the_reason(
+    isolation: Isolation,
+    capfd: pytest.CaptureFixture[str],
+    wrong: Exception | None,
+    reason: str,
+    is_logged: bool,
+) -> None:
+    """No callback ends the executor, and no result says 0, which is success."""
+    begun: list[ServedGoal] = []
+
+    def start(goal: ServedGoal) -> None:
+        begun.append(goal)
+        if wrong is not None:
+            raise wrong
+
+    with RosClient(isolation.domain_id) as client:
+        server = serve(client.node, start, None)
+        caller = client.action(LookupTransform, 'look_up')
+        assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
+        sent = caller.send_goal_async(LookupTransform.Goal())  # type: ignore[no-untyped-call]
+        client.spin_until(lambda: sent.done() and bool(begun), TIMEOUT, 'acceptance')
+        if wrong is None:
+            cancel = sent.result().cancel_goal_async()
+            client.spin_until(cancel.done, TIMEOUT, 'an answer')
+            assert not cancel.result().goals_canceling
+        result = sent.result().get_result_async()
+        client.spin_until(result.done, TIMEOUT, 'a result')
+        assert result.result().status == GoalStatus.STATUS_ABORTED
+        assert result.result().result.error.error == 9
+        assert result.result().result.error.error_string == reason
+        assert not server.running
+        server.destroy()
+    assert ('Traceback' in capfd.readouterr().err) == is_logged
 
 
 @pytest.mark.slow

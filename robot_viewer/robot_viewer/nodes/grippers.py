@@ -37,6 +37,7 @@ class Grippers:
         self._node, self._report = node, report
         self._found: dict[str, _Gripper] = {}
         self._calls: dict[str, ActionCall] = {}
+        self._lost: list[ActionCall] = []  # the graph misses their servers; STOP cancels them, too
         self._ends: Mapping[str, tuple[float, float]] = {}
 
     @property
@@ -53,8 +54,9 @@ class Grippers:
         """Use another robot."""
         self._ends = {joint.name: travel(joint) for joint in tree.movable()}
         for name in [n for n, each in self._found.items() if each.joint not in self._ends]:
+            if call := self._calls.pop(name, None):
+                call.cancel()
             self._found.pop(name).client.destroy()
-            self._calls.pop(name, None)
 
     def look(
         self, services: Mapping[str, Sequence[str]], controllers: Mapping[str, Controller]
@@ -63,7 +65,7 @@ class Grippers:
         for name, gripper in self._found.items():
             call = self._calls.get(name)
             if gripper.service not in services and call is not None and not call.ended:
-                del self._calls[name]
+                self._lost.append(self._calls.pop(name))
                 self._report(f'{name}: its action is gone; what it moved may go on: STOP', True)
         for service, kinds in services.items():
             action = service.removesuffix(SEND_GOAL)
@@ -95,9 +97,10 @@ class Grippers:
 
     def stop(self) -> None:
         """Cancel what is on its way."""
-        for call in self._calls.values():
+        for call in (*self._calls.values(), *self._lost):
             call.cancel()
         self._calls.clear()
+        self._lost.clear()
 
     def _done(self, what: str, result: Any, why: str) -> None:  # noqa: ANN401
         if why:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 import time
 from typing import Any
@@ -17,7 +17,7 @@ from arm_model import RobotState
 from arm_trajectory import GoalCode
 from node_runner.action_goals import Ending
 
-from ...controllers.controller import CONTINUED, Outcome, Source
+from ...controllers.controller import CONTINUED, Outcome, refused, Source
 from ...core.gateway import CommandGateway
 from ...core.motion_queue import MotionCommand
 from ...core.requests import TargetRequest
@@ -82,6 +82,7 @@ class GripperController:
                     request=partial(self._request, interface),
                     canceled='canceled',
                     conclude=partial(self._conclude, interface),
+                    fail=partial(self._fail, interface),
                 ),
             )
             for interface in interfaces
@@ -196,11 +197,7 @@ class GripperController:
         return 'canceled' if goal.handle.is_cancel_requested else ''
 
     def _conclude(self, interface: GripperInterface, goal: _Goal) -> tuple[Ending, Any]:
-        measured = self._gateway.snapshot.measured
-        measured = measured or RobotState.at_rest(np.full(len(self._joints), np.nan))
-        state = goal.state or GripperState(self._joints, measured)
-        if goal.command is None and goal.outcome is not None:
-            goal.problem = goal.outcome.reason
+        state = self._state_of(goal)
         if self._succeeds(goal):
             return Ending.SUCCEEDED, interface.result(state)
         if not (goal.problem and goal.handle.is_cancel_requested):
@@ -208,3 +205,12 @@ class GripperController:
             self._node.get_logger().warning(f'goal aborted: {reason}')
             return Ending.ABORTED, interface.result(state)
         return Ending.CANCELED, interface.result(state)
+
+    def _fail(self, interface: GripperInterface, goal: _Goal, error: Exception) -> Any:  # noqa: ANN401
+        self._node.get_logger().warning(f'goal aborted: {refused(error).reason}')
+        return interface.result(replace(self._state_of(goal), reached=False))
+
+    def _state_of(self, goal: _Goal) -> GripperState:
+        measured = self._gateway.snapshot.measured
+        measured = measured or RobotState.at_rest(np.full(len(self._joints), np.nan))
+        return goal.state or GripperState(self._joints, measured)

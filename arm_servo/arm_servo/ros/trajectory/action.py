@@ -13,7 +13,7 @@ from rclpy.node import Node
 from arm_trajectory import GoalCode
 from node_runner.action_goals import Ending
 
-from ...controllers.controller import Outcome
+from ...controllers.controller import Outcome, refused
 from ...controllers.trajectory import Execution
 from ...core.gateway import CommandGateway
 from ...core.motion_queue import MotionCommand
@@ -49,6 +49,7 @@ class TrajectoryAction:
             request=lambda goal: follow(goal.handle.request),
             canceled='canceled: at rest on the path',
             conclude=self._conclude,
+            fail=self._fail,
         )
         node.create_timer(1.0 / rate, self._watch)
 
@@ -83,8 +84,16 @@ class TrajectoryAction:
             code = code if goal.handle.is_cancel_requested else GoalCode.INVALID_GOAL
         else:
             ending = Ending.SUCCEEDED if code is GoalCode.SUCCESSFUL else Ending.ABORTED
+        return ending, self._result(code, outcome.reason)
+
+    def _fail(self, goal: MotionGoal, error: Exception) -> FollowJointTrajectory.Result:
+        if goal.failure is not None:
+            outcome = refused(error)
+            return self._result(outcome.code, outcome.reason)
+        reason = f'how it ended is not known: {type(error).__name__}: {error}'
+        return self._result(GoalCode.INVALID_GOAL, reason)
+
+    def _result(self, code: GoalCode, reason: str) -> FollowJointTrajectory.Result:
         if code is not GoalCode.SUCCESSFUL:
-            self._node.get_logger().warning(f'goal ended with {code.name}: {outcome.reason}')
-        return ending, FollowJointTrajectory.Result(
-            error_code=int(code), error_string=outcome.reason
-        )
+            self._node.get_logger().warning(f'goal ended with {code.name}: {reason}')
+        return FollowJointTrajectory.Result(error_code=int(code), error_string=reason)
