@@ -332,6 +332,30 @@ def test_a_speed_override_gives_an_execution_more_time(panda: MoveGroupRig) -> N
     server.destroy()
 
 
+def test_a_controller_that_was_held_up_and_goes_on_is_waited_for(panda: MoveGroupRig) -> None:
+    """Its cycles stood still on a busy computer; the end comes later, and is a success."""
+    server = panda.serve_arm('panda_arm_controller', holds=True)
+    topic = '/panda_arm_controller/controller_state'
+    states = panda.client.node.create_publisher(JointTrajectoryControllerState, topic, 10)
+    state = JointTrajectoryControllerState()
+    state.reference.positions = [0.0]
+
+    def publish() -> None:
+        state.reference.positions[0] += 1e-4
+        states.publish(state)
+
+    timer = panda.client.node.create_timer(0.02, publish)
+    panda.client.spin_until(lambda: states.get_subscription_count() > 0, 60.0, 'subscription')
+    result, allowed = held(panda, joint_goal([0.1], JOINTS[:1]), 'panda_arm')
+    panda.client.spin_for(allowed + 1.0)
+    assert not panda.held[0].is_cancel_requested
+    panda.held[0].execute()
+    panda.client.spin_until(result.done, 60.0, 'result')
+    assert result.result().result.error_code.val == MoveItErrorCodes.SUCCESS
+    panda.client.node.destroy_timer(timer)
+    server.destroy()
+
+
 def test_a_search_ends_with_its_goal_and_holds_up_no_other_group(panda: MoveGroupRig) -> None:
     """A goal behind a wall, for which a minute is allowed."""
     wall = box('wall', 0.0, 0.0, 0.0)

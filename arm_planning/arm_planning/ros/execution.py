@@ -32,6 +32,7 @@ from .controllers import Controller, FOLLOW
 from .trajectories import check_trajectory, from_start, part_of
 
 WATCH_PERIOD = 0.05  # how often executions are looked at in [s]
+MAX_WATCH_PERIOD = 0.2  # above it this process was held up; the rest counts for no limit in [s]
 STOP_TIMEOUT = 5.0  # time in which controllers must have stopped in [s]; then they are asked again
 
 FINDING_TIMEOUT = 5.0
@@ -113,6 +114,8 @@ class TrajectoryExecution:
         }
         self._matches: dict[str, ServerMatch] = {}
         self._states: dict[str, tuple[float, bytes]] = {}
+        self._references: dict[str, bytes] = {}
+        self._moving: set[str] = set()
         self._timed = {name for name, each in controllers.items() if each.kind is FOLLOW}
         self._scaling: set[str] = set()
         for name in self._timed:
@@ -371,13 +374,17 @@ class TrajectoryExecution:
     def _speed(self, name: str) -> float:
         """Return the speed override of a controller: 0 in a pause, 1 where it is unknown.
 
-        Many releases of joint_trajectory_controller do not fill the field: a 0 is a pause only
+        It notes whether the reference of the controller moves, too. Many releases of joint_trajectory_controller do not fill the field: a 0 is a pause only
         after another number.
         """
         at, message = self._states.get(name, (-math.inf, b''))
         if time.monotonic() - at > STATE_TIMEOUT:
             return 1.0
         state = deserialize_message(message, JointTrajectoryControllerState)
+        reference = state.reference.positions.tobytes()
+        if self._references.get(name) != reference:
+            self._references[name] = reference
+            self._moving.add(name)
         factor = float(state.speed_scaling_factor)
         if factor > 0.0:
             self._scaling.add(name)
@@ -393,19 +400,27 @@ class TrajectoryExecution:
     def _is_overdue(self, execution: Execution, passed: float) -> bool:
         """Whether an execution takes too long; what a speed override costs does not count.
 
-        The duration of a gripper is not watched: it ends its goal when it stalls.
+        Neither does a pause of this process. A controller whose reference moves is not overdue:
+        a busy computer holds its cycles up, and it goes on later. The duration of a gripper is
+        not watched: it ends its goal when it stalls.
         """
+        pause = max(passed - MAX_WATCH_PERIOD, 0.0)
+        execution.deadline += pause
         if execution.ending is None:
             timed = self._timed & execution.waits_for
             if not timed:
                 return False
-            execution.deadline += passed * (1.0 - min(map(self._speed, timed)))
+            execution.deadline += (passed - pause) * (1.0 - min(map(self._speed, timed)))
+            if timed & self._moving:
+                margin = self._limits.duration_margin + STATE_TIMEOUT
+                execution.deadline = max(execution.deadline, time.monotonic() + margin)
         return time.monotonic() > execution.deadline
 
     def _watch(self) -> None:
         before, self._watched = self._watched, time.monotonic()
         for name in self._clients:
             self._is_found(name)
+        self._moving.clear()
         for name in self._timed - self._scaling:
             self._speed(name)
         for execution in list(self._running):
