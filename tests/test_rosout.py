@@ -27,7 +27,10 @@ LATCHED = QoSProfile(  # type: ignore[no-untyped-call]
 
 @pytest.mark.scenario
 def test_a_bus_that_goes_down_is_a_message_of_the_master_on_rosout(isolation: Isolation) -> None:
-    """The thread of the cycle logs it with Python's logging, and the master goes on."""
+    """The thread of the cycle logs it with Python's logging, and the master goes on.
+
+    So it does after what a callback of another node of the program raises.
+    """
     command = [
         sys.executable,
         str(Path(failing_bus_master.__file__)),
@@ -45,6 +48,10 @@ def test_a_bus_that_goes_down_is_a_message_of_the_master_on_rosout(isolation: Is
             return [each.msg for each in received if each.name == 'master' and each.level == level]
 
         client.spin_until(lambda: bool(of_master(Log.INFO)), TIMEOUT, 'the master on /rosout')
+        client.spin_until(lambda: bool(of_master(Log.ERROR)), TIMEOUT, 'the defect')
+        client.spin_for(1.0)
+        (defect,) = of_master(Log.ERROR)  # once
+        assert failing_bus_master.DEFECT in defect
         os.kill(master.pid, signal.SIGUSR1)
         client.spin_until(
             lambda: failing_bus_master.DOWN in of_master(Log.ERROR), TIMEOUT, 'the failure'

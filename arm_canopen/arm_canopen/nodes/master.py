@@ -21,6 +21,7 @@ from node_runner import (
     declare_thread_priority,
     LINGER,
     log_as,
+    log_defects,
     ParameterReader,
     refuse_misspelt,
     run_program,
@@ -180,7 +181,7 @@ def _serve(
             for process in processes:
                 process.end_on_failure(stop)
                 process.start()
-            spin([*nodes, *others], stop)
+            spin([*nodes, *others], stop, survive=log_defects(nodes[0]))
         finally:
             _stop(processes, others)
         for process in processes:
@@ -201,7 +202,8 @@ def _stop(processes: Sequence[MasterProcess], others: Sequence[Node]) -> None:
 
     with ThreadPoolExecutor(1) as pool:
         stopping = pool.submit(stop)
-        spin(others, stopped, linger=LINGER if others else 0.0)
+        survive = log_defects(others[0]) if others else None
+        spin(others, stopped, linger=LINGER if others else 0.0, survive=survive)
         stopping.result()
 
 

@@ -18,6 +18,7 @@ from arm_model.ros import Description
 from node_runner import (
     destroyed_when_refused,
     LATCHED,
+    log_defects,
     notify_ready,
     ParameterReader,
     run_program,
@@ -171,7 +172,7 @@ def _serve(stop: threading.Event) -> None:
     try:
         notify_ready()
         node.get_logger().info(f'ready: motions of {", ".join(node.groups)} can be planned')
-        spin([node], stop)
+        spin([node], stop, survive=log_defects(node))
     finally:
         node.close()
         node.destroy_node()

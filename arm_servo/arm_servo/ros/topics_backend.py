@@ -16,6 +16,7 @@ from arm_model import RobotModel
 from arm_model.ros import declare_groups, declare_robot
 from node_runner import (
     LINGER,
+    log_defects,
     notify_ready,
     raise_thread_priority,
     settle_process_memory,
@@ -63,11 +64,12 @@ def serve_topics(stop: threading.Event, offers: Offers) -> None:
             stack.callback(thread.stop)
         nodes[0].get_logger().info('ready for commands')
         notify_ready()
-        spin(nodes, stop)
+        survive = log_defects(nodes[0])
+        spin(nodes, stop, survive=survive)
         for thread in threads:
             thread.end()
         for thread in threads:
-            spin(nodes, thread.ended, linger=LINGER)  # goals get their results
+            spin(nodes, thread.ended, linger=LINGER, survive=survive)  # goals get their results
     for thread in threads:
         if thread.error is not None:
             raise thread.error

@@ -23,7 +23,7 @@ from .shared_parameters import (
     raise_thread_priority,
     settle_process_memory,
 )
-from .spinning import LINGER, make_executor, spin, spin_beside
+from .spinning import LINGER, log_defects, make_executor, spin, spin_beside
 
 __all__ = [
     'LATCHED',
@@ -43,6 +43,7 @@ __all__ = [
     'given_values',
     'init_ros',
     'log_as',
+    'log_defects',
     'make_executor',
     'notify_ready',
     'other_nodes',

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 import threading
 import time
+import traceback
 
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -19,6 +20,10 @@ WAKE_PERIOD = 0.1
 
 LINGER = 0.3
 """Time in [s] for an action to see the end of its goal, and for the result to reach the client."""
+
+
+REPEAT_PERIOD = 10.0
+"""Time in [s] in which the same defect of callbacks is logged once."""
 
 
 def make_executor() -> Executor:
@@ -68,6 +73,24 @@ def spin(
         pass
     finally:
         executor.shutdown()
+
+
+def log_defects(node: Node) -> Callable[[Exception], None]:
+    """Return a ``survive`` of :func:`spin` that logs what callbacks raise, with its place.
+
+    For programs whose nodes serve several clients or robots while other threads move these: a
+    defect in the answer to one ends neither the others nor the motion.
+    """
+    logged: dict[str, float] = {}
+
+    def log(error: Exception) -> None:
+        text, now = ''.join(traceback.format_exception(error)), time.monotonic()
+        if now - logged.get(text, -REPEAT_PERIOD) >= REPEAT_PERIOD:
+            logged.clear()
+            logged[text] = now
+            node.get_logger().error(f'a callback failed, the others go on: {text}')
+
+    return log
 
 
 def _spin_once(

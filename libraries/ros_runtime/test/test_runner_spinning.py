@@ -11,7 +11,7 @@ import rclpy
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.utilities import try_shutdown
 
-from node_runner import make_executor, spin, spin_beside
+from node_runner import log_defects, make_executor, spin, spin_beside
 
 TIMEOUT = 20.0  # [s]
 
@@ -44,7 +44,7 @@ def test_spin_serves_until_the_end(
 
 @pytest.mark.parametrize('make', [make_executor, SingleThreadedExecutor])
 def test_what_a_callback_raises_ends_nothing_where_it_is_reported(
-    isolation: Isolation, make: Callable[[], Executor]
+    isolation: Isolation, make: Callable[[], Executor], capfd: pytest.CaptureFixture[str]
 ) -> None:
     """The same callback, and the others, are called again; without a report it is raised."""
     rclpy.init(args=[], domain_id=isolation.domain_id)
@@ -67,6 +67,10 @@ def test_what_a_callback_raises_ends_nothing_where_it_is_reported(
         reported.clear()
         spin([node], stop, make(), linger=0.1, survive=report)
         assert set(reported) == {'no such thing'}, 'while it lingers, too'
+        stop.clear()
+        node.create_timer(0.3, stop.set)
+        spin([node], stop, make(), survive=log_defects(node))
+        assert capfd.readouterr().err.count('a callback failed') == 1
         with pytest.raises(ValueError, match='no such thing'):
             spin([node], threading.Event(), make())
         node.destroy_node()
