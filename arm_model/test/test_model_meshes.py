@@ -29,7 +29,6 @@ from arm_model import (
     Sphere,
 )
 from arm_model.scene import meshes, pieces
-from robot_primitives import cache_folder
 
 CORNERS = list(product((-0.5, 0.5), repeat=3))
 """Of a cube with edges of one, in the order of their coordinates."""
@@ -350,26 +349,43 @@ def test_the_other_links_are_checked_all_the_same() -> None:
     assert 'link_1: an empty <geometry>' in model.notes[0]
 
 
-def test_a_hull_that_is_far_too_large_is_named(
+def _hollow(folder: Path, scales: Sequence[float], name: str) -> None:
+    """Write boxes in boxes as OBJ: each fills little of its hull, and is closed."""
+    lines: list[str] = []
+    for place, scale in enumerate(scales):
+        first = 16 * place + 1
+        for each in (scale, 0.9 * scale):
+            lines += [f'v {x + 9 * place} {y} {z}' for x, y, z in _scaled(each)]
+        lines += [f'f {a + first} {b + first} {c + first}' for a, b, c in TRIANGLES]
+        lines += [f'f {c + first + 8} {b + first + 8} {a + first + 8}' for a, b, c in TRIANGLES]
+    (folder / name).write_text('\n'.join(lines), encoding='utf-8')
+
+
+def test_a_body_that_takes_too_long_is_given_up_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """A shell fills little of its hull, and CoACD takes too long for it: give convex parts."""
+    """Its hull is named as far too large: give convex parts. The next starts do not wait again."""
     monkeypatch.setattr(pieces, 'TIME_LIMIT', 0.01)
-    monkeypatch.setattr(pieces, '_watch', pieces.Stopwatch())
-    ring = '\n'.join(f'v {x} {y} {z}' for scale in (1, 0.9) for x, y, z in _scaled(scale))
-    outside = [f'f {a + 1} {b + 1} {c + 1}' for a, b, c in TRIANGLES]
-    inside = [f'f {c + 9} {b + 9} {a + 9}' for a, b, c in TRIANGLES]
-    (tmp_path / 'hollow.obj').write_text('\n'.join([ring, *outside, *inside]), encoding='utf-8')
-    model = arm('<mesh filename="hollow.obj" scale="0.1 0.1 0.1"/>', tmp_path)
-    assert any('link_1 (27 %)' in note and 'convex parts' in note for note in model.notes)
-    assert not all(hull.final for hull in meshes.load_hulls(tmp_path / 'hollow.obj'))
-    folder = cache_folder('arm_model')
-    assert folder is not None
-    # the next start, when others are done, cuts it
-    assert not list((folder / 'hulls').glob('*.npz'))
-    assert [record.getMessage() for record in caplog.records] == [
-        'cutting meshes into convex pieces, 0.01 s at most; kept for the next start'
-    ]
+    mesh = '<mesh filename="{}" scale="0.1 0.1 0.1"/>'
+
+    def start(name: str) -> Sequence[str]:
+        monkeypatch.setattr(pieces, '_watch', pieces.Stopwatch())
+        meshes._hulls.cache_clear()
+        caplog.clear()
+        model = arm(mesh.format(name), tmp_path)
+        assert any('link_1 (27 %)' in note and 'convex parts' in note for note in model.notes)
+        return [record.getMessage()[:35] for record in caplog.records]
+
+    begins, gives_up = 'cutting meshes into convex pieces, ', 'a body of a mesh was not cut in 0.0'
+    _hollow(tmp_path, [1.0], 'one.obj')
+    assert start('one.obj') == [begins, gives_up]
+    assert start('one.obj') == []
+    _hollow(tmp_path, [1.1, 1.2], 'two.obj')
+    assert start('two.obj') == [begins, gives_up]
+    assert start('two.obj') == [begins, gives_up], 'the first had taken the time of the second'
+    assert start('two.obj') == []
+    monkeypatch.setattr(pieces, 'TIME_LIMIT', 0.02)
+    assert start('one.obj') == [begins, gives_up], 'another limit'
 
 
 def _extruded(outline: list[tuple[int, int]], flat: list[tuple[int, int, int]]) -> str:

@@ -16,18 +16,14 @@ import contextlib
 from dataclasses import dataclass
 from functools import lru_cache
 import hashlib
-import os
 from pathlib import Path
-import tempfile
 
 import coal
 import numpy as np
 from urdf_reader import mesh_unit
 
-from robot_primitives import cache_folder
-
 from ..arrays import Array, frozen, Native, Places
-from .pieces import cut
+from .pieces import cache_file, cut, write_whole
 
 MIN_THICKNESS = 1e-3  # thickness that a flat mesh is given in [m]: a hull needs a volume
 
@@ -51,8 +47,6 @@ MIN_FULLNESS = 0.5
 FAR_OUT, MAX_HALVINGS = 0.005, 8
 """Triangles that stand out of a piece by this share of the body are halved, so many times."""
 
-FORMAT = 'v4'  # version of the files in the cache: part of their names
-
 
 class MeshError(ValueError):
     """A mesh cannot be used; the message says why, and what to do."""
@@ -65,7 +59,7 @@ class Hull:
     points: Array  # its corners (m, 3), in the unit of the mesh
     # volume of the body as a share of its hull's, or of its pieces'; 1 where it has no inside
     fullness: float
-    # False where a busy computer did not cut the body in time: the next start tries it again
+    # False where other bodies took the time to cut this one: the next start does
     final: bool = True
 
 
@@ -84,16 +78,20 @@ def load_hulls(path: Path) -> Sequence[Hull]:
 
 @lru_cache(maxsize=256)
 def _hulls(digest: str, path: Path) -> Sequence[Hull]:
-    cache = cache_folder('arm_model')
-    if cache is None:
+    cached = cache_file('hulls', digest)
+    if cached is None:
         return hulls_of_file(path)
-    cached = cache / 'hulls' / f'{digest}-{FORMAT}.npz'
     hulls = _stored(cached)
     if not hulls:
         hulls = hulls_of_file(path)
         if all(hull.final for hull in hulls):
             with contextlib.suppress(OSError):  # such as a full disk: made the next time, too
-                _store(cached, hulls)
+                write_whole(
+                    cached,
+                    points=np.concatenate([each.points for each in hulls]),
+                    counts=[len(each.points) for each in hulls],
+                    fullness=[each.fullness for each in hulls],
+                )
     return hulls
 
 
@@ -114,26 +112,6 @@ def _stored(path: Path) -> Sequence[Hull]:
                 for part, share in zip(parts, fullness.tolist(), strict=True)
             )
     return ()
-
-
-def _store(path: Path, hulls: Sequence[Hull]) -> None:
-    """Write a file of the cache whole or not at all: several programs start at once."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile(dir=path.parent, suffix='.tmp', delete=False) as file:
-        unfinished = Path(file.name)
-        try:
-            np.savez(
-                file,
-                points=np.concatenate([each.points for each in hulls]),
-                counts=[len(each.points) for each in hulls],
-                fullness=[each.fullness for each in hulls],
-            )
-            file.flush()
-            os.fsync(file.fileno())
-            unfinished.replace(path)
-        except OSError:
-            unfinished.unlink(missing_ok=True)
-            raise
 
 
 def hulls_of_file(path: Path) -> Sequence[Hull]:

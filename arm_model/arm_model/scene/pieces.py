@@ -1,24 +1,30 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Bodies cut into nearly convex pieces by CoACD, in a process of its own.
+"""Bodies cut into nearly convex pieces by CoACD, in a process of its own, and cached.
 
 ``python -m arm_model.scene.pieces BODY PIECES`` reads and writes files of numpy: CoACD can neither
-be stopped nor be trusted with every mesh.
+be stopped nor be trusted with every mesh. The pieces of each body are kept in a file of
+``arm_model/pieces`` in the cache; a body that was given up has none in it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+import contextlib
 from dataclasses import dataclass
+import hashlib
 import logging
+import os
 from pathlib import Path
 import resource
 import subprocess
 import sys
-from tempfile import TemporaryDirectory
+from tempfile import NamedTemporaryFile, TemporaryDirectory
 import time
 
 import numpy as np
+
+from robot_primitives import cache_folder
 
 from ..arrays import Array, Places
 
@@ -46,6 +52,9 @@ SETTINGS = {
 is 11 s, a third of the time of CoACD's defaults, for as many pieces of L, fork and ring."""
 
 
+FORMAT = 'v5'  # version of the files in the cache: part of their names, as is the time limit
+
+
 @dataclass(slots=True)
 class Stopwatch:
     """How long a process has cut bodies, in [s]."""
@@ -70,8 +79,15 @@ def cut(corners: Array, triangles: Places) -> Sequence[Array]:
     """
     if not _closed(triangles):
         return ()
+    content = corners.tobytes() + triangles.tobytes()
+    kept = cache_file('pieces', hashlib.sha256(content).hexdigest())
+    if kept is not None:
+        # numpy and zipfile raise what they like for a file that is missing or damaged
+        with contextlib.suppress(Exception):
+            return _read(kept)
+    log = logging.getLogger(__name__)
     if not _watch.spent:
-        logging.getLogger(__name__).warning(
+        log.warning(
             'cutting meshes into convex pieces, %g s at most; kept for the next start', TIME_LIMIT
         )
     left, begin = TIME_LIMIT - _watch.spent, time.monotonic()
@@ -80,21 +96,61 @@ def cut(corners: Array, triangles: Places) -> Sequence[Array]:
     with TemporaryDirectory(prefix='arm_model-') as folder:
         body, pieces = Path(folder, 'body.npz'), Path(folder, 'pieces.npz')
         np.savez(body, corners=corners, triangles=triangles)
+        command = [sys.executable, '-m', __name__, str(body), str(pieces)]
         try:
-            subprocess.run(
-                [sys.executable, '-m', __name__, body, pieces],
-                capture_output=True,
-                check=True,
-                timeout=left,
-            )
-            with np.load(pieces) as stored:
-                return [stored[name] for name in stored.files]
+            subprocess.run(command, capture_output=True, check=True, timeout=left)
+            found = _read(pieces)
         except subprocess.TimeoutExpired as error:
-            raise TimeoutError from error
-        except (OSError, ValueError, subprocess.SubprocessError):
+            if left < TIME_LIMIT:  # others took the rest of it
+                raise TimeoutError from error
+            log.warning(
+                'a body of a mesh was not cut in %g s; it is checked as its hull. To try again, '
+                'delete %s',
+                TIME_LIMIT,
+                kept,
+            )
+            found = ()
+        except subprocess.SubprocessError:
+            found = ()
+        except (OSError, ValueError):
             return ()
         finally:
             _watch.spent += time.monotonic() - begin
+    if kept is not None:
+        with contextlib.suppress(OSError):  # such as a full disk: cut at the next start, too
+            write_whole(kept, *found)
+    return found
+
+
+def cache_file(kind: str, digest: str) -> Path | None:
+    """Return where the shapes made of a content are kept; None for a user without a home."""
+    cache = cache_folder('arm_model')
+    name = f'{digest}-{FORMAT}-{TIME_LIMIT:g}s.npz'
+    return None if cache is None else cache / kind / name
+
+
+def write_whole(path: Path, *arrays: Array, **named: object) -> None:
+    """Write a file of the cache whole or not at all: several programs start at once.
+
+    Raises:
+        OSError: There is no room, or no access.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with NamedTemporaryFile(dir=path.parent, suffix='.tmp', delete=False) as file:
+        unfinished = Path(file.name)
+        try:
+            np.savez(file, *arrays, **named)  # type: ignore[arg-type]
+            file.flush()
+            os.fsync(file.fileno())
+            unfinished.replace(path)
+        except OSError:
+            unfinished.unlink(missing_ok=True)
+            raise
+
+
+def _read(path: Path) -> Sequence[Array]:
+    with np.load(path) as stored:
+        return [stored[name] for name in stored.files]
 
 
 def _closed(triangles: Places) -> bool:
