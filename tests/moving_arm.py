@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-import time
 from typing import Any, TYPE_CHECKING
 
 from action_msgs.msg import GoalStatus
@@ -28,8 +27,6 @@ if TYPE_CHECKING:
 READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
 """A pose of the Panda from which it can move in every direction in [rad]."""
 
-REACHING = 20.0
-"""Longest time in [s] after which a goal is sent once more."""
 CONTROLLER = '/panda_arm_controller'
 
 
@@ -90,7 +87,7 @@ class MovingArm(SimulatedArm):
         return GoalRun(self.client, goal)
 
     def reach(self, positions: Sequence[float], seconds: float) -> None:
-        """Go to a pose in [rad], once more where a stall of the machine has ended the goal."""
+        """Go to a pose in [rad]."""
         reach(self.client, goal_to(positions, seconds))
 
 
@@ -141,13 +138,9 @@ class GoalRun:
 def reach(
     client: RosClient, goal: FollowJointTrajectory.Goal, controller: str = CONTROLLER
 ) -> None:
-    """Send a goal until it is reached: drives that a busy machine keeps from answering end one."""
-    deadline = time.monotonic() + REACHING
-    while True:
-        status, result = GoalRun(client, goal, controller).wait()
-        if status == GoalStatus.STATUS_SUCCEEDED:
-            return
-        assert time.monotonic() < deadline, result.error_string
+    """Send a goal, and wait until it is reached."""
+    status, result = GoalRun(client, goal, controller).wait()
+    assert status == GoalStatus.STATUS_SUCCEEDED, result.error_string
 
 
 def goal_to(

@@ -20,7 +20,7 @@ import pytest
 
 LATE = 0.15  # [s] masters and drives wait 0.1 to 0.5 s for each other
 RERUNS = 2  # of a test, at most
-WAKE = 0.05  # [s] in which it tells of a stall that has ended
+WAKE = 0.05  # [s] until it has written of a stall that has ended
 _WATCH = f"""
 import select, sys, time
 before = time.monotonic()
@@ -42,11 +42,11 @@ class StallWatch:
 
     def __init__(self) -> None:
         command = [sys.executable, '-S', '-c', _WATCH]
-        self._told, told = os.pipe()
-        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=told)
-        os.close(told)
-        self._lines = os.read(self._told, 1 << 20)  # it has begun
-        os.set_blocking(self._told, False)
+        self._pipe, end = os.pipe()
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=end)
+        os.close(end)
+        self._lines = os.read(self._pipe, 1 << 20)  # it has begun
+        os.set_blocking(self._pipe, False)
 
     def since(self, begin: float) -> list[float]:
         """Return the stalls since then.
@@ -59,14 +59,14 @@ class StallWatch:
         """
         time.sleep(WAKE)
         with suppress(BlockingIOError):
-            self._lines += os.read(self._told, 1 << 20)
+            self._lines += os.read(self._pipe, 1 << 20)
         pairs = (tuple(map(float, line.split())) for line in self._lines.splitlines())
         return [end - start for start, end in pairs if end > begin]
 
     def close(self) -> None:
         """End the process."""
         self.process.communicate()
-        os.close(self._told)
+        os.close(self._pipe)
 
 
 WATCH = pytest.StashKey[StallWatch]()
@@ -106,6 +106,6 @@ def pytest_runtest_makereport(
     """Report the stalls in a test that failed."""
     report = yield
     if report.failed and (stalls := stalls_in(item)):
-        told = ', '.join(f'{stall:.2f} s' for stall in stalls)
-        report.sections.append(('this computer stood still', told))
+        durations = ', '.join(f'{stall:.2f} s' for stall in stalls)
+        report.sections.append(('this computer stood still', durations))
     return report

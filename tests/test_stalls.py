@@ -27,7 +27,7 @@ def test_first(request):
 
 
 @pytest.mark.parametrize(
-    ('stalls', 'passes', 'closing', 'told'),
+    ('stalls', 'passes', 'closing', 'named'),
     [
         ('len(runs) == 1', 2, '1 passed, 1 rerun', False),
         ('False', 2, '1 failed in', False),
@@ -35,7 +35,7 @@ def test_first(request):
     ],
 )
 def test_only_a_test_in_a_stall_is_run_again(
-    tmp_path: Path, *, stalls: str, passes: int, closing: str, told: bool
+    tmp_path: Path, *, stalls: str, passes: int, closing: str, named: bool
 ) -> None:
     """A failure without one stays a failure, and so does one that comes back."""
     (tmp_path / 'test_once.py').write_text(FAILS_ONCE.format(stalls=stalls, passes=passes))
@@ -47,4 +47,4 @@ def test_only_a_test_in_a_stall_is_run_again(
         check=False,
     ).stdout
     assert closing in output, output
-    assert ('this computer stood still' in output) is told, output
+    assert ('this computer stood still' in output) is named, output

@@ -153,7 +153,9 @@ class Workshop:
         link = ['-shared', '-Wl,--as-needed', *(f'-Wl,-rpath,{folder}' for folder in libraries)]
         objects = [unit.with_suffix('.o') for unit in units]
         named = f'-Wl,-soname,{self._library.name}'
-        _run([compiler, *link, named, '-o', self._library, *objects, *needed])
+        linked = self.work / self._library.name
+        _run([compiler, *link, named, '-o', linked, *objects, *needed])
+        _move(linked, self._library)
 
     @property
     def _library(self) -> Path:
@@ -204,8 +206,10 @@ class Workshop:
         _copy(self.source / 'package.xml', share / self.name / 'package.xml')
 
     def _link(self, path: Path) -> None:
-        path.unlink(missing_ok=True)
-        path.symlink_to(self._library)
+        link = self.work / path.name
+        link.unlink(missing_ok=True)
+        link.symlink_to(self._library)
+        _move(link, path)
 
 
 def _is_needed(library: Path) -> bool:
@@ -217,6 +221,13 @@ def _is_needed(library: Path) -> bool:
 def _copy(source: Path, target: Path) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(source, target)
+
+
+def _move(source: Path, target: Path) -> None:
+    """Put a file there whole: packages that are built beside this one link what they find."""
+    beside = target.with_name(f'{target.name}.new')
+    shutil.move(source, beside)
+    beside.replace(target)
 
 
 def _run(command: Sequence[str | Path]) -> None:
