@@ -13,13 +13,19 @@ from typing import Any
 
 from action_msgs.msg import GoalStatus
 from isolation import Isolation
-from moveit_msgs.action import MoveGroup, MoveGroupSequence
+from moveit_msgs.action import ExecuteTrajectory, MoveGroup, MoveGroupSequence
 from moveit_msgs.msg import RobotState, RobotTrajectory
 import pytest
 from ros_client import RosClient
 
 from arm_planning import PlanningCode, PlanningError
-from arm_planning.ros.actions import MotionAction, REPLAN_ATTEMPTS, sequence, single_motion
+from arm_planning.ros.actions import (
+    ExecuteAction,
+    MotionAction,
+    REPLAN_ATTEMPTS,
+    sequence,
+    single_motion,
+)
 from arm_planning.ros.background import Background
 from arm_planning.ros.execution import Done, INVALIDATED
 from arm_planning.ros.planning import PlannedMotion
@@ -49,8 +55,11 @@ class Bench:
         execution: Any = SimpleNamespace(start=self._start, stop=self._stop, stops=0)
         self.execution = execution
         self.actions = [
-            MotionAction(client.node, kind, planning, self.background, execution)
-            for kind in (single_motion(planning), sequence(planning))
+            ExecuteAction(client.node, execution),
+            *(
+                MotionAction(client.node, kind, planning, self.background, execution)
+                for kind in (single_motion(planning), sequence(planning))
+            ),
         ]
 
     def _is_moving(self, _group: str) -> bool:
@@ -195,6 +204,32 @@ def test_no_part_begins_after_a_cancel(bench: Bench, stops: bool) -> None:
         PlanningCode.PREEMPTED,
     )
     assert len(bench.executions) == 1
+
+
+@pytest.mark.parametrize(
+    ('kind', 'name'),
+    [
+        (MoveGroup, 'move_action'),
+        (MoveGroupSequence, 'sequence_move_group'),
+        (ExecuteTrajectory, 'execute_trajectory'),
+    ],
+    ids=['motion', 'sequence', 'trajectory'],
+)
+def test_a_stop_between_the_request_of_a_goal_and_its_acceptance_counts(
+    bench: Bench, kind: Any, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The acceptance is delayed for the client."""
+    delays: list[float] = []
+
+    async def stop_meanwhile(_server: object, duration: float) -> None:
+        bench.execution.stops += not delays
+        delays.append(duration)
+
+    monkeypatch.setattr('node_runner.action_goals._Server._delay', stop_meanwhile)
+    status, result = bench.result(bench.send(kind, name, kind.Goal()))
+    code = getattr(result, 'response', result).error_code
+    assert (status, code.val) == (GoalStatus.STATUS_ABORTED, PlanningCode.PREEMPTED)
+    assert not bench.executions
 
 
 @pytest.mark.parametrize(

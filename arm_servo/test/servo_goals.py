@@ -19,6 +19,7 @@ class _Server:
 
     def __init__(self, node: GoalNode, *_: object, **callbacks: Any) -> None:
         node.servers.append(self)
+        self.receive = callbacks['receive']
         self.begin = callbacks['handle_accepted_callback']
         self.cancel = callbacks['cancel_callback']
         self._execute = callbacks['execute_callback']
@@ -59,14 +60,20 @@ class GoalNode:
         for callback in self._timers:
             callback()
 
-    def send(self, request: object) -> Any:
-        """Send a goal to the first server; its handle gets ``ending`` and ``result``."""
+    def send(self, request: object, meanwhile: Callable[[], object] = lambda: None) -> Any:
+        """Send a goal to the first server; its handle gets ``ending`` and ``result``.
+
+        Args:
+            meanwhile: Called between its request and its acceptance.
+        """
         handle = SimpleNamespace(request=request, ending='', result=None)
         handle.goal_id = SimpleNamespace(uuid=id(handle).to_bytes(16, 'big'))
         handle.is_cancel_requested = False
         handle.publish_feedback = handle._update_state = lambda _: None
         for name, ending in (('succeed', 'succeeded'), ('abort', 'aborted'), ('canceled',) * 2):
             setattr(handle, name, lambda ending=ending: setattr(handle, 'ending', ending))
+        self.servers[0].receive(handle.goal_id.uuid)
+        meanwhile()
         self.servers[0].begin(handle)
         return handle
 

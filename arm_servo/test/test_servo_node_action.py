@@ -15,7 +15,7 @@ from servo_drives import Drives
 from servo_goals import GoalNode
 from std_srvs.srv import Trigger
 
-from arm_servo import SpeedRequest, TargetRequest
+from arm_servo import SpeedRequest, StopRequest, TargetRequest
 from arm_servo.controllers.controller import Outcome
 from arm_servo.core.motion_queue import MotionCommand
 from arm_servo.ros.trajectory import controller
@@ -27,7 +27,9 @@ from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
 def action(monkeypatch: pytest.MonkeyPatch, drives: Drives, follow: Any) -> GoalNode:
     """Return the node of an action whose goals have trajectories for requests."""
     node: Any = GoalNode(monkeypatch)
-    TrajectoryAction(node, drives.gateway, 20.0, lambda request: follow(request.goal))
+    TrajectoryAction(
+        node, drives.gateway, 20.0, lambda request, number: follow(request.goal, number=number)
+    )
     return cast('GoalNode', node)
 
 
@@ -49,8 +51,8 @@ def test_an_unexpected_error_at_the_start_of_a_goal_is_its_result(
 ) -> None:
     """It does not leave the callback, where it would end the master and all drives with it."""
 
-    def follow(_goal: TrajectoryGoal) -> MotionCommand:
-        raise ZeroDivisionError('no such luck')
+    def follow(_goal: TrajectoryGoal, number: int) -> MotionCommand:
+        raise ZeroDivisionError(f'no such luck with {number}')
 
     node = action(monkeypatch, ready(), follow)
     goal = node.send(message(None))
@@ -95,6 +97,26 @@ def test_an_unexpected_error_of_the_planning_is_its_result(
     node.watch()
     assert good.ending == 'succeeded'
     assert good.result.error_code == GoalCode.SUCCESSFUL
+
+
+def test_a_stop_between_the_request_of_a_goal_and_its_acceptance_counts(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The acceptance is delayed for the client; the next goal moves the arm again."""
+    drives = ready()
+    node = action(monkeypatch, drives, drives.gateway.request)
+    before = drives.path[-1].tolist()
+    there = [axis.setpoint + 0.05 for axis in drives.axes]
+    wanted = message(TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(2.0, there)]))
+    goal = node.send(wanted, lambda: drives.gateway.command(StopRequest()))
+    drives.run(20)
+    node.watch()
+    assert goal.ending == 'aborted'
+    assert 'stopped before it had begun' in goal.result.error_string
+    assert drives.path[-1].tolist() == before
+    node.send(wanted)
+    drives.run(300)
+    assert drives.path[-1].tolist() == pytest.approx(there)
 
 
 def test_a_cancel_in_the_middle_of_the_planning_ends_the_goal(

@@ -24,6 +24,7 @@ from .execution import Execution, INVALIDATED, TrajectoryExecution
 from .planning import PlannedMotion, PlanningThreads, sequence_group, sequence_response
 
 STOP = 'stop'  # the event that stops everything
+STOPPED = 'everything was stopped meanwhile'
 REPLAN_ATTEMPTS = 5  # how often a goal that does not say so is planned anew at most, as in MoveIt
 STATE_WAITS, STATE_PERIOD = 10, 0.1
 """How often joint states that are unknown or too old are looked for again, or rest is waited for
@@ -35,8 +36,9 @@ Answer = Callable[[MoveItErrorCodes, PlannedMotion | None, bool], Any]
 
 @dataclass(slots=True, eq=False)
 class _Goal(ServedGoal):
-    """A goal from its acceptance to its end."""
+    """A goal from its request to its end."""
 
+    stops: int  # how often everything was stopped before its request
     execution: Execution | None = None
     outcome: tuple[PlanningCode, str] = (PlanningCode.SUCCESS, '')
 
@@ -50,7 +52,7 @@ class ExecuteAction:
             node,
             ExecuteTrajectory,
             'execute_trajectory',
-            accept=_Goal,
+            accept=lambda: _Goal(execution.stops),
             start=self._start,
             cancel=self._cancel,
             conclude=self._conclude,
@@ -64,6 +66,9 @@ class ExecuteAction:
             goal.outcome = code, reason
             self._server.end(goal)
 
+        if goal.stops != self._execution.stops:
+            done(PlanningCode.PREEMPTED, STOPPED)
+            return
         asked = goal.handle.request
         goal.execution = self._execution.start(
             asked.trajectory.joint_trajectory, done, list(asked.controller_names)
@@ -163,7 +168,6 @@ def sequence(planning: PlanningThreads) -> MotionKind:
 class _MotionGoal(_Goal):
     """A goal of which a plan is executed; why it was stopped before it is planned anew."""
 
-    stops: int = 0
     work: Future[Any] | None = None
     planned: PlannedMotion | None = None
     begun: int = 0
@@ -191,7 +195,7 @@ class MotionAction:
             node,
             kind.action,
             kind.name,
-            accept=lambda handle: _MotionGoal(handle, stops=execution.stops),
+            accept=lambda: _MotionGoal(execution.stops),
             start=self._begin_planning,
             cancel=self._cancel,
             conclude=self._conclude,
@@ -249,7 +253,7 @@ class MotionAction:
     def _follow(self, goal: _MotionGoal, planned: PlannedMotion) -> None:
         """Execute the next trajectory of a plan, or end the goal after the last."""
         if goal.stops != self._execution.stops:
-            self._end(goal, PlanningCode.PREEMPTED, 'everything was stopped meanwhile')
+            self._end(goal, PlanningCode.PREEMPTED, STOPPED)
             return
         if goal.begun == len(planned.trajectories):
             self._end(goal, PlanningCode.SUCCESS, '; '.join(planned.notes))

@@ -129,16 +129,24 @@ class CommandGateway:
         self._mailbox.post(commit)
         return future
 
+    def number(self) -> int:
+        """Return the place of a command that comes now among all commands and stops."""
+        return self._gate.number()
+
     def request(
-        self, request: MotionRequest, get_ready: Callable[[], object] = lambda: None
+        self,
+        request: MotionRequest,
+        get_ready: Callable[[], object] = lambda: None,
+        number: int | None = None,
     ) -> MotionCommand:
         """Prepare a motion, and begin it when its path is clear.
 
         Args:
+            number: Its :meth:`number`, where it came before; by default it comes now.
             get_ready: Gets back drives that others have, where the arm does not follow; called in
                 any thread, and only for a motion that is not refused from where the arm stands.
         """
-        return self._motions.request(request, get_ready)
+        return self._motions.request(request, get_ready, number)
 
     def cancel(self, command: MotionCommand, reason: str) -> None:
         """End a motion: before its begin it does not begin, later the arm comes to rest."""

@@ -116,10 +116,16 @@ class MotionQueue:
         self._waiting: deque[MotionCommand] = deque()
         self._preparing: MotionCommand | None = None
 
-    def request(self, request: MotionRequest, get_ready: Callable[[], object]) -> MotionCommand:
+    def request(
+        self,
+        request: MotionRequest,
+        get_ready: Callable[[], object],
+        number: int | None = None,
+    ) -> MotionCommand:
         """Prepare a motion, and begin it when its path is clear."""
         with self._lock:
-            command = MotionCommand(request, self._mailbox.gate.number(), self._clock(), get_ready)
+            number = self._mailbox.gate.number() if number is None else number
+            command = MotionCommand(request, number, self._clock(), get_ready)
             is_full = len(self._waiting) >= MAX_QUEUED_MOTIONS
             if not is_full:
                 self._waiting.append(command)

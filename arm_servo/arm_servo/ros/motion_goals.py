@@ -29,8 +29,9 @@ START_TIMEOUT = 5.0  # time in which a goal must be planned and taken by the cyc
 
 @dataclass(slots=True, eq=False)
 class MotionGoal(ServedGoal):
-    """A goal from its acceptance to its end."""
+    """A goal from its request to its end."""
 
+    number: int  # its place among all commands and stops
     command: MotionCommand | None = None  # None for a goal that is refused at once
     begin: float = field(default_factory=time.monotonic)
     outcome: Outcome | None = None  # how it ended; None while it goes on
@@ -49,7 +50,7 @@ class MotionGoals(GoalServer[GoalT]):
         action: Any,  # noqa: ANN401  # rclpy has no types here
         name: str,
         *,
-        accept: Callable[[Any], GoalT],
+        accept: Callable[[int], GoalT],
         request: Callable[[GoalT], MotionCommand],
         canceled: str,
         conclude: Callable[[GoalT], tuple[Ending, Any]],
@@ -58,7 +59,9 @@ class MotionGoals(GoalServer[GoalT]):
         """Offer the action.
 
         Args:
-            request: Requests the motion of a goal; raises an ArmError where it is refused.
+            accept: Makes the record of a goal from its number.
+            request: Requests the motion of a goal with its number; raises an ArmError where it
+                is refused.
             canceled: Reason of an outcome that a client has asked for.
         """
         self._gateway = gateway
@@ -67,7 +70,7 @@ class MotionGoals(GoalServer[GoalT]):
             node,
             action,
             name,
-            accept=accept,
+            accept=lambda: accept(gateway.number()),
             start=self._order,
             cancel=self._end_motion,
             conclude=conclude,

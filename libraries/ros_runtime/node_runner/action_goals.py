@@ -12,6 +12,7 @@ import time
 import traceback
 from typing import Any, Generic, TypeVar
 
+from builtin_interfaces.msg import Time
 from rclpy.action.server import ActionServer, CancelResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock
@@ -29,7 +30,8 @@ ANSWER_DELAY = 0.02
 Clients of rclpy 7.1 note a request after it was sent, and drop an answer that another thread gets
 before: 1 of 40 motions of pymoveit2 waited for ever. Python switches threads every 5 ms, and with
 several of them, or on a busy computer, it takes some switches. Cancel requests are not delayed,
-because the motion would go on meanwhile.
+because the motion would go on meanwhile. The record of a goal is made when its request comes, so
+that a stop during the delay counts for it.
 """
 
 REPEATS = (0.5, 1.5)
@@ -49,9 +51,19 @@ delay; [s] at most. Nothing shows that a result was noted; this pace shows how l
 class _Server(ActionServer):
     """Answers when the client has noted its request, see ``ANSWER_DELAY`` and ``REPEATS``."""
 
-    def __init__(self, *args: Any, **kwargs: Any) -> None:  # noqa: ANN401  # as of rclpy
+    def __init__(
+        self,
+        *args: Any,  # noqa: ANN401  # as of rclpy
+        receive: Callable[[bytes], None],
+        forget: Callable[[bytes], None],
+        cancel_received: Callable[[], None],
+        **kwargs: Any,  # noqa: ANN401
+    ) -> None:
+        """Call with each goal when it comes, when it was accepted or not, and to cancel all."""
         self._came_at: dict[bytes, float] = {}
         """When goals came whose result was not yet requested [s]."""
+        self._receive, self._forget = receive, forget
+        self._cancel_received = cancel_received
         super().__init__(*args, **kwargs)
 
     async def _execute_goal_request(self, request: Any) -> None:  # noqa: ANN401  # rclpy has no types
@@ -60,10 +72,18 @@ class _Server(ActionServer):
         is_new = uuid not in self._came_at
         if is_new:
             self._came_at[uuid] = time.monotonic()
+        self._receive(uuid)
         await self._delay(ANSWER_DELAY)
         if is_new:
             self._node.executor.create_task(self._accept_again, header, uuid)
         await super()._execute_goal_request(request)
+        self._forget(uuid)
+
+    async def _execute_cancel_request(self, request: Any) -> None:  # noqa: ANN401
+        asked = request[1].goal_info
+        if not any(asked.goal_id.uuid) and asked.stamp == Time():  # all goals are canceled
+            self._cancel_received()
+        await super()._execute_cancel_request(request)
 
     async def _execute_get_result_request(self, request: Any) -> None:  # noqa: ANN401
         now = time.monotonic()
@@ -112,9 +132,10 @@ class Ending(Enum):
 
 @dataclass(slots=True, eq=False)
 class ServedGoal:
-    """A goal from its acceptance to its result; servers derive from it what they remember."""
+    """A goal from its request to its result; servers derive from it what they remember."""
 
-    handle: Any  # rclpy's ``ServerGoalHandle``
+    handle: Any = field(default=None, init=False)  # rclpy's ``ServerGoalHandle``, once accepted
+    is_canceled_early: bool = field(default=False, init=False)  # canceled before its acceptance
     has_ended: bool = field(default=False, init=False)  # whether its result is on the way
     failure: Exception | None = field(default=None, init=False)  # why it could not be started
 
@@ -131,7 +152,7 @@ class GoalServer(Generic[GoalT]):
         action: Any,  # noqa: ANN401  # rclpy has no types here
         name: str,
         *,
-        accept: Callable[[Any], GoalT],
+        accept: Callable[[], GoalT],
         start: Callable[[GoalT], None],
         cancel: Callable[[GoalT], None],
         conclude: Callable[[GoalT], tuple[Ending, Any]],
@@ -141,8 +162,9 @@ class GoalServer(Generic[GoalT]):
         """Offer the action; all callbacks run in the executor, and none of them ends it.
 
         Args:
-            accept: Makes the record of a goal from its handle.
-            start: Begins with a goal.
+            accept: Makes the record of a goal when its request comes: what was stopped since
+                then must not begin.
+            start: Begins with a goal, ``ANSWER_DELAY`` after its request.
             cancel: Begins to end a goal that a client cancels; where it raises, the client's
                 request is rejected.
             conclude: Returns status and result message of a goal that has ended.
@@ -151,6 +173,7 @@ class GoalServer(Generic[GoalT]):
             refusals: What ``start`` raises for goals that cannot be carried out; anything else is
                 a defect, and has its traceback in the log.
         """
+        self._received: dict[bytes, GoalT] = {}  # goals that are not accepted yet
         self._goals: dict[bytes, GoalT] = {}
         self._accept, self._start, self._cancel = accept, start, cancel
         self._conclude, self._fail, self._refusals = conclude, fail, refusals
@@ -162,6 +185,9 @@ class GoalServer(Generic[GoalT]):
             execute_callback=self._answer,
             handle_accepted_callback=self._begin,
             cancel_callback=self._end_early,
+            receive=self._receive,
+            forget=self._forget,
+            cancel_received=self._cancel_received,
             result_timeout=RESULT_TIMEOUT,
             # an executor that heeds groups would wait in one for the timer of the same
             callback_group=ReentrantCallbackGroup(),
@@ -182,15 +208,30 @@ class GoalServer(Generic[GoalT]):
         """Withdraw the action; goals are answered no more."""
         self._server.destroy()
 
+    def _receive(self, uuid: bytes) -> None:
+        self._received.setdefault(uuid, self._accept())
+
+    def _forget(self, uuid: bytes) -> None:
+        self._received.pop(uuid, None)
+
+    def _cancel_received(self) -> None:
+        for goal in self._received.values():
+            goal.is_canceled_early = True
+
     def _begin(self, handle: Any) -> None:  # noqa: ANN401
         # handle.execute() would end the goal when its callback returns, which is now
         handle._update_state(rclpy_implementation.GoalEvent.EXECUTE)  # noqa: SLF001
-        goal = self._goals[bytes(handle.goal_id.uuid)] = self._accept(handle)
+        uuid = bytes(handle.goal_id.uuid)
+        goal = self._goals[uuid] = self._received[uuid]
+        goal.handle = handle
         try:
             self._start(goal)
         except Exception as error:  # noqa: BLE001  # the goal is answered with it
             goal.failure = error
             self.end(goal)
+        if goal.is_canceled_early and not goal.has_ended:
+            handle._update_state(rclpy_implementation.GoalEvent.CANCEL_GOAL)  # noqa: SLF001
+            self._end_early(handle)
 
     def _end_early(self, handle: Any) -> CancelResponse:  # noqa: ANN401
         goal = self._goals.get(bytes(handle.goal_id.uuid))

@@ -11,6 +11,7 @@ import time
 from typing import Any
 
 from action_msgs.msg import GoalStatus
+from action_msgs.srv import CancelGoal
 from isolation import Isolation
 import pytest
 import rclpy
@@ -28,7 +29,10 @@ TIMEOUT = 20.0  # [s]
 
 
 def serve(
-    node: Node, start: Callable[[ServedGoal], None], ending: Ending | None = Ending.SUCCEEDED
+    node: Node,
+    start: Callable[[ServedGoal], None],
+    ending: Ending | None = Ending.SUCCEEDED,
+    accept: Callable[[], ServedGoal] = ServedGoal,
 ) -> GoalServer[ServedGoal]:
     """Serve goals of an action; a cancel ends them; without an ending all callbacks raise."""
 
@@ -49,7 +53,7 @@ def serve(
         node,
         LookupTransform,
         'look_up',
-        accept=ServedGoal,
+        accept=accept,
         start=start,
         cancel=cancel,
         conclude=conclude,
@@ -121,6 +125,34 @@ def test_a_goal_ends_once_with_the_status_of_its_server(
         client.spin_until(result.done, TIMEOUT, 'a result')
         assert result.result().status == status
         assert not server.running
+        server.destroy()
+
+
+@pytest.mark.slow
+def test_a_cancel_of_all_goals_counts_for_one_that_is_not_accepted_yet(
+    isolation: Isolation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The acceptance is delayed for the client; the goal would begin after the cancel."""
+    monkeypatch.setattr(action_goals, 'ANSWER_DELAY', 1.0)
+    received: list[ServedGoal] = []
+
+    def accept() -> ServedGoal:
+        received.append(ServedGoal())
+        return received[-1]
+
+    with RosClient(isolation.domain_id) as client:
+        server = serve(client.node, lambda _: None, Ending.CANCELED, accept)
+        caller = client.action(LookupTransform, 'look_up')
+        assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
+        sent = caller.send_goal_async(LookupTransform.Goal())  # type: ignore[no-untyped-call]
+        client.spin_until(lambda: bool(received), TIMEOUT, 'the request')
+        cancel = client.call_async(CancelGoal, 'look_up/_action/cancel_goal', CancelGoal.Request())
+        client.spin_until(cancel.done, TIMEOUT, 'the answer to the cancel')
+        assert not sent.done()
+        client.spin_until(sent.done, TIMEOUT, 'acceptance')
+        result = sent.result().get_result_async()
+        client.spin_until(result.done, TIMEOUT, 'a result')
+        assert result.result().status == GoalStatus.STATUS_CANCELED
         server.destroy()
 
 

@@ -35,7 +35,7 @@ NO_EFFORT_LIMIT = (
 
 @dataclass(slots=True, eq=False)
 class _Goal(MotionGoal):
-    """A goal from its acceptance to its end."""
+    """A goal from its request to its end."""
 
     problem: str = ''  # why it cannot go on; empty while it can
     last_motion: float = field(default_factory=time.monotonic)
@@ -95,7 +95,7 @@ class GripperController:
         if interface.asks_effort(goal.handle.request) and not self._has_warned:
             self._has_warned = True
             self._node.get_logger().warning(NO_EFFORT_LIMIT)
-        return self._gateway.request(request, self._prepare)
+        return self._gateway.request(request, self._prepare, goal.number)
 
     def _watch(self) -> None:
         measured = self._gateway.snapshot.measured

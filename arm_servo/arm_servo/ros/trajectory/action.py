@@ -31,13 +31,13 @@ class TrajectoryAction:
         node: Node,
         gateway: CommandGateway,
         rate: float,
-        follow: Callable[[Any], MotionCommand],
+        follow: Callable[[Any, int], MotionCommand],
     ) -> None:
         """Offer ``~/follow_joint_trajectory``.
 
         Args:
             rate: Rate of the feedback in [Hz].
-            follow: Requests the trajectory of a goal message; raises an ArmError.
+            follow: Requests the trajectory of a goal message with its number; raises an ArmError.
         """
         self._node, self._gateway = node, gateway
         self._goals = MotionGoals(
@@ -46,7 +46,7 @@ class TrajectoryAction:
             FollowJointTrajectory,
             '~/follow_joint_trajectory',
             accept=MotionGoal,
-            request=lambda goal: follow(goal.handle.request),
+            request=lambda goal: follow(goal.handle.request, goal.number),
             canceled='canceled: at rest on the path',
             conclude=self._conclude,
             fail=self._fail,

@@ -148,13 +148,15 @@ class TrajectoryController:
     def _now(self) -> float:
         return float(self._node.get_clock().now().nanoseconds) * 1e-9
 
-    def _follow(self, request: Any) -> MotionCommand:  # noqa: ANN401  # goals have no type
+    def _follow(self, request: Any, number: int) -> MotionCommand:  # noqa: ANN401  # goals have no type
         goal = goal_of_action(request, self._now, self._parameters)
-        return self._request(goal, self._prepare)
+        return self._request(goal, self._prepare, number)
 
-    def _request(self, goal: TrajectoryGoal, get_ready: Callable[[], object]) -> MotionCommand:
+    def _request(
+        self, goal: TrajectoryGoal, get_ready: Callable[[], object], number: int | None = None
+    ) -> MotionCommand:
         self.check_active()
-        command = self._gateway.request(goal, get_ready)
+        command = self._gateway.request(goal, get_ready, number)
         command.future.add_done_callback(self._remember)
         return command
 
