@@ -374,8 +374,9 @@ class TrajectoryExecution:
     def _speed(self, name: str) -> float:
         """Return the speed override of a controller: 0 in a pause, 1 where it is unknown.
 
-        It notes whether the reference of the controller moves, too. Many releases of joint_trajectory_controller do not fill the field: a 0 is a pause only
-        after another number.
+        It notes whether the reference of the controller moves, too. Many releases of
+        joint_trajectory_controller do not fill the field: a 0 is a pause only after another
+        number.
         """
         at, message = self._states.get(name, (-math.inf, b''))
         if time.monotonic() - at > STATE_TIMEOUT:
