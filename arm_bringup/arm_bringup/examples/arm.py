@@ -52,6 +52,9 @@ from ..stack import MASTER
 
 ANSWER_TIMEOUT = 30.0
 """Longest time for an answer in [s]."""
+QUEUE = 5
+"""States of the arm that wait: a demo which a busy computer holds up misses some, and sees where
+the arm is now."""
 ENABLE_TIMEOUT = 15.0
 """Longest time in [s] for all drives to be enabled, and for them to be in their mode."""
 ENABLED = 'Operation enabled'

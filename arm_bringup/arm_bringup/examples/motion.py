@@ -39,7 +39,7 @@ from ..robots import Robot
 from ..service_client import ServiceClient
 from ..session import Session
 from ..stack import MOTION_NODE
-from .arm import ActionRun, ArmDemo, EndRequested, number, parse, run
+from .arm import ActionRun, ArmDemo, EndRequested, number, parse, QUEUE, run
 
 RATE = 100.0
 """Rate of the controller's states in [Hz]."""
@@ -48,8 +48,8 @@ JOG_PERIOD = 0.02
 LATE_COMMANDS = 0.05
 """Time between two jog commands in [s] from which on the tool may stop in between: each counts
 for 0.1 s, of which its way to the servo takes some."""
-SETTLE, FRESH = 0.35, 0.1
-"""Least pause after a motion, and age up to which a state says where the arm is now, in [s]."""
+SETTLE = 0.35
+"""Least pause after a motion in [s]."""
 MOTION_TIMEOUT = 60.0
 """Longest time of a trajectory in [s]."""
 
@@ -76,9 +76,10 @@ way back may take twice as long."""
 
 WAYS = (0.5, 0.25, 0.1)
 """How far joints go in a trajectory in [rad] or [m], the first that is free."""
-LIMIT_SHARE, VELOCITY_SHARE, SHORTEST = 0.6, 0.35, 1.5
+LIMIT_SHARE, VELOCITY_SHARE, SHORTEST, CANCELED = 0.6, 0.35, 1.5, 5.0
 """Share of the limits of acceleration and jerk, and of speed, that a trajectory uses (a drive that
-waits for a busy computer must not lose its path), and its shortest time in [s]."""
+waits for a busy computer must not lose its path), its shortest time in [s], and that of one which
+is canceled: on a busy computer the cancel takes a second."""
 SLOW = 0.3
 """Speed override."""
 
@@ -153,7 +154,7 @@ class Motion(ArmDemo):
         )
         self._action_name = f'{self.controller}/follow_joint_trajectory'
         self._action = ActionClient(node, FollowJointTrajectory, self._action_name)
-        node.create_subscription(state, f'{self.controller}/controller_state', self._take, 50)
+        node.create_subscription(state, f'{self.controller}/controller_state', self._take, QUEUE)
         node.create_subscription(ServoStatus, 'servo_node/status', self._take_status, 10)
         return client
 
@@ -312,7 +313,7 @@ class Motion(ArmDemo):
         """Cancel a trajectory in its middle: it comes to rest on its path."""
         self.enter('a trajectory, canceled')
         begin, end, nominal, first = self._plan()
-        goal = self._send(end, nominal)
+        goal = self._send(end, max(nominal, CANCELED))
         self._reach(goal, begin, end, 0.4)
         goal.cancel()
         self._rest()
@@ -410,11 +411,10 @@ class Motion(ArmDemo):
     def _rest(self) -> None:
         """Wait until the arm rests, and what is known of it is new."""
         self.pause(SETTLE)
-        clock = self.client.node.get_clock()
+        asked = 1e-9 * self.client.node.get_clock().now().nanoseconds
 
         def at_rest() -> bool:
-            age = 1e-9 * clock.now().nanoseconds - self.last.time
-            return age < FRESH and not self.last.velocity.any()
+            return self.last.time > asked and not self.last.velocity.any()
 
         self.wait_moving(at_rest, MOTION_TIMEOUT, 'the arm to rest')
 

@@ -45,6 +45,7 @@ from urdf_reader import JointRange, read_urdf
 
 import arm_model
 from arm_model import ArmError, Array, Clearances, load_limits, RobotModel, start_pose
+from arm_model.ros import seconds
 from arm_planning import PlanningCode
 from node_runner import LATCHED
 from process_supervisor import CallError, namespaced_parameters, RosOptions
@@ -57,10 +58,12 @@ from ..robots import Robot
 from ..service_client import ServiceClient
 from ..session import locate, Session
 from ..stack import MOTION_NODE
-from .arm import ActionRun, ANSWER_TIMEOUT, ArmDemo, EndRequested, parse, run
+from .arm import ActionRun, ANSWER_TIMEOUT, ArmDemo, EndRequested, parse, QUEUE, run
 
 SLOW, CAREFUL, FREE = 0.1, 0.2, 0.5
 """Shares of the limits at which the arm meets a box, follows lines, moves freely."""
+LONG = 15.0
+"""Time in [s] in which a box can appear on a way: an arm of low limits meets it less slowly."""
 PLANNING_TIME, IK_TIMEOUT = 5.0, 0.5
 """Longest time for planning, as MoveGroupInterface asks for, and for inverse kinematics in [s]."""
 JOINT_TOLERANCE, POSITION_TOLERANCE, TURN_TOLERANCE = 1e-4, 1e-4, 1e-3
@@ -78,7 +81,7 @@ EARLY = 0.15
 AT_REST, REST_STATES, SHORT_REST_STATES = 5e-4, 16, 4
 """An arm rests whose joints move less than so far in [rad] or [m], in so many joint states; what
 is planned anew while a motion goes on may follow the rest within a tenth of a second."""
-EDGES, SHARES, ROOM = (0.08, 0.06, 0.04, 0.03, 0.02), (0.6, 0.5, 0.7, 0.45), 0.06
+EDGES, SHARES, ROOM = (0.08, 0.06, 0.04, 0.03, 0.02), (0.65, 0.6, 0.75, 0.5), 0.06
 """Edges of a box in the way as shares of the arm's reach, the largest that is possible is taken;
 where on a path it appears; and its least distance from both ends, as a share of the reach."""
 LEAST_REACH, LEAST_WAY, TURN, FAR = 0.05, 0.25, 2.0, 1.0
@@ -244,7 +247,7 @@ class Plan(ArmDemo):
         self._validity = node.create_client(GetStateValidity, 'check_state_validity')
         if self.cell is not None and self.cell.gripper:
             self._gripper = ActionClient(node, GripperCommand, self.gripper_action)
-        node.create_subscription(JointState, 'joint_states', self._take_joints, 50)
+        node.create_subscription(JointState, 'joint_states', self._take_joints, QUEUE)
         path, scene = 'display_planned_path', 'monitored_planning_scene'
         node.create_subscription(DisplayTrajectory, path, self.paths.append, LATCHED)
         node.create_subscription(PlanningScene, scene, self._take_scene, LATCHED)
@@ -364,23 +367,35 @@ class Plan(ArmDemo):
         above = cell.tip_at(place, APPROACH * cell.reach)
         return self._go(name, self._solve(above, cell.above[place], free=True), FREE)
 
-    def _meet(self, target: Mapping[str, float]) -> None:
-        """Put a box in the way of a motion: the arm stops, and the goal is reached around it."""
+    def _meet(self, target: Mapping[str, float], speed: float = SLOW) -> None:
+        """Put a box in the way of a motion: the arm stops, and the goal is reached around it.
+
+        Args:
+            target: Where the motion ends, by joint.
+            speed: Share of the limits at which the arm moves.
+        """
         name = 'box in the way'
         self.enter('slowly on, until a box appears in the way')
         shown = len(self.paths)
-        goal = self._send(target, SLOW, replan=True)
+        goal = self._send(target, speed, replan=True)
         end = np.array([target[joint] for joint in self.model.joints])
         begin = self._here()
 
-        def on_the_way() -> bool:
+        def begins() -> bool:
             executes = any(each.state == 'MONITOR' for each in goal.feedback)
-            done = np.abs(self._here() - begin).max() / max(np.abs(end - begin).max(), 1e-9)
-            return goal.done or (executes and len(self.paths) > shown and done > EARLY)
+            return goal.done or (executes and len(self.paths) > shown)
 
+        def on_the_way() -> bool:
+            done = np.abs(self._here() - begin).max() / max(np.abs(end - begin).max(), 1e-9)
+            return goal.done or done > EARLY
+
+        self.wait_moving(begins, MOTION_TIMEOUT, 'motion')
+        rows = [] if goal.done else self._rows(self.paths[-1])
+        visitor = box_ahead(self.model, rows) if rows else None  # it takes its time: before
         self.wait_moving(on_the_way, MOTION_TIMEOUT, 'motion')
-        rows = [] if goal.done else self._ahead(self.paths[-1])
-        visitor = box_ahead(self.model, rows) if rows else None
+        room = ROOM * max(self.model.reach, LEAST_REACH)
+        if goal.done or (visitor and distance_of(self.model, visitor, self._here()) < room):
+            visitor = None
         if visitor is None:
             self._finish(name, goal, target)
             report = self.add if self.cell is None else self.problem
@@ -420,7 +435,8 @@ class Plan(ArmDemo):
             return
         self.enter('to the farthest pose, by free motion')
         self._go('there', self._joints(far), FREE)
-        self._meet(self._joints(self.home))
+        lasted = seconds(self.paths[-1].trajectory[-1].joint_trajectory.points[-1].time_from_start)
+        self._meet(self._joints(self.home), float(np.clip(FREE * lasted / LONG, SLOW, FREE)))
 
     def _refused(self, name: str, target: Mapping[str, float], obstacle: str) -> None:
         """Judge a goal that is in contact: it is refused, the obstacle is named, nothing moves."""
@@ -545,15 +561,14 @@ class Plan(ArmDemo):
     def _joints(self, positions: Array) -> dict[str, float]:
         return dict(zip(self.model.joints, positions.tolist(), strict=True))
 
-    def _ahead(self, path: DisplayTrajectory) -> list[Array]:
-        """Return positions of the arm on what is left of a path, from where they are."""
-        here, rows = self._here(), []
+    def _rows(self, path: DisplayTrajectory) -> list[Array]:
+        """Return positions of the arm on a path."""
+        rows = []
         for each in path.trajectory:
             names = list(each.joint_trajectory.joint_names)
             order = [names.index(joint) for joint in self.model.joints]
             rows += [np.array(point.positions)[order] for point in each.joint_trajectory.points]
-        passed = min(range(len(rows)), key=lambda row: float(np.abs(rows[row] - here).max()))
-        return [here, *rows[passed + 1 :]]
+        return rows
 
     def _send(
         self, target: Mapping[str, float] | Pose, speed: float, *, replan: bool = False
