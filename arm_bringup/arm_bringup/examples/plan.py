@@ -76,14 +76,16 @@ DURATION_MARGIN = 20.0
 WORST_JOINT, WORST_PLACE, STILL = 5e-3, 2e-3, 1e-2
 """Farthest that a joint may stand from its goal in [rad] or [m], that a tool or the part may be
 from theirs in [m], and that joints move of an arm that was refused a motion in [rad] or [m]."""
-EARLY = 0.15
-"""Share of the way after which a box appears."""
+EARLY, CHOSEN = 0.15, 0.25
+"""Shares of the way after which a box appears, and after which the arm is still clear of it."""
 AT_REST, REST_STATES, SHORT_REST_STATES = 5e-4, 16, 4
 """An arm rests whose joints move less than so far in [rad] or [m], in so many joint states; what
 is planned anew while a motion goes on may follow the rest within a tenth of a second."""
-EDGES, SHARES, ROOM = (0.08, 0.06, 0.04, 0.03, 0.02), (0.65, 0.6, 0.75, 0.5), 0.06
+EDGES, SHARES, ROOM = (0.08, 0.06, 0.04, 0.03, 0.02), (0.6, 0.5, 0.7, 0.45), 0.06
 """Edges of a box in the way as shares of the arm's reach, the largest that is possible is taken;
 where on a path it appears; and its least distance from both ends, as a share of the reach."""
+LEAST_TURN = 1.0
+"""How far a joint must turn for a box to have room on its way in [rad]."""
 LEAST_REACH, LEAST_WAY, TURN, FAR = 0.05, 0.25, 2.0, 1.0
 """Reach of an arm that is shorter in [m]; least way of the tip to a pose as a share of it; turn
 of the first joint in [rad] or [m]; and the distance beyond which all count as this in [m]."""
@@ -307,6 +309,8 @@ class Plan(ArmDemo):
         self.enter('home, by free motion')
         self._go('home', home, FREE)
         joint, place = cell.aside
+        if abs(place - home[joint]) < LEAST_TURN:  # a robot of others that begins elsewhere
+            place = -place
         self._meet({**home, joint: place})
         pillar, grasp = cell.at(0.0, 0.15 * cell.reach), cell.tip_at(source)
         inside = Pose(position=Point(x=pillar[0], y=pillar[1], z=pillar[2]))
@@ -391,10 +395,11 @@ class Plan(ArmDemo):
 
         self.wait_moving(begins, MOTION_TIMEOUT, 'motion')
         rows = [] if goal.done else self._rows(self.paths[-1])
+        rows = rows[int(CHOSEN * len(rows)) :]
         visitor = box_ahead(self.model, rows) if rows else None  # it takes its time: before
         self.wait_moving(on_the_way, MOTION_TIMEOUT, 'motion')
-        room = ROOM * max(self.model.reach, LEAST_REACH)
-        if goal.done or (visitor and distance_of(self.model, visitor, self._here()) < room):
+        least = 0.5 * ROOM * max(self.model.reach, LEAST_REACH)
+        if goal.done or (visitor and distance_of(self.model, visitor, self._here()) < least):
             visitor = None
         if visitor is None:
             self._finish(name, goal, target)
