@@ -62,13 +62,15 @@ class PhysicsRig:
         policy: PolicyRunner | None = None,
         urdf: str = URDF,
         sense: Callable[[RobotState], RobotState] = lambda state: state,
+        *,
+        states: StateParameters | None = None,
     ) -> None:
         """Stand up, by what the robot's sensors say."""
         self._sense = sense
         self.robot, self.model, self._urdf = robot or Robot(urdf), quadruped(urdf), urdf
         self._backend = PhysicsBackend(self.robot, PERIOD)
         self.controller = Controller(
-            self.model, gait or GaitParameters(), StateParameters(), policy=policy
+            self.model, gait or GaitParameters(), states or StateParameters(), policy=policy
         )
         self.tilt = 0.0
         self.step(REST)

@@ -13,6 +13,7 @@ from random import Random
 
 import pytest
 
+from quad_builds import go2_urdf
 from quad_controller import (
     BodyPose,
     Controller,
@@ -22,7 +23,7 @@ from quad_controller import (
     Velocity,
 )
 from quad_controller.gait.parameters import AS_TUNED, LOW_AND_WIDE
-from quad_description import robot_urdf, RobotState, Targets
+from quad_description import quadruped, robot_urdf, RobotState, Targets
 from quad_description.rotations import about_z, multiply, roll_pitch_yaw
 from quad_gait_physics import FIRM, firm, MODEL, PERIOD, PhysicsRig
 from quad_hardware.estimation import ImuMounting, OdometrySettings
@@ -31,6 +32,7 @@ from quad_hardware.estimation.odometry import LegOdometry
 from quad_sim import ServoModel as ServoModels
 from quad_sim import Terrain
 from quad_sim.physics import PhysicsBackend, Robot
+from quad_sim.plant.servo import parse_servo
 
 pytestmark = pytest.mark.slow
 
@@ -96,6 +98,36 @@ def test_other_builds_of_the_robot_walk_too(preset: str, arm: bool) -> None:
     assert not rig.faulted
     assert travel.x == pytest.approx(0.2, abs=0.03)
     assert travel.tilt < LEVEL
+
+
+@pytest.mark.parametrize(
+    'velocity',
+    [Velocity(1.0), Velocity(0.5), Velocity(-0.5), Velocity(0.0, 0.3), Velocity(0.0, 0.0, 1.0)],
+)
+def test_a_robot_of_another_size_trots_by_its_own_urdf(velocity: Velocity) -> None:
+    """Three times the legs of the XGO: the gait's times grow with them, limits are the URDF's."""
+    urdf, pose = go2_urdf(), {'hip': 0.0, 'thigh': 0.8, 'calf': -1.5}
+    servo = parse_servo('kp=60,kv=5,damping=0.1,armature=0.01')
+    start = {name: pose[name.split('_')[1]] for name in quadruped(urdf).names}
+    gait = GaitParameters(
+        nominal_height=0.28,
+        swing_height=0.05,
+        foot_speed=1.2,
+        max_linear_velocity_x=1.2,
+        max_linear_velocity_y=0.4,
+        servo=ServoModel(kp=60.0, damping=5.1),
+    )
+    rig = PhysicsRig(
+        Robot(urdf, servo, pose=start), gait, urdf=urdf, states=StateParameters(lie_height=0.12)
+    )
+    rig.mode('walk')
+    rig.run(2.0, velocity)
+    travel = rig.travel(8.0, velocity)
+    assert not rig.faulted
+    assert travel.x == pytest.approx(velocity.x, abs=0.1)
+    assert travel.y == pytest.approx(velocity.y, abs=0.1)
+    assert travel.yaw == pytest.approx(velocity.yaw, abs=0.1)
+    assert travel.tilt < math.radians(12.0)
 
 
 @pytest.mark.parametrize('gait', ['crawl', 'pace'])

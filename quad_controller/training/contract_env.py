@@ -54,7 +54,7 @@ class GaitTeacher:
     def __init__(self, robot: Quadruped, parameters: GaitParameters) -> None:
         """Use the trot of some parameters."""
         self._robot, self._parameters = robot, parameters
-        self.schedule = parameters.schedule(Gait.TROT)
+        self.schedule = parameters.schedule(Gait.TROT, robot.leg_length)
         self._neutral = parameters.stance(robot, [0.0] * len(robot.names))
         self._lift = SwingLift(robot, self._neutral, self.schedule, parameters.swing_height)
 

@@ -73,3 +73,51 @@ def urdf(build: Build | None = None) -> str:
         + (arm if build.arm else '')
         + '</robot>'
     )
+
+
+GO2_JOINTS = {  # place, axis, limits [rad], torque [N m] and speed [rad/s] of Unitree's URDF
+    'hip': ('{x} {hip_y} 0', '1 0 0', (-1.0472, 1.0472), 23.7, 30.1),
+    'thigh': ('0 {thigh_y} 0', '0 1 0', (-1.5708, 3.4907), 23.7, 30.1),
+    'calf': ('0 0 -0.213', '0 1 0', (-2.7227, -0.83776), 45.43, 15.7),
+}
+GO2_MASSES = {'hip': (0.678, 0.0, 0.0007), 'thigh': (1.152, -0.027, 0.005),
+              'calf': (0.154, -0.1, 0.001)}  # fmt: skip
+"""Mass [kg], centre below the joint [m], moment of inertia [kg m2]."""
+
+
+def go2_urdf() -> str:
+    """Return a robot with lengths, masses and limits of a Unitree Go2, and our names."""
+    parts = [
+        '<robot name="go2">' + body('base_link', 6.921, 0.0, 0.08) + '<link name="imu_link"/>'
+        '<joint name="imu" type="fixed"><parent link="base_link"/><child link="imu_link"/></joint>'
+    ]
+    for name in LEGS:
+        front, side = (1 if name[0] == 'f' else -1), (1 if name[1] == 'l' else -1)
+        places = {'x': 0.1934 * front, 'hip_y': 0.0465 * side, 'thigh_y': 0.0955 * side}
+        parent = 'base_link'
+        for part, (xyz, axis, (lower, upper), effort, velocity) in GO2_JOINTS.items():
+            link = f'{name}_{part}'
+            parts.append(
+                f'<joint name="{link}_joint" type="revolute"><parent link="{parent}"/>'
+                f'<child link="{link}"/><origin xyz="{xyz.format(**places)}"/>'
+                f'<axis xyz="{axis}"/><limit lower="{lower}" upper="{upper}" effort="{effort}" '
+                f'velocity="{velocity}"/></joint>' + body(link, *GO2_MASSES[part])
+            )
+            parent = link
+        parts.append(
+            f'<joint name="{name}_foot" type="fixed"><parent link="{parent}"/>'
+            f'<child link="{name}_foot"/><origin xyz="0 0 -0.213"/></joint><link '
+            f'name="{name}_foot"><inertial><mass value="0.04"/><inertia ixx="1e-5" iyy="1e-5" '
+            'izz="1e-5" ixy="0" ixz="0" iyz="0"/></inertial><collision><geometry>'
+            '<sphere radius="0.022"/></geometry></collision></link>'
+        )
+    return ''.join(parts) + '</robot>'
+
+
+def body(link: str, mass: float, height: float, moment: float) -> str:
+    """Return a link of a mass [kg] that is centred below its joint [m]."""
+    return (
+        f'<link name="{link}"><inertial><mass value="{mass}"/><origin xyz="0 0 {height}"/>'
+        f'<inertia ixx="{moment}" iyy="{moment}" izz="{moment}" ixy="0" ixz="0" iyz="0"/>'
+        '</inertial></link>'
+    )

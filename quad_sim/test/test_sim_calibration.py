@@ -5,15 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+import os
 from pathlib import Path
+from subprocess import run
 
+from processes import executable, RunningProcess
 import pytest
-from sim_serial import serve
 from sim_virtual import TICK, VirtualRobot
 
 from quad_description import movable_joints, robot_urdf
 from quad_hardware import CommandError
-from quad_hardware.calibration.main import run_calibrate
 from quad_hardware.calibration.servo_fit import ServoFit
 from quad_hardware.calibration.servos import calibrate_servos
 from quad_hardware.calibration.wizard import Console
@@ -54,6 +55,8 @@ class Line:
         self.robot = VirtualRobot(*arguments, protocol=protocol)
         self.dialect = (V1Dialect if protocol is V1 else V2Dialect)(0.0)
         self._reports: list[Report] = []
+        self._first: dict[int, float] = {}
+        self.swung: set[int] = set()  # motors that were sent anywhere
 
     def now(self) -> float:
         """Return the virtual time [s]."""
@@ -78,6 +81,7 @@ class Line:
 
     def command(self, angles: Mapping[int, float]) -> float:
         """Send angles [deg]; return when they had left."""
+        self.swung |= {m for m, a in angles.items() if a != self._first.setdefault(m, a)}
         self.dialect.command(angles)
         while (sent := self._pass()) < 0.0:
             pass
@@ -104,7 +108,9 @@ def calibrate(servo: str, protocol: Protocol, *arguments: str) -> tuple[ServoFit
     """Identify the servos of a robot on a stand."""
     person = Person()
     line = Line('--held', '--start', 'stand', '--servo', servo, *arguments, protocol=protocol)
-    return calibrate_servos(person, line, SERVOS, URDF, 'fl'), person.said
+    found = calibrate_servos(person, line, SERVOS, URDF, 'fl')
+    assert line.swung == {12}  # that of the thigh
+    return found, person.said
 
 
 @pytest.mark.parametrize(
@@ -131,7 +137,7 @@ def test_hidden_servos_are_found(protocol: Protocol, servo: tuple[float, ...]) -
 @pytest.mark.parametrize(
     ('arguments', 'reason'),
     [
-        (('--fault', 'silence,at=15,for=0.4'), 'no report for 0.4'),
+        (('--fault', 'silence,at=15,for=0.7'), 'no report for 0.7'),
         (('--fault', 'limp,motor=12,at=12'), 'from those of any servo'),
     ],
     ids=['gap', 'let go on the way'],
@@ -142,18 +148,18 @@ def test_a_poor_recording_is_refused(arguments: tuple[str, ...], reason: str) ->
         calibrate('nominal', V2, *arguments)
 
 
-def test_the_command_asks_first_and_swings_one_joint(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Through a real port: the thigh goes and comes back; a motion too short shows no servo."""
-    monkeypatch.setattr('quad_hardware.calibration.servos.STEPS', 2)
-    monkeypatch.setattr('quad_hardware.calibration.servos.SWEEP_TIME', 0.2)
-    person = Person()
-    with serve(tmp_path / 'xgo', '--held', '--start', 'stand') as served:
-        plant = served.simulation.plant
-        before = plant.joint_targets
-        assert run_calibrate(['servos', '--port', str(served.path)], person) == 1
-        turned = abs(plant.joint_targets - before)
-    assert turned.max() < 0.05, person.said
-    assert 'keep hands away' in person.said[1]
-    assert '300 are needed' in person.said[-1]
+def test_a_whole_calibration_over_a_port_ends_with_the_servos(tmp_path: Path) -> None:
+    """Both programs as a person starts them: it asks first, and ends within a minute."""
+    hidden, port = parse_servo('nominal'), str(tmp_path / 'xgo')
+    robot = [executable('quad_sim', 'fake_xgo'), '--no-ros', '--held', '--link', port]
+    with RunningProcess([*robot, '--start', 'stand'], os.environ) as simulated:
+        simulated.wait_for('fake_xgo: lite')
+        command = [executable('quad_hardware', 'calibrate'), 'servos', '--port', port]
+        ended = run(command, input='\n', capture_output=True, text=True, timeout=60, check=False)
+    assert ended.returncode == 0, ended.stdout
+    assert 'keep hands away' in ended.stdout
+    found = parse_servo(ended.stdout.partition('--servo ')[2].split()[0])
+    assert found.stiffness == pytest.approx(hidden.stiffness, rel=0.1)
+    assert found.damping == pytest.approx(hidden.damping, rel=0.1)
+    assert found.free_width == pytest.approx(hidden.free_width, rel=0.1)
+    assert found.delay == pytest.approx(hidden.delay, abs=0.004)  # and the ticks of a computer

@@ -100,13 +100,11 @@ class GaitGenerator:
         self._neutral = parameters.stance(robot, self.others)
         self.gait = self.wanted_gait = Gait.TROT
         self._lifts = {
-            gait: SwingLift(
-                robot, self._neutral, parameters.schedule(gait), parameters.swing_height
-            )
+            gait: SwingLift(robot, self._neutral, self._scheduled(gait), parameters.swing_height)
             for gait in Gait
         }
         self._stepper = Stepper(
-            parameters.schedule(self.gait),
+            self._scheduled(self.gait),
             self._neutral,
             self._lifts[self.gait].height,
             parameters.stance_depth,
@@ -188,7 +186,7 @@ class GaitGenerator:
         if self.wanted_gait is not self.gait:
             if self.standing:
                 self.gait = self.wanted_gait
-                self._stepper.schedule = self._parameters.schedule(self.gait)
+                self._stepper.schedule = self._scheduled(self.gait)
                 self._stepper.lift = self._lifts[self.gait].height
             velocity = REST
         self.goal = goal = self._within_schedule(self.limits.clamp(velocity))
@@ -204,6 +202,9 @@ class GaitGenerator:
         )
         most = self._schedule.speed
         return velocity.scaled(most / fastest) if fastest > most else velocity
+
+    def _scheduled(self, gait: Gait) -> Schedule:
+        return self._parameters.schedule(gait, self._robot.leg_length)
 
     @property
     def _schedule(self) -> Schedule:

@@ -13,7 +13,7 @@ from quad_description import Feet, Quadruped
 from ..exceptions import ParameterError
 from ..settings import check_settings, setting
 from .body import BodyLimits
-from .schedule import Gait, Schedule, SCHEDULES
+from .schedule import Gait, LEG_LENGTH, Schedule, SCHEDULES
 from .servo_compensation import ServoModel
 from .velocity import VelocityLimits
 
@@ -44,6 +44,9 @@ class GaitParameters:
     )
     sway: float = setting(
         -1.0, -1.0, 0.1, 'body away from the lifted legs [m]; negative: that of the gait'
+    )
+    foot_speed: float = setting(
+        0.0, 0.0, 5.0, 'fastest foot over the body [m/s]; 0: that of the gait'
     )
     level_gain: float = setting(0.5, 0.0, 1.0, 'turns the body against its measured tilt; 0: off')
     heading_gain: float = setting(
@@ -106,14 +109,15 @@ class GaitParameters:
             )
         return feet
 
-    def schedule(self, gait: Gait) -> Schedule:
-        """Return a gait with what was tuned of it."""
-        schedule = SCHEDULES[gait]
+    def schedule(self, gait: Gait, leg_length: float = LEG_LENGTH) -> Schedule:
+        """Return a gait for legs of a length [m], with what was tuned of it."""
+        schedule = SCHEDULES[gait].scaled(leg_length)
         return replace(
             schedule,
             stance_duration=self.stance_duration or schedule.stance_duration,
             duty=self.duty or schedule.duty,
             sway=schedule.sway if self.sway < 0.0 else self.sway,
+            speed=self.foot_speed or schedule.speed,
         )
 
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 import math
 
@@ -32,6 +32,22 @@ class Schedule:
     # largest speed of a foot over the body that the gait keeps its balance at in [m/s]
     speed: float
 
+    def scaled(self, leg_length: float) -> Schedule:
+        """Return the gait of a robot with other legs [m].
+
+        At equal Froude numbers (v^2 / g l) times and speeds grow with the root of the legs.
+        """
+        size = leg_length / LEG_LENGTH
+        if abs(size - 1.0) < 0.01:
+            return self
+        pace = math.sqrt(size)
+        return replace(
+            self,
+            stance_duration=self.stance_duration * pace,
+            sway=self.sway * size,
+            speed=self.speed * pace,
+        )
+
     @property
     def period(self) -> float:
         """Duration of a cycle in [s]."""
@@ -56,6 +72,7 @@ class Schedule:
         return math.atan2(sine, cosine) / math.tau
 
 
+LEG_LENGTH = 0.1349  # [m] thigh and calf of the XGO
 SCHEDULES = {
     Gait.TROT: Schedule((0.0, 0.5, 0.5, 0.0), 0.1456, 0.52, 0.0, 0.45),
     Gait.CRAWL: Schedule((0.0, 0.5, 0.75, 0.25), 0.8, 0.8, 0.012, 0.06),

@@ -105,6 +105,11 @@ class Quadruped:
         return x, y, z
 
     @property
+    def leg_length(self) -> float:
+        """Thigh and calf of the first leg in [m]."""
+        return self.legs[0].thigh_length + self.legs[0].calf_length
+
+    @property
     def others(self) -> tuple[int, ...]:
         """Places of the joints that belong to no leg (those of an arm)."""
         taken = {index for indices in self.leg_indices for index in indices}
@@ -178,8 +183,8 @@ class Quadruped:
             solutions = self.solve(feet)
             if not all(solution.reachable for solution in solutions):
                 raise DescriptionError(
-                    f'the legs do not reach a height of {height:.3f} m; choose a height between '
-                    'folded and straight legs'
+                    f'the legs do not reach a height of {height:.3f} m; set nominal_height and '
+                    f'lie_height between folded and straight legs ({self.leg_length:.3f} m)'
                 )
             placed = self.place(solutions, placed)
             named = dict(zip(self.names, placed, strict=True))

@@ -8,8 +8,9 @@ The model is that of quad_sim: a leg that hangs free turns about one joint by
           - d \dot q + \tau_g(q)
 
 The largest torque, the inertia of the links and their weight come from the URDF, so the stiffness
-has a unit. The parameters minimize the squared error of all positions (Levenberg-Marquardt); their
-standard deviations follow from the Jacobian and show whether the recording determines them.
+has a unit. The parameters minimize the error of the positions (Levenberg-Marquardt), of which
+those far off, as after a command that left late, hardly count (the cost is Cauchy's); standard
+deviations follow from the Jacobian and show whether the recording determines them.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 from urdf_reader import compose, KinematicTree, link_poses, rotate, Transform
 
 from ..exceptions import CommandError
+from ..link import STALE_TIME
 
 GRAVITY = 9.81  # [m/s²]
 ENCODER_STEP = 0.0015  # [rad] of 12 bits: the dead band that the rest of the free play is beside
@@ -31,10 +33,14 @@ INTERPOLATION = 0.02  # [s] in which the board leads a servo from one target to 
 
 _STEP = 0.002  # [s] of the integration
 _MIN_SAMPLES = 300
-_MAX_GAP = 0.2  # [s] between two reports
+_MAX_GAP = STALE_TIME  # between two reports; in a longer one nothing is commanded
 _MIN_TRAVEL = 0.2  # [rad] between the ends of what was reported
 _MAX_ERROR = 0.006  # [rad] rms: twice the rounding of protocol v1
 _MAX_DEVIATION = 0.1  # standard deviation of a parameter, as a share of it
+_OUTLIER = 0.004  # [rad] from which on the weight of a position falls
+_MAX_OUTLIERS = (
+    0.25  # share of positions that a busy computer may spoil; the others have the error
+)
 _ITERATIONS = 15
 
 Array = NDArray[np.float64]
@@ -153,7 +159,7 @@ def _check(recording: Recording) -> None:
     gap = max(b - a for a, b in itertools.pairwise(times))
     if gap > _MAX_GAP:
         raise CommandError(
-            f'no report for {gap:.2f} s in the recording, at most {_MAX_GAP} s are of use; '
+            f'no report for {gap:.2f} s in the recording, at most {_MAX_GAP:g} s are of use; '
             'look at the line with doctor'
         )
     travel = max(places) - min(places)
@@ -182,30 +188,34 @@ class _Model:
         trust = 1e-2
         small = 1e-3 * scale
         residual = self._measured - self.predict(place[:, None])[:, 0]
+        cost = _cost(residual)
         for _ in range(_ITERATIONS):
             columns = self.predict(place[:, None] + np.diag(small))
             base = self._measured - residual
             jacobian = (columns - base[:, None]) / small * scale
-            normal, slope = jacobian.T @ jacobian, jacobian.T @ residual
+            weights = 1.0 / (1.0 + (residual / _OUTLIER) ** 2)
+            weighted = jacobian.T * weights
+            normal, slope = weighted @ jacobian, weighted @ residual
             damping = [trust * each * np.diag(np.diag(normal) + 1e-9) for each in (1, 30)]
             tries = np.array(
                 [place + scale * np.linalg.solve(normal + each, slope) for each in damping]
             )
             tries[:, : count - 1] = np.maximum(tries[:, : count - 1], 1e-4)
             errors = self._measured[:, None] - self.predict(tries.T)
-            best = int(np.argmin((errors**2).sum(axis=0)))
-            before, after = float(residual @ residual), float(errors[:, best] @ errors[:, best])
-            if not after < before:
+            costs = _cost(errors)
+            best = int(np.argmin(costs))
+            if not costs[best] < cost:
                 if trust > 1e3:
                     break
                 trust *= 1e3
                 continue
             moved = np.abs((tries[best] - place) / scale).max()
-            place, residual = tries[best], errors[:, best]
+            place, residual, cost = tries[best], errors[:, best], costs[best]
             trust = max(trust * (0.1, 10.0)[best], 1e-9)
             if moved < 1e-3:
                 break
-        variance = float(residual @ residual) / (len(residual) - count)
+        kept = np.sort(residual**2)[: round((1.0 - _MAX_OUTLIERS) * len(residual))]
+        variance = float(kept.sum()) / (len(kept) - count)
         spread = np.sqrt(np.diag(np.linalg.pinv(normal)) * variance) * scale
         shares = spread / np.maximum(np.abs(place), 1e-6)
         return (
@@ -239,6 +249,12 @@ class _Model:
         found = [np.interp(self._samples, times, column) for column in path.T]
         predicted: Array = np.stack(found, axis=1) + zero
         return predicted
+
+
+def _cost(residuals: Array) -> Array:
+    """Return the cost of each column: that of Cauchy, to which a late moment hardly counts."""
+    cost: Array = np.log1p((residuals / _OUTLIER) ** 2).sum(axis=0)
+    return cost
 
 
 def _set_points(targets: Series, interpolation: float) -> tuple[Array, Array]:

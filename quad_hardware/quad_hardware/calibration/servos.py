@@ -15,6 +15,7 @@ from urdf_reader import read_urdf
 
 from quad_description import movable_joints
 
+from ..estimation.plausibility import SampleClock
 from ..exceptions import CommandError
 from ..joints import JointServo
 from ..protocol import LEG_MOTORS
@@ -158,8 +159,9 @@ def _record(
         sent = robot.command({**held, servo.motor: angle})
         targets.append((sent, servo.position(angle)))
     robot.wait_until(due + SETTLING)
+    clock = SampleClock()
     positions = [
-        (report.arrival - report.wire_time / 2 - report.joints_age, servo.position(angle))
+        (clock.time(report) - report.joints_age, servo.position(angle))
         for report in robot.reports()
         if math.isfinite(angle := report.positions.get(servo.motor, math.nan))
     ]
