@@ -10,7 +10,7 @@ from math import pi
 
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
-from model_robots import ready, robot, ROBOTS
+from model_robots import chain, ready, robot, ROBOTS
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -251,6 +251,29 @@ def test_a_line_may_begin_with_a_straight_wrist(way: tuple[float, ...]) -> None:
     beside = PoseGoal(Pose(pose.rotation, pose.position + np.array([0.0, 0.05, 0.0])))
     with pytest.raises(PlanningError, match=r'singular at 0% of the way'):
         motion('gp110', MotionRequest(straight, [beside], 'LIN'))
+
+
+@pytest.mark.parametrize('way', [(0.0, 0.0, 0.05), (-0.05, 0.0, 0.03), (0.05, 0.0, 0.0)])
+def test_a_line_may_be_singular_all_the_way(way: tuple[float, ...]) -> None:
+    """Axes of a wrist like that of a UR stay parallel while it moves in the plane of the arm."""
+    model, start = chain('zyyyzy'), frozen([0.0, 0.5, 0.8, 0.4, 0.0, 0.0])
+    link = LinkKinematics(model)
+    pose = link.pose(start)
+    line = Line(pose, Pose(pose.rotation, pose.position + np.array(way)))
+    scene = model.scene.allowing('*', '*')
+    path = Planner(model).plan(MotionRequest(start, [PoseGoal(line.at(1.0))], 'LIN'), scene).path
+    worst = np.max([off(line, link, positions) for positions in places(path, 100)], axis=0)
+    assert (worst < [STRAIGHT, TURNED]).all()
+    end = link.pose(path.positions(np.array([path.duration]))[0])
+    assert end.position == pytest.approx(line.at(1.0).position, abs=STRAIGHT)
+
+
+def test_an_arm_of_five_joints_that_cannot_keep_its_turn_is_told_so() -> None:
+    """It is neither singular nor out of reach."""
+    model, start = chain('zyyyz'), frozen([0.0, 0.5, 0.8, 0.4, 0.0])
+    goal = JointGoal(np.add(start, [0.1, -0.1, 0.05, 0.2, 0.3]))
+    with pytest.raises(PlanningError, match='its 5 joints cannot turn the link'):
+        Planner(model).plan(MotionRequest(start, [goal], 'LIN'), model.scene)
 
 
 def test_a_line_through_a_singularity_is_refused_with_its_place() -> None:

@@ -37,6 +37,7 @@ FIRST_STEP, MIN_STEP, MAX_STEP = 1 / 16, 1e-5, 1 / 6
 
 EASY = 1 / 60  # share of the tolerance below which the next step is twice as long
 ON_CURVE = 1e-11  # pose error that counts as none in [m] and [rad]
+ON_SINGULAR_CURVE = 1e-8  # the same where the arm is singular
 MAX_NEWTON = 6  # newton steps to a place at most; from a good guess two suffice
 
 MAX_CORRECTION = 0.3
@@ -44,6 +45,7 @@ MAX_CORRECTION = 0.3
 
 DIFFERENCE = 1e-6  # share of a curve between the places of a difference quotient
 SINGULAR = 1e-7  # share of the largest singular value below which one counts as none
+NEARLY_SINGULAR = 1e-8  # determinant below which singular values are looked at
 SHARPNESS = 16  # exponent of the smooth maximum
 
 MAX_SLOWDOWN = 200.0
@@ -180,30 +182,15 @@ class _Tracer:
         return _Place(share, positions, first, (after - first) / DIFFERENCE)
 
     def _field(self, share: float, positions: Array) -> Array:
-        """Return how joints follow the curve: derivatives by the share.
-
-        The arm may begin where it is singular, such as with a straight wrist, if what it has left
-        there leads along the curve.
-        """
+        """Return how joints follow the curve: derivatives by the share."""
         _, jacobian = self._link.pose_and_jacobian(positions)
         twist = self._curve.twist(share)
-        if share <= DIFFERENCE:
-            solved = np.linalg.lstsq(jacobian, twist, rcond=SINGULAR)[0]
-            if np.abs(jacobian @ solved - twist).max() < SINGULAR * np.abs(twist).max():
-                return np.asarray(solved, dtype=float)
-        return self._solved(jacobian, twist, share)
-
-    def _solved(self, jacobian: Array, twist: Array, share: float) -> Array:
-        try:
-            if jacobian.shape[1] == len(twist):
-                solved = np.linalg.solve(jacobian, twist)
-            elif jacobian.shape[1] > len(twist):
-                solved = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T, twist)
-            else:
-                solved = np.linalg.lstsq(jacobian, twist, rcond=None)[0]
-        except np.linalg.LinAlgError:
-            self._refuse_singular(share, '')
-        return np.asarray(solved, dtype=float)
+        solved, is_singular = _solved(jacobian, twist)
+        if is_singular:
+            missed = np.abs(jacobian @ solved - twist).max()
+            if not missed < SINGULAR * np.abs(twist).max():
+                self._refuse_singular(share, '')
+        return solved
 
     def _next(self, place: _Place, step: float) -> _Place | None:
         """Return the place a step on; None where Newton's method does not lead there."""
@@ -231,7 +218,9 @@ class _Tracer:
             error = pose_error(target, actual)
             if np.abs(error).max() < ON_CURVE:
                 return positions
-            change = self._solved(jacobian, error, share)
+            change, is_singular = _solved(jacobian, error)
+            if is_singular and np.abs(error).max() < ON_SINGULAR_CURVE:
+                return positions + change  # what is left of the error no joint can take away
             if np.abs(change).max() > MAX_CORRECTION:
                 return None
             positions = positions + change
@@ -279,11 +268,30 @@ class _Tracer:
         _, jacobian = self._link.pose_and_jacobian(place.positions)
         values = np.linalg.svd(jacobian, compute_uv=False)
         x, y, z = self._curve.at(place.share).position
+        count = len(place.positions)
+        few = f', or its {count} joints cannot turn the link as it asks' if count < POSE else ''
         raise self._refused(
             f'it cannot be followed beyond {place.share:.0%} of the way, at ({x:.3f}, {y:.3f},'
-            f' {z:.3f}): there it leads out of reach, or the arm is singular (least singular value'
-            f' {values[-1]:.1e}); use PTP, or lead it past that place'
+            f' {z:.3f}): there it leads out of reach{few}, or the arm is singular (least singular'
+            f' value {values[-1]:.1e}); use PTP, or lead it past that place'
         )
 
     def _refused(self, reason: str) -> PlanningError:
         return PlanningError(PlanningCode.PLANNING_FAILED, f'{self._name}: {reason}')
+
+
+def _solved(jacobian: Array, twist: Array) -> tuple[Array, bool]:
+    """Return the least joint rates for a twist, and whether the arm is singular.
+
+    A singular arm, such as one with a straight wrist, may lead its link along what it has left;
+    the rates are those of least squares then.
+    """
+    count = jacobian.shape[1]
+    if count < POSE:
+        return np.asarray(np.linalg.lstsq(jacobian, twist, rcond=None)[0], dtype=float), False
+    square = jacobian if count == POSE else jacobian @ jacobian.T
+    if abs(np.linalg.det(square)) > NEARLY_SINGULAR:
+        solved = np.linalg.solve(square, twist)
+        return solved if count == POSE else jacobian.T @ solved, False
+    solved, _, rank, _ = np.linalg.lstsq(jacobian, twist, rcond=SINGULAR)
+    return np.asarray(solved, dtype=float), int(rank) < POSE
