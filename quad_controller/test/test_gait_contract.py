@@ -41,6 +41,10 @@ pytestmark = pytest.mark.slow
 
 PERIOD = 0.02  # [s]
 OPTIONS = PolicyOptions(gravity_source=GravitySource.EULER, soft_limits=1.0)
+# a default pose of a robot whose calves have another zero
+OTHER_ZERO = [
+    place - 0.5 * ('calf' in name) for name, place in zip(JOINTS, DEFAULTS.tolist(), strict=True)
+]
 ORDER = [ROBOT.names.index(name) for name in JOINTS]
 
 
@@ -555,6 +559,7 @@ def test_clips_of_isaac_lab_are_matched_with_joints(tmp_path: Path) -> None:
         ('playground', 'action.offset=2.5', 'targets standing'),
         ('playground', 'recurrence={h_in: actions}', r'recurrence\.h_in'),
         ('rl_sar', 'action.target_clip=[3.0, 4.0]', 'outside of its soft limits'),
+        ('rl_sar', f'default_positions={OTHER_ZERO}', 'feet in the default pose'),
     ],
 )
 def test_what_leads_the_legs_elsewhere_is_refused(

@@ -150,6 +150,20 @@ def test_a_robot_of_no_known_firmware_is_calibrated(tmp_path: Path) -> None:
     assert output.exists()
 
 
+@pytest.mark.parametrize('protocol', [V1, V2], ids=lambda protocol: protocol.name)
+def test_a_preset_of_another_robot_is_refused(tmp_path: Path, protocol: Protocol) -> None:
+    """Its limits would count: the message names the right one, and that one is taken."""
+    output = tmp_path / 'found.yaml'
+    with PtyPeer(tmp_path / 'port', protocol, firmware='M-4.3.3') as peer:
+        command = ['joints', '--zero-only', '--output', str(output), '--port', str(peer.link)]
+        script = Script('', '')
+        assert run_calibrate(command, script) == 1
+        assert "'M-4.3.3'" in script.said[-1]
+        assert 'start with preset mini' in script.said[-1]
+        assert run_calibrate([*command, '--preset', 'mini'], Script('', '')) == 0
+    assert output.exists()
+
+
 def test_no_robot_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With the remedy, and nothing is written."""
     monkeypatch.setattr(robot, 'REPORT_TIMEOUT', 0.5)

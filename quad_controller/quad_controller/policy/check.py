@@ -20,6 +20,7 @@ from .observation import observed_places
 from .report import Row, Verdict
 
 MAX_POSE_DISTANCE = 0.8  # [rad] of the default pose from where the gait stands
+MAX_LEAN = 0.35  # of the hips' height that feet may be ahead of where they carry the weight
 MAX_SCALE = 1.0  # [rad] an action of one may move a joint by
 MAX_RESTING_ACTION = 1.0  # [rad] a policy that wants more while standing is another robot's
 MAX_PERIOD_ERROR = 0.02  # of the loop's period, that of the training may differ by
@@ -292,6 +293,13 @@ def _defaults(contract: PolicyContract, robot: Quadruped, stand: Targets) -> Ite
     found = f'{farthest:.2f} rad' + (f' ({where})' if where else '')
     expected = f'{MAX_POSE_DISTANCE:g} rad from our stand'
     yield _row('default pose', expected, found, farthest <= MAX_POSE_DISTANCE)
+    pairs = zip(robot.names, stand, strict=True)
+    feet = robot.feet([named.get(name, place) for name, place in pairs])
+    height = robot.hip_centre[2] - sum(z for _, _, z in feet) / len(feet)
+    ahead = sum(x - at for (x, _, _), (at, _, _) in zip(feet, robot.feet(stand), strict=True)) / 4
+    found = f'{ahead:+.3f} m ahead, {height:.3f} m below the hips'
+    expected = f'up to {MAX_LEAN:.0%} of their depth off our stand; else its zero is another one'
+    yield _row('feet in the default pose', expected, found, abs(ahead) <= MAX_LEAN * height)
 
 
 def _row(subject: str, expected: str, found: str, fits: bool) -> Row:

@@ -81,7 +81,9 @@ def _imu(options: argparse.Namespace, console: Console) -> None:
 
 def _link(options: argparse.Namespace) -> LinkOptions:
     protocols, model = PROTOCOL_CHOICES[options.protocol], MODEL_CHOICES[options.model]
-    return LinkOptions(options.port, protocols, model=model)
+    return LinkOptions(
+        options.port, protocols, model=model, preset=vars(options).get('preset', '')
+    )
 
 
 def _odometry(options: argparse.Namespace, console: Console) -> None:

@@ -11,6 +11,8 @@ import select
 import time
 from typing import NamedTuple
 
+from quad_description import PRESETS
+
 from ..exceptions import LinkError, NoAnswerError
 from ..protocol import (
     Code,
@@ -64,6 +66,7 @@ class LinkOptions:
     protocols: tuple[Protocol, ...] = PROTOCOLS  # what to try, in this order
     baud: int = 0  # speed [bit/s]; 0 takes each protocol's own
     model: Model | None = None  # whose ranges scale bytes in protocol v1; None asks the firmware
+    preset: str = ''  # that the URDF is of; a firmware of another one is refused
     rate: int = 50  # reports a second [Hz]
     vendor: bool = False  # go through the vendor's own library, and try nothing else
     vendor_method: str = ''  # name of its method that writes a servo angle
@@ -99,7 +102,7 @@ def open_session(options: LinkOptions) -> Session:
     connection = connect(options.path, options.protocols, options.baud)
     port, protocol, firmware = connection.port, connection.protocol, connection.firmware
     try:
-        model = None if protocol is V2 else _model(firmware, options)
+        model = _model(firmware, protocol, options)
     except LinkError:
         port.close()
         raise
@@ -117,9 +120,19 @@ def make_dialect(model: Model | None, now: float, rate: int = 50) -> Dialect:
     return V2Dialect(now, rate) if model is None else V1Dialect(now, model, rate)
 
 
-def _model(firmware: str, options: LinkOptions) -> Model:
-    """Return whose ranges scale bytes in protocol v1."""
-    model = options.model or model_of_firmware(firmware)
+def _model(firmware: str, protocol: Protocol, options: LinkOptions) -> Model | None:
+    """Return whose ranges scale bytes; None in protocol v2."""
+    known, preset = model_of_firmware(firmware), options.preset
+    asked = options.model is None and known is not None and {known.value, preset} <= {*PRESETS}
+    if asked and known and known.value != preset:
+        raise LinkError(
+            f'firmware {firmware!r} on {options.path} is of a {known.value}, and preset {preset} '
+            f'has the limits of another robot: start with preset {known.value}, or keep it by '
+            'the parameter or option model'
+        )
+    if protocol is V2:
+        return None
+    model = options.model or known
     if model is None:
         raise LinkError(
             f'firmware {firmware!r} is of no known quadruped (M mini, L lite, W or MW '
