@@ -22,7 +22,15 @@ from .backend import Backend
 from .command_line import run_command
 from .kinematics.leg import FEET, foot_position, jacobian, LegGeometry, LEGS, LegSolution, solve
 from .kinematics.quadruped import Feet, FootPose, Quadruped, quadruped, raised_feet, Targets
-from .presets import Pose, pose_positions, PresetError, PRESETS, robot_urdf, STREAM_TIMEOUT
+from .presets import (
+    Pose,
+    pose_positions,
+    preset_of,
+    PresetError,
+    PRESETS,
+    robot_urdf,
+    STREAM_TIMEOUT,
+)
 from .state import (
     ContactSource,
     EMPTY_BATTERY,
@@ -64,6 +72,7 @@ __all__ = [
     'jacobian',
     'movable_joints',
     'pose_positions',
+    'preset_of',
     'quadruped',
     'raised_feet',
     'robot_urdf',

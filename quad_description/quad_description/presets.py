@@ -8,6 +8,7 @@ from enum import Enum
 from functools import lru_cache
 import math
 from pathlib import Path
+import re
 from typing import Any, Final
 
 from urdf_reader import DescriptionError
@@ -83,6 +84,12 @@ def robot_urdf(
             'base_footprint': str(base_footprint).lower(),
         }
     )
+
+
+def preset_of(urdf: str) -> str:
+    """Return the preset that a URDF was made of, by the name of its robot; empty for none."""
+    found = re.search(r'<robot [^>]*name="xgo_(\w+)"', urdf)
+    return found[1] if found and found[1] in PRESETS else ''
 
 
 def _expand(arguments: dict[str, str]) -> str:

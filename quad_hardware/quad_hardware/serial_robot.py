@@ -5,13 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import math
 from pathlib import Path
 import time
 
 from black_box import BlackBox, BlackBoxSettings
-from quad_description import RobotState
+from quad_description import preset_of, RobotState
 
 from .estimation import Estimator, EstimatorSettings
 from .exceptions import CommandError
@@ -146,7 +146,8 @@ class SerialRobot(ObservedRobot):
             self._log_file = SerialLogFile(settings.serial_log)
             self._recorders.append(self._log_file)
         self._losses, self._faults = LossWatch(), FaultWatch()
-        self._driver = Driver(settings.link, self._report, self._link_changed, self._opened)
+        link = replace(settings.link, preset=preset_of(settings.urdf))
+        self._driver = Driver(link, self._report, self._link_changed, self._opened)
         # time after the last command at which :meth:`miss_commands` is to be called [s]
         self.timeout = self._commander.timeout
 

@@ -12,7 +12,6 @@ from rclpy.context import Context
 from rclpy.node import Node
 
 from node_runner import ParameterError
-from quad_description import robot_urdf
 from quad_hardware import HardwareError
 from quad_hardware.nodes.parameters import declare_parameters, NodeSettings
 
@@ -46,10 +45,3 @@ def test_a_wrong_parameter_is_refused(argument: str, reason: str) -> None:
     """The message names the value and the remedy."""
     with pytest.raises((ParameterError, HardwareError), match=re.escape(reason)):
         read(argument)
-
-
-def test_the_robot_at_the_port_has_to_be_that_of_the_preset() -> None:
-    """A URDF of the user's own may be of any robot."""
-    assert read('preset:=mini').robot.link.preset == 'mini'
-    urdf = robot_urdf('mini').replace('\n', ' ')
-    assert read(f'robot_description:={urdf}').robot.link.preset == ''

@@ -127,12 +127,18 @@ def test_a_robot_that_is_lost_is_reported(peer: PtyPeer) -> None:
 
 
 def test_what_protocol_v1_cannot_send_is_a_limit_of_the_joint(tmp_path: Path) -> None:
-    """Its byte reaches to 93 degrees, the thigh of the mini to 109: the clamp is reported."""
+    """93 of 109 degrees of a mini: the clamp is reported. As a lite it is not commanded."""
     urdf = robot_urdf('mini')
     joints = JointMap(map(servo_of, movable_joints(urdf)))
     beyond = [1.9 if name == 'fl_thigh_joint' else q for name, q in POSE.items()]
     with PtyPeer(tmp_path / 'port', V1, firmware='M-4.3.3') as peer:
-        robot = SerialRobot(RobotSettings(LinkOptions(str(peer.link)), urdf, joints))
+        link = LinkOptions(str(peer.link))
+        with (
+            SerialBackend(RobotSettings(link, URDF, JOINTS)) as other,
+            pytest.raises(NoAnswerError, match='start with preset mini'),
+        ):
+            other.reset()
+        robot = SerialRobot(RobotSettings(link, urdf, joints))
         warnings: list[str] = []
         robot.on_warning = warnings.append
         robot.start()

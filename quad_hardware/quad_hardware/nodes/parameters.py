@@ -124,12 +124,9 @@ def declare_robot(read: ParameterReader, link: LinkOptions) -> RobotSettings:
         ParameterError: One is of another kind or out of its range.
         CommandError: They do not fit the robot; the message names the remedy.
     """
-    urdf, preset = _urdf(read)
+    urdf = _urdf(read)
     return RobotSettings(
-        link=replace(link, preset=preset),
-        urdf=urdf,
-        joints=_joint_map(read, urdf),
-        estimator=_estimator(read),
+        link=link, urdf=urdf, joints=_joint_map(read, urdf), estimator=_estimator(read)
     )
 
 
@@ -159,13 +156,12 @@ def _vendor(protocols: tuple[Protocol, ...], method: str) -> bool:
     return wanted
 
 
-def _urdf(read: ParameterReader) -> tuple[str, str]:
-    """Return the URDF, and the preset that it is of; none for that of a parameter."""
+def _urdf(read: ParameterReader) -> str:
     text = read.text('robot_description', '', 'URDF as XML text; empty: of quad_description')
     presets = {name: name for name in PRESETS}
     preset = read.choice('preset', 'lite', presets, 'robot of quad_description')
     arm = read.flag('arm', default=False, meaning='the robot of quad_description has its arm')
-    return (text, '') if text else (robot_urdf(preset, arm=arm), preset)
+    return text or robot_urdf(preset, arm=arm)
 
 
 def _joint_map(read: ParameterReader, urdf: str) -> JointMap:
