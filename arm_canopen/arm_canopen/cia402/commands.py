@@ -38,6 +38,9 @@ T = TypeVar('T')
 Sequence: TypeAlias = Callable[[], Coroutine[Promise[Any], None, str]]
 
 SELECT_MODE = '; select a mode before the first target'
+SETTLING_TIME = 0.5  # [s] from standstill to the place
+WAY_SHARE = 0.02  # of a way that may be left at its end, where the drive has no window (0x6067)
+WINDOW_INCREMENTS = 10  # the same of short ways [increments]
 TAKEN_TIMEOUT = RESUME_TIMEOUT + 1.0  # [s] after which nothing leads the drive out of its halt
 
 
@@ -193,9 +196,11 @@ class AxisCommands:
         One that is later than ``timeout`` in [s] is halted.
 
         Raises:
-            DriveError: It is late, was stopped before, or got another target or mode.
+            DriveError: It is late, was stopped before, got another target or mode, or stands
+                elsewhere.
         """
         axis = self.axis
+        start = axis.view.position
         delivered = self.deliver(command)
         mode, motion = axis.mode, axis.motions
         await delivered
@@ -219,7 +224,33 @@ class AxisCommands:
                 raise DriveError(late) from None
         if lost():
             raise self._steps.refused('was stopped, or got another target, before it arrived')
+        await self._require_place(start)
         return axis.describe()
+
+    async def _require_place(self, start: float) -> None:
+        """Refuse the arrival of an axis that came from ``start`` and stands elsewhere.
+
+        The drive may have shortened the way to its own limits, and in the cyclic modes no bit
+        shows the arrival.
+        """
+        axis = self.axis
+        if axis.mode.setpoint is None:
+            return
+        target, view = axis.setpoint, axis.view
+        tolerance = max(
+            view.parameters.position_window or 0.0,
+            WAY_SHARE * abs(target - start),
+            WINDOW_INCREMENTS / abs(view.units.position.to_dev),
+        )
+        try:
+            await self._scheduler.until(
+                lambda: abs(view.position - target) <= tolerance, SETTLING_TIME
+            )
+        except TimeoutError:
+            raise self._steps.refused(
+                f'stands at {view.position:.6g}, not at its target {target:.6g}: is it blocked, '
+                'or within limits of its own (0x607D less the home offset 0x607C)?'
+            ) from None
 
     def stream_target(self, target: float) -> None:
         """Follow a stream of targets; when it pauses for too long, the drive stops."""
@@ -307,6 +338,10 @@ class AxisCommands:
                 homed = await self._home_at_init()
             if self._steps.needs_mode and axis.mode.number is OperationMode.HOMING:
                 await self._steps.return_to(before)
+        except BaseException:  # a drive may go on although its bit 4 is cleared
+            if axis.node.online and axis.view.state is DriveState.OPERATION_ENABLED:
+                axis.hold()
+            raise
         finally:
             if axis.node.online and not self._steps.needs_mode:
                 axis.select(axis.modes[OperationMode.NO_MODE])

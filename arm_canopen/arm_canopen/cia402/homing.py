@@ -50,8 +50,10 @@ async def home(
     if not (isinstance(homing, Homing) and supported):
         raise steps.refused('has no homing (mode 6 is not in 0x6502)')
     stored = await _stored_method(steps)
-    method = await _choose(steps, method, stored)
+    method = _choice(steps, method, stored)
     try:
+        if method != stored:
+            await _choose(steps, method)
         notify(HomingProgress.SWITCHING)
         await steps.switch(homing)
         notify(HomingProgress.HOMING)
@@ -122,17 +124,17 @@ def _put_back(steps: AxisSteps, method: int) -> None:
     axis.node.objects.write_object(axis.view.at(Index.HOMING_METHOD), 0, method).when_done(check)
 
 
-async def _choose(steps: AxisSteps, method: int | None, stored: int) -> int:
-    """Return the method to home by; one that is given is in the drive then."""
+def _choice(steps: AxisSteps, method: int | None, stored: int) -> int:
+    """Return the method to home by."""
+    if method is None and not stored:
+        raise steps.refused('has no homing method (0x6098 is 0); name one')
+    return stored if method is None else method
+
+
+async def _choose(steps: AxisSteps, method: int) -> None:
+    """Write a method; an answer that is late may still be that of a drive that has taken it."""
     axis = steps.axis
-    if method is None:
-        if not stored:
-            raise steps.refused('has no homing method (0x6098 is 0); name one')
-        return stored
-    if method == stored:
-        return method
     try:
         await axis.node.objects.write_object(axis.view.at(Index.HOMING_METHOD), 0, method)
     except (SdoError, CodecError) as error:
         raise DriveError(f'{axis.name} does not take homing method {method}: {error}') from error
-    return method

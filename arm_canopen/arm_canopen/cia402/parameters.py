@@ -44,7 +44,7 @@ class ProfileLimits:
 
 
 DEFAULT_PROFILE = ProfileLimits(DEFAULT_VELOCITY, DEFAULT_ACCELERATION, DEFAULT_ACCELERATION)
-NO_WINDOW = (0, 0xFFFF_FFFF)  # values of 0x6065 with which nothing is monitored
+NO_WINDOW = (0, 0xFFFF_FFFF)  # values of 0x6065 and 0x6067 with which nothing is monitored
 DEFAULT_TORQUE_SLOPE_DEV = 1000.0  # [device units/s]: from 0 to the rated torque in a second
 
 ADDRESSES: tuple[tuple[int, int], ...] = (
@@ -54,6 +54,7 @@ ADDRESSES: tuple[tuple[int, int], ...] = (
     (Index.SOFTWARE_POSITION_LIMIT, 2),
     (Index.MAX_PROFILE_VELOCITY, 0),
     (Index.FOLLOWING_ERROR_WINDOW, 0),
+    (Index.POSITION_WINDOW, 0),
     (Index.MAX_TORQUE, 0),
     (Index.PROFILE_VELOCITY, 0),
     (Index.PROFILE_ACCELERATION, 0),
@@ -79,6 +80,7 @@ class DriveParameters:
     effort_limit: float | None = None  # 0x6072 in user units
     # 0x6065 in user units; None where nothing is monitored, too
     following_window: float | None = None
+    position_window: float | None = None  # the same of 0x6067
     # limits for profiles of the master's own, from 0x6081, 0x6083, 0x6084 and 0x607F
     profile: ProfileLimits = DEFAULT_PROFILE
     # 0x6085 in user units per second squared
@@ -197,7 +199,7 @@ class ParameterCache:
         def acceleration(index: int, default: float) -> float:
             return abs(units.acceleration.from_device(value(index))) if value(index) else default
 
-        speed_limit = position_limits = effort_limit = following_window = None
+        speed_limit = position_limits = effort_limit = None
         velocity = DEFAULT_VELOCITY
         lower, upper = (held[Index.SOFTWARE_POSITION_LIMIT, subindex] for subindex in (1, 2))
         if lower is not None and upper is not None and lower < upper:
@@ -211,9 +213,11 @@ class ParameterCache:
             velocity = abs(units.velocity.commanded(speed))
         if effort := value(Index.MAX_TORQUE):
             effort_limit = abs(units.effort.commanded(effort))
-        window = held[Index.FOLLOWING_ERROR_WINDOW, 0]
-        if window is not None and window not in NO_WINDOW:
-            following_window = abs(window / units.position.to_dev)
+
+        def window(index: int) -> float | None:
+            increments = value(index)
+            return None if increments in NO_WINDOW else abs(increments / units.position.to_dev)
+
         accelerates = acceleration(Index.PROFILE_ACCELERATION, velocity / RAMP_TIME)
         profile = ProfileLimits(
             velocity=min(velocity, speed_limit or velocity),
@@ -230,7 +234,8 @@ class ParameterCache:
             position_limits=position_limits,
             speed_limit=speed_limit,
             effort_limit=effort_limit,
-            following_window=following_window,
+            following_window=window(Index.FOLLOWING_ERROR_WINDOW),
+            position_window=window(Index.POSITION_WINDOW),
             profile=profile,
             quick_stop_deceleration=acceleration(
                 Index.QUICK_STOP_DECELERATION, profile.deceleration

@@ -93,15 +93,19 @@ class StopCommands:
         return axis.describe()
 
     async def _escalated(self, stop: Coroutine[Promise[Any], None, None]) -> None:
-        """Await a stop; where it does not slow the drive down, the end of what follows it."""
+        """Await a stop; where it does not end in rest, what follows it: a quick stop at least."""
         axis = self._axis
         try:
             await stop
-        except DriveError:
-            if not axis.stop.running:
-                raise
-            await axis.stop.ended()
-            if not axis.stop.rests:
+        except DriveError as error:
+            if axis.stop.running:
+                await axis.stop.ended()
+                if not axis.stop.rests:
+                    raise
+            elif axis.stays_enabled and not axis.view.stands:
+                axis.warn(f'{error}; it gets a quick stop')
+                await self._quick_stop()
+            else:
                 raise
 
     async def at_rest(self, timeout: float = STOP_TIMEOUT) -> str:

@@ -310,6 +310,104 @@ def test_a_homing_that_takes_too_long_names_the_key_of_bus_yml() -> None:
     assert net.motor() == stood
 
 
+def test_a_homing_of_init_that_takes_too_long_is_halted_as_that_of_home() -> None:
+    """Also where the drive goes on by its own bit 4, and stays in mode 6."""
+    net = with_modes(
+        sdo_writes=(*MOTION_WRITES, sdo_write(0x6098, 0, 17)), scales={'homing_timeout': 0.5}
+    )
+    began = False
+
+    def alters(_: object, frame: Frame) -> Frame:
+        nonlocal began
+        if frame.can_id == 0x200 + NODE_ID:
+            (word,) = struct.unpack_from('<H', frame.data)
+            began = began or bool(frame.data[2] == 6 and word & 0x10)
+            if began:
+                return frame._replace(data=struct.pack('<HB', word | 0x10, 6) + frame.data[3:])
+        return frame
+
+    net.wire.alters = alters
+    with pytest.raises(DriveError, match='homing 17 within'):
+        net.do(JOINT, 'init')
+    net.run(1.0)
+    stood = net.motor()
+    net.run(1.0)
+    assert net.motor() == stood
+
+
+@pytest.mark.parametrize('answer', ['late', 'cut'])
+def test_a_homing_method_is_for_this_time_only(answer: str) -> None:
+    """However its write ends: the next homing goes by the method of before."""
+    net = with_modes(sdo_writes=(*MOTION_WRITES, sdo_write(0x6098, 0, 37)))
+    net.do(JOINT, 'init')
+    if answer == 'late':
+        delay = FaultInjection(Fault.SDO_DELAY, object=(0x6098, 0), delay=0.3, duration=1.0)
+        net.devices[JOINT].faults.inject(delay, net.now)
+    before = len(net.wire.log)
+    running = net.home(35)
+    if answer == 'cut':
+        written = b'\x98\x60'
+        net.run_until(
+            lambda: any(
+                sent.frame.can_id == 0x600 + NODE_ID
+                and sent.frame.data[0] & 0xE0 == 0x20
+                and sent.frame.data[1:3] == written
+                for sent in net.wire.log[before:]
+            )
+        )
+        net.do(JOINT, 'halt', preempt=True)
+    net.run(3.0)
+    assert running.error is not None
+    assert net.master.sdo(JOINT).read(0x6098) == 37
+
+
+@pytest.mark.parametrize('mode', [OperationMode.PROFILE_POSITION, OperationMode.CYCLIC_POSITION])
+def test_a_move_that_ends_elsewhere_has_not_arrived(mode: OperationMode) -> None:
+    """A drive with limits of its own, less its home offset, shortens the way without a word."""
+    limits = {(0x607D, 1): -15_000, (0x607D, 2): 5_000}
+    drive = with_defaults(drive_dictionary().for_node(NODE_ID), limits)
+    net = VirtualNetwork(bus_config(full_drive()), dictionaries={JOINT: drive})
+
+    def alters(_: object, frame: Frame) -> Frame:
+        if frame.can_id == 0x580 + NODE_ID and frame.data[:3] == b'\x43\x7d\x60':
+            limit = -10_000 if frame.data[3] == 1 else 10_000
+            return frame._replace(data=frame.data[:4] + struct.pack('<i', limit))
+        return frame
+
+    net.wire.alters = alters
+    net.boot()
+    net.enable(mode)
+    moving = net.master.drive(JOINT)
+    with pytest.raises(DriveError, match=r'stands at 0\.5, not at its target 0\.8'):
+        moving.move_to(0.8, timeout=10.0)
+    net.do(JOINT, 'recover')
+    assert net.motor() == pytest.approx(0.5, abs=0.01)
+    assert 'Operation enabled' in moving.move_to(0.4, timeout=10.0)
+
+
+def test_a_blocked_axis_has_not_arrived() -> None:
+    """On a way too short for the watch over following."""
+    net = with_modes()
+    net.enable(OperationMode.CYCLIC_POSITION)
+    net.simulated().block(now=net.now)
+    with pytest.raises(DriveError, match=r'stands at .*, not at its target 0\.08'):
+        net.master.drive(JOINT).move_to(0.08, timeout=10.0)
+
+
+@pytest.mark.parametrize('acceleration', [500, 50_000])
+def test_mode_9_brakes_with_the_deceleration(acceleration: int) -> None:
+    """From 1 rad/s by 5 rad/s^2, however slowly it was reached."""
+    writes = [write for write in MOTION_WRITES if write.index != 0x6083]
+    net = with_modes(sdo_writes=(*writes, sdo_write(0x6083, 0, acceleration)))
+    net.enable(OperationMode.CYCLIC_VELOCITY)
+    net.target(1.0)
+    net.run(1.0 / (acceleration / SCALE) + 1.0)
+    assert net.speed() == pytest.approx(1.0, abs=0.02)
+    began = net.now
+    net.do(JOINT, 'halt', preempt=True)
+    assert net.now - began < 1.0
+
+
 def test_without_a_mode_in_bus_yml_the_message_says_what_helps() -> None:
     """The drive stays in Switched on; a mode that is selected before lets it enable."""
     net = deviating(Fault.MODE_REQUIRED)

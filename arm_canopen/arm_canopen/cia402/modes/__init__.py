@@ -82,7 +82,10 @@ def _cyclic_modes(view: AxisState) -> Iterator[Mode]:
         yield InterpolatedPosition(units, interpolation, lambda: view.parameters.profile)
     if velocity := target(OperationMode.CYCLIC_VELOCITY):
         yield CyclicVelocity(
-            velocity, units.velocity, lambda: view.parameters.profile.acceleration
+            velocity,
+            units.velocity,
+            lambda: view.parameters.profile.acceleration,
+            lambda: view.parameters.profile.deceleration,
         )
     if torque := target(OperationMode.CYCLIC_TORQUE):
         yield CyclicTorque(torque, units.effort, lambda: view.parameters.torque_slope)

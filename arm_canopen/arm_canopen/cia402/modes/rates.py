@@ -90,11 +90,22 @@ class MasterRamped(Mode):
 
     cyclic = True
 
-    def __init__(self, target: Writer, scale: Scale, slope: Callable[[], float]) -> None:
-        """``slope`` is in user units per second, at most."""
+    def __init__(
+        self,
+        target: Writer,
+        scale: Scale,
+        slope: Callable[[], float],
+        braking: Callable[[], float] | None = None,
+    ) -> None:
+        """Begin at zero.
+
+        Args:
+            slope: Greatest change in user units per second, away from zero.
+            braking: The same towards zero; None for ``slope``.
+        """
         self._target = target
         self._scale = scale
-        self._slope = slope
+        self._slope, self._braking = slope, braking or slope
         self._value = 0.0
         self._goal = 0.0
 
@@ -111,8 +122,12 @@ class MasterRamped(Mode):
 
     def step(self, now: float, period: float, statusword: int) -> int:
         """Advance the ramp."""
-        change = self._slope() * period
-        self._value += max(-change, min(change, self._goal - self._value))
+        difference = self._goal - self._value
+        change = (self._braking if difference * self._value < 0.0 else self._slope)() * period
+        step = max(-change, min(change, difference))
+        if self._value * (self._value + step) < 0.0:  # beyond zero it is the other slope
+            step = -self._value
+        self._value += step
         self._target.write(self._scale.to_device(self._value))
         return NO_BITS
 
