@@ -41,7 +41,6 @@ class Server:
 
     Attributes:
         truth: Where the robot was last; may be read from any thread.
-        unread: Bytes for the host that were not read.
         stopping: Ends :meth:`run` when it is set.
     """
 
@@ -64,7 +63,6 @@ class Server:
         os.set_blocking(self._wake_read, False)
         self.stopping = threading.Event()
         self._start = time.monotonic()
-        self.unread = 0
         self._watch = watch
         self._look()
 
@@ -123,7 +121,7 @@ class Server:
         if line.plugged != terminal.plugged:
             (terminal.plug if line.plugged else terminal.unplug)()
         if out and terminal.plugged:
-            self.unread += terminal.write(out)
+            terminal.write(out)
         if now - self._looked_at >= TRUTH_PERIOD:
             self._look()
 

@@ -6,7 +6,7 @@ All values are texts; lists are joined by commas, numbers and flags have three d
 rl/exporter_utils.py). From 1.5.1 on it writes scales, clips and histories of the terms, too; the
 numbers of one term are joined by semicolons, and ``-inf;inf`` is no clip. A joint may have a
 prefix like ``robot/``. No exporter writes the frame of the IMU, the period of the phase, or the
-rate; :data:`OWN_KEYS` are ours.
+rate; ``phase_period``, ``phase_command_threshold``, ``imu_frame`` and ``kind`` are ours.
 
 Sizes and rate have keys of several tools (unitree_rl_lab's deploy.yaml, rl_sar, IsaacLab); they
 are compared with the contract. What looks like one of them and is not known is reported, and what
@@ -28,15 +28,6 @@ from .terms import MJLAB
 
 CONTRACT_KEY = 'policy_contract'
 """Key of a whole contract in YAML; its values count before all others of the file."""
-
-OWN_KEYS = {
-    CONTRACT_KEY: 'contract of the policy in YAML',
-    'phase_period': 'period of the phase in [s]',
-    'phase_command_threshold': 'a slower command has no phase',
-    'imu_frame': 'frame of the angular velocity: base or yawed',
-    'kind': 'how the policy was made',
-}
-"""Keys that only policies made by this package have."""
 
 VENDOR_TERMS = ('ang_vel', 'gravity', 'cmd', 'phase', 'joint_pos', 'joint_vel', 'prev_action')
 VENDOR_PHASE_PERIOD = 0.4  # [s] luwu_mjlab, XGOMini velocity task; no exporter writes it
