@@ -134,6 +134,8 @@ class Axis:
         # a mode is shown to the drive a cycle after the target that holds it there has left
         self._mode_led = self._mode_shown = self.mode
         self._controlword = 0
+        # by what all modes were preloaded last, and the RPDOs with that; empty after other steps
+        self._preloaded: tuple[object, ...] = ()
         self._mode_sent: int | None = None  # in the RPDO
         self._state = DriveState.UNKNOWN  # that the last cycle has seen
         self._reset_began: float | None = None
@@ -171,18 +173,18 @@ class Axis:
     def feedback(self) -> AxisFeedback:
         """Return the state for motion sources."""
         view, refusal = self.view, self.stream_refusal
-        return AxisFeedback(
-            name=self.name,
-            online=self.node.online,
-            state=view.state,
-            mode=view.mode,
-            position=view.position,
-            velocity=view.velocity,
-            setpoint=self.setpoint,
-            followable=refusal is None or self._is_led_to_rest(),
-            refusal=refusal,
-            age=view.age,
-            speed_limit=view.parameters.speed_limit or math.inf,
+        return AxisFeedback(  # by position, which costs a third
+            self.name,
+            self.node.online,
+            view.state,
+            view.mode,
+            view.position,
+            view.velocity,
+            self.setpoint,
+            refusal is None or self._is_led_to_rest(),
+            refusal,
+            view.age,
+            view.parameters.speed_limit or math.inf,
         )
 
     @property
@@ -346,6 +348,7 @@ class Axis:
     def _step_mode(self, now: float, period: float) -> int:
         """Advance the mode by a cycle, and the halt; return their bits of the controlword."""
         mode, halt = self.mode, self.halt
+        self._preloaded = ()
         bits = mode.step(now, period, self.view.statusword)
         if not halt.held:
             return bits
@@ -380,15 +383,19 @@ class Axis:
         With ``edge`` the drive is enabled, or its mode switched, by what leaves in this cycle:
         targets stay as they left in the one before.
         """
-        held = self.holding_mode
-        keeps_target = held is not None and (held is self.mode or held.cyclic)
-        if not edge and not keeps_target:
-            # every target in an RPDO, also of modes that are not selected: a drive may stay in the
-            # mode that it had; of two modes with one target object the selected one writes last
-            actual = self.view.actual()
+        view, held = self.view, self.holding_mode
+        if edge or (held is not None and (held is self.mode or held.cyclic)):
+            self._preloaded = ()
+            return self.halt_bits
+        # every target in an RPDO, also of modes that are not selected: a drive may stay in the
+        # mode that it had; of two modes with one target object the selected one writes last
+        actual, rpdos = view.actual(), self.node.image.rpdos
+        by = actual, self.mode, view.mode, view.parameters
+        if self._preloaded != (*by, [output.values for output in rpdos]):
             for mode in (*self.modes.values(), self.mode):
                 if not mode.by_sdo:
                     mode.preload(actual)
+            self._preloaded = *by, [output.values.copy() for output in rpdos]
         return self.halt_bits
 
     def _command(self) -> Command:
@@ -434,6 +441,7 @@ class Axis:
             Done when the drive has it.
         """
         held, actual = self.holding_mode, self.view.actual()
+        self._preloaded = ()
         if isinstance(held, CyclicPosition):
             # under load the drive is not quite where it is held, and would sag to where it is
             position_inc = self.view.units.position.to_device(held.setpoint)
@@ -450,6 +458,7 @@ class Axis:
 
     def hold(self) -> None:
         """Brake, and stay halted until a new target is taken."""
+        self._preloaded = ()
         self.mode.brake()
         self.halt.hold()
 
@@ -538,6 +547,7 @@ class Axis:
     def _begin(self) -> None:
         """Read the parameters of a device that has come into operation."""
         self.phase = Phase.UNSEEN
+        self._preloaded = ()
         self._mode_sent = None  # the boot has put into the RPDO what the device holds
         self.view.cache.begin()
         if self.config is self.node.config.drive:  # one axis polls for all

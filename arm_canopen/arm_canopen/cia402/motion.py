@@ -52,9 +52,9 @@ class Refusal:
         return f'{self.cause.value}: {self.detail}' if self.detail else self.cause.value
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # not frozen, which would make it at five times the cost
 class AxisFeedback:
-    """What is known of one drive at the start of a cycle.
+    """What is known of one drive at the start of a cycle, made anew for each.
 
     Attributes:
         name: Name of the drive in bus.yml.
@@ -88,7 +88,7 @@ class AxisFeedback:
     speed_limit: float = math.inf
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # as above
 class Setpoint:
     """A position, and what the drive shall add to its own control on the way there.
 

@@ -96,6 +96,7 @@ class MotionGroup:
 
     def _run(self, attachment: Attachment, now: float, period: float) -> None:
         feedback = [_feedback(drive) for drive in attachment.drives]
+        followable = [axis.followable for axis in feedback]
         try:
             setpoints = list(attachment.source.update(now, period, feedback))
         except Exception as error:  # noqa: BLE001  # a source must not stop the others
@@ -105,8 +106,8 @@ class MotionGroup:
             reason = f'answered {len(setpoints)} set-points for {len(feedback)} axes'
             self._fail(attachment, reason)
             return
-        for drive, axis, setpoint in zip(attachment.drives, feedback, setpoints, strict=True):
-            if setpoint is None or not axis.followable or drive not in attachment.owned:
+        for drive, follows, setpoint in zip(attachment.drives, followable, setpoints, strict=True):
+            if setpoint is None or not follows or drive not in attachment.owned:
                 attachment.streaming.discard(drive.name)
                 continue
             whole = setpoint if isinstance(setpoint, Setpoint) else Setpoint(setpoint)

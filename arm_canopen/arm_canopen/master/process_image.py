@@ -170,8 +170,8 @@ class SentRpdo:
         self.codec = PdoCodec(config.mapping)  # its compiled mapping
         # next values in mapping order
         self.values: list[Number] = [start(mapped) for mapped in config.mapping]
-        self._cob_id = config.cob_id
-        self._pack = self.codec.pack
+        self._packed: list[Number] = []
+        self._frame = Frame(config.cob_id)  # that carries these
 
     @property
     def synchronous(self) -> bool:
@@ -209,8 +209,11 @@ class SentRpdo:
         self.kept_back_by.clear()
 
     def frame(self) -> Frame:
-        """Return the frame that carries the present values."""
-        return Frame(self._cob_id, self._pack(self.values))
+        """Return the frame that carries the present values; the one of before as they stand."""
+        if self.values != self._packed:
+            self._frame = Frame(self.config.cob_id, self.codec.pack(self.values))
+            self._packed = self.values.copy()
+        return self._frame
 
 
 class Writer(Protocol):

@@ -18,7 +18,7 @@ from time import monotonic
 from ..exceptions import BusError
 from .bus import Bus, WallClock
 from .datagram_reader import DATAGRAM_MAX, DatagramReader, SLOTS, Source, WOKEN
-from .frame import Frame
+from .frame import Frame, STANDARD_ID_MAX
 
 # of asm-generic/socket.h; Python's socket module does not name them
 SO_RCVBUFFORCE = 33
@@ -107,6 +107,7 @@ class SocketBus(Bus):
         self._receiver, self._sender = receiver, sender
         self._send_lock = RLock()
         self._reader = reader
+        self._sent: dict[int, tuple[Frame, bytes]] = {}  # last datagrams, by 11-bit identifier
         self._stamps = TimestampReader()  # used without a compiled reader
         self._wake_fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         # of the three below: a closed descriptor is another's by the next moment. A signal handler
@@ -141,7 +142,11 @@ class SocketBus(Bus):
             BusError: The kernel refuses it.
             ValueError: It is no classic CAN frame.
         """
-        datagram = self._encode(frame)
+        sent, datagram = self._sent.get(frame.can_id, (None, b''))
+        if sent is not frame:  # an axis at rest gets the same one in each cycle
+            datagram = self._encode(frame)
+            if frame.can_id <= STANDARD_ID_MAX and type(frame.data) is bytes:
+                self._sent[frame.can_id] = frame, datagram
         with self._send_lock:
             if self._closed:
                 raise BusError(f'{self.name} is closed')

@@ -261,6 +261,10 @@ def test_an_offset_of_the_drive_moves_nothing(
         net.run(1.0)
         assert drive.position == pytest.approx(0.0, abs=1)
         net.do(JOINT, 'disable')
+        if mapped:  # changed while the axis rests
+            net.run(0.1)
+            net.network.publish_objects(net.network.nodes[JOINT], {(offset, 0): -value})
+            net.run(0.1)
     net.enable(mode)
     if mode is OperationMode.CYCLIC_POSITION:
         net.target(0.5)
