@@ -216,6 +216,8 @@ def test_the_bit_rate_is_one_that_the_file_of_the_master_supports(tmp_path: Path
     text = master_dcf(config, {})
     assert '\nBaudrate=100\n' in text
     assert '\nBaudRate_100=1\n' in text
+    config = load_text(tmp_path, edited('# master', 'baudrate: 125'))
+    assert 'BaudRate_100=' not in master_dcf(config, {})  # dcf-tools 2.4.2 refuses it
 
 
 def test_expected_numbers_are_in_the_file_of_the_master(tmp_path: Path) -> None:

@@ -196,7 +196,9 @@ def master_dcf(config: BusConfig, upload_files: Mapping[int, str]) -> str:
 
 
 def _head(master: MasterConfig, rpdos: int, tpdos: int) -> dict[str, dict[str, str]]:
-    identity = master.identity
+    identity, rate = master.identity, round(master.bitrate * KILOBIT)
+    # 100 is in CiA 305 alone: dcf-tools refuses a file that names it
+    rates = [each for each in BIT_RATES_KBIT if each != 100 or rate == 100]
     return {
         'FileInfo': {
             'FileName': 'master.dcf',
@@ -212,7 +214,7 @@ def _head(master: MasterConfig, rpdos: int, tpdos: int) -> dict[str, dict[str, s
             'ProductNumber': f'0x{identity.product_code:08X}',
             'RevisionNumber': f'0x{identity.revision_number:08X}',
             'OrderCode': '',
-            **{f'BaudRate_{rate}': '1' for rate in BIT_RATES_KBIT},
+            **{f'BaudRate_{each}': '1' for each in rates},
             'SimpleBootUpMaster': '1',
             'SimpleBootUpSlave': '0',
             'Granularity': '1',

@@ -38,11 +38,12 @@ NO_VIEW = 'NO_VIEW'
 VIEWER_NICENESS = ('nice', '-n', '5')
 """Whatever moves the robot comes first, from the start of the program on."""
 VIEWER_STOP_STEPS = (
-    StopStep(Signals.SIGTERM, 3.0),
+    StopStep(Signals.SIGTERM, 10.0),
     StopStep(Signals.SIGABRT, 1.0),
     StopStep(Signals.SIGKILL, 1.0),
 )
-"""The viewer holds nothing that would have to be put down."""
+"""The viewer holds nothing that would have to be put down. On a busy computer Python takes
+seconds to end."""
 
 
 @contextlib.contextmanager
