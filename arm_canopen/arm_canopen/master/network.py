@@ -228,9 +228,13 @@ class Network:
     def _send_outputs(self, node: RemoteNode, now: float) -> None:
         for output in node.image.rpdos:
             try:
-                if output.leaves(now):
-                    self.send(output.frame())
-            except Exception as error:  # noqa: BLE001, PERF203
+                if not output.leaves(now):
+                    continue
+                refusal = self.send(output.frame())
+                if refusal is None and not output.cyclic:  # else it stays due
+                    output.left(now)
+            except Exception as error:  # noqa: BLE001
+                output.due = False
                 node.fail(error, output)
 
     def _contain(self, step: Callable[[], object]) -> bool:

@@ -167,6 +167,7 @@ class SentRpdo:
         self.skips = False  # it does not leave in this cycle
         self._repeat_time = REPEAT_SHARE * (config.event_time or 0.0)
         self._left_at: float | None = None
+        self._brought: list[Number] = []  # its values when it left last
         self.codec = PdoCodec(config.mapping)  # its compiled mapping
         # next values in mapping order
         self.values: list[Number] = [start(mapped) for mapped in config.mapping]
@@ -189,19 +190,17 @@ class SentRpdo:
         if self.cyclic:
             return not self.kept_back_by
         repeat = self._left_at is not None and 0.0 < self._repeat_time <= now - self._left_at
-        if not self.due and not repeat:
-            return False
-        self.left(now)
-        return True
+        return self.due or repeat
 
-    @property
-    def was_sent(self) -> bool:
-        """Whether it has left since the device booted."""
-        return self._left_at is not None
+    def sent(self, position: int) -> Number | None:
+        """Return what it has brought of an object since the device booted, None for nothing."""
+        if self._left_at is None:
+            return None
+        return (self._brought if self.due else self.values)[position]
 
     def left(self, now: float) -> None:
-        """It was sent because it was published, at a time in [s]."""
-        self.due, self._left_at = False, now
+        """The bus has taken it, at a time in [s], because it was published."""
+        self.due, self._left_at, self._brought = False, now, [*self.values]
 
     def reset(self) -> None:
         """The device is another one than before: nothing was published to it."""
@@ -400,8 +399,8 @@ class ProcessImage:
     def sent(self, index: int, subindex: int) -> Number | None:
         """Return what an RPDO has brought of an object since the device booted, else None."""
         for entry, position in self._places.get((index, subindex), ()):
-            if entry.was_sent:
-                return entry.values[position]
+            if (value := entry.sent(position)) is not None:
+                return value
         return None
 
     def mapped_output(self, index: int, subindex: int = 0) -> MappedObject | None:

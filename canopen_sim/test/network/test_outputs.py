@@ -257,6 +257,22 @@ def test_a_value_that_the_bus_refuses_is_not_sent_later() -> None:
     assert (read(net, OUTPUTS), read(net, MASK)) == (0x01, 0x03)
 
 
+def test_a_value_that_waits_for_sync_leaves_when_the_bus_takes_frames_again() -> None:
+    """Its publisher was told that it leaves; until then the one before counts as sent."""
+    net = booted()
+    publish(net, (0x6071, 0), 1)
+    net.run(0.1)
+    net.wire.refuses = 'the transmit queue is full'
+    publish(net, (0x6071, 0), 7)
+    net.run(0.05)
+    image = net.network.nodes[MODULE].image
+    assert image.sent(0x6071, 0) == 1
+    net.wire.refuses = ''
+    net.run(0.2)
+    assert [struct.unpack('<h', data) for data in net.frames(SYNC_COB_ID)] == [(1,), (7,)]
+    assert image.sent(0x6071, 0) == 7
+
+
 def test_a_write_that_waits_in_the_queue_changes_no_rpdo_yet() -> None:
     """Of two writes the first one's value leaves until the second one is on its way."""
     net = drive_with_speed_mapped()
