@@ -70,6 +70,7 @@ class Axis:
     Quick Stop Active       Operation Enabled     goal Quick Stop Active, report
     another state           Operation Enabled     goal Switch On Disabled, report
     no TPDOs                Operation Enabled     halt; the stop looks by SDO
+    no state for 0.2 s      Operation Enabled     goal Switch On Disabled, :class:`.StopSequence`
     no motion               set-points            halt, or no power where it is pulled away
     no rest                 halt, or no power     :class:`.StopSequence`: quick stop, then no power
     no life sign            anything              goal none, mode none, :class:`.StopSequence`
@@ -249,8 +250,9 @@ class Axis:
             return Refusal(RefusalCause.OFFLINE, node.loss or node.phase_text)
         if node.left_operational:
             return Refusal(RefusalCause.NOT_OPERATIONAL)
-        if view.state is DriveState.UNKNOWN:
-            return Refusal(RefusalCause.STATE_UNKNOWN)
+        if view.shown_state is DriveState.UNKNOWN:
+            shown = '' if view.undecoded is None else view.word_text
+            return Refusal(RefusalCause.STATE_UNKNOWN, shown)
         if not view.fresh:
             return Refusal(RefusalCause.SILENT, f'the last is {view.age:.1f} s old')
         if view.state in FAULTY:
@@ -291,9 +293,9 @@ class Axis:
             self._begin()
         view, before = self.view, self._state
         view.observe()
-        self._state = view.state
         if view.state is DriveState.UNKNOWN:
-            return
+            return  # what it was enabled for is judged by its next state
+        self._state = view.state
         self.following_error = self.setpoint - view.position
         if before is DriveState.UNKNOWN and self.node.taken_over and self.goal is None:
             self._take_over()
@@ -303,8 +305,9 @@ class Axis:
             self._state_changed(before)
         if view.fresh or not self.acts:
             self._unseen_since = None
-        else:
+        elif view.undecoded is None:
             self._watch_sight()
+        self._watch_statusword()
         if self.halt.held or self.goal is not DriveState.OPERATION_ENABLED:
             self._watch_braking()
         else:
@@ -675,6 +678,14 @@ class Axis:
             f'stopping: no TPDOs for {view.age:.1f} s; it stays halted until the first target '
             'after they have come again',
         )
+
+    def _watch_statusword(self) -> None:
+        """Stop a drive whose statusword has shown no state for too long: it may be faulted."""
+        view = self.view
+        if view.undecoded is None or view.fresh or self.goal is not DriveState.OPERATION_ENABLED:
+            return
+        text = f'its statusword shows no state: {view.word_text}'
+        self._take_out(Refusal(RefusalCause.STATE_UNKNOWN, view.word_text), text)
 
     async def _look_for_motion(self) -> None:
         """See by SDO whether a drive slows down whose TPDOs do not come."""

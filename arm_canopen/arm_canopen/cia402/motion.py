@@ -18,7 +18,7 @@ class RefusalCause(Enum):
 
     OFFLINE = 'is offline'
     NOT_OPERATIONAL = 'is not in the NMT state Operational'
-    STATE_UNKNOWN = 'has not sent its state yet'
+    STATE_UNKNOWN = 'does not show its state'
     SILENT = 'does not send its TPDOs'
     FAULT = 'is faulted'
     NOT_ENABLED = 'is not enabled'

@@ -41,6 +41,7 @@ LOOK_AGE_MAX = 0.5  # [s] of such a reading
 REST_SHARE = 0.002  # share of the profile velocity below which an axis counts as standing
 REST_TIME = 0.004  # [s] within which one that counts as standing could stop
 NOISE_DEV = 2  # units of 0x606C, and increments within the window, that noise of sensors may be
+UNDECODED_MAX = 0.2  # [s] for which a statusword without a state counts as a lost TPDO
 WINDOW = 0.1  # [s] of positions that the estimate looks back on
 FLICKER_INC = 1  # [inc] by which an encoder at rest may change
 WARNINGS = int(Statusword.WARNING | Statusword.INTERNAL_LIMIT)
@@ -147,7 +148,9 @@ class AxisState:
         units: Its units.
         cache: Reads its parameters.
         state: State of the power drive system.
-        statusword: 0x6041.
+        statusword: 0x6041, the last one that shows a state.
+        undecoded: 0x6041 where it shows no state (no row of CiA 402-2, table 31), else None.
+            State and statusword stay the last known ones; soon they are no longer fresh.
         mode: Mode of operation that the drive displays (0x6061); 0 while unknown.
         fresh: The TPDOs with all of this are young enough to act on.
         position: Actual position; the last one of a lost drive, NaN before the first.
@@ -171,6 +174,8 @@ class AxisState:
         self.cache = ParameterCache(node, config, self.units, scheduler, warn)
         self.state = DriveState.UNKNOWN
         self.statusword = self.mode = 0
+        self.undecoded: int | None = None
+        self._decoded_at = -math.inf
         self.fresh = False
         self.position = self.position_inc = math.nan
         self.velocity_dev: float | None = None
@@ -345,8 +350,8 @@ class AxisState:
             shown = f'{statusword_text(self.statusword)} by SDO; ' if self._looks else ''
             return f'{shown}offline: {node.phase.value}{detail}{loss}'
         parts = ['no statusword' if node.left_operational else 'no statusword yet']
-        if self.state is not DriveState.UNKNOWN:
-            parts = [statusword_text(self.statusword)]
+        if self.undecoded is not None or self.state is not DriveState.UNKNOWN:
+            parts = [self.word_text]
             if node.operational:
                 parts.append(f'mode {mode_title(self.mode)}')
             if not self.seen:
@@ -362,6 +367,19 @@ class AxisState:
         if node.left_operational and node.nmt_state is not None:
             parts.append(f'NMT state {node.nmt_state.name}: start it by NMT')
         return '; '.join(parts)
+
+    @property
+    def shown_state(self) -> DriveState:
+        """State that 0x6041 shows now; UNKNOWN where it shows none."""
+        return self.state if self.undecoded is None else DriveState.UNKNOWN
+
+    @property
+    def word_text(self) -> str:
+        """0x6041 in words, as it came."""
+        if self.undecoded is None:
+            return statusword_text(self.statusword)
+        before = self.state.title
+        return f'{statusword_text(self.undecoded)}, no state of CiA 402 (before: {before})'
 
     async def read_error_code(self) -> None:
         """Read 0x603F, so that the answer can name the error."""
@@ -397,7 +415,7 @@ class AxisState:
             self._estimate.clear()
         if shown is None:
             self.state, self.statusword, self.mode = DriveState.UNKNOWN, 0, 0
-            self.velocity_dev = None
+            self.velocity_dev = self.undecoded = None
             if position is not None:  # it may come before the statusword
                 self.position_inc = position
                 self.position = self.units.position.from_device(position)
@@ -406,13 +424,25 @@ class AxisState:
         looked = shown is self._looked
         self.velocity_dev = None if looked or self._velocity is None else self._velocity.value
         self.position = self.units.position.from_device(self.position_inc)
+        self._decode(word)
+
+    def _decode(self, word: int) -> None:
+        """Keep the state before a word that shows none; soon that is not fresh any more."""
+        now = self._scheduler.now
         if word != self.statusword or self.state is DriveState.UNKNOWN:
-            self.state, self.statusword = drive_state(word), word
+            state = drive_state(word)
+            if state is DriveState.UNKNOWN:
+                self.undecoded = word
+                self.fresh = self.fresh and now - self._decoded_at <= UNDECODED_MAX
+                return
+            self.state, self.statusword = state, word
+        self.undecoded, self._decoded_at = None, now
 
     def lose_sight(self) -> None:
         """Forget the state; the position stays the last one."""
         self.state, self.statusword, self.mode = DriveState.UNKNOWN, 0, 0
-        self.fresh, self.velocity_dev = False, None
+        self.fresh, self.velocity_dev, self.undecoded = False, None, None
+        self._decoded_at = -math.inf
         self._looked = None
         self._estimate.clear()
 
@@ -432,7 +462,8 @@ class AxisState:
         self._looked, self._looked_at = (word, position_inc), begin
         if not self.fresh:
             self._estimate.note(self._scheduler.now, position_inc)
-        return drive_state(word)
+        state = drive_state(word)
+        return self.state if state is DriveState.UNKNOWN else state  # it may still be powered
 
     async def confirm(self) -> bool:
         """Read by SDO what a lost TPDO may have changed; return whether anything differs.
@@ -524,7 +555,7 @@ class AxisState:
             node=node_status(self.node, self._scheduler.now),
             state=self.state,
             mode=mode_title(self.mode),
-            statusword=statusword_text(self.statusword),
+            statusword=self.word_text,
             warning=bool(self.statusword & WARNINGS),
             error=self.error,
             failure=failure,

@@ -394,7 +394,10 @@ class AxisSteps:
 
     def _why(self) -> str:
         """Name the condition outside of the bus keeps the drive from being enabled."""
-        word = self.axis.view.statusword
+        view = self.axis.view
+        if view.undecoded is not None:
+            return ' (its statusword shows no state of CiA 402)'
+        word = view.statusword
         if not word & Statusword.VOLTAGE_ENABLED:
             return (
                 ' (no voltage at the power stage, bit 4: is the safe torque off or the e-stop on?)'
@@ -414,6 +417,11 @@ class AxisSteps:
 
     def _why_not_ready(self) -> str:
         axis = self.axis
+        if axis.view.undecoded is not None:
+            return (
+                f'{axis.name} shows no state in its statusword: {axis.describe()}; do bits 0 to '
+                '3, 5 and 6 of its 0x6041 follow CiA 402-2, table 31?'
+            )
         known = axis.view.state is not DriveState.UNKNOWN
         if known and not axis.view.fresh:
             return f'{axis.name} does not send its TPDOs any more: {axis.describe()}'

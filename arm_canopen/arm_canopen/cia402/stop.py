@@ -12,7 +12,7 @@ from collections.abc import Callable
 import math
 
 from canopen_core import CodecError, SdoError
-from canopen_core.standard import DriveState, Index, NmtCommand, NmtState, statusword_text
+from canopen_core.standard import DriveState, Index, NmtCommand, NmtState
 
 from ..master.events import Severity
 from ..master.scheduler import Scheduler, Task
@@ -28,6 +28,8 @@ SHUTDOWN_MAX = STOP_TIMEOUT + RAMP_MAX + 2 * STOP_TIMEOUT
 """Longest time of a shutdown in [s]: to brake, to lose the power, and to run out without it."""
 DISABLED = (DriveState.SWITCH_ON_DISABLED, DriveState.NOT_READY_TO_SWITCH_ON, DriveState.FAULT)
 """States without power; after UNKNOWN and in the reaction to a fault it may still move."""
+MAY_MOVE = (DriveState.OPERATION_ENABLED, DriveState.UNKNOWN)
+"""States in which a target may move it."""
 FALLEN_RATIO = 0.98  # of the least speed so far, below which a speed is falling
 SLOWING_RATIO = 0.04  # of the time of a ramp, in which more than that has to be seen
 
@@ -96,13 +98,12 @@ class StopSequence:
     @property
     def disabled(self) -> bool:
         """Whether the drive was seen to be without power."""
-        return self._view.seen and self._view.state in DISABLED
+        return self._view.seen and self._view.shown_state in DISABLED
 
     @property
     def rests(self) -> bool:
         """Whether the drive was seen to stand, and no target moves it any more."""
-        enabled = self._view.state in {DriveState.OPERATION_ENABLED, DriveState.UNKNOWN}
-        return self._view.stands and not enabled
+        return self._view.stands and self._view.shown_state not in MAY_MOVE
 
     def ramp_time(self) -> float:
         """Return how long it brakes in [s], by the slower of its ramps."""
@@ -197,8 +198,7 @@ class StopSequence:
             return max(0.0, end - self._scheduler.now)
 
         def reacts() -> bool:
-            waits = (DriveState.OPERATION_ENABLED, DriveState.UNKNOWN)
-            return done() or self._gives_up() or (view.seen and view.state not in waits)
+            return done() or self._gives_up() or (view.seen and view.shown_state not in MAY_MOVE)
 
         by_sdo = self._controlword.kept_back or not view.node.operational
         while True:
@@ -224,7 +224,7 @@ class StopSequence:
         if not view.seen:
             return now > self._unseen_after
         self._note_sight()
-        idle = view.stands and view.state is DriveState.OPERATION_ENABLED
+        idle = view.stands and view.shown_state in MAY_MOVE
         if idle and now - self._began > STOP_TIMEOUT:
             return True
         return self._braking.fails(now, view, self._deceleration)
@@ -244,8 +244,8 @@ class StopSequence:
         if not self._quiet:
             view = self._view
             shown = 'nothing'
-            if view.state is not DriveState.UNKNOWN:
-                shown = statusword_text(view.statusword)
+            if view.undecoded is not None or view.state is not DriveState.UNKNOWN:
+                shown = view.word_text
             if view.speed_known:
                 shown += f'; {view.speed:.3g} per second'
             self._send_report(Severity.ERROR, f'{what}: {shown}{remedy}')

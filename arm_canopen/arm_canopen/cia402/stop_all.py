@@ -67,6 +67,8 @@ async def _stopped(commands: AxisCommands, scheduler: Scheduler) -> tuple[str, s
         return 'failed', str(error)
     if view.state is DriveState.FAULT:  # its own reaction has ended its motion
         return 'unpowered', f'{view.name} (faulted)'
+    if view.shown_state is DriveState.UNKNOWN:
+        return 'failed', f'{view.name}: {commands.axis.describe()}'
     if view.state not in POWERED:
         return 'unpowered', view.name
     return 'stopped' if moved else 'standing', view.name

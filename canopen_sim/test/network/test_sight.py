@@ -15,6 +15,7 @@ from drive_samples import (
     bus_config,
     drive_config,
     DRIVE_EDS,
+    every_mode,
     PERIOD,
     SCALE,
     sdo_write,
@@ -33,6 +34,7 @@ from arm_canopen import (
     Severity,
 )
 from arm_canopen.cia402.following_watch import Following, FollowingWatch
+from arm_canopen.cia402.stop_all import stop_all
 from arm_canopen.config import boot_writes, check_bus
 from arm_canopen.config.model.pdo import with_event_timer
 from arm_canopen.master.process_image import ReceivedTpdo, SyncRound
@@ -132,11 +134,86 @@ def test_feedback_is_that_of_the_sync_it_is_stamped_with() -> None:
     assert reported == pytest.approx(sent, abs=1e-9)
 
 
-STREAMED = pytest.mark.parametrize(
-    'mode',
-    [OperationMode.CYCLIC_POSITION, OperationMode.INTERPOLATED_POSITION],
-    ids=lambda m: m.name,
+def show(net: VirtualNetwork, word: Callable[[int], int], frames: int = 1_000_000) -> None:
+    """Change the statusword of some TPDOs."""
+    left = [frames]
+
+    def alters(sender: str, frame: Frame) -> Frame:
+        if frame.can_id != STATE_PDO or not left[0]:
+            return frame
+        left[0] -= 1
+        changed = struct.pack('<H', word(struct.unpack_from('<H', frame.data)[0]))
+        return frame._replace(data=changed + frame.data[2:])
+
+    net.wire.alters = alters
+
+
+@pytest.mark.parametrize(
+    ('word', 'mode', 'target'),
+    [
+        (0x022B, OperationMode.PROFILE_POSITION, 5.0),
+        (0x0209, OperationMode.PROFILE_VELOCITY, 1.0),
+        (0x022B, OperationMode.CYCLIC_POSITION, 5.0),
+    ],
 )
+def test_a_statusword_of_no_state_stops_an_axis_only_where_it_lasts(
+    word: int, mode: OperationMode, target: float
+) -> None:
+    """One counts as a lost TPDO; then the axis brakes, is named, and stays disabled."""
+    net = booted(every_mode(drive_config(JOINT, NODE_ID)))
+    net.enable(mode)
+    net.target(target)
+    net.run(0.8)
+    moving, since = net.speed(), net.now
+    show(net, lambda shown: word, 3)
+    net.run(0.3)
+    assert net.speed() == pytest.approx(moving, rel=0.3)
+    assert net.drives[JOINT].stays_enabled
+    assert 0 not in net.controlwords(JOINT, since=since)
+    assert not net.reported(Severity.WARNING)
+    show(net, lambda shown: word, 50)
+    while abs(net.speed()) > 0.05:
+        net.run(PERIOD)
+        assert 0 not in net.controlwords(JOINT, since=since)  # no power is taken in motion
+    net.run(3.0)
+    assert net.simulated().state is DriveState.SWITCH_ON_DISABLED
+    (report,) = net.reported(Severity.ERROR)
+    assert f'0x{word:04X}' in report
+    with pytest.raises(DriveError, match='enable it'):
+        net.target(0.0)
+
+
+def test_an_axis_that_loses_its_power_unseen_is_not_enabled_again() -> None:
+    """The safe torque off ends with its statuswords of no state; set-points go on."""
+    led = Led(OperationMode.CYCLIC_POSITION, Leader(heeds=False))
+    net, since = led.net, led.net.now
+    show(net, lambda shown: 0x0209)
+    net.devices[JOINT].faults.inject(FaultInjection(Fault.STO, duration=3.0), net.now)
+    net.run(1.0)
+    assert '0x0209' in net.drives[JOINT].describe()
+    assert led.source.losses[JOINT].cause is RefusalCause.STATE_UNKNOWN
+    net.run(3.0)
+    show(net, lambda shown: shown)
+    net.run(2.0)
+    assert net.simulated().state is DriveState.SWITCH_ON_DISABLED
+    assert 0x7 not in net.controlwords(JOINT, since=since)
+    assert '0x0209' in net.reported(Severity.ERROR)[0]
+
+
+def test_a_drive_that_never_shows_a_state_is_named_and_not_known_to_stand() -> None:
+    """One without bit 5 shows no state while it is disabled."""
+    net = VirtualNetwork(bus_config(drive_config(JOINT, NODE_ID)))
+    show(net, lambda shown: 0x0211)
+    net.start()
+    net.run(3.0)
+    with pytest.raises(DriveError, match='0x0211'):
+        net.do(JOINT, 'init')
+    assert not net.controlwords(JOINT)
+    report = net.result(
+        net.network.scheduler.spawn(stop_all([net.commands[JOINT]], net.network.scheduler)), 60.0
+    )
+    assert JOINT in ''.join(report.failed)
+    assert not report.unpowered
 
 
 def with_window(window_inc: int | None) -> NodeConfig:
