@@ -92,8 +92,7 @@ def time_of_two_arms(turn: float, *, apart: bool) -> tuple[float, float]:
 
 def jog(core: MotionCore, twist: Array, now: float, duration: float) -> None:
     """Move the tool at a speed for a time."""
-    request = JogRequest(TwistCommand(twist), now + duration)
-    core.commit(core.prepare(request), now)
+    core.apply(JogRequest(TwistCommand(twist), now + duration), now)
 
 
 def ours(core: MotionCore, twist: Array) -> tuple[float, bool]:
@@ -213,7 +212,7 @@ def time_of_check(model: RobotModel) -> tuple[float, int]:
         core = MotionCore(model, CoreSettings(check_self_collision=False))
         core.reset(ready(model.name))
         try:
-            motion = core.prepare(TrajectoryGoal(model.joints, points), core.basis).motion
+            motion = core.plan(TrajectoryGoal(model.joints, points), core.basis)
         except GoalError:
             continue  # too fast somewhere
         assert isinstance(motion, Execution)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Commands to a core in a loop without other threads: prepared, and committed at once."""
+"""Commands to a core in a loop without other threads."""
 
 from __future__ import annotations
 
@@ -33,9 +33,8 @@ def command(
     core: MotionCore, request: MotionRequest | ImmediateRequest, now: float = 0.0
 ) -> Execution | None:
     """Put a request into effect; return the execution of a trajectory."""
-    prepared = core.prepare(request, core.basis)
-    core.commit(prepared, now)
-    return prepared.motion if isinstance(prepared.motion, Execution) else None
+    motion = core.command(request, now)
+    return motion if isinstance(motion, Execution) else None
 
 
 def twist(

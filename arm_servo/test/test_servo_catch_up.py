@@ -66,8 +66,9 @@ def test_catching_up_makes_no_contact(jog: float, aside: float, speed: float) ->
     ]
     # the plan is for an arm at rest there: the way from the motion is not in it
     basis = replace(core.basis, state=RobotState.at_rest(np.array([x, y])))
-    prepared = core.prepare(TrajectoryGoal(core.model.joints, points), basis)
-    core.commit(prepared, 0.0)
+    motion = core.plan(TrajectoryGoal(core.model.joints, points), basis)
+    assert motion is not None
+    core.begin(motion, basis)
     execution = core.execution
     assert execution is not None
     for cycle in range(400, 700):
@@ -86,10 +87,11 @@ def test_a_trajectory_is_void_where_the_arm_is_elsewhere() -> None:
     core = MotionCore(robot('panda'))
     core.reset(ready('panda'))
     goal = TrajectoryGoal(core.model.joints, [GoalPoint(2.0, (ready('panda') + 0.2).tolist())])
-    aside = core.basis.foreseen(0.0)
-    state = RobotState.at_rest(aside.state.position + 0.02)
-    prepared = core.prepare(goal, replace(aside, state=state))
+    basis = core.basis.foreseen(0.0)
+    aside = replace(basis, state=RobotState.at_rest(basis.state.position + 0.02))
+    motion = core.plan(goal, aside)
+    assert motion is not None
     with pytest.raises(StateMovedError) as refused:
-        core.commit(prepared, 0.0)
+        core.begin(motion, aside)
     assert refused.value.code is GoalCode.INVALID_GOAL
     assert core.source is Source.NONE

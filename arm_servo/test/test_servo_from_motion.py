@@ -88,11 +88,11 @@ def test_a_trajectory_in_motion_is_refused_with_a_time_that_suffices(
     here = tuple(core.state.position)
     hasty = TrajectoryGoal(core.model.joints, [GoalPoint(0.02, here)])
     try:
-        core.prepare(hasty, core.basis)
+        core.plan(hasty, core.basis)
     except GoalError as error:
         factor = float(str(error).split('give the trajectory ')[1].split(' times')[0])
         later = replace(hasty.points[0], time=0.02 * factor)
-        core.prepare(replace(hasty, points=[later]), core.basis)
+        core.plan(replace(hasty, points=[later]), core.basis)
 
 
 @pytest.mark.parametrize('where', ['drives of this process', 'drives elsewhere'])

@@ -32,7 +32,7 @@ from arm_servo import (
 from arm_servo.controllers.target import SingleTarget
 from arm_servo.core.gateway import start_worker
 from arm_servo.core.motion_queue import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand
-from arm_servo.core.preparation import CommandBasis, Prepared
+from arm_servo.core.preparation import CommandBasis, Motion
 from arm_servo.core.requests import by_joint
 from arm_servo.core.snapshot import MAX_CYCLE_AGE
 from arm_trajectory import GoalCode, GoalError, GoalPoint, StateMovedError, TrajectoryGoal
@@ -311,18 +311,16 @@ def test_a_long_goal_that_is_refused_at_rest_does_not_end_a_jog(
 ) -> None:
     """The jog is held for it, and goes on: where it has come to rest, there is no way any more."""
     drives = ready()
-    prepare, attempts = MotionCore.prepare, 0
+    plan, attempts = MotionCore.plan, 0
 
-    def prepare_once(
-        core: MotionCore, request: Any, basis: CommandBasis | None = None
-    ) -> Prepared:
+    def plan_once(core: MotionCore, request: Any, basis: CommandBasis) -> Motion | None:
         nonlocal attempts
         attempts += isinstance(request, TrajectoryGoal)
         if attempts > 1:
             raise GoalError(GoalCode.INVALID_GOAL, 'the elbow would collide')
-        return prepare(core, request, basis)
+        return plan(core, request, basis)
 
-    monkeypatch.setattr(MotionCore, 'prepare', prepare_once)
+    monkeypatch.setattr(MotionCore, 'plan', plan_once)
     goal = wave(drives, 300)
     jog(drives.gateway, {JOINT: 0.4}, drives.now, 30.0)
     drives.run(40)

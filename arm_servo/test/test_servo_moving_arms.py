@@ -9,6 +9,7 @@ from contextlib import nullcontext, suppress
 from functools import cache
 import math
 
+import core_commands
 import numpy as np
 import pytest
 
@@ -24,7 +25,7 @@ from arm_model import (
     RobotModel,
     RobotState,
 )
-from arm_servo import JogRequest, JointCommand, MotionCore, Outcome, SetPoint, TargetRequest
+from arm_servo import JogRequest, JointCommand, MotionCore, Outcome, SetPoint
 from arm_servo.core.moving_arms import MovingArms
 from arm_servo.core.requests import by_joint
 from arm_servo.core.safety_filter import SafetyFilter
@@ -111,13 +112,13 @@ class Pair:
         core = self.cores[side]
         numbers = dict(zip(ARMS[side], velocities, strict=True))
         command = JointCommand(*by_joint(core.model, numbers, 'velocities'))
-        core.commit(core.prepare(JogRequest(command, self.now + 60.0)), self.now)
+        core_commands.command(core, JogRequest(command, self.now + 60.0), self.now)
 
     def go(self, side: str, positions: Sequence[float], seconds: float) -> None:
         """Make an arm follow a trajectory."""
         core = self.cores[side]
         goal = TrajectoryGoal(core.model.joints, [GoalPoint(seconds, positions)])
-        core.commit(core.prepare(goal, core.basis), self.now)
+        core_commands.follow(core, goal)
 
     def at(self, side: str) -> np.ndarray:
         """Return where an arm is commanded to be."""
@@ -199,9 +200,7 @@ def test_a_trajectory_behind_an_arm_that_gives_way_is_not_held_up() -> None:
 def test_a_target_ends_where_another_arm_comes_in_its_way() -> None:
     """Single targets are as jogs and trajectories."""
     pair = Pair(right=(0.1, 0.0))
-    left = pair.cores['left']
-    prepared = left.prepare(TargetRequest({'left_1': -0.9}), left.basis)
-    left.commit(prepared, pair.now)
+    core_commands.move_to(pair.cores['left'], {'left_1': -0.9})
     pair.jog('right', 0.8, 0.0)
     pair.run(4.0)
     assert rests(pair)

@@ -87,7 +87,7 @@ def test_an_unexpected_error_of_the_planning_is_its_result(
     there = [axis.setpoint + 0.05 for axis in drives.axes]
     goal = TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(2.0, there)])
     with monkeypatch.context() as patch:
-        patch.setattr(drives.gateway._core, 'prepare', lambda *_: 1 // 0)
+        patch.setattr(drives.gateway._core, 'plan', lambda *_: 1 // 0)
         bad = node.send(message(goal))
         drives.run(5)
         node.watch()

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from control_msgs.msg import JointJog
+import core_commands
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from model_robots import ready, robot
 import numpy as np
@@ -57,7 +58,7 @@ def tool_twist(made: CommandConverter, message: TwistStamped) -> tuple[Array, Ar
     core.reset(ready('gp110'))
     for number in range(60):
         now = number * PERIOD
-        core.commit(core.prepare(made.twist(message, now)), now)
+        core_commands.command(core, made.twist(message, now), now)
         core.step(number * PERIOD, PERIOD)
     state = core.state
     return core.model.jacobian(state.position) @ state.velocity, state.position
@@ -106,7 +107,7 @@ def test_a_joint_jog_is_cut_and_scaled() -> None:
     for number in range(60):
         request = made.jog(JointJog(joint_names=[name], velocities=[2.0]), number * PERIOD)
         assert isinstance(request, JogRequest)
-        core.commit(core.prepare(request), 0.0)
+        core_commands.command(core, request)
         core.step(number * PERIOD, PERIOD)
     assert core.state.velocity[0] == pytest.approx(0.4, abs=1e-3)
     assert 'cut' in made.capped
@@ -158,7 +159,7 @@ def test_a_pose_is_not_approached_faster_than_its_speed() -> None:
     here = core.model.pose(core.state.position)
     there = Pose(here.rotation, here.position + np.array((0.0, 0.3, 0.0)))
     jog = JogRequest(PoseCommand(there, 0.05, 0.8), 10.0)
-    core.commit(core.prepare(jog), 0.0)
+    core_commands.command(core, jog)
     for number in range(200):
         core.step(number * PERIOD, PERIOD)
     speed = core.model.jacobian(core.state.position) @ core.state.velocity

@@ -124,10 +124,12 @@ def test_a_plan_is_void_when_another_command_came() -> None:
     """What was checked does not begin behind a stop, nor behind another motion."""
     core = core_at('prbt', ready('prbt'))
     for come_between in (core_commands.stop, core_commands.pause, _move_a_little):
-        plan = core.prepare(DisplacementRequest({'prbt_joint_1': 0.1}), core.basis)
+        basis = core.basis
+        motion = core.plan(DisplacementRequest({'prbt_joint_1': 0.1}), basis)
+        assert motion is not None
         come_between(core)
         with pytest.raises(CommandError, match='before this command had begun'):
-            core.commit(plan, 0.0)
+            core.begin(motion, basis)
         core_commands.stop(core)
         core_commands.resume(core)
         assert core.source is Source.NONE

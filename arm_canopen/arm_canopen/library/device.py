@@ -45,7 +45,13 @@ class DeviceSdo:
     """Objects of a device by SDO, typed by its EDS.
 
     An object is an index such as ``0x6041``, or what a person writes: ``'Statusword'``,
-    ``'0x607D:02'``, ``'Software position limit/Max'``.
+    ``'0x607D:02'``, ``'Software position limit/Max'``. Each answer may take the ``timeout`` in [s],
+    by default the SDO time-out of bus.yml.
+
+    Raises:
+        ObjectError: The EDS has no such object, or several; the message names them.
+        SdoError: The device refused, or did not answer in time.
+        BusError: The master has ended.
     """
 
     def __init__(self, device: RemoteNode, thread: NetworkThread) -> None:
@@ -53,15 +59,7 @@ class DeviceSdo:
         self._thread = thread
 
     def read(self, target: int | str, subindex: int = 0, *, timeout: float | None = None) -> Value:
-        """Read an object by its name, or by its index and sub-index.
-
-        Each answer may take the ``timeout`` in [s], by default the SDO time-out of bus.yml.
-
-        Raises:
-            ObjectError: The EDS has no such object, or several; the message names them.
-            SdoError: The device refused, or did not answer in time.
-            BusError: The master has ended.
-        """
+        """Read an object."""
         upload = partial(self._device.objects.upload, _path(target, subindex), timeout)
         entry, data = self._thread.run_coroutine(upload).result()
         return decode(entry.data_type, data)
@@ -74,16 +72,11 @@ class DeviceSdo:
         *,
         timeout: float | None = None,
     ) -> None:
-        """Write an object by its name, or index and sub-index; return when the device has it.
-
-        Each answer may take the ``timeout`` in [s], by default the SDO time-out of bus.yml.
+        """Write an object; return when the device has it.
 
         Raises:
-            ObjectError: The EDS has no such object, or several; the message names them.
             CodecError: The value does not fit the type.
             DriveError: The master writes the object itself in each cycle.
-            SdoError: The device refused, or did not answer in time.
-            BusError: The master has ended.
         """
 
         def to_bytes(entry: ObjectEntry) -> bytes:
@@ -124,7 +117,7 @@ class CanopenDevice:
     def read(self, target: int | str, subindex: int = 0, *, timeout: float | None = None) -> Value:
         """Return the value of an object: from its TPDO while that comes, else by SDO.
 
-        Arguments and errors are those of :meth:`DeviceSdo.read`.
+        Arguments and errors are those of :class:`DeviceSdo`.
         """
         path = _path(target, subindex)
         entry = find_object(self.config.dictionary, path)

@@ -3,5 +3,5 @@
 """The motion core: one source moves an arm, within its limits and clear of contact; no ROS.
 
 A :class:`MotionCore` belongs to the loop that steps it. Requests are prepared beside the cycle and
-committed in it, by a :class:`CommandGateway` for any number of threads.
+begun in it, by a :class:`CommandGateway` for any number of threads.
 """

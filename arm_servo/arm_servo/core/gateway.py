@@ -3,7 +3,7 @@
 """Where any thread gives commands to the motion core, and reads what it does.
 
 Every motion goes the same way: it is requested in any thread, prepared beside the cycle from the
-state that the cycle hands out, and committed in the cycle. A stop counts from the moment of the
+state that the cycle hands out, and begun in the cycle. A stop counts from the moment of the
 call: whatever was requested before it is refused at every later step, so no stop is overtaken by
 what was under way.
 """
@@ -27,7 +27,14 @@ from .motion_core import MotionCore
 from .motion_queue import MotionCommand, MotionQueue
 from .moving_arms import Neighbours
 from .preparation import PreparedScene
-from .requests import ImmediateRequest, JogRequest, MotionRequest, PauseRequest, StopRequest
+from .requests import (
+    check_request,
+    ImmediateRequest,
+    JogRequest,
+    MotionRequest,
+    PauseRequest,
+    StopRequest,
+)
 from .snapshot import Snapshot
 
 MAX_QUEUED_JOGS = 1000  # jog commands that may wait for the cycle
@@ -98,7 +105,7 @@ class CommandGateway:
         number = self._gate.number()  # first: a stop during what follows counts
         moves = isinstance(request, JogRequest) and not request.is_zero
         try:
-            prepared = self._core.prepare(request)
+            check_request(self.model, request)
             if isinstance(request, JogRequest):
                 if len(self._mailbox) >= MAX_QUEUED_JOGS:
                     raise NotReadyError(f'{MAX_QUEUED_JOGS} commands wait for the cycle')
@@ -117,7 +124,7 @@ class CommandGateway:
             try:
                 if moves:
                     self._mailbox.admit(Source.JOG, number, since, cycle)
-                self._core.commit(prepared, cycle.now)
+                self._core.apply(request, cycle.now)
             except Exception as error:  # noqa: BLE001  # its future carries it
                 future.set_exception(error)
                 return True

@@ -5,10 +5,9 @@
 Every source starts from the commanded state, and every step passes the same filter, so a hand-over
 is no event: positions, velocities and accelerations go on from where they are.
 
-Every command comes in by one contract, be it a jog, a motion, a pause or a stop:
-:meth:`MotionCore.prepare` checks a request and plans a motion beside the cycle,
-:meth:`MotionCore.commit` lets it count in the cycle, and refuses a motion that was prepared for
-another state or before another command or stop.
+A jog, a stop, a pause or a speed counts at once: :meth:`MotionCore.apply`. A motion is planned
+beside the cycle by :meth:`MotionCore.plan`; :meth:`MotionCore.begin` begins it in the cycle, and
+refuses one that was planned for another state or before another command or stop.
 """
 
 from __future__ import annotations
@@ -43,7 +42,7 @@ from ..controllers.trajectory import Execution
 from ..exceptions import NotReadyError
 from ..report import Cause, Limiter, MotionReport
 from .moving_arms import Neighbours
-from .preparation import CommandBasis, CoreSettings, Motion, Preparation, Prepared, PreparedScene
+from .preparation import CommandBasis, CoreSettings, Motion, Preparation, PreparedScene
 from .requests import (
     check_request,
     ImmediateRequest,
@@ -51,7 +50,6 @@ from .requests import (
     JogRequest,
     MotionRequest,
     PauseRequest,
-    SpeedRequest,
     StopRequest,
 )
 from .safety_filter import SafetyFilter
@@ -89,7 +87,7 @@ class MotionCore:
     """Set-points for an arm, cycle by cycle: one controller moves it, and hands it over.
 
     Times are steady times in [s] that the owner hands over; it reads no clock. All methods are for
-    the thread of the cycle but :meth:`prepare`, which is for any one other thread, and
+    the thread of the cycle but :meth:`plan`, which is for any one other thread, and
     :meth:`prepare_scene`, for any.
 
     Attributes:
@@ -240,44 +238,75 @@ class MotionCore:
         """Bring a jog or a single target to rest for what is prepared, or let it go on."""
         self._held = is_held
 
-    def prepare(
-        self, request: MotionRequest | ImmediateRequest, basis: CommandBasis | None = None
-    ) -> Prepared:
-        """Check a request; plan a motion, and check its path. Nothing moves.
-
-        Motions are for one thread at a time, whichever; other requests for any thread.
+    def plan(self, request: MotionRequest, basis: CommandBasis) -> Motion | None:
+        """Plan a motion, and check its path; for one thread at a time, whichever. Nothing moves.
 
         Args:
-            basis: The arm where a motion begins: :attr:`basis`, or foreseen from it.
+            basis: The arm where the motion begins: :attr:`basis`, or foreseen from it.
+
+        Returns:
+            None for a displacement by nothing.
 
         Raises:
             CommandError: The request is refused.
         """
-        if isinstance(request, ImmediateRequest):
-            check_request(self.model, request)
-            return Prepared(request)
-        if basis is None:
-            raise ValueError('a motion is prepared from a state of the arm: MotionCore.basis')
-        return Prepared(request, self._preparation.prepare(request, basis), basis)
+        return self._preparation.prepare(request, basis)
 
-    def commit(
-        self, prepared: Prepared, now: float, elapsed: float = 0.0, *, in_any_scene: bool = False
+    def begin(
+        self,
+        motion: Motion,
+        basis: CommandBasis,
+        elapsed: float = 0.0,
+        *,
+        in_any_scene: bool = False,
     ) -> None:
-        """Apply a request from now on; where a motion is off, the arm catches up smoothly.
+        """Begin a motion; where the arm is off it, the arm catches up smoothly.
 
         Args:
-            elapsed: Time since its basis in [s], by which a motion that begins later waits less.
-            in_any_scene: A motion that was prepared in an old scene begins, too. The path of a
+            basis: What it was planned from.
+            elapsed: Time since then in [s], by which a motion that begins later waits less.
+            in_any_scene: A motion that was planned in an old scene begins, too. The path of a
                 trajectory is then to be checked beside the cycle, as after :meth:`use_scene`.
 
         Raises:
-            StateMovedError: Another command or a stop came after a motion was prepared, or the arm
-                is elsewhere than where a trajectory was: prepared again it may begin.
-            CommandError: The arm is paused, and a jog or a single target would begin later, by
-                surprise.
+            StateMovedError: Another command or a stop came after the motion was planned, or the
+                arm is elsewhere than where a trajectory was: planned again it may begin.
+            CommandError: The arm is paused, and a single target would begin later, by surprise.
+            NotReadyError: The position of the arm is not known yet.
+        """
+        if basis.sequence != self._sequence:
+            raise StateMovedError(
+                GoalCode.INVALID_GOAL,
+                f'{self._last_change} before this command had begun; send it again',
+            )
+        is_old = basis.scene is not self.scene
+        if is_old and not in_any_scene:
+            raise StateMovedError(
+                GoalCode.INVALID_GOAL,
+                f'the scene changed (version {basis.scene.version} to {self.scene.version}) while'
+                ' this motion was prepared; send it again',
+            )
+        if isinstance(motion, Execution):
+            self._check_place(basis.state, self.state)
+            motion.elapse(elapsed)
+            self._release('a new trajectory took over')
+            self.execution = motion
+            self._unchecked = motion if is_old and self.scene.check is not None else None
+        else:
+            self._check_held()
+            if isinstance(self._active, SingleTarget):  # what was asked before is in this one
+                self._active.end(CONTINUED)
+            self._release('a single target took over')
+        self._changed('another command came')
+        self._active = motion
+
+    def apply(self, request: ImmediateRequest, now: float) -> None:
+        """Apply a request that :func:`.check_request` has checked from now on.
+
+        Raises:
+            CommandError: The arm is paused, and a jog would begin later, by surprise.
             NotReadyError: A jog has expired, or the position of the arm is not known yet.
         """
-        request = prepared.request
         if isinstance(request, JogRequest):
             self._begin_jog(request, now)
         elif isinstance(request, StopRequest):
@@ -286,10 +315,30 @@ class MotionCore:
             if request.is_paused:
                 self._changed('the arm was paused')
             self.paused = request.is_paused
-        elif isinstance(request, SpeedRequest):
+        else:
             self.speed = request.speed
-        elif prepared.motion is not None and prepared.basis is not None:
-            self._begin(prepared.motion, prepared.basis, elapsed, in_any_scene)
+
+    def command(
+        self, request: MotionRequest | ImmediateRequest, now: float = 0.0
+    ) -> Motion | None:
+        """Check a request and let it count, in a loop that has no other thread to plan motions.
+
+        Returns:
+            The motion that has begun; None for anything else.
+
+        Raises:
+            CommandError: The request is refused, or as of :meth:`apply`.
+            NotReadyError: As of :meth:`apply`; before the position is known, of any request.
+        """
+        basis = self.basis
+        if isinstance(request, ImmediateRequest):
+            check_request(self.model, request)
+            self.apply(request, now)
+            return None
+        motion = self.plan(request, basis)
+        if motion is not None:
+            self.begin(motion, basis)
+        return motion
 
     def fail(self, reason: str, code: GoalCode = GoalCode.INVALID_GOAL) -> None:
         """Come to rest, a trajectory on its path, because something has gone wrong."""
@@ -402,35 +451,6 @@ class MotionCore:
             self._jog.begin()
             self._active = self._jog
         self._jog.take(command, request.expires, request.client)
-
-    def _begin(
-        self, motion: Motion, basis: CommandBasis, elapsed: float, in_any_scene: bool
-    ) -> None:
-        if basis.sequence != self._sequence:
-            raise StateMovedError(
-                GoalCode.INVALID_GOAL,
-                f'{self._last_change} before this command had begun; send it again',
-            )
-        is_old = basis.scene is not self.scene
-        if is_old and not in_any_scene:
-            raise StateMovedError(
-                GoalCode.INVALID_GOAL,
-                f'the scene changed (version {basis.scene.version} to {self.scene.version}) while'
-                ' this motion was prepared; send it again',
-            )
-        if isinstance(motion, Execution):
-            self._check_place(basis.state, self.state)
-            motion.elapse(elapsed)
-            self._release('a new trajectory took over')
-            self.execution = motion
-            self._unchecked = motion if is_old and self.scene.check is not None else None
-        else:
-            self._check_held()
-            if isinstance(self._active, SingleTarget):  # what was asked before is in this one
-                self._active.end(CONTINUED)
-            self._release('a single target took over')
-        self._changed('another command came')
-        self._active = motion
 
     def _stop(self, request: StopRequest) -> None:
         if request.motion is not None and request.motion is not self._active:

@@ -21,7 +21,7 @@ from ..controllers.trajectory import Execution
 from ..exceptions import NotReadyError
 from .mailbox import Cycle, Mailbox
 from .motion_core import MotionCore
-from .preparation import CommandBasis, Motion, Prepared
+from .preparation import CommandBasis, Motion
 from .requests import MotionRequest, StopRequest
 
 MAX_QUEUED_MOTIONS = 50  # motions that may wait to be prepared
@@ -142,8 +142,7 @@ class MotionQueue:
 
         def stop(cycle: Cycle) -> bool:
             if command.motion is not None:
-                request = StopRequest(reason, motion=command.motion)
-                self._core.commit(self._core.prepare(request), cycle.now)
+                self._core.apply(StopRequest(reason, motion=command.motion), cycle.now)
             return True
 
         # the mark first: a commit that has missed it comes before the order
@@ -184,7 +183,7 @@ class MotionQueue:
 
     def _try_out(self, command: MotionCommand, basis: CommandBasis) -> None:
         """Prepare a motion from where the arm stands: one that is refused takes no drives."""
-        self._core.prepare(command.request, basis)
+        self._core.plan(command.request, basis)
         self._get_ready(command)
 
     def _get_ready(self, command: MotionCommand) -> None:
@@ -216,24 +215,25 @@ class MotionQueue:
         """Plan and check a motion; in the worker's thread."""
         request = command.request
         if not isinstance(request, TrajectoryGoal):
-            self._order_commit(command, self._core.prepare(request, basis), cycle.now)
+            self._order_begin(command, basis, self._core.plan(request, basis), cycle.now)
             return
         elapsed = cycle.now - command.requested
         at_rest = not basis.state.moving and basis.source is Source.NONE
         if at_rest and not request.age:  # it begins whenever it begins
-            self._order_commit(command, self._core.prepare(request, basis), cycle.now)
+            self._order_begin(command, basis, self._core.plan(request, basis), cycle.now)
             return
         needed = _preparation_time(request)
         if not at_rest and basis.source is not Source.TRAJECTORY and needed > MAX_FORESIGHT:
             # a jog cannot be foreseen for so long; a goal that is refused does not stop it
             rest = replace(basis, state=RobotState.at_rest(basis.state.position))
-            self._core.prepare(_aged(request, elapsed), rest)
+            self._core.plan(_aged(request, elapsed), rest)
             self._order_rest(command)
             return
         cycles = max(MIN_CYCLES_AHEAD, math.ceil(needed / cycle.period) + 1)
         ahead = cycles * cycle.period
-        prepared = self._core.prepare(_aged(request, elapsed + ahead), basis.foreseen(ahead))
-        self._order_commit(command, prepared, cycle.now + ahead)
+        basis = basis.foreseen(ahead)
+        motion = self._core.plan(_aged(request, elapsed + ahead), basis)
+        self._order_begin(command, basis, motion, cycle.now + ahead)
 
     def _order_rest(self, command: MotionCommand) -> None:
         """Bring the arm to rest for a trajectory, and prepare it from there.
@@ -267,22 +267,20 @@ class MotionQueue:
 
         self._mailbox.post(rest)
 
-    def _order_commit(self, command: MotionCommand, prepared: Prepared, planned: float) -> None:
+    def _order_begin(
+        self, command: MotionCommand, basis: CommandBasis, motion: Motion | None, planned: float
+    ) -> None:
         """Begin a motion at the time for which it was planned, or as soon as possible."""
         self._mailbox.check(command.source, command.number)  # no cycle may come that does
         ordered = max(self._clock(), planned)
 
         def begin(cycle: Cycle) -> None:
             self._mailbox.admit(command.source, command.number, ordered, cycle)
-            self._core.commit(
-                prepared,
-                cycle.now,
-                cycle.now - planned,
-                in_any_scene=command.attempts == 1,  # one that changes all the time holds none up
-            )
-            command.motion = prepared.motion
-            is_old = prepared.basis is not None and prepared.basis.scene is not self._core.scene
-            if is_old and command.execution is not None:
+            if motion is not None:  # a scene that changes all the time holds none up
+                late, again = cycle.now - planned, command.attempts == 1
+                self._core.begin(motion, basis, late, in_any_scene=again)
+            command.motion = motion
+            if basis.scene is not self._core.scene and command.execution is not None:
                 self._recheck(command.execution)
             self._begun.append(command)
             # canceled in this moment: the order behind it stops it

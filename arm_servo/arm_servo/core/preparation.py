@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The first half of the command contract: motions planned and checked, beside the cycle.
-
-``MotionCore.prepare(request, basis) -> Prepared`` moves nothing, and takes as long as it needs.
-``MotionCore.commit(prepared)`` lets it count in the cycle, and refuses what was prepared for
-another state or before another command.
-"""
+"""Motions planned and checked beside the cycle, from what that hands out."""
 
 from __future__ import annotations
 
@@ -37,7 +32,7 @@ from ..controllers.controller import Source
 from ..controllers.jog import ServoSettings
 from ..controllers.target import SingleTarget
 from ..controllers.trajectory import Execution, ExecutionSettings
-from .requests import by_joint, DisplacementRequest, ImmediateRequest, MotionRequest
+from .requests import by_joint, DisplacementRequest, MotionRequest
 
 Motion = Execution | SingleTarget  # what has a goal, and an outcome once it ended
 
@@ -101,17 +96,6 @@ class CommandBasis:
         state = self.state
         there = state.position + ahead * state.velocity
         return replace(self, state=RobotState(there, state.velocity, 0.0 * state.acceleration))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Prepared:
-    """A request that was checked; of a motion, one whose path is clear."""
-
-    request: MotionRequest | ImmediateRequest  # the request
-    # what begins; None for a displacement by nothing, and where nothing is planned
-    motion: Motion | None = None
-    # from what it was planned: it does not begin from anything else. None where nothing is planned
-    basis: CommandBasis | None = None
 
 
 class Preparation:
