@@ -14,8 +14,7 @@ from .robots import Robot
 if TYPE_CHECKING:
     from arm_canopen import BusConfig, NodeConfig
 
-INTERPOLATED_POSITION = 7
-"""Mode of operation (CiA 402-2, 0x6060)."""
+INTERPOLATED_POSITION = 7  # mode of operation (CiA 402-2, 0x6060)
 
 
 def read_bus(robot: Robot) -> BusConfig:

@@ -16,14 +16,12 @@ from process_supervisor import CallError, GivenUpError, join_in_time
 if TYPE_CHECKING:
     from .service_client import ServiceClient
 
-ENABLE_TIMEOUT = 60.0
-"""Longest time for all drives to boot and to be enabled in [s]."""
+ENABLE_TIMEOUT = 60.0  # longest time for all drives to boot and to be enabled in [s]
 BOOT_TIMEOUT = 30.0
 """Longest time in [s] in which drives boot before they are enabled all the same."""
 OPERATIONAL = 'START'
 """The NMT state of a device that has booted, on its topic ``nmt_state``."""
-AGAIN = 1.0
-"""Pause after a refusal in [s]: a drive that has not booted yet says so."""
+AGAIN = 1.0  # pause after a refusal in [s]: a drive that has not booted yet says so
 
 
 def enabling_services(drives: Sequence[str], mode_service: str) -> list[list[str]]:

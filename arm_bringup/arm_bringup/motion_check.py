@@ -24,14 +24,11 @@ if TYPE_CHECKING:
     from arm_model import JointLimits, RobotModel
 
 LONGER = 5.0  # times the way of a stop within the limits, from which on one surprises
-START = 'ready'
-"""Pose of the SRDF from which an arm starts."""
+START = 'ready'  # pose of the SRDF from which an arm starts
 SINGULAR = 0.05
 """Least singular value of the Jacobian, lengths divided by the reach, of a good start."""
-CLEARANCE = 0.01
-"""Least distance between links at the start in [m]."""
-MARGIN = 0.02
-"""Share of the range of a joint that a good start leaves on either side."""
+CLEARANCE = 0.01  # least distance between links at the start in [m]
+MARGIN = 0.02  # share of the range of a joint that a good start leaves on either side
 
 
 def check_motion(

@@ -30,10 +30,8 @@ import yaml
 
 from .exceptions import RobotError
 
-BUS_CONFIG = 'bus.yml'
-"""Name of the bus configuration in a robot folder."""
-SETTINGS = 'robot.yaml'
-"""Name of the file with what the names of files do not say."""
+BUS_CONFIG = 'bus.yml'  # name of the bus configuration in a robot folder
+SETTINGS = 'robot.yaml'  # name of the file with what the names of files do not say
 FILES: Mapping[str, Sequence[str]] = {
     'description': ('{name}.urdf.xacro', '{name}.xacro', '{name}.urdf'),
     'semantic': ('{name}.srdf', '{name}.srdf.xacro'),
@@ -43,10 +41,8 @@ FILES: Mapping[str, Sequence[str]] = {
 """Names of each file of a robot folder; the first that exists is taken."""
 TABLES, WORDS = ('xacro_args', 'packages'), ('tip_link',)
 """Keys of :data:`SETTINGS` that are tables of text, and those that are text."""
-GROUP = 'group'
-"""Key of one group, or of a list."""
-START_POSITIONS = 'start_positions'
-"""Key of the positions of simulated drives at power-on."""
+GROUP = 'group'  # key of one group, or of a list
+START_POSITIONS = 'start_positions'  # key of the positions of simulated drives at power-on
 KEYS = (*FILES, *TABLES, *WORDS, GROUP, START_POSITIONS)
 """All keys of :data:`SETTINGS`."""
 

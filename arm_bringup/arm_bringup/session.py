@@ -37,8 +37,7 @@ REAL_BUS = 'can0'
 """Bus without --can on hardware: never one on which only simulated drives could be."""
 SIMULATED_BUS = 'auto'
 """Bus without --can in simulation: vcan0 when it exists, else multicast on the loopback."""
-BUS_REMEDY = 'another bus with --can'
-"""What a second bring-up on a bus is advised to take."""
+BUS_REMEDY = 'another bus with --can'  # what a second bring-up on a bus is advised to take
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,7 @@ from .description import expand_xacro, read_description, read_semantic
 from .exceptions import BringupError
 from .session import add_robot, locate, robots_epilog
 
-MIN_SAMPLES = 1000
-"""Poses at least: with fewer, `never` would say nothing."""
+MIN_SAMPLES = 1000  # poses at least: with fewer, `never` would say nothing
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:

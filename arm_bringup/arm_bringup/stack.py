@@ -27,8 +27,7 @@ MOTION_NODE = Executable('arm_servo', 'motion_node')
 """Trajectories and jogging: with the master in it, or for drives that another process has."""
 PLANNER = Executable('arm_planning', 'move_group')
 """Motions among obstacles, for clients of MoveIt."""
-SLAVES = Executable('canopen_sim', 'fake_slaves')
-"""Simulated drives."""
+SLAVES = Executable('canopen_sim', 'fake_slaves')  # simulated drives
 
 MASTER_FIRST, THEN_LISTENERS, SLAVES_LAST = range(3)
 """Order of stopping: the master disables the drives, so they must still be there."""

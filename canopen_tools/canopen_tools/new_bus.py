@@ -45,8 +45,7 @@ POSITION_MODES = (
     OperationMode.PROFILE_POSITION,
 )
 """Modes for arms, the best one first: set-points of each cycle, else moves of the drive's own."""
-HEARTBEAT_MS = 1000
-"""Time between two heartbeats of a device in [ms]."""
+HEARTBEAT_MS = 1000  # time between two heartbeats of a device in [ms]
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,10 +21,8 @@ from canopen_core import CanopenError
 from canopen_core.eds import Eds
 from canopen_core.standard import Index, is_drive, OperationMode
 
-TURN = 2.0 * math.pi
-"""A turn in [rad]."""
-SAME = 0.01
-"""Share by which two scales may differ and still say the same."""
+TURN = 2.0 * math.pi  # a turn in [rad]
+SAME = 0.01  # share by which two scales may differ and still say the same
 FAR = 10.0
 """How many times the increments of the factor group somebody may say without being asked."""
 

@@ -45,8 +45,7 @@ OF_TESTS = {
     'rosbags': 'python3-rosbags-pip',
 }
 """Keys of rosdep for what only tests import."""
-PROGRAMS = {'iproute2', 'tmux'}
-"""Keys of rosdep for programs that tests start."""
+PROGRAMS = {'iproute2', 'tmux'}  # keys of rosdep for programs that tests start
 STARTED = {'arm_bringup': {'canopen_sim', 'robot_viewer'}}
 STARTED |= {'quad_bringup': {'quad_hardware', 'quad_sim', 'quad_teleop', 'robot_viewer'}}
 """Packages whose executables a bring-up starts; it imports nothing of them."""

@@ -21,8 +21,7 @@ from unittest import mock
 from .errors import WorkspaceError
 from .packages import Package
 
-PYTHON = Path('lib') / 'python'
-"""Folder of an installation that stands in PYTHONPATH."""
+PYTHON = Path('lib') / 'python'  # folder of an installation that stands in PYTHONPATH
 
 _PROGRAM = """\
 #!{python}

@@ -50,19 +50,16 @@ from ..session import (
 )
 from ..stack import MASTER
 
-ANSWER_TIMEOUT = 30.0
-"""Longest time for an answer in [s]."""
+ANSWER_TIMEOUT = 30.0  # longest time for an answer in [s]
 QUEUE = 5
 """States of the arm that wait: a demo which a busy computer holds up misses some, and sees where
 the arm is now."""
 ENABLE_TIMEOUT = 15.0
 """Longest time in [s] for all drives to be enabled, and for them to be in their mode."""
-ENABLED = 'Operation enabled'
-"""Title of the state in which a drive can move (CiA 402-2, figure 4)."""
+ENABLED = 'Operation enabled'  # title of the state in which a drive can move (CiA 402-2, figure 4)
 GAUGE_FROM, WORDS_FROM = 102, 118
 """Columns from which there is room for the gauges, and from which modes are written out."""
-GAUGE_WIDTH = 21
-"""Characters of a gauge."""
+GAUGE_WIDTH = 21  # characters of a gauge
 STATE_STYLES = {
     ENABLED: 'green',
     'Fault': 'bold red',

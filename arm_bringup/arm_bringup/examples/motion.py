@@ -41,29 +41,21 @@ from ..session import Session
 from ..stack import MOTION_NODE
 from .arm import ActionRun, ArmDemo, EndRequested, number, parse, QUEUE, run
 
-RATE = 100.0
-"""Rate of the controller's states in [Hz]."""
-JOG_PERIOD = 0.02
-"""Time between two jog commands in [s]."""
+RATE = 100.0  # rate of the controller's states in [Hz]
+JOG_PERIOD = 0.02  # time between two jog commands in [s]
 LATE_COMMANDS = 0.05
 """Time between two jog commands in [s] from which on the tool may stop in between: each counts
 for 0.1 s, of which its way to the servo takes some."""
-SETTLE = 0.35
-"""Least pause after a motion in [s]."""
-MOTION_TIMEOUT = 60.0
-"""Longest time of a trajectory in [s]."""
+SETTLE = 0.35  # least pause after a motion in [s]
+MOTION_TIMEOUT = 60.0  # longest time of a trajectory in [s]
 
-SIDE, SPEED = 0.08, 0.1
-"""Side of a square in [m], and greatest speed of the tool on it in [m/s]."""
-SIDES = ((1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0))
-"""Directions of the sides of a square."""
-MAX_RUN_UP = 0.3
-"""Greatest part of a side on which the joints may accelerate."""
+SIDE, SPEED = 0.08, 0.1  # side of a square in [m], and greatest speed of the tool on it in [m/s]
+SIDES = ((1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0))  # directions of the sides of a square
+MAX_RUN_UP = 0.3  # greatest part of a side on which the joints may accelerate
 STEPS, SPEED_SHARE, MARGIN = 8, 0.6, 0.03
 """Steps in which a side is gone through on the model, the share of a joint's speed that it may
 need there, and the share of a joint's range that it keeps from the ends."""
-OFF_LINE = 0.01
-"""Share of the speed that may lead off a line on the model."""
+OFF_LINE = 0.01  # share of the speed that may lead off a line on the model
 CLEARANCE, NEARER = 0.015, 0.001
 """Least distance of links on a square in [m], and how much nearer links may come that are near
 each other where it begins."""
@@ -80,14 +72,12 @@ LIMIT_SHARE, VELOCITY_SHARE, SHORTEST, CANCELED = 0.6, 0.35, 1.5, 5.0
 """Share of the limits of acceleration and jerk, and of speed, that a trajectory uses (a drive that
 waits for a busy computer must not lose its path), its shortest time in [s], and that of one which
 is canceled: on a busy computer the cancel takes a second."""
-SLOW = 0.3
-"""Speed override."""
+SLOW = 0.3  # speed override
 
 WORST_LINE, WORST_SPEED = 3e-3, 0.01
 """Greatest distance of the tool from the line that it is jogged along in [m], and difference of
 its speed from the asked one as a share."""
-LEAST_RETURN = 0.9
-"""Share of the way that the tool must come back from the singular pose."""
+LEAST_RETURN = 0.9  # share of the way that the tool must come back from the singular pose
 WORST_PATH, WORST_TRACKING = 5e-3, 0.2
 """Greatest distance of a set-point from the path of a trajectory, and of a joint from its
 set-point, in [rad]; the latter is judged only where every drive answered in every cycle."""

@@ -71,8 +71,7 @@ JOINT_TOLERANCE, POSITION_TOLERANCE, TURN_TOLERANCE = 1e-4, 1e-4, 1e-3
 START_TIMEOUT, MOTION_TIMEOUT, SETTLE_TIMEOUT = 60.0, 120.0, 5.0
 """Longest time in [s] until move_group has received joint states, since DDS takes long on a busy
 computer, of a motion, and until what happened is seen."""
-DURATION_MARGIN = 20.0
-"""How much longer than planned a motion may take on a busy computer in [s]."""
+DURATION_MARGIN = 20.0  # how much longer than planned a motion may take on a busy computer in [s]
 WORST_JOINT, WORST_PLACE, STILL = 5e-3, 2e-3, 1e-2
 """Farthest that a joint may stand from its goal in [rad] or [m], that a tool or the part may be
 from theirs in [m], and that joints move of an arm that was refused a motion in [rad] or [m]."""
@@ -84,16 +83,14 @@ is planned anew while a motion goes on may follow the rest within a tenth of a s
 EDGES, SHARES, ROOM = (0.08, 0.06, 0.04, 0.03, 0.02), (0.6, 0.5, 0.7, 0.45), 0.06
 """Edges of a box in the way as shares of the arm's reach, the largest that is possible is taken;
 where on a path it appears; and its least distance from both ends, as a share of the reach."""
-LEAST_TURN = 1.0
-"""How far a joint must turn for a box to have room on its way in [rad]."""
+LEAST_TURN = 1.0  # how far a joint must turn for a box to have room on its way in [rad]
 LEAST_REACH, LEAST_WAY, TURN, FAR = 0.05, 0.25, 2.0, 1.0
 """Reach of an arm that is shorter in [m]; least way of the tip to a pose as a share of it; turn
 of the first joint in [rad] or [m]; and the distance beyond which all count as this in [m]."""
 GAP, APPROACH = 0.003, 0.1
 """Room below the part in [m]; straight approach and retreat as a share of the reach."""
 PART, PILLAR, VISITOR = 'part', 'pillar', 'visitor'
-WITH_GRIPPER = '_hand'
-"""What follows the name of a robot in that of its folder with a gripper."""
+WITH_GRIPPER = '_hand'  # what follows the name of a robot in that of its folder with a gripper
 
 
 @dataclass(frozen=True)

@@ -30,19 +30,15 @@ from ..service_client import ServiceClient
 from ..session import Session
 from .arm import ArmDemo, known, number, parse, run
 
-SWING_TIME = 5.0
-"""Time of one swing in [s]."""
-OMEGA = 2 * math.pi / SWING_TIME
-"""Angular velocity of the wave in [rad/s]."""
+SWING_TIME = 5.0  # time of one swing in [s]
+OMEGA = 2 * math.pi / SWING_TIME  # angular velocity of the wave in [rad/s]
 AMPLITUDE, RANGE_SHARE = 0.45, 0.5
 """Greatest amplitude in [rad] or [m]; the swing covers at most this share of a joint's range."""
 VELOCITY_SHARE, MAX_VELOCITY = 0.6, 1.2
 """Greatest speed: as a share of a joint's limit, and in [rad/s] or [m/s], since drives approach
 their targets at that speed or less and some URDFs have limits of thousands."""
-SHORTEST_ENTRY = 2.0
-"""A joint takes at least this long to enter in [s]."""
-PERIOD = 0.04
-"""Time between two targets of a drive in [s]."""
+SHORTEST_ENTRY = 2.0  # a joint takes at least this long to enter in [s]
+PERIOD = 0.04  # time between two targets of a drive in [s]
 FOLLOWING_MODES = ('Interpolated position', 'Cyclic position')
 """Titles of the modes in which a drive follows targets along a path (7 and 8)."""
 READY_WITHIN = 5.0
@@ -53,10 +49,8 @@ the distance, as a share of the amplitude, from which on it is beside the wave."
 LEAST_MOTION, LEAST_MOTION_SHARE, LEAST_MOTION_TIME = 0.1, 0.1, 0.2
 """A joint that moved less than the least of these did not wave: in [rad] or [m], as a share of its
 range, and in [s] at its greatest speed."""
-WORST_PATH_ERROR = 2.0
-"""A joint that was as many times as far from its set-point did not follow."""
-HALT_TIMEOUT = 10.0
-"""Longest time in [s] for the drives to come to rest."""
+WORST_PATH_ERROR = 2.0  # a joint that was as many times as far from its set-point did not follow
+HALT_TIMEOUT = 10.0  # longest time in [s] for the drives to come to rest
 
 
 def quintic_step(x: float) -> float:

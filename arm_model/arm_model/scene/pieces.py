@@ -28,17 +28,14 @@ from robot_primitives import cache_folder
 
 from ..arrays import Array, Places
 
-CPU_LIMIT = 20
-"""Seconds of a processor for one body: those of arms take 0.2 to 9."""
+CPU_LIMIT = 20  # seconds of a processor for one body: those of arms take 0.2 to 9
 
 TIME_LIMIT = 30.0
 """Seconds by the clock for all bodies of a process; the next start goes on with the others."""
 
-MANY_TRIANGLES = 5000
-"""A body of more is remeshed first: CoACD's time grows with their number."""
+MANY_TRIANGLES = 5000  # a body of more is remeshed first: CoACD's time grows with their number
 
-MAX_PIECES = 16
-"""Pieces of a body at most: each is one more shape to check."""
+MAX_PIECES = 16  # pieces of a body at most: each is one more shape to check
 
 SETTINGS = {
     'threshold': 0.1,

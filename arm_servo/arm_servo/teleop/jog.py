@@ -11,8 +11,7 @@ import math
 Vector = tuple[float, float, float]
 """Along or about x, y and z."""
 
-UNITLESS = 'unitless'
-"""command_in_type of a servo that multiplies by its scales itself."""
+UNITLESS = 'unitless'  # command_in_type of a servo that multiplies by its scales itself
 
 
 ServoReport = tuple[int, str]

@@ -50,8 +50,7 @@ TOOL = {
 JOINTS = {str(number): number - 1 for number in range(1, 9)}
 """Keys that move a joint as long as they are held."""
 
-SPEEDS = {'+': 1, '=': 1, '-': -1, '_': -1}
-"""Keys that change the speed, in steps."""
+SPEEDS = {'+': 1, '=': 1, '-': -1, '_': -1}  # keys that change the speed, in steps
 
 FRAMES = {'w': Frame.BASE, 'e': Frame.TOOL}
 REVERSE_KEY = 'r'

@@ -25,8 +25,7 @@ from .output import print_line
 from .scan import LISTEN
 
 T = TypeVar('T')
-PERIOD_MS = 10
-"""Time between two SYNC in [ms]."""
+PERIOD_MS = 10  # time between two SYNC in [ms]
 INCREMENTS = 'a number of increments other than 0, such as 360000, -36000.5 or 2000*50'
 """What a person writes for a turn or a metre."""
 

@@ -381,8 +381,7 @@ def _remote(
 NODES = 127
 
 IS_MASTER, START_ALL, NO_OWN_START = 0x01, 0x02, 0x04
-NO_START, RESET_ALL, STOP_ALL = 0x08, 0x10, 0x40
-"""Bits of 0x1F80, NMT start-up (CiA 302-2, 7.2)."""
+NO_START, RESET_ALL, STOP_ALL = 0x08, 0x10, 0x40  # bits of 0x1F80, NMT start-up (CiA 302-2, 7.2)
 IS_SLAVE, BOOT, MANDATORY, KEEP_ALIVE, RESTORE = 0x01, 0x04, 0x08, 0x10, 0x80
 """Bits of 0x1F81, slave assignment (CiA 302-2, 7.3); bits 8 to 15 are the retry factor, 16 to 31
 the guard time."""

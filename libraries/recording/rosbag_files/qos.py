@@ -10,8 +10,7 @@ from typing import Any
 
 from .exceptions import BagError
 
-UNLIMITED = 2**63 - 1
-"""The duration in [ns] that stands for no limit."""
+UNLIMITED = 2**63 - 1  # the duration in [ns] that stands for no limit
 
 _NANO = 1_000_000_000
 

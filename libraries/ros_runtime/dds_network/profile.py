@@ -15,8 +15,7 @@ from .reach import NetworkChoiceError, Reach
 
 LOCALHOST_PROFILE = Path(__file__).with_name('dds_network_localhost.xml')
 """The profile with loopback alone; all others are made from it."""
-PREFIX = 'dds_network_'
-"""How the file of every profile of this package begins."""
+PREFIX = 'dds_network_'  # how the file of every profile of this package begins
 # RTPS 2.2, 9.6.1.4.1; naming peers takes the place of this default
 _DISCOVERY_GROUP = '239.255.0.1'
 _NAMESPACE = 'http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles'

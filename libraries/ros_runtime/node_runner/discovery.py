@@ -17,10 +17,8 @@ from rclpy.task import Future
 DISCOVERY_TIME = 2.0  # [s] in which nodes that run are discovered
 _LOOK_PERIOD = 0.1  # [s]
 
-PROBE = 'get_parameter_types'
-"""A service of nearly every node that changes nothing."""
-PROBE_PERIOD = 1.0
-"""Time after which the answer of a probe counts as lost, in [s]."""
+PROBE = 'get_parameter_types'  # a service of nearly every node that changes nothing
+PROBE_PERIOD = 1.0  # time after which the answer of a probe counts as lost, in [s]
 
 
 def other_nodes(node: Node, names: Iterable[str], own: Sequence[str]) -> list[str]:

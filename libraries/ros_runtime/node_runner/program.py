@@ -35,10 +35,8 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 ECHO_TIME = 0.5
 """A SIGINT this soon after the first signal in [s] is its echo: a key that bounces, or a signal to
 a process and to its group."""
-NOTIFY_VARIABLE = 'NOTIFY_SOCKET'
-"""Names the socket of the supervisor, as in sd_notify(3)."""
-REFUSED = 1
-"""Exit code of a program that could not begin."""
+NOTIFY_VARIABLE = 'NOTIFY_SOCKET'  # names the socket of the supervisor, as in sd_notify(3)
+REFUSED = 1  # exit code of a program that could not begin
 HELP_OPTIONS = frozenset({'-h', '--help'})
 PLAIN_HELP = """\
 usage: {name} --ros-args -p PARAMETER:=VALUE --params-file FILE

@@ -15,15 +15,13 @@ from rclpy.utilities import ok
 
 from .log_bridge import log_as
 
-WAKE_PERIOD = 0.1
-"""How late the end may be noticed, in [s]."""
+WAKE_PERIOD = 0.1  # how late the end may be noticed, in [s]
 
 LINGER = 0.3
 """Time in [s] for an action to see the end of its goal, and for the result to reach the client."""
 
 
-REPEAT_PERIOD = 10.0
-"""Time in [s] in which the same defect of callbacks is logged once."""
+REPEAT_PERIOD = 10.0  # time in [s] in which the same defect of callbacks is logged once
 
 
 def make_executor() -> Executor:

@@ -33,8 +33,7 @@ TF_RATE = 100.0
 """Greatest rate of /tf in [Hz]; its default of 20 would halve what /joint_states has."""
 VIEWER = Executable('robot_viewer', 'web_viewer')
 """Serves the page, and says its URL when it is ready."""
-NO_VIEW = 'NO_VIEW'
-"""Variable that leaves the page out, where it is neither empty nor 0."""
+NO_VIEW = 'NO_VIEW'  # variable that leaves the page out, where it is neither empty nor 0
 VIEWER_NICENESS = ('nice', '-n', '5')
 """Whatever moves the robot comes first, from the start of the program on."""
 VIEWER_STOP_STEPS = (

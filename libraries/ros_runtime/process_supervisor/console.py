@@ -18,11 +18,9 @@ from .spec import ProcessSpec
 from .supervision import Notice, Outcome, Phase, Severity
 from .terminal import LineWriter, Painter, wants_colour
 
-ENDING_TIMEOUT = 10.0
-"""Time in [s] in which a thread that was asked to has to end."""
+ENDING_TIMEOUT = 10.0  # time in [s] in which a thread that was asked to has to end
 
-USAGE_ERROR = 2
-"""Exit code of a bring-up when nothing was started."""
+USAGE_ERROR = 2  # exit code of a bring-up when nothing was started
 REPORTED_STATES = {Phase.RUNNING: 'READY=1', Phase.STOPPING: 'STOPPING=1'}
 """What is reported to the service manager of a bring-up, as in sd_notify(3)."""
 Shutdown = Callable[[Callable[[str], None], Callable[[], bool]], None]

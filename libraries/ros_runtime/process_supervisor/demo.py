@@ -35,14 +35,10 @@ if TYPE_CHECKING:
 
 ClientT = TypeVar('ClientT', bound='GraphClient')
 
-REFRESH_PERIOD = 0.2
-"""Time between two pictures in [s]."""
-LINE_PERIOD = 3.0
-"""Time between two lines of progress in [s]."""
-NARROWEST = 80
-"""Columns of a terminal below which there is no table."""
-SHOWN_MESSAGES = 2
-"""Lines that messages get below the table."""
+REFRESH_PERIOD = 0.2  # time between two pictures in [s]
+LINE_PERIOD = 3.0  # time between two lines of progress in [s]
+NARROWEST = 80  # columns of a terminal below which there is no table
+SHOWN_MESSAGES = 2  # lines that messages get below the table
 MESSAGE_LIFE = {Severity.INFO: 4.0, Severity.WARNING: 20.0, Severity.ERROR: 60.0}
 """How long a message is shown in [s]."""
 

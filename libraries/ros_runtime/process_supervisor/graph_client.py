@@ -18,8 +18,7 @@ from node_runner import init_ros, ServerMatch
 
 from .exceptions import GivenUpError, no_answer
 
-SPIN = 0.05
-"""Longest time in [s] after which a wait looks whether it shall be given up."""
+SPIN = 0.05  # longest time in [s] after which a wait looks whether it shall be given up
 
 
 class GraphClient:

@@ -14,8 +14,7 @@ from typing import Any
 from .exceptions import StartError
 from .ros_options import RosOptions
 
-DOMAIN_MAX = 232
-"""Highest ROS domain whose UDP ports exist."""
+DOMAIN_MAX = 232  # highest ROS domain whose UDP ports exist
 
 LOG_FORMAT = {
     'RCUTILS_CONSOLE_OUTPUT_FORMAT': '[{severity}] [{name}]: {message}',

@@ -8,8 +8,7 @@ import contextlib
 import os
 import socket
 
-VARIABLE = 'NOTIFY_SOCKET'
-"""Names the socket in the environment of the process."""
+VARIABLE = 'NOTIFY_SOCKET'  # names the socket in the environment of the process
 _READY = b'READY=1'
 _STATUS = b'STATUS='
 _MAX_MESSAGE = 4096

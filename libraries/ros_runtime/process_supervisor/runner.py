@@ -27,14 +27,12 @@ from .supervision import Notice, Outcome, Phase, Supervision
 LONGEST_LINE = 16384
 """Bytes after which a line is cut: a process that never ends a line must not eat the memory."""
 
-CHUNK = 65536
-"""Bytes read from a pipe at once."""
+CHUNK = 65536  # bytes read from a pipe at once
 LAST_CHUNKS = 64
 """How often a pipe is read after its process has ended; what it left behind may go on."""
 TRACES = 'PYTHONFAULTHANDLER'
 """Variable by which Python prints what its threads are doing when it crashes, or gets SIGABRT."""
-LEAVE_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""Signals that end the supervisor."""
+LEAVE_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # signals that end the supervisor
 
 
 class LineSplitter:

@@ -15,8 +15,7 @@ from .exceptions import StartError
 from .spec import ProcessSpec
 from .stopping import StopSequence
 
-LAST_LINES = 12
-"""How many lines of a process are kept to explain its end."""
+LAST_LINES = 12  # how many lines of a process are kept to explain its end
 
 ECHO_TIME = 0.5
 """An interrupt this soon after another one in [s] is its echo: a key that bounces, or a signal to

@@ -20,8 +20,7 @@ RED = '\x1b[31m'
 NAME_COLOURS = ('\x1b[36m', '\x1b[32m', '\x1b[35m', '\x1b[34m', '\x1b[96m', '\x1b[92m')
 """Colours of process names, in the order of the bring-up."""
 
-SEVERITY_COLOURS = {Severity.WARNING: YELLOW, Severity.ERROR: RED}
-"""Colours of notices."""
+SEVERITY_COLOURS = {Severity.WARNING: YELLOW, Severity.ERROR: RED}  # colours of notices
 
 ROS_SEVERITY = re.compile(r'^\[(DEBUG|INFO|WARN|ERROR|FATAL)\]')
 """Severity at the start of a line of rcutils logging, in the format that the bring-up sets."""

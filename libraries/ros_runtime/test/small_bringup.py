@@ -13,8 +13,7 @@ import sys
 
 from small_processes import NOTIFY, TIMEOUT
 
-SOURCES = Path(__file__).parents[3]
-"""The checkout."""
+SOURCES = Path(__file__).parents[3]  # the checkout
 
 PROGRAM = """#!{python} -IS
 import os, signal, sys

@@ -15,8 +15,7 @@ import time
 
 from process_supervisor import ProcessSpec, StopStep
 
-TIMEOUT = 30.0
-"""Longest time in [s] that a test waits for something that should happen at once."""
+TIMEOUT = 30.0  # longest time in [s] that a test waits for something that should happen at once
 
 QUICK = tuple(
     StopStep(signal, timeout)

@@ -46,8 +46,7 @@ def test_each_combination_is_logged(
     assert any(level in line for line in written.splitlines() if 'priority' in line)
 
 
-SERVICE_MAX = 70.0
-"""Memory of a service in [kB]; 103 where Fast DDS sets room for samples aside."""
+SERVICE_MAX = 70.0  # memory of a service in [kB]; 103 where Fast DDS sets room for samples aside
 
 PROGRAM = """
 import ctypes, importlib, sys

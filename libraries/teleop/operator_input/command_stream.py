@@ -10,8 +10,7 @@ from typing import Generic, TypeVar
 
 T = TypeVar('T')
 
-RESTS = 3
-"""Commands to rest at the end of a motion: one might be lost, more would be a stream."""
+RESTS = 3  # commands to rest at the end of a motion: one might be lost, more would be a stream
 
 
 class CommandStream(Generic[T]):

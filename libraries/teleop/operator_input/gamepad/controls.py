@@ -101,8 +101,7 @@ class GamepadState:
         return self.buttons - before.buttons
 
 
-AT_REST = GamepadState()
-"""Nothing is touched."""
+AT_REST = GamepadState()  # nothing is touched
 
 DEADMAN_BUTTONS: Mapping[str, Button | None] = {
     **{button.value: button for button in Button},

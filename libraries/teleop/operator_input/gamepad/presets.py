@@ -110,8 +110,7 @@ PRESETS = (
 )
 """All presets, the first that fits is used."""
 
-AUTO = 'auto'
-"""Name that means: whichever fits the device."""
+AUTO = 'auto'  # name that means: whichever fits the device
 
 
 def is_gamepad(info: DeviceInfo) -> bool:

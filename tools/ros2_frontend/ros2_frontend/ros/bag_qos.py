@@ -11,8 +11,7 @@ from rosbag_files import OfferedQos, UNLIMITED
 
 from ..names import Handle
 
-RECORD_DEPTH = 10_000
-"""Messages of a topic that may wait for the recorder: ten seconds at 1 kHz."""
+RECORD_DEPTH = 10_000  # messages of a topic that may wait for the recorder: ten seconds at 1 kHz
 
 PLAY_DEPTH = 10
 
