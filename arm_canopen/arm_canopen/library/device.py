@@ -45,8 +45,8 @@ class DeviceSdo:
     """Objects of a device by SDO, typed by its EDS.
 
     An object is an index such as ``0x6041``, or what a person writes: ``'Statusword'``,
-    ``'0x607D:02'``, ``'Software position limit/Max'``. Each answer may take the ``timeout`` in [s],
-    by default the SDO time-out of bus.yml.
+    ``'0x607D:02'``, ``'Software position limit/Max'``. Each answer may take the ``timeout`` in
+    [s], by default the SDO time-out of bus.yml.
 
     Raises:
         ObjectError: The EDS has no such object, or several; the message names them.
