@@ -14,7 +14,7 @@ from servo_commands import InlineWorker
 
 from arm_canopen import AxisFeedback, DriveState, MotionSource, Setpoint
 from arm_model import Array, RobotModel
-from arm_servo import MotionCore
+from arm_servo import CoreSettings, MotionCore
 from arm_servo.core.gateway import CommandGateway
 from arm_servo.io.drive_source import DriveSource
 
@@ -37,11 +37,11 @@ class Drives:
         worker: Executor | None = None,
         model: RobotModel | None = None,
         begin: Sequence[float] | None = None,
+        settings: CoreSettings | None = None,
     ) -> None:
         self.now = 100.0
-        self.gateway = CommandGateway(
-            MotionCore(model or robot(name)), worker or InlineWorker(), lambda: self.now
-        )
+        core = MotionCore(model or robot(name), settings)
+        self.gateway = CommandGateway(core, worker or InlineWorker(), lambda: self.now)
         self.source = DriveSource(self.gateway)
         self.axes = [
             AxisFeedback(joint, True, DriveState.OPERATION_ENABLED, 8, at, 0.0, at, True)

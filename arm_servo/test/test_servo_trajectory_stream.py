@@ -20,9 +20,11 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_canopen import Refusal, RefusalCause
 from arm_model import JointLimits
+from arm_servo import CoreSettings, ExecutionSettings
 from arm_servo.core.mailbox import TOGETHER
 from arm_servo.ros.trajectory.controller import TrajectoryController
 from arm_servo.ros.trajectory.parameters import declare_trajectory
+from arm_trajectory import GoalRules
 
 STEP = 0.004  # how far each trajectory of a stream goes in [rad]
 MOVED = 0.01  # farther than this a stream has moved the arm in [rad]
@@ -32,7 +34,8 @@ class Arm:
     """A trajectory controller whose messages the test hands over, cycle by cycle."""
 
     def __init__(self, node: Any) -> None:
-        self.drives = Drives()
+        rules = GoalRules(end_velocity=True)
+        self.drives = Drives(settings=CoreSettings(execution=ExecutionSettings(rules)))
         joints = self.drives.gateway.model.joints
         parameters = declare_trajectory(node, joints)
         self.controller = TrajectoryController(
@@ -48,11 +51,17 @@ class Arm:
 
     def send(self, target: float, duration: float = 0.02) -> None:
         """Send the first joint to a place in [rad], and run a few cycles."""
+        self.publish(target, duration)
+        self.drives.run(2)
+
+    def publish(self, target: float, duration: float, speed: float | None = None) -> None:
+        """Send the first joint to a place in [rad], with a speed in [rad/s] there."""
         row = [axis.setpoint for axis in self.drives.axes]
         point = JointTrajectoryPoint(positions=[target, *row[1:]])
+        if speed is not None:
+            point.velocities = [speed, *(0.0 for _ in row[1:])]
         point.time_from_start.nanosec = round(duration * 1e9)
         self._subscription.callback(JointTrajectory(joint_names=self._joints, points=[point]))
-        self.drives.run(2)
 
     def stream(self, count: int) -> None:
         """Send trajectories as moveit_servo does: each goes on from where the arm is sent."""
@@ -168,6 +177,27 @@ def test_a_stream_that_begins_takes_the_arm_back(arm: Arm) -> None:
     arm.stream(40)
     assert arm.position > rest + MOVED
     assert arm.taken_back == 1
+
+
+@pytest.mark.parametrize('rate', [30.0, 100.0])
+def test_the_newest_trajectory_of_a_stream_counts(arm: Arm, rate: float) -> None:
+    """As moveit_servo sends them: steadily, soon, and no longer than they come."""
+    speed, ahead, duration = 0.3, 0.034, 2.0  # [rad/s], [s], [s]
+    drives, begin, number = arm.drives, arm.drives.now, 0
+    while (end := drives.now) < begin + duration:
+        while (sent := begin + number / rate) <= end:
+            drives.now = sent
+            arm.publish(speed * (sent + ahead - begin), ahead, speed)
+            number += 1
+        drives.now = end
+        drives.run()
+    last = arm.position
+    assert last > speed * (duration - 0.1)
+    speeds = np.diff([row[0] for row in drives.path[-100:]]) / PERIOD
+    assert speeds == pytest.approx(speed, rel=0.1)
+    arm.wait(0.6)
+    assert not np.ptp([row[0] for row in drives.path[-5:]])
+    assert arm.position < last + 0.2 * speed
 
 
 def test_one_trajectory_after_another_is_no_stream(arm: Arm) -> None:

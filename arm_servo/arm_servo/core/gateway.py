@@ -145,15 +145,17 @@ class CommandGateway:
         request: MotionRequest,
         get_ready: Callable[[], object] = lambda: None,
         number: int | None = None,
+        stream: Hashable = None,
     ) -> MotionCommand:
         """Prepare a motion, and begin it when its path is clear.
 
         Args:
             number: Its :meth:`number`, where it came before; by default it comes now.
+            stream: Where the motion comes from, if it replaces all from there that have not begun.
             get_ready: Gets back drives that others have, where the arm does not follow; called in
                 any thread, and only for a motion that is not refused from where the arm stands.
         """
-        return self._motions.request(request, get_ready, number)
+        return self._motions.request(request, get_ready, number, stream)
 
     def cancel(self, command: MotionCommand, reason: str) -> None:
         """End a motion: before its begin it does not begin, later the arm comes to rest."""

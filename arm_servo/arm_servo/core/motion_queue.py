@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from concurrent.futures import CancelledError, Executor, Future, InvalidStateError
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -46,6 +46,8 @@ MAX_ATTEMPTS = 3
 
 REST_TIMEOUT = 1.0  # time in which a jogged arm must come to rest for a trajectory in [s]
 
+MAX_LAG = 0.1  # longest lag to which a trajectory of a stream is delayed in [s]
+
 CANCELED = Outcome(GoalCode.SUCCESSFUL, 'canceled before it began', canceled=True)
 NOTHING = Outcome(GoalCode.SUCCESSFUL, 'a displacement by nothing')
 
@@ -58,6 +60,7 @@ class MotionCommand:
     number: int  # its place among all commands and stops
     requested: float  # steady time of the request in [s]
     get_ready: Callable[[], object] = lambda: None  # gets the drives back
+    stream: Hashable = None  # where each newer one replaces those that wait; None for nowhere
     # its execution, or None for a single target, once it began; else why it is refused
     future: Future[Execution | None] = field(default_factory=Future)
     # how it ended, whatever became of it; set once, at the latest when the cycle fails
@@ -115,20 +118,27 @@ class MotionQueue:
         self._lock = threading.Lock()  # of the two below; held for a few instructions only
         self._waiting: deque[MotionCommand] = deque()
         self._preparing: MotionCommand | None = None
+        self._lag = 0.0  # from the requests of a stream to their motion in [s]; of the worker
 
     def request(
         self,
         request: MotionRequest,
         get_ready: Callable[[], object],
         number: int | None = None,
+        stream: Hashable = None,
     ) -> MotionCommand:
         """Prepare a motion, and begin it when its path is clear."""
         with self._lock:
             number = self._mailbox.gate.number() if number is None else number
-            command = MotionCommand(request, number, self._clock(), get_ready)
+            command = MotionCommand(request, number, self._clock(), get_ready, stream)
+            replaced = [each for each in self._waiting if stream and each.stream == stream]
+            for each in replaced:
+                self._waiting.remove(each)
             is_full = len(self._waiting) >= MAX_QUEUED_MOTIONS
             if not is_full:
                 self._waiting.append(command)
+        for each in replaced:
+            self._refuse(each, CancelledError())
         if is_full:
             error = NotReadyError(
                 f'{MAX_QUEUED_MOTIONS} motions wait already; send them more slowly'
@@ -219,6 +229,8 @@ class MotionQueue:
             return
         elapsed = cycle.now - command.requested
         at_rest = not basis.state.moving and basis.source is Source.NONE
+        if basis.source is not Source.TRAJECTORY:
+            self._lag = 0.0
         if at_rest and not request.age:  # it begins whenever it begins
             self._order_begin(command, basis, self._core.plan(request, basis), cycle.now)
             return
@@ -231,9 +243,31 @@ class MotionQueue:
             return
         cycles = max(MIN_CYCLES_AHEAD, math.ceil(needed / cycle.period) + 1)
         ahead = cycles * cycle.period
+        if command.stream is not None and basis.source is Source.TRAJECTORY and not request.age:
+            request = self._in_step(request, elapsed + ahead, ahead)
         basis = basis.foreseen(ahead)
         motion = self._core.plan(_aged(request, elapsed + ahead), basis)
         self._order_begin(command, basis, motion, cycle.now + ahead)
+
+    def _in_step(self, goal: TrajectoryGoal, lag: float, margin: float) -> TrajectoryGoal:
+        """Delay a goal of a stream to the lag of those before it, which keeps the speed.
+
+        Each waits for another time until it can begin. Without a margin the arm would have no time
+        to correct what the times of arrival differ by.
+
+        Args:
+            lag: Time from its request to its begin in [s].
+            margin: Time by which the lag of the stream is longer in [s].
+        """
+        self._lag = max(self._lag, min(lag + margin, MAX_LAG))
+        wait = max(self._lag - lag, 0.0)
+        points = [
+            replace(each, time=each.time + wait)
+            if each.time > 0.0
+            else each  # one of 0 has passed
+            for each in goal.points
+        ]
+        return replace(goal, points=points)
 
     def _order_rest(self, command: MotionCommand) -> None:
         """Bring the arm to rest for a trajectory, and prepare it from there.

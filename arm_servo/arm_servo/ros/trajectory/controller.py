@@ -153,10 +153,14 @@ class TrajectoryController:
         return self._request(goal, self._prepare, number)
 
     def _request(
-        self, goal: TrajectoryGoal, get_ready: Callable[[], object], number: int | None = None
+        self,
+        goal: TrajectoryGoal,
+        get_ready: Callable[[], object],
+        number: int | None = None,
+        stream: str | None = None,
     ) -> MotionCommand:
         self.check_active()
-        command = self._gateway.request(goal, get_ready, number)
+        command = self._gateway.request(goal, get_ready, number, stream)
         command.future.add_done_callback(self._remember)
         return command
 
@@ -188,7 +192,7 @@ class TrajectoryController:
         try:
             self._gateway.stream(Source.TRAJECTORY, TOPIC)
             goal = goal_of_trajectory(message, self._now, self._parameters)
-            command = self._request(goal, self._get_ready)
+            command = self._request(goal, self._get_ready, stream=TOPIC)
         except ArmError as error:
             self._news.append(f'trajectory refused: {error}')
             return
