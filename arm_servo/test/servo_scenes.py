@@ -12,6 +12,7 @@ from servo_commands import SteppedWorker
 from servo_drives import Drives
 
 from arm_servo.ros.scene_listener import SceneListener
+from node_runner import LATCHED
 
 
 class Listener:
@@ -22,6 +23,7 @@ class Listener:
         errors: What was logged as an error.
         warnings: What was warned of.
         publishers: Of scenes for controllers.
+        durability: Of the publisher of another move_group.
         made: The listener.
     """
 
@@ -30,14 +32,19 @@ class Listener:
         self.errors: list[str] = []
         self.warnings: list[str] = []
         self.publishers = 0
+        self.durability = LATCHED.durability
         logger = SimpleNamespace(
-            error=lambda text, **_: self.errors.append(text), warning=self.warnings.append
+            error=lambda text, **_: self.errors.append(text),
+            warning=lambda text, **_: self.warnings.append(text),
         )
         node: Any = SimpleNamespace(
             get_logger=lambda: logger,
             create_subscription=lambda *_, **__: None,
             create_timer=lambda *_: None,
             count_publishers=lambda _topic: self.publishers,
+            get_publishers_info_by_topic=lambda _topic: [
+                SimpleNamespace(qos_profile=SimpleNamespace(durability=self.durability))
+            ],
         )
         self._now = 0.0
         self._worker = SteppedWorker()

@@ -6,17 +6,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 import math
+from typing import Any
 
 from geometry_msgs.msg import Point, Pose
+from isolation import Isolation
 from model_robots import table, texts
 from moveit_msgs.msg import CollisionObject, LinkPadding, PlanningScene, PlanningSceneWorld
 import pytest
 from rclpy.serialization import serialize_message
+from ros_client import RosClient
 from servo_drives import Drives
 from servo_scenes import Listener
 from shape_msgs.msg import SolidPrimitive
 
 from arm_model import Clearances, RobotModel
+from arm_servo.ros.scene_listener import SceneListener
+from node_runner import LATCHED
 
 
 def message(name: str, frame: str = '') -> PlanningScene:
@@ -127,17 +132,59 @@ def test_a_scene_is_not_lost_when_the_position_goes_unknown_before_it_is_built()
     assert objects(drives) == {'box'}
 
 
-def test_a_diff_on_the_latched_topic_is_refused_with_words() -> None:
-    """Whoever joins late would see the diff alone."""
+def test_diffs_change_the_scene_before_and_a_whole_scene_replaces_them() -> None:
+    """MoveIt's monitor sends a whole scene first, and diffs after that."""
+    drives = arm()
+    listener = Listener(drives)
+    for name in ('box', 'cup', 'jug'):
+        scene = message(name)
+        scene.is_diff = name != 'box'
+        listener.take(scene)
+    started(drives)
+    for _ in range(3):
+        listener.run()
+    assert objects(drives) == {'box', 'cup', 'jug'}
+    scene.world.collision_objects[0].operation = CollisionObject.REMOVE
+    listener.take(scene)
+    listener.run()
+    assert objects(drives) == {'box', 'cup'}
+    listener.take(message('lid'))
+    listener.run()
+    assert objects(drives) == {'lid'}
+    assert not listener.warnings
+
+
+def test_a_diff_before_any_whole_scene_counts_with_a_warning() -> None:
+    """What was there before move_group sent it is not known."""
     drives = started(arm())
     listener = Listener(drives)
-    listener.take(message('box'))
     diff = message('cup')
     diff.is_diff = True
     listener.take(diff)
     listener.run()
-    assert objects(drives) == {'box'}
-    assert 'publish whole scenes' in listener.errors[0]
+    assert objects(drives) == {'cup'}
+    assert 'start this node before move_group' in listener.warnings[0]
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize('qos', [LATCHED, 100], ids=['latched', 'volatile'])
+def test_a_scene_of_another_move_group_is_received(isolation: Isolation, qos: Any) -> None:
+    """MoveIt's monitor does not latch it; what was latched before counts, too."""
+    drives = started(arm())
+    with RosClient(isolation.domain_id) as client:
+        publisher = client.node.create_publisher(PlanningScene, 'monitored_planning_scene', qos)
+        if qos is LATCHED:
+            publisher.publish(message('box'))
+        SceneListener(client.node, [drives.gateway])
+        client.spin_until(lambda: publisher.get_subscription_count() > 0, 20.0, 'its listener')
+        if qos != LATCHED:
+            publisher.publish(message('box'))
+
+        def is_there() -> bool:
+            drives.run()
+            return objects(drives) == {'box'}
+
+        client.spin_until(is_there, 20.0, 'the scene')
 
 
 def test_a_scene_equal_to_the_present_one_changes_nothing() -> None:

@@ -51,7 +51,7 @@ class JointPlaces:
 class SceneUpdater:
     """Has the newest scene count for one group, as it is with the joints beside the group.
 
-    :meth:`replace` is for any thread, :meth:`update` for one: it takes as long as it needs.
+    :meth:`change` is for one thread, :meth:`update` for another: it takes as long as it needs.
     """
 
     def __init__(
@@ -75,12 +75,12 @@ class SceneUpdater:
         if self._unchecked:
             self._planned = model.scene.with_allowed(model.allowed)
         self._moved = -math.inf
-        self._newest: deque[SceneChange] = deque(maxlen=1)
+        self._changes: deque[SceneChange] = deque()  # the last whole scene, and those after it
 
     @property
     def waits(self) -> bool:
         """Whether a scene does not count yet."""
-        return bool(self._newest)
+        return bool(self._changes)
 
     @property
     def others(self) -> Mapping[str, float]:
@@ -92,12 +92,17 @@ class SceneUpdater:
         """Whether it is known where the group is, so that a scene can be applied."""
         return self.gateway.snapshot.reference is not None
 
-    def replace(self, change: SceneChange) -> None:
-        """Replace the present scene, and any that waits."""
-        self._newest.append(change)
+    def change(self, change: SceneChange, *, is_whole: bool) -> None:
+        """Change the scene after the changes that wait; a whole scene replaces those."""
+        if is_whole:
+            self._changes = deque([change])
+        else:
+            self._changes.append(change)
 
     def update(self, joints: JointPlaces, now: float) -> None:
-        """Apply what is new, if it is known where the group is; an equal scene changes nothing.
+        """Apply the next change, if it is known where the group is.
+
+        An equal scene changes nothing.
 
         Raises:
             ArmError: The scene is refused; the one before counts.
@@ -107,8 +112,9 @@ class SceneUpdater:
             return
         moved = self._planned.kinematics.with_others(self._elsewhere(joints, now))
         planned = self._planned.with_others(moved)
-        if self._newest:
-            planned = self._newest.pop()(planned, reference.position)
+        changes = self._changes  # another thread may replace them
+        if changes:
+            planned = changes.popleft()(planned, reference.position)
         unchecked = self._moved_by(
             group
             for group, names in self._arms.items()

@@ -10,6 +10,7 @@ from functools import partial
 import time
 
 from moveit_msgs.msg import PlanningScene
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
@@ -32,6 +33,8 @@ as the hulls that it has made, for programs that have a control cycle to keep.""
 FOREIGN_TOPIC = 'monitored_planning_scene'
 """Where any move_group publishes its scene; it counts where nothing publishes the other topic."""
 
+FOREIGN_DEPTH = 100  # messages of MoveIt's monitor that may wait, as it keeps as many
+
 LOOK_PERIOD = 0.1  # time between two looks where the joints are in [s]
 PLACE_TIMEOUT = 1.0  # time for which a scene waits for a group's position without a warning in [s]
 OTHERS_TIMEOUT = 5.0  # time for which joints beside a group are awaited without a warning in [s]
@@ -53,7 +56,7 @@ def keep_apart(gateways: Sequence[CommandGateway]) -> MovingArms | None:
 
 
 class SceneListener:
-    """Applies each scene of the topic to all groups, with the joints beside them where they are.
+    """Applies scenes and diffs to all groups, with the joints beside them where they are.
 
     Scenes are built and measured in a thread of their own: neither the executor nor a cycle waits.
     What is refused is logged.
@@ -86,6 +89,7 @@ class SceneListener:
         ]
         self._gateways = [*gateways, *unchecked]
         self._received = clock()
+        self._is_complete = False  # whether a whole scene came
         self._unplaced = list(self._updaters)  # those of which no warning has said so
         self._assuming = list(self._updaters)  # the same for joints beside them
         self._placed: dict[SceneUpdater, float] = {}  # since when
@@ -94,30 +98,43 @@ class SceneListener:
         awaited = {name for each in self._updaters for name in each.others} - commanded
         self._states = JointStateStore(awaited)
         node.create_subscription(PlanningScene, TOPIC, self._take, LATCHED)
-        # raw: its meshes take long to read, which is left out where they have no use
-        node.create_subscription(
-            PlanningScene, FOREIGN_TOPIC, self._take_foreign, LATCHED, raw=True
-        )
+        # MoveIt's monitor does not latch it. A latched subscription gets nothing of that, and says
+        # so; one that is not gets no scene that was latched before. Raw: its meshes take long to
+        # read, which is left out where they have no use
+        silent = SubscriptionEventCallbacks(use_default_callbacks=False)
+        for callback, qos in (
+            (self._take_foreign, LATCHED),
+            (self._take_volatile, FOREIGN_DEPTH),
+        ):
+            node.create_subscription(
+                PlanningScene, FOREIGN_TOPIC, callback, qos, raw=True, event_callbacks=silent
+            )
         if awaited:
             node.create_subscription(JointState, joint_topic, self._take_joints, 10)
         node.create_timer(LOOK_PERIOD, self._look)
+
+    def _take_volatile(self, data: bytes) -> None:
+        """Take a scene that comes in no other way."""
+        publishers = self._node.get_publishers_info_by_topic(FOREIGN_TOPIC)
+        if all(each.qos_profile.durability != LATCHED.durability for each in publishers):
+            self._take_foreign(data)
 
     def _take_foreign(self, data: bytes) -> None:
         if not self._node.count_publishers(TOPIC):
             self._take(deserialize_message(data, PlanningScene))
 
     def _take(self, message: PlanningScene) -> None:
-        if message.is_diff:
-            self._node.get_logger().error(
-                f'{FOREIGN_TOPIC}: a diff (is_diff) is refused, the scene before counts: who joins'
-                ' a latched topic gets its last message only; publish whole scenes there, and send'
-                ' diffs to planning_scene of move_group',
+        if message.is_diff and not self._is_complete:
+            self._node.get_logger().warning(
+                f'{FOREIGN_TOPIC}: a diff (is_diff) came before a whole scene: only what it names'
+                ' counts, and objects that were there before it do not; start this node before'
+                ' move_group, or have move_group publish a whole scene',
                 once=True,
             )
-            return
+        self._is_complete |= not message.is_diff
         self._received = self._clock()
         for updater in self._updaters:
-            updater.replace(partial(_replaced, message))
+            updater.change(partial(_changed, message), is_whole=not message.is_diff)
         self._submit()
 
     def _take_joints(self, message: JointState) -> None:
@@ -180,5 +197,5 @@ class SceneListener:
                     self._node.get_logger().warning(assumption)
 
 
-def _replaced(message: PlanningScene, scene: Scene, positions: Array) -> Scene:
+def _changed(message: PlanningScene, scene: Scene, positions: Array) -> Scene:
     return apply_planning_scene(scene, message, positions)
