@@ -77,7 +77,7 @@ class Gripper:
         """Cancel a goal."""
         self._node.cancel(handle)
 
-    def run(self, duration: float, *, blocked: bool = False) -> None:
+    def run(self, duration: float, *, blocked: bool = False, has_speeds: bool = True) -> None:
         """Advance the time by a duration in [s]."""
         before = list(self.drives.axes)
         for _ in range(round(duration / PERIOD)):
@@ -87,6 +87,8 @@ class Gripper:
                     replace(now, position=was.position, velocity=0.0)
                     for now, was in zip(self.drives.axes, before, strict=True)
                 ]
+            elif not has_speeds:
+                self.drives.axes = [replace(each, velocity=0.0) for each in self.drives.axes]
             self._node.watch()
 
 
@@ -118,6 +120,21 @@ def test_a_goal_that_is_held_does_not_stall(clock: Any, allow_stalling: bool) ->
     gripper.run(3.0)
     assert gripper.ended == {'goal': 'succeeded'}
     assert gripper.position == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize('allow_stalling', [False, True])
+def test_a_gripper_that_moves_does_not_stall_without_velocities(
+    clock: Any, allow_stalling: bool
+) -> None:
+    """Joint states of other drivers may have none; blocked, it stalls as with them."""
+    gripper = Gripper(clock, allow_stalling=allow_stalling)
+    gripper.send('goal', 0.5)  # takes 5 s
+    gripper.run(6.0, has_speeds=False)
+    assert gripper.ended == {'goal': 'succeeded'}
+    assert gripper.position == pytest.approx(0.5)
+    gripper.send('blocked', 1.0)
+    gripper.run(2.0, blocked=True)
+    assert gripper.ended['blocked'] == ('succeeded' if allow_stalling else 'aborted')
 
 
 def test_an_aborted_goal_moves_nothing_any_more(clock: Any) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from rclpy.node import Node
 
-from arm_model import RobotState
+from arm_model import Array, RobotState
 from arm_trajectory import GoalCode
 from node_runner.action_goals import Ending
 
@@ -39,6 +39,7 @@ class _Goal(MotionGoal):
 
     problem: str = ''  # why it cannot go on; empty while it can
     last_motion: float = field(default_factory=time.monotonic)
+    last_place: Array | None = None  # where the joints were then in [rad]
     state: GripperState | None = None
 
 
@@ -157,16 +158,19 @@ class GripperController:
 
     def _look(self, goal: _Goal, measured: RobotState) -> GripperState:
         """Return where the gripper is, and whether it stalls or is there."""
-        now, command = time.monotonic(), goal.command
-        moves = bool((np.abs(measured.velocity) > self._parameters.stall_velocity).any())
-        if moves or not self._is_pushed(command):
-            goal.last_motion = now
+        now, command, parameters = time.monotonic(), goal.command, self._parameters
+        moves = bool((np.abs(measured.velocity) > parameters.stall_velocity).any())
+        if goal.last_place is not None:  # joint states may have no velocities
+            way = parameters.stall_velocity * parameters.stall_timeout
+            moves |= bool((np.abs(measured.position - goal.last_place) > way).any())
+        if moves or goal.last_place is None or not self._is_pushed(command):
+            goal.last_motion, goal.last_place = now, measured.position
         reached = False
         if command is not None and command.ended.done():
             reached = command.ended.result().code is GoalCode.SUCCESSFUL and self._there(
                 command, measured
             )
-        stalled = not reached and now - goal.last_motion > self._parameters.stall_timeout
+        stalled = not reached and now - goal.last_motion > parameters.stall_timeout
         return GripperState(self._joints, measured, stalled, reached)
 
     def _is_pushed(self, command: MotionCommand | None) -> bool:
