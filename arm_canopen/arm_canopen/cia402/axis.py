@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from enum import auto, Enum
 import math
 
@@ -39,6 +40,7 @@ FOLLOWS_COMMAND = int(Statusword.FOLLOWS_COMMAND)
 FOLLOWING_ERROR = int(Statusword.FOLLOWING_ERROR)
 ENABLE_OPERATION = int(Command.ENABLE_OPERATION)
 POSITION_AGE_MAX = 0.25  # [s] of a position at which an axis may be held
+TAKE_OVER_TIME = 0.5  # [s] for a drive that is taken over to show whether it moves
 UNSEEN_STOP_TIME = 1.0  # [s] in which a motion source may lead a silent drive to rest on its path
 NOT_TAKEN = (
     'it has not taken its new target (bit 12); disable and enable it to make it forget the moves '
@@ -568,7 +570,7 @@ class Axis:
             self.leave_operation()
 
     def _take_over(self) -> None:
-        """Go on where another master has left the drive: enabled, it holds where it is held."""
+        """Go on where another master has left the drive: enabled, it is held."""
         held, view = self.holding_mode, self.view
         if held is not None:
             actual, target = view.actual(), view.held_position(held.number)
@@ -577,13 +579,26 @@ class Axis:
             held.preload(actual)
             self.mode = self._mode_shown = self._mode_led = held
             self.goal = DriveState.OPERATION_ENABLED
-            title = mode_title(held.number)
-            self.report(Severity.INFO, f'taken over enabled, in mode {title}; it holds')
+            self._scheduler.background(self._hold_taken_over(held))
             return
         self._mode_shown = self._mode_led = self.mode
         self.warn(f'is not enabled by the new master: {self.describe()}')
         if view.state in POWERED:
             self.leave_operation()
+
+    async def _hold_taken_over(self, mode: Mode) -> None:
+        """Halt what moves on by a target of the other master: a move, or a torque."""
+        motions, taken = self.motions, f'taken over enabled, in mode {mode_title(mode.number)}'
+        holds = isinstance(mode, CyclicPosition)
+        with suppress(TimeoutError):
+            await self._scheduler.until(lambda: holds or self.view.speed_known, TAKE_OVER_TIME)
+        if self.mode is not mode or not self.acts or self.motions != motions:
+            return  # a command has come meanwhile
+        if holds or self.view.stands:
+            self.report(Severity.INFO, f'{taken}; it {"holds" if holds else "stands"}')
+            return
+        self.hold()
+        self.warn(f'{taken}; it is not seen to stand, and is halted until the next target')
 
     def _state_changed(self, before: DriveState) -> None:
         view, left = self.view, before is DriveState.OPERATION_ENABLED

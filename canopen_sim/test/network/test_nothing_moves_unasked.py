@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-import itertools
 from itertools import pairwise
 import math
 from pathlib import Path
@@ -47,6 +46,7 @@ from arm_canopen import (
 from arm_canopen.config import PdoConfig
 from canopen_core.standard import (
     CobId,
+    Controlword,
     NmtCommand,
     PdoCodec,
     rpdo_default,
@@ -510,18 +510,48 @@ def test_a_drive_that_holds_goes_on_holding(mode: OperationMode) -> None:
     assert drive.view.position == pytest.approx(0.5, abs=1e-3)
 
 
-def test_a_move_on_its_way_is_brought_to_its_end() -> None:
-    """Profile position: the drive has its target, and nobody takes it away."""
+@pytest.mark.parametrize(
+    ('mode', 'target'),
+    [
+        (OperationMode.PROFILE_POSITION, 6.0),
+        (OperationMode.PROFILE_VELOCITY, 1.0),
+        (OperationMode.PROFILE_TORQUE, 100.0),
+        (OperationMode.CYCLIC_TORQUE, 100.0),
+    ],
+)
+def test_a_drive_that_moves_is_halted_by_the_new_master(
+    mode: OperationMode, target: float
+) -> None:
+    """What another master has begun does not go on, and the report says so."""
     net = kept_alive()
-    net.select('a', OperationMode.PROFILE_POSITION)
-    net.commands['a'].set_target(2.0)
-    net.run(0.5)
+    net.select('a', mode)
+    net.commands['a'].set_target(target)
+    net.run(1.0)
+    begin = net.motor('a')
     net.replace_master()
     net.start()
-    seen = motor_positions(net, 4.0)
-    steps = [later - before for before, later in itertools.pairwise(seen)]
-    assert min(steps) >= -1
-    assert net.drives['a'].view.position == pytest.approx(2.0, abs=1e-3)
+    net.run_until(net.all_ready)
+    net.run(1.5)
+    assert net.speed('a') == pytest.approx(0.0, abs=1e-2)
+    assert begin < net.motor('a') < 3.0
+    assert net.drives['a'].view.state is DriveState.OPERATION_ENABLED
+    assert not any('it holds' in text for text in net.reported())
+    net.commands['a'].set_target(-target)
+    net.run(0.5)
+    assert net.speed('a') < -0.01
+
+
+def test_a_drive_that_stands_in_a_profile_mode_is_not_halted() -> None:
+    """It is taken over as it is; nothing is warned of."""
+    net = kept_alive()
+    net.select('a', OperationMode.PROFILE_POSITION)
+    net.replace_master()
+    begin = net.now
+    net.start()
+    net.run_until(net.all_ready)
+    net.run(1.0)
+    assert not any(word & Controlword.HALT for word in net.controlwords('a', since=begin))
+    assert any('it stands' in text for text in net.reported())
 
 
 def test_a_drive_that_is_not_enabled_is_not_enabled() -> None:
