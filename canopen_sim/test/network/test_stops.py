@@ -103,7 +103,7 @@ def owner_of(failing: MovingDrive, place: str) -> tuple[object, str]:
         'write': (drive, 'write'),
         'read': (drive, 'read'),
         'controlword': (drive.controlword.writer, 'write'),
-        'RPDO': (rpdo, '_pack'),
+        'RPDO': (rpdo, 'frame'),
     }[place]
 
 
