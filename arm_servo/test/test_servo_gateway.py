@@ -12,13 +12,14 @@ from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from model_robots import table, texts
 import numpy as np
 import pytest
 from servo_commands import jog, move_by, SteppedWorker, twist
 from servo_drives import Drives, PERIOD
 
 from arm_canopen import Refusal, RefusalCause
-from arm_model import CommandError
+from arm_model import CommandError, RobotModel
 from arm_servo import (
     DisplacementRequest,
     JogRequest,
@@ -274,6 +275,24 @@ def test_a_displacement_that_the_safety_filter_stops_ends_with_words() -> None:
     assert 'panda_hand would collide' in ended.reason
     assert drives.gateway.snapshot.source is Source.NONE
     assert drives.path[-1].tolist() == drives.path[-2].tolist()
+
+
+def test_a_long_trajectory_waits_until_a_fast_jog_has_been_braked() -> None:
+    """That takes more than a second where the acceleration is the default of MoveIt."""
+    limits = {
+        name: {**each, 'has_acceleration_limits': False} for name, each in table('panda').items()
+    }
+    drives = Drives(model=RobotModel(*texts('panda'), limits))
+    drives.attach()
+    drives.run(2)
+    begin = [axis.setpoint for axis in drives.axes]
+    jog(drives.gateway, {JOINT: 2.0}, drives.now, 1.5)
+    drives.run(150)
+    assert drives.path[-1][0] - drives.path[-2][0] > 1.2 * PERIOD
+    points = [GoalPoint(20.0, begin)]
+    command = drives.gateway.request(TrajectoryGoal(drives.gateway.model.joints, points))
+    drives.run(300)
+    assert command.future.result(0.0) is not None
 
 
 @pytest.mark.parametrize('before', ['rest', 'jog', 'trajectory'])

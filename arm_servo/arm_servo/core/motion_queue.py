@@ -44,7 +44,9 @@ MIN_CYCLES_AHEAD = 3  # least cycles from the basis to the begin of a motion tha
 MAX_ATTEMPTS = 3
 """How often a motion is prepared where others move the arm, or the scene changes, meanwhile."""
 
-REST_TIMEOUT = 1.0  # time in which a jogged arm must come to rest for a trajectory in [s]
+REST_MARGIN = 1.0
+"""How much longer than it brakes from full speed a jogged arm may take to come to rest for a
+trajectory in [s]."""
 
 MAX_LAG = 0.1  # longest lag to which a trajectory of a stream is delayed in [s]
 
@@ -114,6 +116,9 @@ class MotionQueue:
         """
         self._core, self._mailbox = core, mailbox
         self._worker, self._clock, self._rest, self._recheck = worker, clock, rest, recheck
+        limits = core.model.limits
+        braking = limits.velocity / limits.acceleration + limits.acceleration / limits.jerk
+        self._rest_timeout = REST_MARGIN + float(braking.max())
         self._begun: list[MotionCommand] = []  # of the cycle
         self._lock = threading.Lock()  # of the two below; held for a few instructions only
         self._waiting: deque[MotionCommand] = deque()
@@ -288,7 +293,7 @@ class MotionQueue:
             if self._core.basis.source is Source.NONE and not self._core.state.moving:
                 self._guarded(command, lambda: self._hand_out(command, cycle.now, cycle))
                 return True
-            if cycle.now - ordered <= REST_TIMEOUT:
+            if cycle.now - ordered <= self._rest_timeout:
                 return False
             self._refuse(
                 command,
