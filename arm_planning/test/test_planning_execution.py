@@ -16,13 +16,16 @@ from action_msgs.srv import CancelGoal
 from control_msgs.action import FollowJointTrajectory
 from planning_messages import panda, QuietNode
 import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_planning import PlanningCode, PlanningError
 from arm_planning.ros import controllers, execution, scene_monitor
 from arm_planning.ros.controllers import FOLLOW, KINDS
-from arm_planning.ros.execution import ExecutionLimits, TrajectoryExecution
+from arm_planning.ros.execution import ExecutionLimits, GoalClient, TrajectoryExecution
 from arm_planning.ros.scene_monitor import SceneMonitor, STATE_TIMEOUT
 
 JOINTS = ('left', 'right')
@@ -91,7 +94,7 @@ class Bench:
         self.ends: list[tuple[PlanningCode, str]] = []
         self.place = 0.0
         self.watch: Callable[[], None] = lambda: None
-        monkeypatch.setattr(execution, 'ActionClient', lambda *parts: self.clients[parts[2]])
+        monkeypatch.setattr(execution, 'GoalClient', lambda *parts: self.clients[parts[2]])
         self.is_known = True
         match = SimpleNamespace(advance=lambda: self.is_known)
         monkeypatch.setattr(execution, 'ServerMatch', lambda *_: match)
@@ -419,3 +422,22 @@ def test_a_robot_that_moved_while_its_controller_was_waited_for_is_not_moved(ben
     assert code is PlanningCode.CONTROL_FAILED
     assert 'it is at 0.2000, the trajectory begins at 0.0000; plan anew' in reason
     assert bench.controller.goal is None
+
+
+def test_an_acceptance_that_comes_twice_counts_once() -> None:
+    """Both wait for a client that a busy computer held up; rclpy raises for the second."""
+    context = Context()
+    rclpy.init(context=context)
+    node = Node('client', context=context)
+    client = GoalClient(node, FollowJointTrajectory, 'arm/follow_joint_trajectory')
+    goal_id = FollowJointTrajectory.Impl.SendGoalService.Request().goal_id
+    client._goal_sequence_number_to_goal_id[7] = goal_id
+    pending = client._pending_goal_requests[7] = Future()
+    response = FollowJointTrajectory.Impl.SendGoalService.Response(accepted=True)
+    for _ in range(2):
+        with pytest.raises(StopIteration):
+            client.execute({'goal': (7, response)}).send(None)
+    assert pending.result().accepted
+    client.destroy()
+    node.destroy_node()
+    context.shutdown()

@@ -87,6 +87,23 @@ class Execution:
         return set(self.trajectory.joint_names)
 
 
+class GoalClient(ActionClient):
+    """A client that takes an acceptance twice.
+
+    Servers of actions here repeat it where no result is requested soon. On a busy computer both
+    wait; rclpy raises RuntimeError for the second, and its EventsExecutor ends by SIGSEGV when a
+    task raises.
+    """
+
+    async def execute(self, taken_data: dict[str, Any]) -> None:
+        """Process what came, without the repeat."""
+        sequence, _ = taken_data.get('goal', (None, None))
+        goal_id = self._goal_sequence_number_to_goal_id.get(sequence)
+        if goal_id is not None and bytes(goal_id.uuid) in self._goal_handles:
+            del taken_data['goal']
+        await super().execute(taken_data)
+
+
 class TrajectoryExecution:
     """Has controllers follow trajectories, and watches them; belongs to the node's executor."""
 
@@ -109,7 +126,7 @@ class TrajectoryExecution:
         self._node, self._controllers, self._received = node, controllers, received
         self._limits = limits
         self._clients = {
-            name: ActionClient(node, each.kind.action, each.action(name))
+            name: GoalClient(node, each.kind.action, each.action(name))
             for name, each in controllers.items()
         }
         self._matches: dict[str, ServerMatch] = {}
