@@ -17,6 +17,7 @@ from moveit_msgs.action import ExecuteTrajectory, MoveGroup, MoveGroupSequence
 from moveit_msgs.msg import RobotState, RobotTrajectory
 import pytest
 from ros_client import RosClient
+from sensor_msgs.msg import JointState
 
 from arm_planning import PlanningCode, PlanningError
 from arm_planning.ros.actions import (
@@ -29,6 +30,7 @@ from arm_planning.ros.actions import (
 from arm_planning.ros.background import Background
 from arm_planning.ros.execution import Done, INVALIDATED
 from arm_planning.ros.planning import PlannedMotion
+from node_runner import action_goals
 
 TIMEOUT = 20.0  # [s]
 
@@ -39,6 +41,8 @@ class Bench:
     def __init__(self, client: RosClient) -> None:
         self.client = client
         self.plans = 0
+        self.warnings: list[str] = []
+        self.requests: list[Any] = []
         self.stops = True
         self.stale = self.moving = 0
         self.refusal: Exception | None = None
@@ -58,7 +62,7 @@ class Bench:
             ExecuteAction(client.node, execution),
             *(
                 MotionAction(client.node, kind, planning, self.background, execution)
-                for kind in (single_motion(planning), sequence(planning))
+                for kind in (single_motion(planning, self.warnings.append), sequence(planning))
             ),
         ]
 
@@ -66,13 +70,14 @@ class Bench:
         self.moving -= 1
         return self.moving >= 0
 
-    def _prepare(self, count: int, *_: Any) -> Callable[[], PlannedMotion]:
+    def _prepare(self, count: int, request: Any, *_: Any) -> Callable[[], PlannedMotion]:
         if self.stale:
             self.stale -= 1
             raise PlanningError(PlanningCode.ROBOT_STATE_STALE, 'nobody knows where it is')
         if self.refusal is not None:
             raise self.refusal
         self.plans += 1
+        self.requests.append(request)
 
         def plan() -> PlannedMotion:
             assert self.may_plan.wait(TIMEOUT)
@@ -219,13 +224,13 @@ def test_a_stop_between_the_request_of_a_goal_and_its_acceptance_counts(
     bench: Bench, kind: Any, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The acceptance is delayed for the client."""
-    delays: list[float] = []
+    delay = action_goals._Server._delay
 
-    async def stop_meanwhile(_server: object, duration: float) -> None:
-        bench.execution.stops += not delays
-        delays.append(duration)
+    async def stop_meanwhile(server: Any, duration: float) -> None:
+        bench.execution.stops += duration == action_goals.ANSWER_DELAY
+        await delay(server, duration)
 
-    monkeypatch.setattr('node_runner.action_goals._Server._delay', stop_meanwhile)
+    monkeypatch.setattr(action_goals._Server, '_delay', stop_meanwhile)
     status, result = bench.result(bench.send(kind, name, kind.Goal()))
     code = getattr(result, 'response', result).error_code
     assert (status, code.val) == (GoalStatus.STATUS_ABORTED, PlanningCode.PREEMPTED)
@@ -252,6 +257,20 @@ def test_what_is_planned_while_everything_is_stopped_is_not_begun(
     assert code.message == 'everything was stopped meanwhile'
     assert not bench.executions
     bench.begin(kind, name, kind.Goal())
+
+
+@pytest.mark.parametrize('plan_only', [False, True])
+def test_a_motion_is_executed_from_where_the_robot_is(bench: Bench, *, plan_only: bool) -> None:
+    """MoveIt ignores another start state, too, with a warning; a plan may begin anywhere."""
+    goal = MoveGroup.Goal()
+    goal.request.start_state.joint_state = JointState(name=['a'], position=[1.0])
+    goal.planning_options.plan_only = plan_only
+    bench.send(MoveGroup, 'move_action', goal)
+    bench.client.spin_until(lambda: bool(bench.requests), TIMEOUT, 'the plan')
+    start = bench.requests[0].start_state
+    assert list(start.joint_state.name) == ['a'] * plan_only
+    assert start.is_diff != plan_only
+    assert len(bench.warnings) == (not plan_only)
 
 
 def test_a_sequence_is_not_planned_anew(bench: Bench) -> None:

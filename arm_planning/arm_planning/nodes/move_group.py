@@ -129,7 +129,7 @@ class MoveGroup(Node):
             cartesian_limits=given.cartesian_limits,
         )
         PlannerQueries(self, settings.planners)
-        for kind in (single_motion(planning), sequence(planning)):
+        for kind in (single_motion(planning, self.get_logger().warning), sequence(planning)):
             MotionAction(self, kind, planning, self._planning, execution)
 
     def close(self) -> None:

@@ -110,15 +110,25 @@ class MotionKind:
     answer: Answer  # makes the result of how it ended, the plan, and whether that was begun
 
 
-def single_motion(planning: PlanningThreads) -> MotionKind:
-    """Return move_action: a motion of MoveGroupInterface::plan and ::move."""
+def single_motion(planning: PlanningThreads, warn: Callable[[str], object]) -> MotionKind:
+    """Return move_action: a motion of MoveGroupInterface::plan and ::move.
+
+    Args:
+        warn: Logs a warning.
+    """
 
     def prepare(
         asked: Any,  # noqa: ANN401
         again: bool,
         is_canceled: Callable[[], bool],
     ) -> Callable[[], PlannedMotion]:
-        if again:  # from where it has stopped
+        if again or not asked.planning_options.plan_only:  # from where it is, as in MoveIt
+            given = asked.request.start_state
+            if given.joint_state.name or given.multi_dof_joint_state.joint_names:
+                warn(
+                    'move_action: a motion is executed from where the robot is: the start_state of'
+                    ' the request is ignored; plan from it with plan_only'
+                )
             asked.request.start_state = RobotState(is_diff=True)
         diff = asked.planning_options.planning_scene_diff
         return planning.prepare(asked.request, diff, is_canceled)
