@@ -604,6 +604,8 @@ class Axis:
         view, left = self.view, before is DriveState.OPERATION_ENABLED
         if left:
             self.halt.release()
+        if before in FAULTY and view.state not in FAULTY:
+            view.error = ''  # also where another tool has reset it
         if view.state in FAULTY and before not in FAULTY:
             self.goal = DriveState.SWITCH_ON_DISABLED
             view.error = view.error_of_emcy()

@@ -64,5 +64,10 @@ class ControllerWatch:
             severity, text = _REPORTS[state]
             self._log(severity, f'CAN controller {state.value} ({self.last_error}): {text}')
 
+    def receive_data(self) -> None:
+        """End bus off: data has come, after a restart that no error frame has shown."""
+        self.state, self._alone = ControllerState.ACTIVE, False
+        self._log(Severity.INFO, 'CAN controller receives frames again after bus off')
+
     def _log(self, severity: Severity, text: str) -> None:
         self._report(Event(EventKind.BUS, severity, '', text))

@@ -15,7 +15,7 @@ from traceback import walk_tb
 from typing import TypeAlias
 
 from canopen_core import CanopenError
-from canopen_core.can import Frame
+from canopen_core.can import ControllerState, Frame
 from canopen_core.standard import (
     ALL_NODES,
     CAN_ID_MASK,
@@ -118,7 +118,9 @@ class Network:
         nodes = list(self.nodes.values())
         for node in nodes:
             node.send_nmt = partial(self.send_nmt, node_id=node.config.node_id)
-        self._startup = Startup(master, nodes, self.scheduler, self.send_nmt, report)
+        self._startup = Startup(
+            master, nodes, self.scheduler, self.send_nmt, report, command_nmt=self.command_nmt
+        )
         self._boots = BootManager(
             config, nodes, self.scheduler, self._startup, send=self.send, send_nmt=self.send_nmt
         )
@@ -155,6 +157,8 @@ class Network:
         if frame.is_error:
             self.controller.receive(frame)
             return
+        if self.controller.state is ControllerState.BUS_OFF:
+            self.controller.receive_data()
         handler = self._handlers.get(frame.can_id)
         if handler is None or frame.is_extended or frame.is_remote:
             self.unknown_frames += 1

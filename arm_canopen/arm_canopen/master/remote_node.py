@@ -354,7 +354,7 @@ class RemoteNode:
             # it must not go on as if it followed
             self.image.clear()
             itself = self.wanted is NmtState.OPERATIONAL
-            who = 'it left Operational by itself, for' if itself else 'somebody sent it to'
+            who = 'it left Operational by itself, for' if itself else 'it was sent to'
             self._stop_drivers(f'{who} NMT state {state.name}')
 
     def _stop_drivers(self, reason: str) -> None:

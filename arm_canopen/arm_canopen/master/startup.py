@@ -4,9 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from functools import partial
+from typing import Any, TypeAlias
 
+from canopen_core import BusError
 from canopen_core.standard import ALL_NODES, NmtCommand
 
 from ..config.model.bus import MasterConfig
@@ -14,6 +16,9 @@ from .events import Event, EventKind, Report, Severity
 from .frame_sender import SendNmt
 from .remote_node import RemoteNode
 from .scheduler import Promise, Scheduler
+
+CommandNmt: TypeAlias = Callable[[NmtCommand, int], Coroutine[Promise[Any], None, str]]
+"""Sends a command after the axes that it concerns were brought to rest."""
 
 
 class Startup:
@@ -29,11 +34,14 @@ class Startup:
         scheduler: Scheduler,
         send_nmt: SendNmt,
         report: Report,
+        *,
+        command_nmt: CommandNmt,
     ) -> None:
         self._config = config
         self._nodes = list(nodes)
         self._scheduler = scheduler
         self._send_nmt = send_nmt
+        self._command_nmt = command_nmt
         self._report = report
         self._waiting: dict[RemoteNode, Promise[bool]] = {}
         # all mandatory devices were configured, so nobody is held back any more
@@ -105,19 +113,22 @@ class Startup:
         if self._config.reset_all_nodes:
             self.complete = False
             self._report_error(f'{node.name} is mandatory and lost: all devices are reset')
-            self._send_nmt(NmtCommand.RESET_NODE, ALL_NODES).when_done(self._look)
+            self._scheduler.background(self._command(NmtCommand.RESET_NODE))
         elif self._config.stop_all_nodes:
             self._report_error(
                 f'{node.name} is mandatory and lost: all devices are stopped; start them by '
                 'NMT when it is back'
             )
-            self._send_nmt(NmtCommand.STOP, ALL_NODES).when_done(self._look)
+            self._scheduler.background(self._command(NmtCommand.STOP))
         else:
             self._report_error(f'{node.name} is mandatory and lost; the others go on without it')
 
-    def _look(self, sent: Promise[None]) -> None:
-        if sent.error is not None:
-            self._report_error(str(sent.error))
+    async def _command(self, command: NmtCommand) -> None:
+        """Bring the axes to rest, and send a command to all devices."""
+        try:
+            await self._command_nmt(command, ALL_NODES)
+        except BusError as error:
+            self._report_error(str(error))
 
     def _report_error(self, text: str) -> None:
         self._report(Event(EventKind.BOOT_FAILED, Severity.ERROR, '', text))

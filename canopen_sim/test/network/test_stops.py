@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import count
 
 from bus_rig import booted, JOINT, VirtualNetwork
@@ -11,6 +12,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from drive_samples import (
     bus_config,
     drive_config,
+    every_mode,
     MOTION_WRITES,
     PERIOD,
     SCALE,
@@ -26,8 +28,9 @@ from arm_canopen.config import RecoveryPolicy
 from arm_canopen.library.canopen_master import leave_device
 from arm_canopen.master.remote_node import BootPhase
 from arm_canopen.nodes.diagnostics import drive_diagnostic
-from canopen_core.can import Frame
+from canopen_core.can import ControllerState, Frame
 from canopen_core.standard import NmtCommand
+from canopen_sim import Fault, FaultInjection
 
 pytestmark = pytest.mark.slow
 
@@ -564,3 +567,45 @@ def test_shutdown_of_a_lost_drive_is_no_success_unless_its_rest_is_seen(*, gone:
     assert 'Switch on disabled' in moving.net.do(JOINT, 'shutdown', timeout=5.0)
     assert abs(moving.net.speed()) < 1e-3
     assert moving.device.state is DriveState.SWITCH_ON_DISABLED
+
+
+@pytest.mark.parametrize('key', ['stop_all_nodes', 'reset_all_nodes'])
+def test_the_loss_of_a_mandatory_device_lets_no_other_axis_coast(key: str) -> None:
+    """The others stand before NMT takes them from the master."""
+    first = replace(drive_config(JOINT, 2), mandatory=True)
+    net = booted(first, every_mode(drive_config('joint2', 3)), **{key: True})
+    net.enable(OperationMode.PROFILE_VELOCITY, 'joint2')
+    net.target(1.0, 'joint2')
+    net.run(1.0)
+    since = net.now
+    net.power_off(JOINT)
+    net.run_until(lambda: bool(net.frames(0x000, since=since)), 10.0)
+    assert net.speed('joint2') == pytest.approx(0.0, abs=1e-2)
+    assert net.simulated('joint2').state is DriveState.SWITCH_ON_DISABLED
+    assert not any('somebody' in text for text in net.reported())
+
+
+def test_an_error_ends_with_its_fault_whoever_resets_it() -> None:
+    """Another tool resets the fault; the drive is described without it."""
+    net = booted(drive_config(JOINT, 2))
+    net.enable(OperationMode.PROFILE_POSITION)
+    net.devices[JOINT].faults.inject(FaultInjection(Fault.OVER_CURRENT), net.now)
+    net.run(0.5)
+    assert 'error 0x' in net.drives[JOINT].describe()
+    for word in (0x00, 0x80):
+        net.send_as('tool', Frame(0x202, bytes((word, 0, 1))))
+        net.run(0.001)
+    net.run(0.5)
+    assert net.simulated().state is DriveState.SWITCH_ON_DISABLED
+    assert 'error 0x' not in net.drives[JOINT].describe()
+
+
+def test_bus_off_ends_with_the_next_data_and_is_reported_again() -> None:
+    """`ip link set down` and `up` restart the controller without an error frame."""
+    net = booted(drive_config(JOINT, 2))
+    for number in (1, 2):
+        net.network.receive(Frame(0x40, bytes(8), net.now, is_error=True))
+        assert net.network.controller.state is ControllerState.BUS_OFF
+        assert len([text for text in net.reported() if 'left the bus' in text]) == number
+        net.run(0.5)
+        assert net.network.controller.state is ControllerState.ACTIVE
