@@ -22,7 +22,6 @@ from control_msgs.msg import JointTrajectoryControllerState, SpeedScalingFactor
 from geometry_msgs.msg import TwistStamped
 from moveit_msgs.msg import ServoStatus
 import numpy as np
-from rclpy.action.client import ActionClient
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from urdf_reader import JointRange
 
@@ -30,6 +29,7 @@ from arm_canopen import load_bus
 from arm_model import ArmError, Array, load_limits, ModelError, RobotModel, start_pose
 from arm_trajectory import PathCheck
 from node_runner import LATCHED
+from node_runner.action_goals import GoalClient
 from process_supervisor import CallError, namespaced_parameters, RosOptions
 
 from ..description import read_semantic
@@ -143,7 +143,7 @@ class Motion(ArmDemo):
             SpeedScalingFactor, f'{self.controller}/speed_scaling_input', LATCHED
         )
         self._action_name = f'{self.controller}/follow_joint_trajectory'
-        self._action = ActionClient(node, FollowJointTrajectory, self._action_name)
+        self._action = GoalClient(node, FollowJointTrajectory, self._action_name)
         node.create_subscription(state, f'{self.controller}/controller_state', self._take, QUEUE)
         node.create_subscription(ServoStatus, 'servo_node/status', self._take_status, 10)
         return client

@@ -38,7 +38,6 @@ from moveit_msgs.msg import (
 )
 from moveit_msgs.srv import ApplyPlanningScene, GetPositionIK, GetStateValidity
 import numpy as np
-from rclpy.action.client import ActionClient
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 from urdf_reader import JointRange, read_urdf
@@ -48,6 +47,7 @@ from arm_model import ArmError, Array, Clearances, load_limits, RobotModel, star
 from arm_model.ros import seconds
 from arm_planning import PlanningCode
 from node_runner import LATCHED
+from node_runner.action_goals import GoalClient
 from process_supervisor import CallError, namespaced_parameters, RosOptions
 
 from ..description import read_semantic
@@ -240,12 +240,12 @@ class Plan(ArmDemo):
         """Join the ROS graph as a client of move_group does, and as a viewer."""
         client = super().join(given_up)
         node = client.node
-        self._move = ActionClient(node, MoveGroup, 'move_action')
+        self._move = GoalClient(node, MoveGroup, 'move_action')
         self._apply = node.create_client(ApplyPlanningScene, 'apply_planning_scene')
         self._ik = node.create_client(GetPositionIK, 'compute_ik')
         self._validity = node.create_client(GetStateValidity, 'check_state_validity')
         if self.cell is not None and self.cell.gripper:
-            self._gripper = ActionClient(node, GripperCommand, self.gripper_action)
+            self._gripper = GoalClient(node, GripperCommand, self.gripper_action)
         node.create_subscription(JointState, 'joint_states', self._take_joints, QUEUE)
         path, scene = 'display_planned_path', 'monitored_planning_scene'
         node.create_subscription(DisplayTrajectory, path, self.paths.append, LATCHED)

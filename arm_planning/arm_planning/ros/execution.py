@@ -17,7 +17,6 @@ from typing import Any
 from action_msgs.msg import GoalStatus
 from action_msgs.srv import CancelGoal
 from control_msgs.msg import JointTrajectoryControllerState
-from rclpy.action.client import ActionClient
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from rclpy.serialization import deserialize_message
@@ -26,6 +25,7 @@ from trajectory_msgs.msg import JointTrajectory
 from arm_model.ros import seconds
 from arm_trajectory import GoalCode
 from node_runner import ServerMatch
+from node_runner.action_goals import GoalClient
 
 from ..exceptions import PlanningCode, PlanningError
 from .controllers import Controller, FOLLOW
@@ -85,23 +85,6 @@ class Execution:
     def joints(self) -> set[str]:
         """Names of the joints that it moves."""
         return set(self.trajectory.joint_names)
-
-
-class GoalClient(ActionClient):
-    """A client that takes an acceptance twice.
-
-    Servers of actions here repeat it where no result is requested soon. On a busy computer both
-    wait; rclpy raises RuntimeError for the second, and its EventsExecutor ends by SIGSEGV when a
-    task raises.
-    """
-
-    async def execute(self, taken_data: dict[str, Any]) -> None:
-        """Process what came, without the repeat."""
-        sequence, _ = taken_data.get('goal', (None, None))
-        goal_id = self._goal_sequence_number_to_goal_id.get(sequence)
-        if goal_id is not None and bytes(goal_id.uuid) in self._goal_handles:
-            del taken_data['goal']
-        await super().execute(taken_data)
 
 
 class TrajectoryExecution:

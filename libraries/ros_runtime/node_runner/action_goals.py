@@ -13,6 +13,7 @@ import traceback
 from typing import Any, Generic, TypeVar
 
 from builtin_interfaces.msg import Time
+from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer, CancelResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock
@@ -120,6 +121,23 @@ class _Server(ActionServer):
         )
         await elapsed
         self._node.destroy_timer(timer)
+
+
+class GoalClient(ActionClient):
+    """A client that takes an acceptance twice.
+
+    Servers of actions here repeat it where no result is requested soon. On a busy computer both
+    wait; rclpy raises RuntimeError for the second, and its EventsExecutor ends by SIGSEGV when a
+    task raises.
+    """
+
+    async def execute(self, taken_data: dict[str, Any]) -> None:
+        """Process what came, without the repeat."""
+        sequence, _ = taken_data.get('goal', (None, None))
+        goal_id = self._goal_sequence_number_to_goal_id.get(sequence)
+        if goal_id is not None and bytes(goal_id.uuid) in self._goal_handles:
+            del taken_data['goal']
+        await super().execute(taken_data)
 
 
 class Ending(Enum):

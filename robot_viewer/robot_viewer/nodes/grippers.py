@@ -10,9 +10,10 @@ from functools import partial
 from importlib import import_module
 from typing import Any
 
-from rclpy.action.client import ActionClient
 from rclpy.node import Node
 from urdf_reader import KinematicTree
+
+from node_runner.action_goals import GoalClient
 
 from ..page.robot_scene import travel
 from .calls import ActionCall
@@ -26,7 +27,7 @@ SINGLE_TYPE = 'control_msgs/action/GripperCommand_SendGoal'
 @dataclass(frozen=True, slots=True)
 class _Gripper:
     service: str
-    client: ActionClient
+    client: GoalClient
     joint: str
 
 
@@ -79,7 +80,7 @@ class Grippers:
                 and controller.joints[0] in self._ends
             ):
                 kind = import_module('control_msgs.action').GripperCommand
-                client = ActionClient(self._node, kind, action)
+                client = GoalClient(self._node, kind, action)
                 self._found[name] = _Gripper(service, client, controller.joints[0])
 
     def grip(self, name: str, position: float) -> None:

@@ -13,7 +13,6 @@ import time
 from typing import Any
 
 import numpy as np
-from rclpy.action.client import ActionClient
 from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -31,6 +30,7 @@ from viser import (
 )
 
 from node_runner import LATCHED
+from node_runner.action_goals import GoalClient
 
 from ..page.live import Hold, RELEASED_AFTER
 from ..page.robot_page import RobotPage
@@ -73,8 +73,8 @@ GOAL_SIZE = 0.22
 class _Links:
     """Clients of a move_group, and where executions are ended."""
 
-    move: ActionClient
-    execute: ActionClient
+    move: GoalClient
+    execute: GoalClient
     ik: Client
     events: Publisher
 
@@ -143,8 +143,8 @@ class MotionPlanning:
         node, actions = self._node, import_module('moveit_msgs.action')
         solve = import_module('moveit_msgs.srv').GetPositionIK
         self._links = _Links(
-            ActionClient(node, actions.MoveGroup, MOVE),
-            ActionClient(node, actions.ExecuteTrajectory, EXECUTE),
+            GoalClient(node, actions.MoveGroup, MOVE),
+            GoalClient(node, actions.ExecuteTrajectory, EXECUTE),
             node.create_client(solve, 'compute_ik'),
             node.create_publisher(String, 'trajectory_execution_event', 10),
         )
