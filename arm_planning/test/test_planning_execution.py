@@ -7,6 +7,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
+import math
 import re
 from types import SimpleNamespace
 from typing import Any
@@ -92,7 +93,7 @@ class Bench:
         self.clients = {each.action(name): Controller() for name, each in known.items()}
         self.controller = next(iter(self.clients.values()))
         self.ends: list[tuple[PlanningCode, str]] = []
-        self.place = 0.0
+        self.place, self.turns = 0.0, dict[str, int]()
         self.watch: Callable[[], None] = lambda: None
         monkeypatch.setattr(execution, 'GoalClient', lambda *parts: self.clients[parts[2]])
         self.is_known = True
@@ -103,6 +104,7 @@ class Bench:
             known,
             self.received,
             ExecutionLimits(),
+            continuous=['left'],
         )
 
     def create_timer(self, _period: float, callback: Callable[[], None]) -> None:
@@ -118,7 +120,7 @@ class Bench:
 
     def received(self, joints: Sequence[str]) -> Mapping[str, float]:
         """Return where joints are."""
-        return dict.fromkeys(joints, self.place)
+        return {name: self.place + self.turns.get(name, 0) * math.tau for name in joints}
 
     def start(self, trajectory: Any = None) -> execution.Execution:
         """Start a trajectory."""
@@ -422,6 +424,24 @@ def test_a_robot_that_moved_while_its_controller_was_waited_for_is_not_moved(ben
     assert code is PlanningCode.CONTROL_FAILED
     assert 'it is at 0.2000, the trajectory begins at 0.0000; plan anew' in reason
     assert bench.controller.goal is None
+
+
+@pytest.mark.parametrize(('joint', 'begins'), [('left', True), ('right', False)])
+def test_whole_turns_of_a_continuous_joint_do_not_count(
+    bench: Bench, joint: str, begins: bool
+) -> None:
+    """The way to a first point that comes later is that within the turn, too."""
+    bench.turns = {joint: -2}
+    later = motion()
+    for number, point in enumerate(later.points, 1):
+        point.time_from_start.sec = number
+    if begins:
+        way = bench.start(later).way
+        assert way is not None
+        assert list(way.points[0].positions) == pytest.approx([0.0, 0.0])
+    else:
+        with pytest.raises(PlanningError, match='plan anew'):
+            bench.start(later)
 
 
 def test_an_acceptance_that_comes_twice_counts_once() -> None:

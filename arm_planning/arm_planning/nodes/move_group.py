@@ -113,8 +113,14 @@ class MoveGroup(Node):
         monitor = SceneMonitor(self, robot, prefix)
         self._queries = Background(self, 'queries')
         RobotServices(self, monitor, self._queries, settings)
-        followers = robot.kinematics.mimics
-        execution = TrajectoryExecution(self, controllers, monitor.received, limits, followers)
+        execution = TrajectoryExecution(
+            self,
+            controllers,
+            monitor.received,
+            limits,
+            followers=robot.kinematics.mimics,
+            continuous=robot.continuous,
+        )
         self._watch = Background(self, 'watch')
         PathWatch(monitor, execution, self._watch)
         ExecuteAction(self, execution)

@@ -96,7 +96,9 @@ class TrajectoryExecution:
         controllers: Mapping[str, Controller],
         received: Callable[[Sequence[str]], Mapping[str, float]],
         limits: ExecutionLimits,
+        *,
         followers: Collection[str] = (),
+        continuous: Collection[str] = (),
     ) -> None:
         """Create clients of the controllers, whose actions may come later.
 
@@ -104,8 +106,9 @@ class TrajectoryExecution:
             received: Returns where joints are in [rad], by joint; raises PlanningError where
                 that is not known.
             followers: Joints that follow others, which no controller takes.
+            continuous: Joints of which whole turns do not count.
         """
-        self._followers = frozenset(followers)
+        self._followers, self._continuous = frozenset(followers), frozenset(continuous)
         self._node, self._controllers, self._received = node, controllers, received
         self._limits = limits
         self._clients = {
@@ -287,9 +290,11 @@ class TrajectoryExecution:
     def _check_start(self, execution: Execution) -> None:
         """Refuse to begin far from where its joints are; take the way from there."""
         trajectory, tolerance = execution.trajectory, self._limits.start_tolerance
-        places = self._received(trajectory.joint_names)
+        places = dict(self._received(trajectory.joint_names))
         start = trajectory.points[0].positions
         for name, wanted in zip(trajectory.joint_names, start, strict=True):
+            if name in self._continuous:  # in the turn in which the trajectory begins
+                places[name] = wanted + math.remainder(places[name] - wanted, math.tau)
             if tolerance and abs(places[name] - wanted) > tolerance:
                 raise PlanningError(
                     PlanningCode.CONTROL_FAILED,

@@ -11,7 +11,7 @@ import threading
 from typing import Any
 
 import numpy as np
-from urdf_reader import DescriptionError, find_group, parse_srdf, read_urdf
+from urdf_reader import DescriptionError, find_group, JointKind, parse_srdf, read_urdf
 
 from arm_model import (
     AllowedCollisionMatrix,
@@ -41,6 +41,7 @@ class RobotGroups:
 
     Attributes:
         all_joints: Names of all joints, those that follow others too.
+        continuous: Names of the joints of which whole turns do not count.
         scene: The robot alone; all joints move.
         world_frames: Frames in which the root link is held, by the SRDF.
     """
@@ -64,6 +65,9 @@ class RobotGroups:
             raise ModelError('the SRDF has no group; give it one with <group name="arm">')
         self.kinematics = Kinematics(tree, [each.name for each in tree.joints if each.independent])
         self.all_joints = tuple(each.name for each in tree.movable())
+        self.continuous = frozenset(
+            each.name for each in tree.movable() if each.kind is JointKind.CONTINUOUS
+        )
         joints = {}
         for name in self.names:
             # a group of links alone, such as a fixed hand, moves nothing
