@@ -23,8 +23,8 @@ import pytest
 from urdf_reader import read_urdf
 
 from arm_model import example_files
-from robot_viewer.page.jog_panel import Offered
-from robot_viewer.page.robot_page import Actions, RobotPage
+from robot_viewer.page.jog_panel import Actions, Offered
+from robot_viewer.page.robot_page import RobotPage
 from robot_viewer.robot_state import ALLOW, Level, RobotState, Stop
 
 if TYPE_CHECKING:
@@ -57,6 +57,7 @@ BOXES = """selector => Object.fromEntries([...document.querySelectorAll(selector
 CONTRASTS = """() => {
   const part = v => (v /= 255) <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
   const light = c => 0.2126 * part(c[0]) + 0.7152 * part(c[1]) + 0.0722 * part(c[2]);
+  const ratio = (a, b) => (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
   const numbers = text => text.match(/[\\d.]+/g).map(Number);
   const back = e => { for (; e; e = e.parentElement) {
     const c = numbers(getComputedStyle(e).backgroundColor);
@@ -69,8 +70,15 @@ CONTRASTS = """() => {
     const seen = document.elementFromPoint(b.left + b.width / 2, b.top + b.height / 2);
     if (!e.innerText?.trim() || !(e.contains(seen) || seen?.matches('button'))) continue;
     const [one, two] = [light(numbers(getComputedStyle(e).color)), light(back(e))];
-    const ratio = (Math.max(one, two) + 0.05) / (Math.min(one, two) + 0.05);
-    if (ratio < 4.5) found.push([e.innerText, ratio]);
+    if (ratio(one, two) < 4.5) found.push([e.innerText, ratio(one, two)]);
+  }
+  const edged = '.rv-hold, #rv-view button, .mantine-Button-root, .mantine-Input-input';
+  for (const e of document.querySelectorAll(`${edged}, .rv-cell i, .mantine-Slider-track`)) {
+    const [style, bar] = [getComputedStyle(e), getComputedStyle(e, '::before')];
+    const edge = e.matches('.mantine-Slider-track') ? bar.backgroundColor
+      : /rgb[^)]*\\)/.exec(style.boxShadow)?.[0] ?? style.borderTopColor;
+    const shape = ratio(light(numbers(edge)), light(back(e.parentElement)));
+    if (e.offsetParent && shape < 3) found.push([e.className, shape]);
   }
   return found;
 }"""

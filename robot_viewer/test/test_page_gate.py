@@ -22,9 +22,10 @@ from websockets.typing import Origin, Subprotocol
 from robot_viewer.loopback import binding_problem
 from robot_viewer.page import overlay
 from robot_viewer.page.gate import COOKIE, Gate
+from robot_viewer.page.jog_panel import Actions
 from robot_viewer.page.live import Live, LIVE_PATH
 from robot_viewer.page.overlay import Overlay, STOP_HEADER
-from robot_viewer.page.robot_page import Actions, RobotPage
+from robot_viewer.page.robot_page import RobotPage
 from robot_viewer.robot_state import Stop
 
 TIMEOUT = 10.0  # [s]

@@ -39,8 +39,8 @@ from node_runner import (
 )
 
 from ..loopback import binding_problem
-from ..page.jog_panel import Offered, Twist
-from ..page.robot_page import RobotPage, Velocity
+from ..page.jog_panel import Offered, Twist, Velocity
+from ..page.robot_page import RobotPage
 from ..page.robot_scene import greatest_velocities
 from ..robot_state import Stop
 from ..robots import of_robot, SET_MODE_TYPE, stops_robot

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import partial
@@ -14,11 +15,13 @@ from typing import Protocol, TypeAlias
 from urdf_reader import Joint, JointKind, KinematicTree
 from viser import GuiDropdownHandle, ViserServer
 
+from ..robot_state import Stop
 from .live import Hold, Live
 from .robot_scene import RobotScene, travel
 from .style import NEUTRAL, pad, sentence, Share, THREE_COLUMNS, value_of
 from .target_panel import TargetPanel
 
+Velocity: TypeAlias = tuple[float, float, float]
 Twist: TypeAlias = tuple[float, float, float, float, float, float]
 
 TWISTS: Mapping[str, tuple[str, Twist]] = {
@@ -41,8 +44,26 @@ BASE = 'base'
 """The frame that a command has which names none."""
 
 
-class JogActions(Protocol):
-    """What moves an arm; any thread may call it, and none of it waits."""
+class Actions(Protocol):
+    """What a page may have done; any thread may call it, and none of it waits."""
+
+    def stop(self) -> Future[Stop]:
+        """Stop whatever moves; the future has the robot's answer."""
+
+    def act(self, action: str) -> None:
+        """Do the action that is wanted now, if it is still this one."""
+
+    def call(self, what: str, services: Sequence[str]) -> None:
+        """Call Trigger services at the same time; what they are for, in words."""
+
+    def walk(self, velocity: Velocity) -> None:
+        """Command a velocity in [m/s] and [rad/s] once."""
+
+    def set_mode(self, mode: str) -> None:
+        """Request a mode of a walking robot."""
+
+    def publish_joints(self, positions: Mapping[str, float]) -> None:
+        """Publish joint states."""
 
     def jog(self, twist: Twist, frame: str) -> None:
         """Command a share of the speed of jogging once, -1 to 1, along the axes of a frame."""
@@ -85,7 +106,7 @@ class JogPanel:
         server: ViserServer,
         robot: RobotScene,
         offered: Offered,
-        ways: tuple[JogActions, Live, Share],
+        ways: tuple[Actions, Live, Share],
         place: Callable[[JogPanel], AbstractContextManager[None]],
     ) -> None:
         actions, live, self._speed = ways

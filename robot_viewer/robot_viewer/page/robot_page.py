@@ -12,7 +12,7 @@ from html import escape
 import io
 import math
 import time
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol
 
 from urdf_reader import KinematicTree, Transform
 from viser import (
@@ -32,7 +32,7 @@ from ..loopback import shown_host
 from ..robot_state import BUS, drives_of, FOLLOWS, Level, RobotState, Status, Stop
 from .diagnose import drive_html, Log
 from .gate import Gate
-from .jog_panel import JogActions, JogPanel, joint_texts, Offered
+from .jog_panel import Actions, JogPanel, joint_texts, Offered, Velocity
 from .live import Hold, Live, RELEASED_AFTER
 from .overlay import Overlay
 from .robot_scene import Ground, RobotScene, start_position, travel
@@ -53,8 +53,6 @@ from .style import (
     WARNING,
 )
 from .target_panel import History, PlotPanel
-
-Velocity: TypeAlias = tuple[float, float, float]
 
 ARM_SPEED, LEGS_SPEED = 20.0, 30.0
 """In the beginning, in [%]."""
@@ -111,16 +109,14 @@ NO_DRIVE, ALL_DRIVES = 'none chosen', 'all drives'
 WORST = (2, 3, 1, 0)
 """Levels of a status, the worst first."""
 VIEWS: Mapping[str, tuple[str, Velocity]] = {
-    'Fit': ('F', (0.65, -0.65, 0.58)),
-    'Front': ('X', (1.1, 0.0, 0.2)),
-    'Side': ('Y', (0.0, -1.1, 0.2)),
-    'Top': ('T', (0.001, 0.0, 1.3)),
+    'Fit': ('F', (0.52, -0.52, 0.46)),
+    'Front': ('X', (0.9, 0.0, 0.16)),
+    'Side': ('Y', (0.0, -0.9, 0.16)),
+    'Top': ('T', (0.001, 0.0, 1.05)),
 }
 """Hotkey and place of the camera of each view, by the size of the robot."""
 STATUS_BOX = 'margin:0 12px 0.5em 2.2em;height:2.5em;line-height:1.25em;overflow:auto'
 """Style of what a status says: no button below moves with its length."""
-LOW_PICTURE = 420
-"""Height of a picture in [px] below which the camera is nearer."""
 KEYS_MOVE = (
     '<div class="rv-speed"><span></span>'
     '<label><input type="checkbox" tabindex="-1">Keys move the robot (? lists them)</label></div>'
@@ -142,28 +138,6 @@ ICONS = {
     'See': Icon.EYE,
     'Diagnose': Icon.STETHOSCOPE,
 }
-
-
-class Actions(JogActions, Protocol):
-    """What a page may have done; any thread may call it, and none of it waits."""
-
-    def stop(self) -> Future[Stop]:
-        """Stop whatever moves; the future has the robot's answer."""
-
-    def act(self, action: str) -> None:
-        """Do the action that is wanted now, if it is still this one."""
-
-    def call(self, what: str, services: Sequence[str]) -> None:
-        """Call Trigger services at the same time; what they are for, in words."""
-
-    def walk(self, velocity: Velocity) -> None:
-        """Command a velocity in [m/s] and [rad/s] once."""
-
-    def set_mode(self, mode: str) -> None:
-        """Request a mode of a walking robot."""
-
-    def publish_joints(self, positions: Mapping[str, float]) -> None:
-        """Publish joint states."""
 
 
 class Panel(Protocol):
@@ -309,9 +283,8 @@ class RobotPage:
             self._place_camera(event.client, view)
 
     def _place_camera(self, client: ClientHandle, view: str) -> None:
-        near = 0.8 if 0 < client.camera.image_height < LOW_PICTURE else 1.0
         height = 0.3 * self.robot.size if self.robot is not None else 0.3
-        x, y, z = (near * part for part in self._camera(view))
+        x, y, z = self._camera(view)
         client.camera.position = (x, y, z + height if view != 'Top' else z)
         client.camera.look_at = (0.0, 0.0, height)
 
