@@ -33,8 +33,8 @@ from shape_msgs.msg import SolidPrimitive
 
 from arm_msgs.srv import InjectFault
 from robot_viewer.nodes.motion_planning import DRAGGED, HOLD_EXECUTE
-from robot_viewer.page.jog_panel import BASE
-from robot_viewer.page.robot_page import Actions, RobotPage
+from robot_viewer.page.jog_panel import Actions, BASE
+from robot_viewer.page.robot_page import RobotPage
 from robot_viewer.page.target_panel import HOLD_TARGET
 from robot_viewer.robot_state import ALLOW, Level, RobotState, Stop
 
@@ -47,6 +47,8 @@ pytestmark = [
     pytest.mark.skipif(bool(chromium.lacking()), reason=chromium.lacking()),
 ]
 
+ARM = ('panda', '--simulate', '--enable', '--plan')
+NICE = ('nice', '-n', '5')
 STARTING = 90.0  # [s]
 REACTION = 60.0  # [s] until a motion begins or ends on a busy machine; real ones are far shorter
 REST = 0.6  # [s] of joint states without motion
@@ -58,6 +60,14 @@ WRIST = 'panda_joint7'
 """Turns the tool, which points downwards, about the z axis."""
 READY_TIP = (0.307, 0.0, 0.59)
 """Where the tip is in the state 'ready' of the SRDF, in [m]."""
+GROUPS = ['Drive', 'Plan', 'See', 'Diagnose']
+SOON = 10_000  # [ms] for 2 s to a fault and 3 s to the loss of the robot, on a busy machine
+ACTIVE = """[...document.querySelectorAll('.rv-hold:not(.rv-always)')].filter(hold =>
+  getComputedStyle(hold).cursor !== 'not-allowed').map(hold => hold.innerText)"""
+WORDS_OF_STOP = """window.said = []; new MutationObserver(() => window.said.push(
+  document.querySelector('#robot-stop small').innerText)).observe(
+  document.querySelector('#robot-stop'), {subtree: true, childList: true, characterData: true})"""
+"""Keeps them in ``window.said``."""
 JOINT1 = 1
 """Place of the joint's slider in the tab of the target; the speed is above it."""
 
@@ -68,9 +78,11 @@ class Seen:
 
     Attributes:
         bringup: The programs of the arm.
+        viewer: The program that serves its page.
         browser: The browser.
         url: Of the page.
-        page: It, opened once: drawing it without a graphics card costs time.
+        page: It, opened once, before there was a robot: drawing it without a graphics card costs
+            time.
         client: A ROS node of the test.
         states: The last joint states with the time of their arrival.
         wrist: Where that joint was in the beginning in [rad].
@@ -78,6 +90,7 @@ class Seen:
     """
 
     bringup: RunningProcess
+    viewer: RunningProcess
     browser: Browser
     url: str
     page: Page
@@ -178,19 +191,19 @@ class Seen:
 
 @pytest.fixture(scope='module')
 def seen() -> Iterator[Seen]:
-    """Bring an arm up with its page, and start the browser."""
-    with reserve() as isolation, RosClient(isolation.domain_id) as client:
-        command = [
-            executable('arm_bringup', 'bringup'),
-            'panda',
-            '--simulate',
-            '--enable',
-            '--plan',
-        ]
-        command += ['--can', isolation.bus, '--timeout', f'{STARTING:g}']
-        with RunningProcess(command, isolation.env | {'NO_VIEW': ''}) as bringup:
-            url = chromium.url_of(bringup, STARTING)
-            bringup.wait_for('are enabled', STARTING)
+    """Open a page, and bring an arm up as it says."""
+    with (
+        reserve() as isolation,
+        RosClient(isolation.domain_id) as client,
+        RunningProcess([*NICE, executable('robot_viewer', 'web_viewer')], isolation.env) as viewer,
+        chromium.browser() as browser,
+    ):
+        url = chromium.url_of(viewer, STARTING)
+        page = chromium.open_page(browser, url, robot='')
+        chromium.state_is(page, 'NO ROBOT')
+        assert page.locator('[role=tab]').all_inner_texts() == GROUPS
+        command = executable('arm_bringup', 'bringup'), *ARM, '--can', isolation.bus
+        with RunningProcess([*command, '--timeout', f'{STARTING:g}'], isolation.env) as bringup:
             states: deque[tuple[float, JointState]] = deque(maxlen=500)
             client.node.create_subscription(
                 JointState,
@@ -198,9 +211,12 @@ def seen() -> Iterator[Seen]:
                 lambda message: states.append((time.monotonic(), message)),
                 10,
             )
+            bringup.wait_for('are enabled', STARTING)
             client.spin_until(lambda: bool(states), REACTION, 'joint states')
-            with chromium.browser() as browser:
-                yield Seen(bringup, browser, url, chromium.open_page(browser, url), client, states)
+            chromium.state_is(page, 'READY')
+            page.locator('#rv-first').wait_for(state='hidden')
+            assert page.locator('[role=tab]').all_inner_texts()[: len(GROUPS)] == GROUPS
+            yield Seen(bringup, viewer, browser, url, page, client, states)
 
 
 @pytest.fixture(autouse=True)
@@ -208,6 +224,7 @@ def one_page(seen: Seen) -> Iterator[None]:
     """Close what a test that failed leaves open: it would draw, and hold control."""
     yield
     seen.page.mouse.up()
+    seen.page.set_default_timeout(chromium.PAGE_TIMEOUT)
     for context in seen.browser.contexts:
         if context is not seen.page.context:
             context.close()
@@ -507,11 +524,13 @@ def test_a_fault_has_two_presses_to_motion(seen: Seen) -> None:
     request = InjectFault.Request(device='panda_joint3', fault='over_current')
     answer = seen.client.call(InjectFault, '/fake_slaves/fault', request)
     assert answer.success, answer.message
+    page.set_default_timeout(SOON)
     chromium.state_is(page, 'FAULT')
     page.locator('#rv-state').filter(has_text=re.compile('panda_joint3.*over current')).wait_for()
-    for group in ('Plan', 'See', 'Diagnose', 'Drive'):
+    for group in (*GROUPS[1:], GROUPS[0]):
         chromium.show(page, group)
         assert page.locator('#rv-do').inner_text() == 'Recover panda_joint3'
+        assert not page.evaluate(ACTIVE), group
     chromium.hold(page, '3 +')
     seen.wait_for_rest()
     page.mouse.up()
@@ -601,9 +620,17 @@ def test_a_robot_that_does_not_answer_has_not_stopped(seen: Seen) -> None:
     words_of_stop(page, 'stopped|NOT confirmed').wait_for()
     page.keyboard.press('Escape')
     robot.kill()
+    page.set_default_timeout(SOON)
     chromium.state_is(page, 'NO CONTACT WITH THE ROBOT')
-    assert page.evaluate("document.body.classList.contains('rv-still')")
-    (viewer,) = chromium.viewers_below(seen.bringup)
+    page.evaluate(WORDS_OF_STOP)
+    page.keyboard.press('Space')
+    words_of_stop(page, 'NOT confirmed: use the emergency stop').wait_for()
+    assert 'stopped' not in page.evaluate('window.said')
+    chromium.show(page, 'Drive')
+    page.locator('.rv-hold:visible').first.wait_for()
+    assert not page.evaluate(ACTIVE)
+    assert not page.locator('.well:visible').count(), 'nothing is green'
+    viewer = psutil.Process(seen.viewer.pid)
     viewer.suspend()
     try:
         chromium.state_is(page, 'NO CONTACT$')

@@ -82,6 +82,8 @@ CONTRASTS = """() => {
   }
   return found;
 }"""
+ACTIVE = """() => [...document.querySelectorAll('.rv-hold:not(.rv-always)')].filter(hold =>
+  getComputedStyle(hold).cursor !== 'not-allowed').map(hold => hold.innerText)"""
 REDS = """() => [...document.querySelectorAll('body *')].filter(e => {
   const b = e.getBoundingClientRect();
   if (!b.width || !b.height || e.closest('#robot-stop, canvas, svg, [role=dialog]')) return false;
@@ -253,6 +255,8 @@ def test_stop_is_in_reach_and_nothing_overlaps_or_moves(
         }
         assert not moved, state.word
         assert not page.evaluate(CONTRASTS), state.word
+        assert page.locator('#rv-do').is_visible() is bool(state.action), state.word
+        assert bool(page.evaluate(ACTIVE)) is state.movable, state.word
     see(page, shown, READY)
     shown.page.say('done')
     page.locator('#rv-foot').filter(has_text='done').wait_for(state='attached')

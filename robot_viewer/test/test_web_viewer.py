@@ -9,6 +9,7 @@ from concurrent.futures import Future
 from contextlib import closing, contextmanager
 from functools import partial
 from importlib import import_module
+from itertools import cycle
 import math
 import socket
 import sys
@@ -18,7 +19,7 @@ from typing import Any
 
 from canopen_interfaces.srv import CONmtID
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import TwistStamped
+from geometry_msgs.msg import TransformStamped, TwistStamped
 from isolation import Isolation
 import pytest
 from rcl_interfaces.msg import ParameterValue
@@ -32,6 +33,7 @@ from rclpy.service import Service
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Empty, Trigger
+from tf2_msgs.msg import TFMessage
 from urdf_robots import ARM
 from viewer_rig import in_domain, ViewerRig
 from viser import GuiEvent
@@ -337,6 +339,23 @@ def test_who_does_not_look_takes_no_messages(
     opened.append(True)
     robot.spin_until(lambda: listeners() == [2, 1, 1], 'subscriptions again')
     robot.spin_until(lambda: robot.node.count_subscribers('more') == 1, 'the new one')
+
+
+def test_a_robot_that_walks_is_shown_where_it_is(robot: Robot, opened: list[bool]) -> None:
+    """Its place comes among the transforms of its links, which are more."""
+    assert opened
+    robot.description.publish(String(data=TWO_SLIDERS))
+    publisher = robot.node.create_publisher(TFMessage, '/tf', 10)
+    children = cycle('120')
+    for x in (0.25, 0.5):
+
+        def is_shown(x: float = x) -> bool:
+            frame = TransformStamped(child_frame_id=next(children))
+            frame.transform.translation.x = x
+            publisher.publish(TFMessage(transforms=[frame]))
+            return robot.viewer._shown_base.translation[0] == x
+
+        robot.spin_until(is_shown, f'{x} m')
 
 
 def test_each_heartbeat_is_one_command(robot: Robot) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import qos_profile_sensor_data, QoSProfile
+from rclpy.qos import QoSProfile
 
 from ..page.live import RELEASED_AFTER
 from ..page.target_panel import History, motion_time
@@ -138,7 +138,7 @@ class Controllers:
         publisher = self._node.create_publisher(command, f'{name}{COMMAND}', QoSProfile(depth=2))
         controller = Controller(publisher)
         take = partial(self._take, controller)
-        self._listening.add(state, f'{name}{STATE}', take, qos_profile_sensor_data)
+        self._listening.add_latest(state, f'{name}{STATE}', take)
         return controller
 
     def _take(self, controller: Controller, message: Any) -> None:  # noqa: ANN401

@@ -9,7 +9,8 @@ from functools import partial
 from typing import Any
 
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
+from rclpy.qos import qos_profile_sensor_data, QoSProfile
+from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
 LINGER = 5.0
@@ -23,6 +24,7 @@ class Listening:
         self._node = node
         self._makers: list[Callable[[], Subscription]] = []
         self._made: list[Subscription] = []
+        self._latest: dict[tuple[Any, Callable[[Any], None]], bytes] = {}
         self._last_look: float | None = None
 
     @property
@@ -36,12 +38,25 @@ class Listening:
         topic: str,
         take: Callable[[Any], None],
         qos: QoSProfile | int,
+        *,
+        raw: bool = False,
     ) -> None:
         """Subscribe to a topic while a page is open."""
-        maker = partial(self._node.create_subscription, kind, topic, take, qos)
+        maker = partial(self._node.create_subscription, kind, topic, take, qos, raw=raw)
         self._makers.append(maker)
         if self._made:
             self._made.append(maker())
+
+    def add_latest(self, kind: Any, topic: str, take: Callable[[Any], None]) -> None:  # noqa: ANN401
+        """Subscribe likewise; only the last message before each :meth:`take_latest` is decoded."""
+        keep = partial(self._latest.__setitem__, (kind, take))
+        self.add(kind, topic, keep, qos_profile_sensor_data, raw=True)
+
+    def take_latest(self) -> None:
+        """Process the last message of each topic that is new."""
+        while self._latest:
+            (kind, take), message = self._latest.popitem()
+            take(deserialize_message(message, kind))
 
     def update(self, now: float, *, looked_at: bool) -> bool:
         """Begin or end; return whether it has just begun."""

@@ -23,6 +23,7 @@ from rclpy.client import Client
 from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
+from rclpy.serialization import deserialize_message
 from rclpy.task import Future
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -61,6 +62,8 @@ DRAW_PERIOD = 1.0 / 30.0
 """Time between two pictures, and between two looks at what was done on the page, in [s]."""
 LIST_PERIOD = 0.2
 """Time between two looks at numbers in [s]."""
+LOOK_TIME = 0.2
+"""Time in each second in [s] in which it looks whether /tf moves the root of the robot."""
 LIMIT_AGE = 1.0
 """Time in [s] for which a limit that the servo names is shown."""
 SCALES = ('command_in_type', 'scale.linear', 'override_velocity_scaling_factor')
@@ -133,11 +136,11 @@ class WebViewer(Node):
         self._servo_listens = False
         self._servo: Client | None = None
         self._set_mode: Client | None = None
-        self._root = ''
         self._velocities: Mapping[str, float] = {}
         self._independent: Sequence[str] = ()
         self._listening = Listening(self)
         self._base = self._shown_base = Transform()
+        self._root, self._root_moves = '', False
         self._jogs: Publisher | None = None
         self._joint_jogs: Publisher | None = None
         self._walks: Publisher | None = None
@@ -155,7 +158,7 @@ class WebViewer(Node):
         self.create_subscription(String, 'robot_description', self._describe, LATCHED)
         sensor = qos_profile_sensor_data
         self._listening.add(JointState, 'joint_states', self._take_joints, sensor)
-        self._listening.add(TFMessage, '/tf', self._take_transforms, sensor)
+        self._listening.add(TFMessage, '/tf', self._take_raw_transforms, sensor, raw=True)
         self._listening.add(Log, '/rosout', self._take_log, ROSOUT)
         self.create_subscription(DiagnosticArray, 'diagnostics', self._watch.take_statuses, 10)
         self.create_timer(DRAW_PERIOD, self._serve_page)
@@ -171,6 +174,7 @@ class WebViewer(Node):
 
     def _show(self, tree: KinematicTree) -> None:
         self._root, self._judge.robot, self._drawn = tree.root, tree.name, {}
+        self._root_moves = False
         self._watch.forget()
         self._velocities = greatest_velocities(tree)
         self._independent = [joint.name for joint in tree.joints if joint.independent]
@@ -189,9 +193,15 @@ class WebViewer(Node):
         self._first_motion.take(positions)
         self._positions.update(positions)
 
+    def _take_raw_transforms(self, data: bytes) -> None:
+        """Decode a message; few of them as long as none moves the root: it is half of the load."""
+        if self._root_moves or time.monotonic() % 1.0 < LOOK_TIME:
+            self._take_transforms(deserialize_message(data, TFMessage))
+
     def _take_transforms(self, message: TFMessage) -> None:
         for transform in message.transforms:
             if transform.child_frame_id == f'{self._prefix}{self._root}':
+                self._root_moves = True
                 place, turn = transform.transform.translation, transform.transform.rotation
                 self._base = Transform(
                     (place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w)
@@ -214,6 +224,8 @@ class WebViewer(Node):
     def _serve_page(self) -> None:
         while self._orders:
             self._orders.popleft()()
+        with self.border.around('a message or answer'):
+            self._listening.take_latest()
         self._controllers.advance(self._velocities)
         self._first_motion.advance()
         self._planning.advance()
@@ -355,7 +367,7 @@ class WebViewer(Node):
         if any(end.topic_type == SERVO_STATUS_TYPE for end in ends):
             self._servo_listens = True
             kind = import_module('moveit_msgs.msg').ServoStatus
-            self._listening.add(kind, topic, self._take_servo, qos_profile_sensor_data)
+            self._listening.add_latest(kind, topic, self._take_servo)
 
     def _offered(self) -> Offered:
         grippers = dict(self._grippers.named)
