@@ -203,6 +203,29 @@ def test_an_adapter_that_delivers_nothing_but_damage_is_reported(
         assert frames == [(0x181, b'\xaa')]
 
 
+def fill(bus: Bus) -> float:
+    """Send until that is refused; return how long the last one took in [s]."""
+    for _ in range(10_000):
+        began = monotonic()
+        try:
+            bus.send(Frame(0x201, bytes(8)))
+        except BusError:
+            break
+    return monotonic() - began
+
+
+def test_an_adapter_that_takes_no_more_bytes_blocks_no_caller(
+    serial_adapter: SerialAdapter,
+) -> None:
+    """Sending is refused soon, closing ends, and frames leave as soon as it reads again."""
+    with open_bus(serial_adapter.name) as bus:
+        assert fill(bus) < 1.0
+        assert bus.counters.send_errors == 1
+        serial_adapter.read(b't201')
+        bus.send(Frame(0x201))
+        assert fill(bus) < 1.0
+
+
 def failure(bus: Bus) -> str:
     """Receive once; return why that failed, or nothing."""
     try:

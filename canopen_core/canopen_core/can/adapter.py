@@ -23,6 +23,8 @@ _POLL = 0.02  # [s] longest time until wake() is noticed; python-can has no way 
 _BATCH_MAX = 1000  # frames; a flooded bus must not keep the caller inside receive
 _DAMAGED_MAX = 100  # messages in a row, after which the adapter counts as gone
 _WALL_CLOCK_SPAN = 1.0  # [s] stamps further from now count from something else than 1970
+# [s] for which a serial adapter may take no more bytes; other drivers mean something else by it
+_SEND_TIMEOUTS = {'slcan': 0.02, 'robotell': 0.02}
 _UNPLUGGED = frozenset({errno.ENODEV, errno.ENXIO, errno.EIO})
 _log = logging.getLogger(__name__)
 
@@ -42,6 +44,7 @@ class AdapterBus(Bus):
         super().__init__(name)
         self._open = partial(_open_driver, name, interface, channel, bitrate)
         self._bus = self._open()
+        self._send_timeout = _SEND_TIMEOUTS.get(interface)
         self._woken = Event()
         self._send_lock = Lock()
         self._closed = self._gone = False
@@ -65,7 +68,7 @@ class AdapterBus(Bus):
             raise BusError(f'{self.name} went away')
         try:
             with self._send_lock:
-                self._bus.send(message)
+                self._bus.send(message, self._send_timeout)
                 self.counters.sent += 1
         except (can.CanError, OSError) as error:
             self.counters.send_errors += 1
@@ -196,7 +199,8 @@ class AdapterBus(Bus):
         self._woken.set()
         opened = self._reopening
         if opened is None:
-            self._bus.shutdown()
+            with contextlib.suppress(can.CanError, OSError):  # of an adapter that takes no bytes
+                self._bus.shutdown()
         elif not opened.cancel() and opened.exception() is None:
             opened.result().shutdown()
 

@@ -19,6 +19,7 @@ from .frame import Frame
 
 T = TypeVar('T')
 
+STOP_TIMEOUT = 5.0  # [s] for the step that runs to end
 REOPEN_PAUSE = 0.1  # [s] between two attempts to read a bus that went away
 
 logger = logging.getLogger(__name__)
@@ -82,13 +83,15 @@ class BusThread:
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread after the step that runs, and wait for it; it may not have begun."""
+        """End the thread after the step that runs, and wait for it for 5 s."""
         self.stopping = True
         if not self._started:
             self._end()
             return
         self._bus.wake()
-        self._thread.join()
+        self._thread.join(STOP_TIMEOUT)
+        if self._thread.is_alive():
+            logger.error('%s hangs in its driver, and is left', self._owner)
 
     def call(self, function: Callable[[], T]) -> Future[T]:
         """Run a function in the thread; it must not wait.
