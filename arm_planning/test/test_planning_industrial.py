@@ -268,7 +268,7 @@ def test_a_line_may_be_singular_all_the_way(way: tuple[float, ...]) -> None:
     assert end.position == pytest.approx(line.at(1.0).position, abs=STRAIGHT)
 
 
-def test_an_arm_of_five_joints_that_cannot_keep_its_turn_is_told_so() -> None:
+def test_an_arm_of_five_joints_that_cannot_keep_its_turn_is_named() -> None:
     """It is neither singular nor out of reach."""
     model, start = chain('zyyyz'), frozen([0.0, 0.5, 0.8, 0.4, 0.0])
     goal = JointGoal(np.add(start, [0.1, -0.1, 0.05, 0.2, 0.3]))

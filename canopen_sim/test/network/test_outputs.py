@@ -258,7 +258,7 @@ def test_a_value_that_the_bus_refuses_is_not_sent_later() -> None:
 
 
 def test_a_value_that_waits_for_sync_leaves_when_the_bus_takes_frames_again() -> None:
-    """Its publisher was told that it leaves; until then the one before counts as sent."""
+    """Its publisher has the answer that it leaves; until then the one before counts as sent."""
     net = booted()
     publish(net, (0x6071, 0), 1)
     net.run(0.1)

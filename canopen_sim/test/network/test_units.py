@@ -133,7 +133,7 @@ def test_a_write_that_the_drive_refuses_changes_nothing() -> None:
     promise = net.network.nodes[JOINT].sdo.write(0x6081, 0, b'\x01', 0.5)  # too short
     net.run(0.2)
     assert promise.error is not None
-    net.result(net.network.nodes[JOINT].objects.write_object(0x6067, 0, 12))
+    net.result(net.network.nodes[JOINT].objects.write_object(0x6068, 0, 12))
     net.run(0.2)
     assert net.drives[JOINT].view.parameters == before
     assert len(net.frames(0x600 + NODE_ID, since=begin)) <= 3

@@ -35,9 +35,10 @@ because the motion would go on meanwhile. The record of a goal is made when its 
 that a stop during the delay counts for it.
 """
 
-REPEATS = (0.5, 1.5)
+REPEATS = (2.0, 3.0)
 """Pauses in [s] after which acceptance is sent again while no result has been requested.
 
+Longer than clients are held up: one that finds two of them ends with an error of rclpy's.
 A client that requests the result has the acceptance. On a busy computer its thread may pause
 for longer than ``ANSWER_DELAY`` between sending and noting. A client that has it and never
 requests a result drops the repeats with a warning.
@@ -256,7 +257,7 @@ class GoalServer(Generic[GoalT]):
         if goal is not None and not goal.has_ended:
             try:
                 self._cancel(goal)
-            except Exception as error:  # noqa: BLE001  # the goal goes on, and the client is told
+            except Exception as error:  # noqa: BLE001  # the goal goes on: the answer says so
                 self._log_defect(error)
                 return CancelResponse.REJECT
         return CancelResponse.ACCEPT
