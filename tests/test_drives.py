@@ -19,6 +19,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from simulated_arm import JOINTS, panda_bus, SimulatedArm
 from std_msgs.msg import Float64, String
+from std_srvs.srv import Trigger
 
 from arm_msgs.action import Home
 from arm_msgs.srv import InjectFault, Move, ReadObject, ReadUnits, WriteObject
@@ -128,6 +129,25 @@ def test_homing_as_an_action_and_as_a_service(arm: SimulatedArm) -> None:
     assert wrong.status == GoalStatus.STATUS_ABORTED
     assert 'method 36' in wrong.result.message
     assert arm.client.trigger(f'{JOINT}/enable').success
+
+
+def test_a_halt_right_after_a_goal_to_home_is_not_overtaken(arm: SimulatedArm) -> None:
+    """The acceptance of a goal is delayed for its client."""
+    assert arm.client.trigger(f'{JOINT}/enable').success
+    client = arm.client.action(Home, f'{JOINT}/home')
+    arm.client.spin_until(client.server_is_ready, 10.0, 'the action')
+    arm.client.client_of(Trigger, f'{JOINT}/halt')
+    messages = []
+    for _ in range(10):  # which of the two comes first, DDS decides
+        sent = client.send_goal_async(Home.Goal(method=35))
+        halted = arm.client.call_async(Trigger, f'{JOINT}/halt', Trigger.Request())
+        arm.client.spin_until(sent.done, 10.0, 'acceptance')
+        arm.client.spin_until(halted.done, 10.0, 'the halt')
+        assert halted.result().success, halted.result().message
+        homed = sent.result().get_result_async()
+        arm.client.spin_until(homed.done, 20.0, 'the result')
+        messages.append(homed.result().result.message)
+    assert any('was stopped before it was homed' in message for message in messages), messages
 
 
 def test_one_of_many_homings_at_a_time_is_done(arm: SimulatedArm) -> None:

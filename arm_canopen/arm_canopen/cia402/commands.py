@@ -66,6 +66,7 @@ class AxisCommands:
             **self._stopping,
         }
         self._scheduler = scheduler
+        self.stop_count = 0  # of commands that stop the drive
         self._running = ''
         self._delivery = completed()  # of the target or move that was commanded last
         self._task: Task[str] | None = None
@@ -99,6 +100,7 @@ class AxisCommands:
             sequence.close()
             return self._leaving if preempt else _refused(self._ending())
         if preempt:
+            self.stop_count += 1
             self.cancel(f'{self._running} was ended by {name}')
         if self._busy:
             sequence.close()

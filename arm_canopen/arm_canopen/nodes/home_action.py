@@ -12,6 +12,7 @@ import time
 from typing import Any, TYPE_CHECKING
 
 from arm_msgs.action import Home
+from canopen_core import DriveError
 from node_runner.action_goals import Ending, GoalServer, ServedGoal
 
 from ..cia402.commands import AxisCommands
@@ -28,8 +29,9 @@ FEEDBACK_PERIOD = 0.1  # [s]
 
 @dataclass(slots=True, eq=False)
 class _Homing(ServedGoal):
-    """A goal from its acceptance to its end."""
+    """A goal from its request to its end."""
 
+    stop_count: Future[int]  # at its request
     phase: str = HomingProgress.ENABLING.value
     begin: float = field(default_factory=time.monotonic)
     timer: Any = None
@@ -57,7 +59,7 @@ class HomeAction:
             node,
             Home,
             name,
-            accept=_Homing,
+            accept=lambda: _Homing(thread.call(lambda: commands.stop_count)),
             start=self._start,
             conclude=self._conclude,
             cancel=self._cancel,
@@ -75,6 +77,8 @@ class HomeAction:
 
         def run() -> Promise[str]:
             self._node.admit()
+            if homing.stop_count.result() != self._commands.stop_count:
+                raise DriveError(f'{self._commands.axis.name} was stopped before it was homed')
             method = homing.handle.request.method or None
             homing.task = self._commands.run('home', self._commands.home(method, notify))
             return homing.task

@@ -605,7 +605,8 @@ def test_bus_off_ends_with_the_next_data_and_is_reported_again() -> None:
     net = booted(drive_config(JOINT, 2))
     for number in (1, 2):
         net.network.receive(Frame(0x40, bytes(8), net.now, is_error=True))
-        assert net.network.controller.state is ControllerState.BUS_OFF
+        states = [net.network.controller.state]
         assert len([text for text in net.reported() if 'left the bus' in text]) == number
         net.run(0.5)
-        assert net.network.controller.state is ControllerState.ACTIVE
+        states.append(net.network.controller.state)
+        assert states == [ControllerState.BUS_OFF, ControllerState.ACTIVE]
