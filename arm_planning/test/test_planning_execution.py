@@ -26,8 +26,9 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from arm_planning import PlanningCode, PlanningError
 from arm_planning.ros import controllers, execution, scene_monitor
 from arm_planning.ros.controllers import FOLLOW, KINDS
-from arm_planning.ros.execution import ExecutionLimits, GoalClient, TrajectoryExecution
+from arm_planning.ros.execution import ExecutionLimits, TrajectoryExecution
 from arm_planning.ros.scene_monitor import SceneMonitor, STATE_TIMEOUT
+from node_runner.action_goals import GoalClient
 
 JOINTS = ('left', 'right')
 
@@ -448,11 +449,13 @@ def test_an_acceptance_that_comes_twice_counts_once() -> None:
     """Both wait for a client that a busy computer held up; rclpy raises for the second."""
     context = Context()
     rclpy.init(context=context)
-    node = Node('client', context=context)
-    client = GoalClient(node, FollowJointTrajectory, 'arm/follow_joint_trajectory')
+    node: Any = Node('client', context=context)
+    make: Any = GoalClient
+    client = make(node, FollowJointTrajectory, 'arm/follow_joint_trajectory')
     goal_id = FollowJointTrajectory.Impl.SendGoalService.Request().goal_id
     client._goal_sequence_number_to_goal_id[7] = goal_id
-    pending = client._pending_goal_requests[7] = Future()
+    pending: Future[Any] = Future()
+    client._pending_goal_requests[7] = pending
     response = FollowJointTrajectory.Impl.SendGoalService.Response(accepted=True)
     for _ in range(2):
         with pytest.raises(StopIteration):
