@@ -18,7 +18,7 @@ import time
 
 import pytest
 
-LATE = 0.15  # [s] masters and drives wait 0.1 to 0.5 s for each other
+LATE = 0.1  # [s] reports of a robot count as missing after that; drives wait for 0.1 to 0.5 s
 RERUNS = 2  # of a test, at most
 WAKE = 0.05  # [s] until it has written of a stall that has ended
 _WATCH = f"""

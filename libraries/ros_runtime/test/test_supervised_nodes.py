@@ -101,7 +101,7 @@ def test_the_robot_needs_no_page(tmp_path: Path) -> None:
     assert not spec.required
     assert not spec.awaited
     assert spec.ready_timeout == 7.0
-    assert sum(step.timeout for step in spec.stop_steps) <= 5.0
+    assert sum(step.timeout for step in spec.stop_steps) <= 12.0  # Python ends slowly there
     assert spec.argv[0] == 'nice'
     assert spec.argv[spec.argv.index('-p') + 1] == 'frame_prefix:=left/'
     assert spec.argv[-2:] == ('-p', 'port:=9000')
