@@ -40,12 +40,12 @@ class Schedule:
         size = leg_length / LEG_LENGTH
         if abs(size - 1.0) < 0.01:
             return self
-        pace = math.sqrt(size)
+        root = math.sqrt(size)
         return replace(
             self,
-            stance_duration=self.stance_duration * pace,
+            stance_duration=self.stance_duration * root,
             sway=self.sway * size,
-            speed=self.speed * pace,
+            speed=self.speed * root,
         )
 
     @property
