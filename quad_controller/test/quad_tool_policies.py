@@ -300,8 +300,8 @@ def playground() -> Tool:
         )  # fmt: skip
 
     config = {'ctrl_dt': 0.02, 'sim_dt': 0.004, 'Kp': 10.0, 'Kd': 0.25, 'action_scale': 0.25,
-              'history_len': 1, 'command_config': {}, 'noise_config': {},
-              'pert_config': {}}  # fmt: skip
+              'history_len': 1, 'command_config': {}, 'pert_config': {},
+              'noise_config': {'level': 1.0, 'scales': {'joint_vel': 1.5}}}  # fmt: skip
     return Tool(
         files={'config.json': json.dumps(config)},
         metadata={},

@@ -443,6 +443,36 @@ def test_a_policy_needs_a_velocity_that_somebody_estimates(tmp_path: Path) -> No
     assert not controller.set_mode('policy').accepted
 
 
+@pytest.mark.parametrize(
+    ('setting', 'error', 'accepted', 'warned'),
+    [
+        ('kind=test', 0.5, True, False),  # the file says 1.5 rad/s to either side, uniformly
+        ('kind=test', 1.4, False, False),
+        ('observation.terms.joint_vel.noise=1.5', 1.4, True, False),
+        ('observation.terms.joint_vel.noise=null', 1.4, True, True),
+    ],
+)
+def test_joint_velocities_are_as_exact_as_in_the_training(
+    tmp_path: Path, setting: str, error: float, accepted: bool, warned: bool
+) -> None:
+    """What is less exact is refused; of a training that says nothing, one warning shows."""
+    tool = TOOLS['playground']()
+    write_network(tool, tmp_path / 'policy.onnx')
+    assert run([*attached(tool, tmp_path), '--set', setting]) == 0
+    policy = load(tmp_path / 'policy.onnx').runner
+    controller = Controller(ROBOT, GaitParameters(), StateParameters(), policy=policy)
+    joints = JointSample(STAND, (0.0,) * 12, velocity_error=error)
+    state = RobotState(joints, UPRIGHT, 0.9, linear_velocity=(0.0, 0.0, 0.0))
+    controller.step(state, PERIOD)
+    answer = controller.set_mode('policy')
+    assert answer.accepted is accepted
+    assert accepted or 'error of 1.40 rad/s rms, and with 0.866 rad/s the policy' in answer.message
+    logged: list[str] = []
+    for _ in range(300):
+        logged += [event.text for event in controller.step(state, PERIOD).events]
+    assert sum('nothing says with what noise' in text for text in logged) == warned
+
+
 def test_contacts_of_feet_are_observed_in_the_order_of_the_training(tmp_path: Path) -> None:
     """The order is asked for; the mode is refused while nobody publishes them, or not lately."""
     tool = TOOLS['mjlab']()

@@ -22,7 +22,7 @@ from rcl_interfaces.srv import SetParameters
 import rclpy
 from ros_client import RosClient
 from sensor_msgs.msg import Imu, JointState
-from std_msgs.msg import String
+from std_msgs.msg import Float64, String
 
 from node_runner import LATCHED, ParameterError
 from quad_controller import QuadControllerError, replay_policy
@@ -267,6 +267,8 @@ def test_another_policy_is_loaded_while_it_walks(robot: Robot, tmp_path: Path) -
     # before the robot lives: it is silent as long as this process writes
     renamed = write_policy(tmp_path / 'renamed.onnx', metadata(joint_names=names))
     reports = robot.client.listen(String, 'controller_node/policy', LATCHED)
+    inexact = robot.client.node.create_publisher(Float64, 'joint_velocity_error', LATCHED)
+    inexact.publish(Float64(data=0.5))
     robot.begin()
     robot.until_ready()
     assert robot.mode('walk').success
@@ -277,6 +279,7 @@ def test_another_policy_is_loaded_while_it_walks(robot: Robot, tmp_path: Path) -
     assert answer.success, answer.message
     assert 'stands, then follows trot_imitation.onnx; sha256 ' in answer.message
     robot.until_state('policy')
+    robot.process.wait_for('error of 0.50 rad/s rms, and nothing says with what noise')
     robot.client.spin_until(lambda: bool(reports), 20.0, 'the report')
     assert answer.message.rpartition(' ')[2] in reports[-1].data
     assert robot.load('gait').message == 'stands, then follows the gait'

@@ -12,7 +12,9 @@ from pathlib import Path
 from isolation import reserve
 from processes import executable, RunningProcess
 import pytest
+from std_msgs.msg import Float64
 
+from node_runner import LATCHED
 from quad_description import movable_joints, Pose, pose_positions, robot_urdf
 from quad_hardware.joints import LimiterSettings
 from quad_hardware.joints.command import MAX_PERIOD
@@ -107,3 +109,6 @@ def test_the_old_protocol_does_as_well(rig: XgoRig) -> None:
     assert list(rig.receive('/joint_states', 3).position) == pytest.approx(STAND, abs=0.1)
     covariance = rig.receive('/imu').angular_velocity_covariance
     assert covariance[0] == pytest.approx(0.02**2)
+    errors = rig.client.listen(Float64, '/joint_velocity_error', LATCHED)
+    rig.client.spin_until(lambda: bool(errors), TIMEOUT, 'the error of joint velocities')
+    assert errors[-1].data >= 0.5

@@ -27,7 +27,7 @@ from rclpy.qos import (
     ReliabilityPolicy,
 )
 from sensor_msgs.msg import BatteryState, Imu, JointState
-from std_msgs.msg import String
+from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
 from message_templates import FastPublisher, FastReader
@@ -255,6 +255,9 @@ class ControllerNode(Node):
             self.create_subscription(kind, topic, take, sensor, raw=True)
         self.create_subscription(BatteryState, 'battery_state', self._take_battery, sensor)
         self.create_subscription(String, 'servo_problem', self._take_servo_problem, LATCHED)
+        self.create_subscription(
+            Float64, 'joint_velocity_error', self._take_velocity_error, LATCHED
+        )
         self.create_subscription(Twist, 'cmd_vel', self._take_twist, REQUEST_QOS)
         self.create_subscription(
             TwistStamped, 'cmd_vel_stamped', self._take_stamped_twist, REQUEST_QOS
@@ -306,6 +309,9 @@ class ControllerNode(Node):
 
     def _take_servo_problem(self, message: String) -> None:
         self._loop.offer(servo_problem=message.data)
+
+    def _take_velocity_error(self, message: Float64) -> None:
+        self._joints.velocity_error = message.data
 
     def _take_twist(self, message: Twist) -> None:
         velocity = Velocity(message.linear.x, message.linear.y, message.angular.z)

@@ -108,6 +108,7 @@ class JointReader:
         self._places: list[int | None] = []
         # joints that were in no message yet; empty before the first
         self.unreported: tuple[str, ...] = ()
+        self.velocity_error = 0.0  # of velocities, rms [rad/s]; 0 where it is unknown
 
     def read(
         self, message: JointState, numbers: Sequence[float], sent: Sequence[float]
@@ -140,6 +141,7 @@ class JointReader:
             tuple(0.0 if place is None else velocity[place] for place in self._places)
             if known
             else None,
+            velocity_error=self.velocity_error,
         )
 
     def _find(self, names: list[str]) -> None:

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from quad_description import Quadruped, Targets
+from quad_description import JointSample, Quadruped, Targets
 
 from ..exceptions import PolicyError
 from ..gait.velocity import Velocity
@@ -97,6 +97,24 @@ class PolicyRunner:
         if inputs.foot_contacts is None and needs(Source.FOOT_CONTACTS):
             return 'the policy needs the contacts of the feet, and /foot_contacts is not published'
         return ''
+
+    def inexact(self, joints: JointSample | None, *, stated: bool = False) -> str:
+        """Return why joint velocities may be too inexact for it; nothing where they are not.
+
+        Args:
+            stated: Only if the contract states what it was trained with.
+        """
+        noise = self.contract.velocity_noise
+        error = 0.0 if joints is None else joints.velocity_error
+        needed = self.contract.needs(Source.JOINT_VELOCITIES) and error > (noise or 0.0)
+        if not needed or (stated and noise is None):
+            return ''
+        trained = 'nothing says with what noise' if noise is None else f'with {noise:.3g} rad/s'
+        return (
+            f'joint velocities have an error of {error:.2f} rad/s rms, and {trained} the policy '
+            'was trained; use protocol v2 or more reports a second (rate of the hardware node), '
+            'or set noise [rad/s rms] of joint_velocities in policy_contract to what it stands'
+        )
 
     def reset(self, others: Targets) -> None:
         """Begin anew: no previous action, no history, phase zero.

@@ -373,6 +373,9 @@ class Controller:
             conditions['following'] = self._tracking.text
         if self._health.uncertainty and state in UPRIGHT_STATES:
             conditions['uncertain'] = self._health.uncertainty
+        policy = self.policy if state is State.POLICY else None
+        if policy is not None and (inexact := policy.inexact(self._health.joints)):
+            conditions['velocities'] = inexact
         if (getting_up := self._machine.getting_up) is not None:
             conditions[getting_up.text] = f'get_up: {getting_up.text}'
         gait = self._generator

@@ -179,7 +179,7 @@ class Health:
             return self.uncertainty
         return policy.missing(
             Situation(self.joints, self.imu, REST, self.linear_velocity, self.foot_contacts)
-        )
+        ) or policy.inexact(self.joints, stated=True)
 
     def _silence(self, what: Fault, age: float, topic: str) -> str:
         """Return why nothing was received for a time [s]."""

@@ -140,15 +140,16 @@ SLOPE_SHARE = 0.75
 The line lags by half a period; the parabola does not, and makes more of the rounding of bytes.
 """
 ERROR_SHARE = 0.02  # weight of the newest report in the mean square of the error
+TROT_ERROR = 0.5  # [rad/s] rms, by bytes of protocol v1, 50 times a second or oftener, in a trot
+NOMINAL_PERIOD = 0.02  # [s] from which on it grows with the period, to the power of 1.5
 
 
 class JointRate:
     """Joint velocities from the last three positions, where the robot does not report them.
 
-    Attributes:
-        error: Of the velocities [rad/s] rms, by those that the report after shows: the slope
-            between its neighbours. It contains the rounding of positions, so it is no smaller than
-            the true one as long as reports are frequent.
+    Its error is judged by the velocities that the report after shows: the slope between its
+    neighbours. That contains the rounding of positions, so it is no smaller than the true one as
+    long as reports are frequent.
     """
 
     def __init__(self, cutoff: float) -> None:
@@ -157,13 +158,23 @@ class JointRate:
         Args:
             cutoff: Of the low-pass [Hz].
         """
-        self.error = 0.0
+        self._error = 0.0  # as reports show it, rms [rad/s]
+        self._period = NOMINAL_PERIOD  # between reports, in the mean [s]
         self._cutoff = cutoff
         self._time = -math.inf
         self._elapsed = 0.0  # between the last two reports [s]
         self._last: dict[str, float] = {}
         self._slopes: dict[str, float] = {}  # between the last two reports
         self._rates: dict[str, float] = {}
+
+    @property
+    def error(self) -> float:
+        """Of the velocities [rad/s] rms: what reports show, or what a trot would have.
+
+        A robot that stands shows only rounding, and is about to walk.
+        """
+        slower = max(self._period / NOMINAL_PERIOD, 1.0)
+        return max(self._error, TROT_ERROR * math.pow(slower, 1.5))
 
     def update(self, time: float, positions: Mapping[str, float]) -> dict[str, float]:
         """Add positions [rad]; return velocities [rad/s] of the same joints."""
@@ -183,7 +194,8 @@ class JointRate:
                 for name, rate in self._rates.items()
             ]
             square = sum(error * error for error in errors) / len(errors)
-            self.error = math.sqrt(self.error**2 + ERROR_SHARE * (square - self.error**2))
+            self._error = math.sqrt(self._error**2 + ERROR_SHARE * (square - self._error**2))
+            self._period += ERROR_SHARE * (elapsed - self._period)
         share, bend = low_pass_share(self._cutoff, elapsed), SLOPE_SHARE * elapsed / span
         if not 0.5 < elapsed / (self._elapsed or elapsed) < 2.0:
             bend = 0.0  # a report was late: one of both slopes is that of another time

@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import BatteryState, Imu, JointState
-from std_msgs.msg import String
+from std_msgs.msg import Float64, String
 from tf2_msgs.msg import TFMessage
 
 from message_templates import FastPublisher
@@ -74,6 +74,7 @@ class RobotTopics:
         self._diagnostics = node.create_publisher(DiagnosticArray, 'diagnostics', SENSOR_DEPTH)
         self._servos = node.create_publisher(String, 'servo_problem', LATCHED)
         self._servo_problem: str | None = None
+        self._velocity_error = node.create_publisher(Float64, 'joint_velocity_error', LATCHED)
 
     def publish(self, state: RobotState) -> None:
         """Publish a report, in the thread that has it."""
@@ -131,6 +132,8 @@ class RobotTopics:
                 robot_diagnostic(name, port, state, status, gravity_error=error, recording=box)
             )
             self._battery.publish(messages.battery(state, now))
+            if state.joints is not None:
+                self._velocity_error.publish(Float64(data=state.joints.velocity_error))
         self._diagnostics.publish(array)
 
     def _stamp(self, moment: float) -> int:

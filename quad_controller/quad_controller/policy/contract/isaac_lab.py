@@ -18,6 +18,7 @@ import yaml
 
 from ...exceptions import PolicyError
 from .document import ContractDocument, document_of, known, Values
+from .model import Source
 from .terms import ISAAC_LAB
 
 JOINTS_HINT = 'the file does not have the order of the joints; Isaac Lab prints robot.joint_names'
@@ -105,6 +106,8 @@ def read_env(values: Mapping[str, Any], origin: str, joints: Sequence[str]) -> C
             continue
         kind = str(term['func']).rpartition(':')[2]
         terms[name] = _term(kind, {**term, **({'history_length': length} if length else {})})
+        if terms[name].get('source') == Source.JOINT_VELOCITIES.value:
+            terms[name] |= known(noise=_noise(group, term))
         if term.get('modifiers'):
             refusals.append(f'{origin}: observations.policy.{name}.modifiers cannot be run here')
     sim = _mapping(values, 'sim')
@@ -163,6 +166,18 @@ def _term(kind: str, term: Mapping[str, Any]) -> Values:
         clip=clip,
         history=max(int(term.get('history_length') or 1), 1),
     )
+
+
+def _noise(group: Mapping[str, Any], term: Mapping[str, Any]) -> float | None:
+    """Return the deviation of what is added to a term; None where the file does not say."""
+    noise = term.get('noise')
+    if group.get('enable_corruption') is False or ('noise' in term and noise is None):
+        return 0.0
+    if not isinstance(noise, Mapping) or noise.get('operation') != 'add':
+        return None
+    if 'n_min' in noise:
+        return float(noise['n_max'] - noise['n_min']) / math.sqrt(12.0)
+    return noise.get('std')
 
 
 def _one_action(actions: Mapping[str, Any], origin: str) -> list[str]:

@@ -129,6 +129,8 @@ class ObservationTerm:
     phase_threshold: float = 0.0  # a command whose norm is smaller has no phase
     values: tuple[float, ...] = ()  # what a constant, or the scan of a flat ground, is
     feet: tuple[str, ...] = ()  # links of the feet whose contacts these are, in their order
+    # of joint velocities in the training, rms in [rad/s]; None where it is unknown
+    noise: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,6 +201,11 @@ class PolicyContract:
     def width(self) -> int:
         """Numbers of the whole observation."""
         return sum(term.width * term.history for term in self.terms)
+
+    @property
+    def velocity_noise(self) -> float | None:
+        """Least noise of joint velocities in the training, rms [rad/s]; None where unknown."""
+        return min((term.noise for term in self.terms if term.noise is not None), default=None)
 
     def needs(self, source: Source) -> bool:
         """Return whether a term is made of this."""
@@ -391,9 +398,11 @@ def _term(name: str, section: _Section, joints: int) -> ObservationTerm:
         return section.required(key, convert, default) if source in sources else default
 
     velocities = {Source.LINEAR_VELOCITY, Source.ANGULAR_VELOCITY}
-    threshold = 0.0
+    threshold, noise = 0.0, None
     if source is Source.PHASE:
         threshold = section.optional('phase_threshold', _number(0.0, 1.0), threshold)
+    if source is Source.JOINT_VELOCITIES:
+        noise = section.optional('noise', _number(0.0), noise)
     term = ObservationTerm(
         name=name,
         source=source,
@@ -411,6 +420,7 @@ def _term(name: str, section: _Section, joints: int) -> ObservationTerm:
         phase_threshold=threshold,
         values=values,
         feet=own('feet', {Source.FOOT_CONTACTS}, _feet, ()),
+        noise=noise,
     )
     section.end()
     return term
