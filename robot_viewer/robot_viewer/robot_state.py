@@ -181,15 +181,18 @@ def legs_of(statuses: Iterable[Status]) -> list[Status]:
 
 
 def _fault(seen: Seen, drives: Mapping[str, Status], legs: Sequence[Status]) -> RobotState | None:
-    for name, status in drives.items():
-        if status.level == STALE:
-            text = f'{name}: {status.message}. {EMERGENCY}'
-            return RobotState('NO CONTACT WITH THE ROBOT', Level.UNKNOWN, text)
     faulty = {
         name: status
         for name, status in drives.items()
         if status.values.get('state') in FAULTY or (status.level == 2 and not _boots(status))
     }
+    for name, status in drives.items():
+        if status.level == STALE:
+            text = f'{name}: {status.message}. {EMERGENCY}'
+            others = ''.join(f' {each} is faulty.' for each in faulty if each != name)
+            return RobotState(
+                'NO CONTACT WITH THE ROBOT', Level.UNKNOWN, text + others, faulty=tuple(faulty)
+            )
     if faulty:
         first, status = next(iter(faulty.items()))
         reason = status.values.get('error_code') or status.message

@@ -92,6 +92,13 @@ def legs(level: int, state: str, message: str = '') -> Status:
             ALLOW,
             0,
         ),
+        (
+            replace(ROBOT, statuses=[OLD, OTHER_FAULT]),
+            'NO CONTACT WITH THE ROBOT',
+            'use the emergency stop. j2 is faulty.',
+            '',
+            0,
+        ),
         (replace(ROBOT, statuses=[OFF]), 'NOT ENABLED', '1 of 1 drives', 'Enable j1', 2),
         (replace(ROBOT, statuses=[NO_MODE]), 'NOT ENABLED', 'no mode', 'Select the mode', 1),
         (replace(ROBOT, limit='j2 is at its end'), 'AT A LIMIT', 'J2 is at its end.', '', 0),
