@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
+import math
 import time
 from typing import Any
 
@@ -99,6 +100,34 @@ def test_a_stream_of_zeros_takes_no_drives_back(topics: Topics) -> None:
     assert topics.prepared == 0
     topics.send(TWIST, twist(0.5))
     assert topics.prepared == 1
+
+
+def test_displacements_that_come_faster_than_they_begin_add_up(topics: Topics) -> None:
+    """None is refused or late: those that wait become one; a wrong one spoils no other."""
+    joints = ['panda_joint1', 'panda_joint2']
+    drives, begin = topics.drives, topics.drives.path[-1]
+    for number in range(150):
+        joint = joints[number % 2]
+        topics.send(JOG, JointJog(joint_names=[joint], displacements=[0.001]))
+        topics.send(JOG, JointJog(joint_names=[joint], displacements=[math.nan]))
+        topics.send(JOG, JointJog(joint_names=['elbow'], displacements=[0.001]))
+        drives.run()
+    drives.run(100)
+    assert (drives.path[-1] - begin)[:2] == pytest.approx([0.075, 0.075], abs=1e-6)
+
+
+def test_displacements_before_a_stop_do_not_come_back_with_the_next(topics: Topics) -> None:
+    """Also those that waited."""
+    step = JointJog(joint_names=['panda_joint1'], displacements=[0.01])
+    for _ in range(20):
+        topics.send(JOG, step)
+    topics.drives.gateway.interrupt('a stop')
+    topics.send(JOG, JointJog(joint_names=['panda_joint1'], displacements=[0.0]))
+    topics.drives.run(200)
+    stands = topics.drives.path[-1][0]
+    topics.send(JOG, step)
+    topics.drives.run(200)
+    assert topics.drives.path[-1][0] - stands == pytest.approx(0.01, abs=1e-6)
 
 
 @pytest.mark.parametrize(

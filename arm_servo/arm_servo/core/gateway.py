@@ -151,7 +151,8 @@ class CommandGateway:
 
         Args:
             number: Its :meth:`number`, where it came before; by default it comes now.
-            stream: Where the motion comes from, if it replaces all from there that have not begun.
+            stream: Where the motion comes from, if it replaces all from there that have not begun;
+                a displacement goes beyond those.
             get_ready: Gets back drives that others have, where the arm does not follow; called in
                 any thread, and only for a motion that is not refused from where the arm stands.
         """

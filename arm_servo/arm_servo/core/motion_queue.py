@@ -22,7 +22,7 @@ from ..exceptions import NotReadyError
 from .mailbox import Cycle, Mailbox
 from .motion_core import MotionCore
 from .preparation import CommandBasis, Motion
-from .requests import MotionRequest, StopRequest
+from .requests import DisplacementRequest, MotionRequest, StopRequest
 
 MAX_QUEUED_MOTIONS = 50  # motions that may wait to be prepared
 
@@ -132,13 +132,19 @@ class MotionQueue:
         number: int | None = None,
         stream: Hashable = None,
     ) -> MotionCommand:
-        """Prepare a motion, and begin it when its path is clear."""
+        """Prepare a motion, and begin it when its path is clear.
+
+        It replaces those of its stream that wait; displacements add up.
+        """
         with self._lock:
             number = self._mailbox.gate.number() if number is None else number
-            command = MotionCommand(request, number, self._clock(), get_ready, stream)
             replaced = [each for each in self._waiting if stream and each.stream == stream]
             for each in replaced:
                 self._waiting.remove(each)
+                is_void = each.is_canceled or self._mailbox.gate.refusal(each.source, each.number)
+                if isinstance(request, DisplacementRequest) and not is_void:
+                    request = request.beyond(each.request)
+            command = MotionCommand(request, number, self._clock(), get_ready, stream)
             is_full = len(self._waiting) >= MAX_QUEUED_MOTIONS
             if not is_full:
                 self._waiting.append(command)

@@ -62,6 +62,14 @@ class DisplacementRequest:
         """Whether it asks for standing still."""
         return not any(self.displacements.values())
 
+    def beyond(self, before: MotionRequest) -> DisplacementRequest:
+        """Return it beyond another displacement; anything else it takes the place of."""
+        if not isinstance(before, DisplacementRequest):
+            return self
+        ways = {name: before.displacements.get(name, 0.0) for name in self.displacements}
+        sums = {name: way + ways[name] for name, way in self.displacements.items()}
+        return replace(self, displacements={**before.displacements, **sums})
+
 
 @dataclass(frozen=True, slots=True)
 class TargetRequest:

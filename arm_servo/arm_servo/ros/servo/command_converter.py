@@ -84,6 +84,7 @@ class CommandConverter:
             raise CommandError('give either velocities or displacements, one for each joint')
         if message.displacements:
             ways = _by_name(names, message.displacements, 'displacements')
+            by_joint(self._model, ways, 'displacements')  # none spoils those that it adds to
             self.capped = ''
             return DisplacementRequest(ways, self.scales.joint * self.scales.override)
         if not 0.0 <= message.duration <= MAX_DURATION:

@@ -174,7 +174,7 @@ class Servo:
             return
         # a stream of displacements is held like a jog
         self._gateway.stream(Source.JOG, client, is_zero=request.is_zero)
-        command = self._gateway.request(request, get_ready)
+        command = self._gateway.request(request, get_ready, stream=client)
         command.future.add_done_callback(self._note)
         command.ended.add_done_callback(self._note_end)
 
