@@ -34,7 +34,7 @@ from .quirks import quirks_of
 from .state import AxisState, DriveStatus, FAULTY, LOOK_PERIOD, POWERED
 from .state_machine import Command, fault_reset, next_command
 from .stop import BrakingWatch, StopSequence
-from .targets import check_setpoint, check_target
+from .targets import check_setpoint, check_target, TORQUE_MODES
 
 FOLLOWS_COMMAND = int(Statusword.FOLLOWS_COMMAND)
 FOLLOWING_ERROR = int(Statusword.FOLLOWING_ERROR)
@@ -467,6 +467,11 @@ class Axis:
         self.mode.brake()
         self.halt.hold()
 
+    def hold_here(self) -> None:
+        """Hold it where it is, so that it does not jump when it comes free or is reached again."""
+        self.hold()
+        self.mode.preload(self.view.actual())
+
     def check_target(self, target: float) -> None:
         """Refuse a target beyond the limits that the drive has in the selected mode."""
         view = self.view
@@ -529,8 +534,10 @@ class Axis:
             self._take_out(Refusal(RefusalCause.OFFLINE, reason), reason, severity)
             await self.stop.ended()
             seen = self.stop.disabled and self.stop.rests
+        elif self.node.operational:
+            seen = await self.stop.seen_at_rest()  # without power it may coast
         else:
-            seen = self.view.stands  # without power it may coast
+            seen = self.view.stands
         if not self.node.operational:
             self.view.lose_sight()
         return seen
@@ -573,10 +580,15 @@ class Axis:
         """Go on where another master has left the drive: enabled, it is held."""
         held, view = self.holding_mode, self.view
         if held is not None:
-            actual, target = view.actual(), view.held_position(held.number)
-            if isinstance(held, CyclicPosition) and target is not None:
-                actual = actual._replace(position_inc=target)
-            held.preload(actual)
+            actual, is_torque = view.actual(), held.number in TORQUE_MODES
+            if isinstance(held, CyclicPosition):
+                target = view.held_target(held.number)
+                if target is not None:
+                    actual = actual._replace(position_inc=target)
+            elif is_torque:  # as the other master commanded it: 0x6077 may be in no TPDO
+                actual = actual._replace(torque=view.held_target(held.number) or 0)
+            if not (is_torque and held.by_sdo):  # then the drive has what holds its load
+                held.preload(actual)
             self.mode = self._mode_shown = self._mode_led = held
             self.goal = DriveState.OPERATION_ENABLED
             self._scheduler.background(self._hold_taken_over(held))
@@ -788,8 +800,7 @@ class Axis:
         if following is Following.LASTING_ERROR or view.position_age > POSITION_AGE_MAX:
             self._take_out(refusal, f'{text}. Can it hold its load, and is the axis free?')
             return
-        self.hold()
-        mode.preload(view.actual())  # so that it does not jump when set-points reach it again
+        self.hold_here()
         self.released(refusal)
         self.report(
             Severity.ERROR, f'stopping: {text}. Do its RPDOs arrive, and is the axis free?'

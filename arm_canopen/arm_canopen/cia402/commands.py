@@ -9,6 +9,7 @@ they are made of, ``stop_commands.py`` those that stop the axis.
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, TypeAlias, TypeVar
 
@@ -195,7 +196,7 @@ class AxisCommands:
     async def arrive(self, command: Callable[[], str], timeout: float) -> str:
         """Run ``command``, which sets a target or a move, and wait until the drive stands there.
 
-        One that is later than ``timeout`` in [s] is halted.
+        One that is later than ``timeout`` in [s], or stands elsewhere, is halted.
 
         Raises:
             DriveError: It is late, was stopped before, got another target or mode, or stands
@@ -207,52 +208,67 @@ class AxisCommands:
         mode, motion = axis.mode, axis.motions
         await delivered
 
+        def replaced() -> bool:
+            other = axis.motions != motion or axis.mode is not mode
+            return other or not axis.acts or not axis.view.fresh
+
         def lost() -> bool:
-            replaced = axis.motions != motion or axis.mode is not mode
-            return axis.halt.rests or replaced or not axis.acts or not axis.view.fresh
+            return axis.halt.rests or replaced()
 
         def arrived() -> bool:
             return mode.reached(axis.view.statusword) and axis.view.stands
 
+        ended = 'was stopped, or got another target, before it arrived'
         try:
             await self._scheduler.until(lambda: lost() or arrived(), timeout)
         except TimeoutError:
             if not lost():  # else the motion is that of somebody else
-                late = f'{axis.name} has not arrived within {timeout:g} s'
-                try:
-                    late = f'{late}, and was halted: {await self.request("halt")}'
-                except DriveError as error:
-                    late = f'{late}, and was commanded to halt: {error}'
-                raise DriveError(late) from None
+                raise await self._halted(f'has not arrived within {timeout:g} s') from None
         if lost():
-            raise self._steps.refused('was stopped, or got another target, before it arrived')
-        await self._require_place(start)
+            raise self._steps.refused(ended)
+        elsewhere = await self._elsewhere(start, replaced)
+        if replaced():
+            raise self._steps.refused(ended)
+        if elsewhere and axis.halt.rests:
+            raise self._steps.refused(elsewhere)
+        if elsewhere:
+            axis.hold_here()
+            raise await self._halted(elsewhere)
         return axis.describe()
 
-    async def _require_place(self, start: float) -> None:
-        """Refuse the arrival of an axis that came from ``start`` and stands elsewhere.
+    async def _elsewhere(self, start: float, replaced: Callable[[], bool]) -> str:
+        """Return where an axis that came from ``start`` stands, empty where that is its target.
 
         The drive may have shortened the way to its own limits, and in the cyclic modes no bit
         shows the arrival.
         """
         axis = self.axis
-        if axis.mode.setpoint is None:
-            return
-        target, view = axis.setpoint, axis.view
+        target, view, is_placed = axis.setpoint, axis.view, axis.mode.setpoint is not None
         tolerance = max(
             view.parameters.position_window or 0.0,
             WAY_SHARE * abs(target - start),
             WINDOW_INCREMENTS / abs(view.units.position.to_dev),
         )
+
+        def in_place() -> bool:
+            return not is_placed or abs(view.position - target) <= tolerance
+
+        with suppress(TimeoutError):
+            await self._scheduler.until(lambda: replaced() or in_place(), SETTLING_TIME)
+        if in_place():
+            return ''
+        return (
+            f'stands at {view.position:.6g}, not at its target {target:.6g} (is it blocked, or '
+            'within limits of its own?)'
+        )
+
+    async def _halted(self, failure: str) -> DriveError:
+        """Halt an axis whose motion has failed; return the error, with what came of the halt."""
+        text = f'{self.axis.name} {failure}'
         try:
-            await self._scheduler.until(
-                lambda: abs(view.position - target) <= tolerance, SETTLING_TIME
-            )
-        except TimeoutError:
-            raise self._steps.refused(
-                f'stands at {view.position:.6g}, not at its target {target:.6g}: is it blocked, '
-                'or within limits of its own (0x607D less the home offset 0x607C)?'
-            ) from None
+            return DriveError(f'{text}, and was halted: {await self.request("halt")}')
+        except DriveError as error:
+            return DriveError(f'{text}, and was commanded to halt: {error}')
 
     def stream_target(self, target: float) -> None:
         """Follow a stream of targets; when it pauses for too long, the drive stops."""

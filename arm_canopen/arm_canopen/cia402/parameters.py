@@ -50,6 +50,7 @@ DEFAULT_TORQUE_SLOPE_DEV = 1000.0  # [device units/s]: from 0 to the rated torqu
 ADDRESSES: tuple[tuple[int, int], ...] = (
     (Index.SUPPORTED_MODES, 0),
     (Index.HOMING_METHOD, 0),
+    (Index.HOME_OFFSET, 0),
     (Index.SOFTWARE_POSITION_LIMIT, 1),
     (Index.SOFTWARE_POSITION_LIMIT, 2),
     (Index.MAX_PROFILE_VELOCITY, 0),
@@ -74,7 +75,7 @@ class DriveParameters:
 
     supported_modes: int | None = None  # bits of 0x6502
     homing_method: int = 0  # 0x6098
-    # software limits 0x607D in user units, lower first
+    # software limits 0x607D less the home offset 0x607C in user units, lower first
     position_limits: tuple[float, float] | None = None
     speed_limit: float | None = None  # 0x607F in user units per second
     effort_limit: float | None = None  # 0x6072 in user units
@@ -203,8 +204,9 @@ class ParameterCache:
         velocity = DEFAULT_VELOCITY
         lower, upper = (held[Index.SOFTWARE_POSITION_LIMIT, subindex] for subindex in (1, 2))
         if lower is not None and upper is not None and lower < upper:
-            # as targets go, which they are limits of
-            low, high = sorted((units.position.commanded(lower), units.position.commanded(upper)))
+            # as targets go, which they are limits of; they count from home, not from zero
+            offset = value(Index.HOME_OFFSET)
+            low, high = sorted(units.position.commanded(end - offset) for end in (lower, upper))
             position_limits, velocity = (low, high), (high - low) / RANGE_TIME
         if speed := value(Index.MAX_PROFILE_VELOCITY):
             speed_limit = abs(units.velocity.commanded(speed))

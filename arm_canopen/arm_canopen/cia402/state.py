@@ -22,6 +22,7 @@ from canopen_core.standard import (
     OperationMode,
     Statusword,
     statusword_text,
+    TARGET_OBJECTS,
 )
 
 from ..config.model.drive import DriveConfig
@@ -29,7 +30,7 @@ from ..master.process_image import InputReader, ReceivedTpdo
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler
 from ..master.status import node_status, NodeStatus
-from .parameters import DriveParameters, ParameterCache
+from .parameters import DriveParameters, OFFSET_OBJECTS, ParameterCache
 from .units import clamp, INT16_MAX, INT32_MAX, Units
 
 FAULTY = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
@@ -322,14 +323,14 @@ class AxisState:
         source = self._statusword.source
         return source.timestamp > since or source.stale_after == math.inf
 
-    def held_position(self, mode: OperationMode) -> int | None:
-        """Position that a cyclic mode commands by RPDO in [inc], None when none carries it."""
-        interpolated = mode is OperationMode.INTERPOLATED_POSITION
-        place = (Index.INTERPOLATION_DATA, 1) if interpolated else (Index.TARGET_POSITION, 0)
-        value = self.node.image.commanded(self.at(place[0]), place[1])
+    def held_target(self, mode: OperationMode) -> int | None:
+        """Target and offset of a mode in the RPDOs in device units; None when none carries it."""
+        index, subindex = TARGET_OBJECTS[mode]
+        value = self.node.image.commanded(self.at(index), subindex)
+        offset = OFFSET_OBJECTS.get(mode)
         if value is None:
             return None
-        return int(value) + (0 if interpolated else self.offset(Index.POSITION_OFFSET))
+        return int(value) + (0 if offset is None else self.offset(offset))
 
     def offset(self, index: Index) -> int:
         """Return what the drive adds to a target: as the RPDOs carry it, else as it was read."""

@@ -141,6 +141,13 @@ class StopSequence:
         with self._view.looking():
             return await self._within(UNSEEN_TIMEOUT, lambda: self.disabled and self.rests)
 
+    async def seen_at_rest(self) -> bool:
+        """Return whether the drive is seen to stand now; what TPDOs do not show is read by SDO."""
+        view = self._view
+        with view.looking():
+            await self._within(UNSEEN_TIMEOUT, lambda: view.speed_known)
+        return view.stands
+
     async def ended(self) -> None:
         """Wait until it does not run."""
         await self._within(SHUTDOWN_MAX + REACTION_TIME, lambda: not self.running)

@@ -72,7 +72,7 @@ class ReplayedAxis:
 
     def _target(self) -> float:
         interpolated = self.view.mode == OperationMode.INTERPOLATED_POSITION
-        target = self.view.held_position(
+        target = self.view.held_target(
             OperationMode.INTERPOLATED_POSITION if interpolated else OperationMode.CYCLIC_POSITION
         )
         return math.nan if target is None else self.view.units.position.commanded(target)

@@ -14,7 +14,7 @@ from functools import partial
 from traceback import walk_tb
 from typing import TypeAlias
 
-from canopen_core import CanopenError
+from canopen_core import BusError, CanopenError
 from canopen_core.can import ControllerState, Frame
 from canopen_core.standard import (
     ALL_NODES,
@@ -36,7 +36,7 @@ from .controller_watch import ControllerWatch
 from .events import Event, EventKind, Report, Severity
 from .frame_sender import BusSender, NmtSender, PeriodicFrame
 from .other_master import OtherMasterWatch
-from .process_image import SyncRound
+from .process_image import SentRpdo, SyncRound
 from .remote_node import RemoteNode
 from .scheduler import completed, Promise, Scheduler
 from .sdo_client import SdoClient
@@ -314,7 +314,7 @@ class Network:
 
         Raises:
             CanopenError: The device or the master is not operational, no RPDO carries one of
-                them, or the bus does not take it.
+                them, or the bus does not take it; the text names the RPDOs that had left by then.
         """
         if not node.operational or self.state is not NmtState.OPERATIONAL:
             what = 'the master' if node.operational else node.name
@@ -328,15 +328,30 @@ class Network:
             for address, value in values.items()
             for output in node.image.store(*address, value)
         }
-        for output in outputs.values():
-            if output.cyclic or output.synchronous:
-                output.due = True
-            elif (refusal := self.send(output.frame())) is not None:
-                for address, value in before.items():  # none may leave with another one
-                    node.image.store(*address, value or 0)
-                raise refusal
-            else:
-                output.left(self.scheduler.now)
+        waiting = [each for each in outputs.values() if each.cyclic or each.synchronous]
+        sent = [each for each in outputs.values() if each not in waiting]
+        for number, output in enumerate(sent):
+            refusal = self.send(output.frame())
+            if refusal is not None:
+                raise self._taken_back(node, before, sent[:number], refusal)
+            output.left(self.scheduler.now)
+        for output in waiting:
+            output.due = True
+
+    @staticmethod
+    def _taken_back(
+        node: RemoteNode,
+        before: Mapping[tuple[int, int], Number | None],
+        sent: Sequence[SentRpdo],
+        refusal: BusError,
+    ) -> BusError:
+        """Put back the values that have not left, so that none leaves with another one."""
+        left = {(each.index, each.subindex) for output in sent for each in output.config.mapping}
+        for address, value in before.items():
+            if address not in left:
+                node.image.store(*address, value or 0)
+        numbers = ', '.join(str(output.config.number) for output in sent)
+        return BusError(f'RPDO {numbers} was sent, the rest not: {refusal}') if sent else refusal
 
     def _set_state(self, command: NmtCommand) -> None:
         before = self.state

@@ -240,9 +240,12 @@ class DriveObjects:
         return max(period, PERIOD_MIN)
 
     def position_limits(self) -> tuple[float, float]:
-        """Return the software position limits in [inc]; infinite when 0x607D sets none."""
-        low, high = self.limit_low.value, self.limit_high.value
-        return (low, high) if low < high else (float('-inf'), float('inf'))
+        """Return the software position limits in [inc]; infinite when 0x607D sets none.
+
+        They count from the home position, so the home offset is taken off (CiA 402-2, 10.4).
+        """
+        low, high, offset = self.limit_low.value, self.limit_high.value, self.home_offset.value
+        return (low - offset, high - offset) if low < high else (float('-inf'), float('inf'))
 
     def within_limits(self, position: float, start: float) -> float:
         """Return the position, or the limit that ends the way to it from a start."""

@@ -99,6 +99,22 @@ def test_moves_are_for_mode_1_and_within_the_limits() -> None:
         net.commands[JOINT].move(Move(0.1, immediate=False))
 
 
+def test_limits_count_from_home() -> None:
+    """0x607D less the home offset 0x607C, as the drive has them; also when that is written."""
+    limits = (*MOTION_WRITES, sdo_write(0x607D, 1, -5_000), sdo_write(0x607D, 2, 5_000))
+    net = with_modes(sdo_writes=(*limits, sdo_write(0x607C, 0, 2_000)))
+    net.enable(OperationMode.PROFILE_POSITION)
+    drive = net.master.drive(JOINT)
+    with pytest.raises(DriveError, match=r'0\.4 is beyond the software limits -0\.7 to 0\.3'):
+        drive.move_to(0.4)
+    drive.move_to(-0.65)
+    assert net.motor() == pytest.approx(-0.65, abs=1e-3)
+    net.result(net.commands[JOINT].axis.node.objects.write_object(0x607C, 0, -2_000))
+    net.run(0.5)
+    with pytest.raises(DriveError, match=r'software limits -0\.3 to 0\.7'):
+        drive.move_to(0.8)
+
+
 def test_home_is_a_command_of_its_own() -> None:
     """It enables, reports its phases, sets the reference and returns to the mode of before."""
     net = with_modes(sdo_writes=(*MOTION_WRITES, sdo_write(0x607C, 0, 2_000)))
@@ -385,13 +401,35 @@ def test_a_move_that_ends_elsewhere_has_not_arrived(mode: OperationMode) -> None
     assert 'Operation enabled' in moving.move_to(0.4, timeout=10.0)
 
 
-def test_a_blocked_axis_has_not_arrived() -> None:
-    """On a way too short for the watch over following."""
+@pytest.mark.parametrize(
+    'mode', [OperationMode.INTERPOLATED_POSITION, OperationMode.CYCLIC_POSITION], ids=by_name
+)
+def test_a_blocked_axis_has_not_arrived_and_stays_where_it_is(mode: OperationMode) -> None:
+    """On a way too short for the watch over following; also when it comes free later."""
+    net = with_modes()
+    net.enable(mode)
+    net.simulated().block(now=net.now)
+    with pytest.raises(DriveError, match=r'stands at .*, not at its target 0\.08.*was halted'):
+        net.master.drive(JOINT).move_to(0.08, timeout=10.0)
+    net.simulated().release(net.now)
+    net.run(1.0)
+    assert net.motor() == pytest.approx(0.0, abs=1e-3)
+    assert 'Operation enabled' in net.master.drive(JOINT).move_to(0.05, timeout=10.0)
+
+
+def test_a_motion_that_another_one_replaces_while_it_settles_names_no_target_of_that() -> None:
+    """The half second in which a blocked axis might still arrive belongs to the newest command."""
     net = with_modes()
     net.enable(OperationMode.CYCLIC_POSITION)
     net.simulated().block(now=net.now)
-    with pytest.raises(DriveError, match=r'stands at .*, not at its target 0\.08'):
-        net.master.drive(JOINT).move_to(0.08, timeout=10.0)
+    commands, drive = net.commands[JOINT], net.drives[JOINT]
+    moving = net.network.scheduler.spawn(commands.arrive(lambda: commands.set_target(0.08), 10.0))
+    net.run_until(lambda: drive.stream_refusal is None and drive.setpoint == 0.08)
+    net.run(0.3)
+    net.target(-0.05)
+    with pytest.raises(DriveError, match='got another target'):
+        net.result(moving)
+    assert not drive.halt.held
 
 
 @pytest.mark.parametrize('acceleration', [500, 50_000])

@@ -736,6 +736,18 @@ def test_an_axis_that_coasts_without_power_is_not_seen_to_stand(node_id: int) ->
     assert sum('not seen to stand' in text for text in net.reported(Severity.WARNING)) == 1
 
 
+def test_a_disabled_axis_whose_tpdos_do_not_come_is_seen_to_stand_by_sdo() -> None:
+    """It is not named as one that may move."""
+    net = VirtualNetwork(bus_config(every_mode(drive_config(FAULTY, NODE_ID))))
+    net.boot()
+    tpdos = {0x180 + NODE_ID, 0x280 + NODE_ID}
+    net.wire.loses = lambda _, frame: frame.can_id in tpdos
+    net.run(1.0)
+    assert not net.drives[FAULTY].view.fresh
+    answer = f'NMT ENTER_PRE_OPERATIONAL sent to node {NODE_ID}'
+    assert commanded(net, PRE_OPERATIONAL, NODE_ID) == answer
+
+
 def commanded(net: VirtualNetwork, command: NmtCommand, node_id: int) -> str:
     """Return the answer to an NMT command of a client."""
     sent = net.network.command_nmt(command, node_id)

@@ -511,6 +511,42 @@ def test_a_drive_that_holds_goes_on_holding(mode: OperationMode) -> None:
 
 
 @pytest.mark.parametrize(
+    ('mode', 'way'),
+    [
+        (OperationMode.PROFILE_TORQUE, '0x6077'),
+        (OperationMode.PROFILE_TORQUE, 'no 0x6077'),
+        (OperationMode.PROFILE_TORQUE, 'SDO'),
+        (OperationMode.CYCLIC_TORQUE, '0x6077'),
+        (OperationMode.CYCLIC_TORQUE, 'no 0x6077'),
+    ],
+)
+def test_a_torque_that_holds_a_load_is_taken_over_as_it_is(mode: OperationMode, way: str) -> None:
+    """Whether a TPDO brings the torque, and an RPDO the target, or not."""
+    config = every_mode(drive_config('a', 2))
+    if way != '0x6077':
+        config = replace(config, tpdos=config.tpdos[:2])
+    if way == 'SDO':
+        config = replace(config, rpdos=config.rpdos[:2])
+    net = booted(replace(config, reset_communication=False))
+    net.do('a', 'init')
+    net.select('a', mode)
+    net.simulated('a').set_load(150, net.now)
+    net.commands['a'].set_target(150.0)
+    net.run(1.0)
+    net.do('a', 'halt')
+    net.commands['a'].set_target(150.0)
+    net.run(0.5)
+    begin, speed = net.motor('a'), net.speed('a')
+    assert speed == pytest.approx(0.0, abs=1e-2)
+    net.replace_master()
+    net.start()
+    net.run_until(net.all_ready)
+    net.run(1.5)
+    assert net.motor('a') == pytest.approx(begin, abs=1e-2)
+    assert any('it stands' in text for text in net.reported())
+
+
+@pytest.mark.parametrize(
     ('mode', 'target'),
     [
         (OperationMode.PROFILE_POSITION, 6.0),

@@ -23,6 +23,7 @@ import pytest
 
 from arm_canopen import BusError, CanopenError, CodecError, NodeConfig, OperationMode
 from arm_canopen.config import check_bus, PdoConfig
+from canopen_core.can import Frame
 from canopen_core.standard import (
     AccessType,
     DataType,
@@ -242,6 +243,37 @@ def test_a_value_published_meanwhile_outlives_a_write_that_is_refused() -> None:
     begin = net.now
     net.run(0.2)
     assert set(speeds(net, since=begin)) == {3_000}
+
+
+def test_what_has_left_before_the_bus_refuses_the_rest_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of several RPDOs: their values stay, those of the others do not leave later."""
+    config = module()
+    rpdos = (
+        pdo(1, COB_ID, OUTPUTS, transmission=255),
+        pdo(3, 0x405, MASK, transmission=255),
+        config.rpdos[1],
+    )
+    net = booted(replace(config, rpdos=rpdos))
+    put, full = net.wire.put, True
+
+    def refuses(now: float, sender: str, frame: Frame) -> None:
+        if full and frame.can_id == 0x405:
+            raise BusError('the transmit queue is full')
+        put(now, sender, frame)
+
+    monkeypatch.setattr(net.wire, 'put', refuses)
+    node, torque = net.network.nodes[MODULE], (0x6071, 0)
+    with pytest.raises(BusError, match=r'RPDO 1 was sent, the rest not: .*queue is full'):
+        net.network.publish_objects(node, {torque: 3, OUTPUTS: 1, MASK: 2})
+    full = False
+    net.run(0.5)
+    assert (read(net, OUTPUTS), read(net, MASK), read(net, torque)) == (1, 0, 0)
+    publish(net, MASK, 4)
+    publish(net, torque, 5)
+    net.run(0.5)
+    assert (read(net, OUTPUTS), read(net, MASK), read(net, torque)) == (1, 4, 5)
 
 
 def test_a_value_that_the_bus_refuses_is_not_sent_later() -> None:

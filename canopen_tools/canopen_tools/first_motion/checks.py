@@ -24,7 +24,7 @@ class AxisFacts:
 
     axis: DriveConfig  # its configuration, with the scales that the master uses
     factors: FactorGroup  # its factor group
-    # software limits 0x607D in [rad] or [m], the lower one first; None without
+    # software limits 0x607D less 0x607C in [rad] or [m], the lower one first; None without
     limits: tuple[float, float] | None
     # 0x6081 for the motion, in velocity units of the drive; None in the modes 7, 8
     speed_dev: int | None
@@ -57,8 +57,10 @@ def read_facts(master: CanopenMaster, axis: DriveConfig, speed: float) -> AxisFa
     low, high = (read(Index.SOFTWARE_POSITION_LIMIT, subindex) for subindex in (1, 2))
     limits = None
     if low is not None and high is not None and low < high:
+        home = read(Index.HOME_OFFSET, 0) or 0  # the limits count from home
         ends = sorted(
-            each * axis.scale_pos_from_dev + axis.offset_pos_from_dev for each in (low, high)
+            (end - home) * axis.scale_pos_from_dev + axis.offset_pos_from_dev
+            for end in (low, high)
         )
         limits = ends[0], ends[1]
     if motion_mode(axis) in CYCLIC_MODES:
