@@ -23,6 +23,7 @@ from dds_network import restrict_dds
 pytest_plugins = ['stalls']
 
 SCENARIOS = Path(__file__).parent / 'tests'
+CORES = len(os.sched_getaffinity(0))
 NICENESS = os.getpriority(os.PRIO_PROCESS, 0)
 OF_ROBOTS = -5  # beside it
 
@@ -45,23 +46,25 @@ settings.load_profile('workspace')
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
     """Use one worker more than cores: robots wait for deadlines, and starve beside more."""
-    return len(os.sched_getaffinity(0)) + 1
+    return CORES + 1
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
+    """Let no more workers have whole robots than there are cores."""
+    from lanes import Lanes
+
+    return Lanes(config, log, CORES) if config.getvalue('dist') == 'loadgroup' else None
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Give the scenarios with whole robots to two workers: more would share two cores too often.
-
-    One of them has all pages, as browsers that draw without a graphics card take much of a core;
-    every third file of the others makes both take about as long. Large groups begin first, so that
-    the others run beside them, and not all scenarios at the end.
-    """
-    robots = [item for item in items if item.path.parent == SCENARIOS]
-    pages = {item.path for item in robots if hasattr(getattr(item, 'module', None), 'chromium')}
-    others = sorted({item.path for item in robots} - pages)
-    first = pages | set(others[::3])
-    for item in robots:
-        item.add_marker(pytest.mark.xdist_group(f'robots-{int(item.path not in first)}'))
+    """Keep the scenarios of a file together, in one worker."""
+    for item in items:
+        if item.path.parent == SCENARIOS and not item.get_closest_marker('xdist_group'):
+            pages = hasattr(getattr(item, 'module', None), 'chromium')
+            kind = 'pages' if pages else 'robots'
+            item.add_marker(pytest.mark.xdist_group(f'{kind} {item.path.stem}'))
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -39,6 +39,7 @@ class Robot:
     Attributes:
         name: The namespace.
         cycles: Programs of it that own a cycle.
+        ending: What its bring-up prints at the end.
         client: The test's own node.
         bringup: Its processes.
     """
@@ -46,6 +47,7 @@ class Robot:
     package: str
     ready: str
     cycles: tuple[str, str]
+    ending = ''
 
     def __init__(self, name: str, isolation: Isolation, client: RosClient, *command: str) -> None:
         """Start the bring-up."""
@@ -97,6 +99,7 @@ class Dog(Robot):
     """The quadruped, lying, which stands up."""
 
     package, ready = 'quad_bringup', 'all is ready'
+    ending = 'lying down first'
     cycles = ('hardware_node', 'controller_node')
 
     def __init__(self, name: str, isolation: Isolation, client: RosClient, _: Path) -> None:
@@ -206,5 +209,6 @@ def test_robots_of_one_domain(isolation: Isolation, tmp_path: Path) -> None:
             moves_alone(first, rest)
             first.bringup.signal(signal.SIGINT)
             assert first.bringup.wait(40.0) == 0, first.bringup.output
+            assert first.ending in first.bringup.output
             assert all(each.bringup.is_running() for each in rest)
             robots = rest

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Ctrl-C of a bring-up while the robot is on its way down: it is let go lying, not half-way."""
+"""A bring-up of the quadruped: the article's frames, and Ctrl-C while it is on its way down."""
 
 from __future__ import annotations
 
@@ -14,13 +14,15 @@ from rclpy.qos import qos_profile_sensor_data
 from ros_client import RosClient
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+from tf2_msgs.msg import TFMessage
 
 from node_runner import LATCHED
 from quad_bringup.examples.walk import GROUND_TRUTH
-from quad_description import Pose, pose_positions
+from quad_description import LEGS, Pose, pose_positions
 from quad_msgs.srv import SetMode
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from isolation import Isolation
@@ -31,6 +33,26 @@ STARTING = 60.0  # [s] until all is ready on a busy machine
 MOVING = 60.0  # [s] for a mode to be reached
 WAY_DOWN = 6.0  # [s]
 STALLS = 5  # how often a machine that stalls may end its way up
+
+
+def tree(messages: Sequence[TFMessage]) -> dict[str, str]:
+    """Return the parent of each frame."""
+    return {
+        each.child_frame_id: each.header.frame_id
+        for message in messages
+        for each in message.transforms
+    }
+
+
+def expected_tree() -> dict[str, str]:
+    """Return the article's frames: the parent of each."""
+    legs = {
+        f'{leg}_{part}': f'{leg}_{above}' if above else 'base_link'
+        for leg in LEGS
+        for part, above in (('hip', ''), ('thigh', 'hip'), ('calf', 'thigh'), ('foot', 'calf'))
+    }
+    body = {'base_link': 'odom', 'base_footprint': 'base_link', 'imu_link': 'base_link'}
+    return body | legs
 
 
 def test_a_robot_on_its_way_down_arrives_before_its_processes_end(
@@ -48,6 +70,8 @@ def test_a_robot_on_its_way_down_arrives_before_its_processes_end(
         joints = client.listen(JointState, '/joint_states', qos_profile_sensor_data)
         truth = client.listen(Odometry, GROUND_TRUTH, qos_profile_sensor_data)
         states = client.listen(String, '/controller_node/state', LATCHED)
+        moving = client.listen(TFMessage, '/tf', 100)
+        static = client.listen(TFMessage, '/tf_static', LATCHED)
 
         def height() -> float:
             return float(truth[-1].pose.pose.position.z)
@@ -61,6 +85,10 @@ def test_a_robot_on_its_way_down_arrives_before_its_processes_end(
 
         bringup.wait_for('all is ready', STARTING)
         client.spin_until(lambda: bool(truth and joints), STARTING, 'robot')
+        wanted = expected_tree().items()
+        client.spin_until(
+            lambda: wanted <= tree([*moving, *static]).items(), STARTING, 'the frames'
+        )
         low = height()
         for _ in range(STALLS):
             ask('stand')

@@ -81,12 +81,3 @@ def test_frames_and_joints(pad: InjectedDevice, servo: ServoListener) -> None:
     servo.client.spin_until(lambda: bool(servo.jogs), TIMEOUT, 'joint')
     assert list(servo.jogs[0].joint_names) == ['joint_2_l']
     assert list(servo.jogs[0].velocities) == [pytest.approx(0.15)]
-
-
-def test_pad_unplugged_while_moving(pad: InjectedDevice, servo: ServoListener) -> None:
-    """The cable is pulled with the deadman held: rests leave."""
-    pad.press(LEFT_SHOULDER)
-    pad.move(ABS_Y, -32768)
-    servo.client.spin_until(lambda: bool(servo.twists), TIMEOUT, 'motion')
-    pad.unplug()
-    servo.client.spin_until(lambda: servo.received[-1][1] == (0.0,) * 6, TIMEOUT, 'rest')

@@ -68,6 +68,8 @@ def parameters(folder: Path, **values: object) -> list[str]:
         (motion, {'robot_description_semantic': 'none'}, 'robot_description_semantic: .*no XML'),
         (motion, {'limits': {'elbow': {}}}, r'/limits\.yaml: joint joint_1_s is missing'),
         (motion, {'publish_joint_states': 3}, 'publish_joint_states is 3'),
+        (motion, {'group': 'arm'}, "'arm'"),
+        (motion, {'joints': ['a', 'b']}, 'not those of the group'),
         (motion, {}, 'bus.yml has no drive'),
         (
             motion,

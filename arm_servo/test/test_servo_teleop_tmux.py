@@ -94,21 +94,6 @@ def test_jogging_with_real_key_presses(pane: Pane, servo: ServoListener) -> None
     wait_on_screen(servo, pane, 'ended with 0')
 
 
-def test_held_key_moves_until_it_is_released(pane: Pane, servo: ServoListener) -> None:
-    """Repeats of a held key keep the arm moving without a gap, and fast."""
-    pane.press(RUN, 'Enter')
-    wait_on_screen(servo, pane, LINKED)
-    for _ in range(10):
-        pane.press('Left')
-        servo.client.spin_until(lambda: True, TIMEOUT, '')
-    wait_for_rest(servo, 0)
-    values = [numbers for _, numbers in servo.received]
-    assert values[-3:] == [REST] * 3
-    slow, fast = ((0.0, -speed, 0.0, 0.0, 0.0, 0.0) for speed in (0.02, 0.1))
-    assert fast in values
-    assert set(values[:-3]) <= {slow, fast}  # the first two may come as one
-
-
 def test_without_a_servo(pane: Pane) -> None:
     """The screen says that nobody listens, and that there is no frame yet."""
     pane.press(RUN, 'Enter')

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
@@ -162,18 +161,6 @@ class Rig(ABC):
             f'{text!r} of {name}; the last was {self.status(name).message!r}',
         )
         return self.status(name)
-
-    def watch_steps(self) -> Callable[[], list[float]]:
-        """Watch the largest step of a target in every diagnostic from now on [rad]."""
-        first = len(self.received['/diagnostics'])
-
-        def steps() -> list[float]:
-            self.receive('/diagnostics', 2)
-            statuses = (s for array in self.received['/diagnostics'][first:] for s in array.status)
-            pairs = (pair for status in statuses for pair in status.values)
-            return [float(pair.value) for pair in pairs if pair.key == 'largest_step']
-
-        return steps
 
     def __enter__(self) -> Self:
         """Use it in a with statement."""

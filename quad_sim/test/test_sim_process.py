@@ -97,14 +97,13 @@ def test_a_path_in_use_is_refused_and_a_dead_one_replaced(tmp_path: Path) -> Non
         assert process.wait(TEST_TIMEOUT) == 0
 
 
-@pytest.mark.parametrize('ros', [True, False], ids=['with ROS', 'without'])
-def test_it_reports_that_it_is_ready(ros: bool, tmp_path: Path) -> None:
-    """At the socket of sd_notify(3), as a supervisor or systemd wants it."""
+def test_it_reports_that_it_is_ready(tmp_path: Path) -> None:
+    """Without ROS, too: at the socket of sd_notify(3), as a supervisor or systemd wants it."""
     environment = {**os.environ, 'NOTIFY_SOCKET': str(tmp_path / 'notify')}
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as supervisor:
         supervisor.bind(environment['NOTIFY_SOCKET'])
         supervisor.settimeout(TEST_TIMEOUT)
-        options = ('--physics', 'none', *(() if ros else ('--no-ros',)))
+        options = ('--physics', 'none', '--no-ros')
         with fake_xgo(tmp_path / 'xgo', *options, env=environment):
             assert supervisor.recv(100) == b'READY=1'
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-import subprocess
 import threading
 
 from input_devices import InjectedDevice, InjectedDevices, xbox_pad
 from isolation import Isolation
-from processes import executable
 import pytest
 import rclpy
 from ros_client import RosClient
@@ -80,21 +78,3 @@ def test_modes_and_body(pad: InjectedDevice, robot: Robot) -> None:
     pad.move(ABS_HAT0Y, -1)
     robot.client.spin_until(lambda: bool(robot.poses), TEST_TIMEOUT, 'body pose')
     assert robot.poses[0].position.z == pytest.approx(0.005)
-
-
-def test_program_without_a_gamepad_waits_and_ends(isolation: Isolation) -> None:
-    """Started before the gamepad is there: it says so, waits, and ends by Ctrl-C with 0."""
-    process = subprocess.Popen(
-        [executable('quad_teleop', 'teleop_gamepad'), '--ros-args', '-p', 'device:=no such pad'],
-        env=isolation.env,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        assert process.stderr is not None
-        assert 'no gamepad yet: ' in process.stderr.readline()
-        process.send_signal(2)
-        assert process.wait(TEST_TIMEOUT) == 0
-    finally:
-        process.kill()
-        process.communicate()

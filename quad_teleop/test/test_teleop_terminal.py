@@ -61,27 +61,24 @@ def settle(robot: Robot, terminal: ScriptedTerminal) -> None:
     terminal.wait_written(rb'idle +\| true releases', TEST_TIMEOUT)
 
 
-def test_true_release(isolation: Isolation, robot: Robot) -> None:
-    """With the Kitty protocol a key may be silent for long and is held, until its release."""
-    with ScriptedTerminal(kitty=True) as terminal, teleop(terminal, isolation):
-        settle(robot, terminal)
-        terminal.key('i', 1)
-        robot.wait_for(FORWARD)
-        robot.listen_for(1.5)
-        assert set(robot.velocities) == {FORWARD}, 'no stutter without repeats'
-        terminal.key('i', 3)
-        robot.wait_until_silent()
-        assert robot.velocities[-4:] == [FORWARD, STILL, STILL, STILL]
+def test_true_release_and_an_end_while_moving(isolation: Isolation, robot: Robot) -> None:
+    """With the Kitty protocol a key may be silent for long and is held, until its release.
 
-
-def test_killed_while_moving(isolation: Isolation, robot: Robot) -> None:
-    """Ended by a signal with a key held: zeros leave, and the terminal is as it was."""
+    Ended by a signal with a key held, zeros leave, and the terminal is as it was.
+    """
     with ScriptedTerminal(kitty=True) as terminal:
         before = terminal.settings()
         with teleop(terminal, isolation) as process:
             settle(robot, terminal)
             terminal.key('i', 1)
             robot.wait_for(FORWARD)
+            robot.listen_for(1.5)
+            assert set(robot.velocities) == {FORWARD}, 'no stutter without repeats'
+            terminal.key('i', 3)
+            settled = robot.wait_until_silent()
+            assert robot.velocities[-4:] == [FORWARD, STILL, STILL, STILL]
+            terminal.key('i', 1)
+            robot.wait_for(FORWARD, after=settled)
             process.send_signal(signal.SIGTERM)
             robot.wait_until_stopped()
             assert process.wait(TEST_TIMEOUT) == 0

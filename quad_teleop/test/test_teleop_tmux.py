@@ -89,27 +89,3 @@ def test_nobody_there(pane: Pane) -> None:
     pane.wait_for('no subscriber')
     pane.press('1')
     pane.wait_for(r'stand: no service /set_mode; is controller_node running')
-
-
-def test_suspended_like_any_program(pane: Pane, isolation: Isolation) -> None:
-    """Ctrl-Z gives the shell its terminal, after a zero; fg goes on."""
-    with RosClient(isolation.domain_id) as client:
-        robot = Robot(client)
-        pane.press('ros2 run quad_teleop teleop_keyboard', 'Enter')
-        pane.wait_for('idle')
-        robot.wait_until_linked()
-        pane.wait_for(LINKED)
-        pane.press('i')
-        robot.wait_for((0.15, 0.0, 0.0))
-        pane.press('C-z')
-        robot.wait_until_stopped()
-        pane.wait_for('Stopped')
-        pane.press('echo shell $((6 * 7))', 'Enter')
-        pane.wait_for('shell 42')
-        count = len(robot.twists)
-        pane.press('fg', 'Enter')
-        pane.wait_for('going on')
-        pane.press('l')
-        robot.wait_for((0.0, 0.0, -0.6), after=count)
-        pane.press('C-c')
-        robot.wait_until_stopped()

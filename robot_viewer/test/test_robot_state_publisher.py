@@ -54,11 +54,6 @@ def urdf(tmp_path: Path) -> Path:
     return file
 
 
-def test_it_reports_that_it_is_ready(start: StartNode, urdf: Path) -> None:
-    """As in sd_notify(3), when it publishes."""
-    start(str(urdf)).wait_until_ready()
-
-
 def frames(messages: list[TFMessage]) -> dict[str, Any]:
     """Return the last transform of each child frame."""
     return {each.child_frame_id: each for message in messages for each in message.transforms}
@@ -84,6 +79,7 @@ def test_a_viewer_gets_description_fixed_and_moving_frames(
     """Latched for who comes late; a new description replaces the old one, a wrong one does not."""
     node = start(str(urdf), '--ros-args', '-p', 'publish_frequency:=100.0')
     node.wait_for('publishing 2 fixed and 5 moving frames')
+    node.wait_until_ready()
     with RosClient(isolation.domain_id) as client:
         descriptions = client.listen(String, 'robot_description', LATCHED)
         static = client.listen(TFMessage, '/tf_static', LATCHED)
@@ -124,22 +120,18 @@ def test_silence_on_joint_states_is_reported(start: StartNode, urdf: Path) -> No
 @pytest.mark.parametrize(
     ('arguments', 'words'),
     [
-        ([], 'no robot_description'),
         (['/nowhere.urdf'], 'nowhere.urdf.*No such file'),
-        (['--ros-args', '-p', 'robot_description:=<robot/>'], 'robot_description: .*no <link>'),
         (['{broken}'], r'broken\.urdf: .*no <link>'),
-        (['{urdf}', '--ros-args', '-p', 'publish_frequency:=2000.0'], 'publish_frequency'),
-        (['{urdf}', '--ros-args', '-p', 'publish_frequncy:=9.0'], "mean 'publish_frequency'"),
     ],
-    ids=['nothing', 'no file', 'no robot', 'broken file', 'range', 'misspelt'],
+    ids=['no file', 'broken file'],
 )
 def test_what_cannot_work_ends_at_once_with_the_reason(
-    start: StartNode, urdf: Path, arguments: list[str], words: str
+    start: StartNode, tmp_path: Path, arguments: list[str], words: str
 ) -> None:
     """Exit code 1, one line, no traceback."""
-    broken = urdf.with_name('broken.urdf')
+    broken = tmp_path / 'broken.urdf'
     broken.write_text('<robot/>')
-    node = start(*(word.format(urdf=urdf, broken=broken) for word in arguments))
+    node = start(*(word.format(broken=broken) for word in arguments))
     node.wait_for(words)
     assert node.wait() == 1
     assert 'Traceback' not in node.output
