@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
 import threading
 import time
 from typing import Any
@@ -18,7 +17,7 @@ from typing import Any
 import can
 from can_addresses import free_virtual
 import canopen
-from canopen.profiles.p402 import BaseNode402, OperationMode
+from canopen.profiles.p402 import BaseNode402
 from device_rig import drive_dictionary, EDS, NODE_ID, Rig
 import pytest
 
@@ -113,35 +112,6 @@ def test_every_object_reads_as_the_eds_says(wire: Wire, node: Any) -> None:
         assert value == entry.default, str(entry)
 
 
-def test_long_names_arrive_in_segments(node: Any) -> None:
-    """A string longer than four bytes is read."""
-    assert node.sdo[0x1008].raw == 'Simulated CiA 402 drive'
-
-
-@pytest.mark.parametrize(
-    ('index', 'subindex', 'data', 'code'),
-    [
-        (0x5000, 0, None, 0x06020000),
-        (0x1018, 7, None, 0x06090011),
-        (0x1000, 0, bytes(4), 0x06010002),
-        (0x1017, 0, bytes(4), 0x06070012),
-        (0x6060, 0, b'\x05', 0x06090030),
-    ],
-)
-def test_aborts_are_understood(
-    node: Any,
-    index: int,
-    subindex: int,
-    data: bytes | None,
-    code: int,
-) -> None:
-    """Each refusal arrives as the abort code of the standard."""
-    request = node.sdo.upload if data is None else partial(node.sdo.download, data=data)
-    with pytest.raises(canopen.SdoAbortedError) as aborted:
-        request(index, subindex)
-    assert aborted.value.code == code
-
-
 def test_block_transfers_of_python_canopen(node: Any) -> None:
     """python-canopen reads a string and writes a number by the block protocol, CRC included."""
     with node.sdo.open(0x1008, 0, 'rb', block_transfer=True) as stream:
@@ -149,51 +119,6 @@ def test_block_transfers_of_python_canopen(node: Any) -> None:
     with node.sdo.open(0x6081, 0, 'wb', block_transfer=True, size=4) as stream:
         stream.write(b'\x10\x27\x00\x00')
     assert node.sdo.upload(0x6081, 0) == b'\x10\x27\x00\x00'
-
-
-def test_nmt_and_heartbeat(wire: Wire, node: Any) -> None:
-    """Commands are executed, and heartbeats have the state that python-canopen requested."""
-    node.sdo[0x1017].raw = 100
-    for state in ('OPERATIONAL', 'STOPPED', 'PRE-OPERATIONAL'):
-        node.nmt.state = state
-        seen = len(wire.rig.times(0x700 + NODE_ID))
-        wire.run(0.5)
-        assert node.nmt.state == state
-        assert len(wire.rig.times(0x700 + NODE_ID)) - seen == 5
-
-
-@pytest.mark.parametrize('command', ['RESET', 'RESET COMMUNICATION'])
-def test_boot_up_is_seen(wire: Wire, node: Any, command: str) -> None:
-    """A reset ends in a boot-up frame, which python-canopen takes for pre-operational."""
-    node.nmt.state = 'OPERATIONAL'
-    beats: list[int] = []
-    node.nmt.add_heartbeat_callback(beats.append)
-    node.nmt.state = command
-    assert beats == [0]
-    assert node.nmt.state == 'PRE-OPERATIONAL'
-
-
-def test_node_guarding(wire: Wire, node: Any) -> None:
-    """python-canopen's remote frames are answered with the state, the toggle bit alternating."""
-    toggles: list[int] = []
-    node.nmt.add_heartbeat_callback(toggles.append)
-    for _ in range(3):
-        wire.network.send_message(0x700 + NODE_ID, b'', remote=True)
-    assert node.nmt.state == 'PRE-OPERATIONAL'
-    answers = [f.data[0] for _, f in wire.rig.sent if f.can_id == 0x700 + NODE_ID]
-    assert answers == [0x7F, 0xFF, 0x7F]
-    assert len(toggles) == 3
-
-
-def test_emergencies_arrive(wire: Wire, node: Any) -> None:
-    """A fault and its reset are an active emergency and none."""
-    wire.rig.drive.raise_fault(0x2310)
-    wire.deliver()
-    assert [(error.code, error.register) for error in node.emcy.active] == [(0x2310, 3)]
-    assert 'Current' in node.emcy.active[0].get_desc()
-    node.sdo[0x6040].raw = 0x80
-    assert node.emcy.active == []
-    assert len(node.emcy.log) == 2
 
 
 def test_pdos_are_configured_and_exchanged(wire: Wire, node: Any) -> None:
@@ -210,31 +135,6 @@ def test_pdos_are_configured_and_exchanged(wire: Wire, node: Any) -> None:
     assert node.tpdo[1]['Modes of operation display'].raw == 8
     assert node.tpdo[2]['Position actual value'].raw == 0
     assert node.sdo[0x607A].raw == -123456
-
-
-def test_written_configuration_reads_back(wire: Wire, node: Any) -> None:
-    """What was saved is what another client reads from the device."""
-    configure(node)
-    other: Any = canopen.RemoteNode(NODE_ID, str(EDS))
-    wire.network.add_node(other)
-    other.pdo.read()
-    for kind, pdos in MAPPING.items():
-        for number, pdo in getattr(other, kind).items():
-            assert pdo.enabled is (number in pdos)
-            mapped = [(variable.index, variable.subindex) for variable in pdo]
-            assert mapped == pdos.get(number, [])
-
-
-def test_remote_request_is_answered(wire: Wire, node: Any) -> None:
-    """A remote frame to a TPDO that allows it brings the PDO."""
-    node.pdo.read()
-    pdo = node.tpdo[1]
-    pdo.trans_type, pdo.rtr_allowed = 253, True
-    pdo.save()
-    node.nmt.state = 'OPERATIONAL'
-    before = len(wire.rig.times(pdo.cob_id))
-    pdo.remote_request()
-    assert len(wire.rig.times(pdo.cob_id)) == before + 1
 
 
 @contextmanager
@@ -313,29 +213,6 @@ def test_state_machine_by_others(drive: Any) -> None:
     drive.state = 'OPERATION ENABLED'
     drive.state = 'SWITCHED ON'
     drive.state = 'SWITCH ON DISABLED'
-
-
-@pytest.mark.parametrize('method', [35, 19, 17, 33])
-def test_homing_by_others(drive: Any, method: int) -> None:
-    """BaseNode402 homes the drive by the present position, a switch or an index pulse."""
-    drive.sdo[0x6098].raw = method
-    drive.sdo[0x6099][1].raw = 9000
-    drive.sdo[0x6099][2].raw = 1000
-    drive.sdo[0x609A].raw = 100_000
-    drive.sdo[0x607C].raw = 1234
-    assert not drive.is_homed()
-    assert drive.homing(timeout=ARRIVAL)
-    assert drive.is_homed()
-    assert drive.sdo[0x6064].raw == pytest.approx(1234, abs=0 if method == 35 else 50)
-
-
-@pytest.mark.parametrize('mode', list(OperationMode.NAME2CODE))
-def test_modes_by_others(mode: str, drive: Any) -> None:
-    """BaseNode402 selects each mode, enabled."""
-    drive.state = 'OPERATION ENABLED'
-    drive.op_mode = mode
-    assert drive.op_mode == mode
-    assert drive.state == 'OPERATION ENABLED'
 
 
 def test_fault_reset_by_others(drive: Any) -> None:
