@@ -17,7 +17,7 @@ from std_msgs.msg import Float64
 from node_runner import LATCHED
 from quad_description import movable_joints, Pose, pose_positions, robot_urdf
 from quad_msgs.msg import FootContacts
-from quad_node_rig import Rig
+from quad_node_rig import Rig, TIMEOUT
 
 pytestmark = [pytest.mark.scenario, pytest.mark.xdist_group('sim_hardware_node')]
 
