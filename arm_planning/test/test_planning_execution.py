@@ -228,6 +228,36 @@ def test_a_gripper_gets_where_the_trajectory_ends(
         assert bench.ends.pop() == (code, words)
 
 
+def test_a_gripper_that_holds_something_begins_where_it_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A part of a sequence was planned from where its fingers would meet; arms must be there."""
+    hand = controllers.Controller(('right',), KINDS['GripperCommand'], 'gripper_cmd')
+    arm = controllers.Controller(('left',), FOLLOW, FOLLOW.namespace)
+    bench = Bench(monkeypatch, {'arm': arm, 'hand': hand})
+    bench.turns['right'] = 0.1
+    bench.start()
+    assert bench.clients['hand/gripper_cmd'].goal.command.position == 1.0
+    bench = Bench(monkeypatch, {'arm': arm, 'hand': hand})
+    bench.place = 0.1
+    assert "at joint 'left'" in str(bench.refusal())
+
+
+def test_an_execution_whose_watch_raises_ends_with_a_reason(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its controller is stopped; a defect that is only logged would leave the client waiting."""
+    bench.start()
+    monkeypatch.setattr(bench.controller, 'server_is_ready', lambda: 1 // 0)
+    monkeypatch.setattr(bench.execution, '_is_found', lambda _: True)
+    bench.watch()
+    assert bench.controller.cancels == 1
+    bench.controller.end()
+    ((code, reason),) = bench.ends
+    assert code is PlanningCode.CONTROL_FAILED
+    assert 'ZeroDivisionError' in reason
+
+
 @pytest.mark.parametrize('fate', ['forgets', 'is_ready'])
 def test_a_controller_that_was_restarted_frees_its_joints(bench: Bench, fate: str) -> None:
     """It knows nothing of the goal any more, or is gone."""

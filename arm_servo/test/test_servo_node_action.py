@@ -15,7 +15,7 @@ from servo_drives import Drives
 from servo_goals import GoalNode
 from std_srvs.srv import Trigger
 
-from arm_servo import SpeedRequest, StopRequest, TargetRequest
+from arm_servo import Source, SpeedRequest, StopRequest, TargetRequest
 from arm_servo.controllers.controller import Outcome
 from arm_servo.core.motion_queue import MotionCommand
 from arm_servo.ros.trajectory import controller
@@ -76,6 +76,25 @@ def test_an_unexpected_error_at_the_end_of_a_goal_is_its_result(
     assert goal.ending == 'aborted'
     assert goal.result.error_code == GoalCode.INVALID_GOAL
     assert 'ZeroDivisionError' in goal.result.error_string
+
+
+def test_an_unexpected_error_while_a_goal_is_watched_is_its_result(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The arm comes to rest; a goal without an end would keep its client waiting."""
+    drives = ready()
+    node = action(monkeypatch, drives, drives.gateway.request)
+    there = [axis.setpoint + 0.5 for axis in drives.axes]
+    goal = node.send(message(TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(5.0, there)])))
+    drives.run(100)
+    monkeypatch.setattr(goal, 'publish_feedback', lambda _: 1 // 0)
+    node.watch()
+    assert goal.ending == 'aborted'
+    assert goal.result.error_code == GoalCode.INVALID_GOAL
+    assert 'ZeroDivisionError' in goal.result.error_string
+    drives.run(300)
+    assert drives.gateway.snapshot.source is Source.NONE
+    assert drives.path[-1][0] < there[0] - 0.1
 
 
 def test_an_unexpected_error_of_the_planning_is_its_result(

@@ -120,6 +120,7 @@ class TrajectoryExecution:
         self._references: dict[str, bytes] = {}
         self._moving: set[str] = set()
         self._timed = {name for name, each in controllers.items() if each.kind is FOLLOW}
+        self._checked = {each for name in self._timed for each in controllers[name].joints}
         self._scaling: set[str] = set()
         for name in self._timed:
             node.create_subscription(
@@ -295,7 +296,8 @@ class TrajectoryExecution:
         for name, wanted in zip(trajectory.joint_names, start, strict=True):
             if name in self._continuous:  # in the turn in which the trajectory begins
                 places[name] = wanted + math.remainder(places[name] - wanted, math.tau)
-            if tolerance and abs(places[name] - wanted) > tolerance:
+            # a gripper gets where it shall be alone, and may hold something by now
+            if tolerance and name in self._checked and abs(places[name] - wanted) > tolerance:
                 raise PlanningError(
                     PlanningCode.CONTROL_FAILED,
                     f'Invalid Trajectory: start point deviates from current robot state more than'
@@ -430,25 +432,31 @@ class TrajectoryExecution:
         for name in self._timed - self._scaling:
             self._speed(name)
         for execution in list(self._running):
-            if execution.held:
-                self._look_again(execution)
-                continue
-            if lost := self._lost(execution):
-                reason = f'{lost}: its action is gone while it moves; restart the controller'
+            try:
+                self._watch_execution(execution, self._watched - before)
+            except Exception as error:  # noqa: BLE001, PERF203  # it must not go on unwatched
+                reason = f'it cannot be watched: {type(error).__name__}: {error}'
                 self.stop(execution, PlanningCode.CONTROL_FAILED, reason)
-                continue
-            if not self._is_overdue(execution, self._watched - before):
-                continue
-            if execution.ending is None:
-                allowed = execution.deadline - execution.begin
-                self.stop(
-                    execution,
-                    PlanningCode.TIMED_OUT,
-                    'Controller is taking too long to execute trajectory (the expected upper'
-                    f' bound for the trajectory execution was {allowed:.2f} seconds)',
-                )
-            else:
-                self._give_up(execution)
+
+    def _watch_execution(self, execution: Execution, passed: float) -> None:
+        """Stop an execution that cannot go on, or takes too long, for the time passed in [s]."""
+        if execution.held:
+            self._look_again(execution)
+        elif lost := self._lost(execution):
+            reason = f'{lost}: its action is gone while it moves; restart the controller'
+            self.stop(execution, PlanningCode.CONTROL_FAILED, reason)
+        elif not self._is_overdue(execution, passed):
+            return
+        elif execution.ending is None:
+            allowed = execution.deadline - execution.begin
+            self.stop(
+                execution,
+                PlanningCode.TIMED_OUT,
+                'Controller is taking too long to execute trajectory (the expected upper'
+                f' bound for the trajectory execution was {allowed:.2f} seconds)',
+            )
+        else:
+            self._give_up(execution)
 
     def _give_up(self, execution: Execution) -> None:
         """Report that a controller may still move, and ask it again.

@@ -156,7 +156,8 @@ class ServedGoal:
     handle: Any = field(default=None, init=False)  # rclpy's ``ServerGoalHandle``, once accepted
     is_canceled_early: bool = field(default=False, init=False)  # canceled before its acceptance
     has_ended: bool = field(default=False, init=False)  # whether its result is on the way
-    failure: Exception | None = field(default=None, init=False)  # why it could not be started
+    # why it could not be started or watched
+    failure: Exception | None = field(default=None, init=False)
 
 
 GoalT = TypeVar('GoalT', bound=ServedGoal)
@@ -188,7 +189,7 @@ class GoalServer(Generic[GoalT]):
                 request is rejected.
             conclude: Returns status and result message of a goal that has ended.
             fail: Returns the result message, with code and reason, of a goal that is aborted for
-                what ``start`` or ``conclude`` has raised.
+                what ``start``, ``conclude`` or a :meth:`watch` has raised.
             refusals: What ``start`` raises for goals that cannot be carried out; anything else is
                 a defect, and has its traceback in the log.
         """
@@ -216,6 +217,16 @@ class GoalServer(Generic[GoalT]):
     def running(self) -> list[GoalT]:
         """The goals that have not ended."""
         return [goal for goal in self._goals.values() if not goal.has_ended]
+
+    def watch(self, look: Callable[[GoalT], None]) -> None:
+        """Look at each goal that has not ended; one for which that raises is ended and aborted."""
+        for goal in self.running:
+            try:
+                look(goal)
+            except Exception as error:  # noqa: BLE001, PERF203  # the others are looked at, too
+                goal.failure = error
+                self._end_early(goal.handle)
+                self.end(goal)
 
     def end(self, goal: GoalT) -> None:
         """Answer a goal with what ``conclude`` returns; once, always from the same thread."""

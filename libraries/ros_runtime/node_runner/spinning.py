@@ -21,6 +21,12 @@ LINGER = 0.3
 """Time in [s] for an action to see the end of its goal, and for the result to reach the client."""
 
 
+SIMULATED_TIME = (
+    'use_sim_time is true: stamps follow /clock, and what is done periodically stands still until '
+    'that is published; control cycles, time-outs and ages keep the time of this computer. Leave '
+    'use_sim_time out where nothing publishes /clock'
+)
+
 REPEAT_PERIOD = 10.0  # time in [s] in which the same defect of callbacks is logged once
 
 
@@ -47,7 +53,8 @@ def spin(
 ) -> None:
     """Serve nodes until an event is set, or until ``rclpy.shutdown``.
 
-    The nodes are still there afterwards; destroying them is up to the caller.
+    The nodes are still there afterwards; destroying them is up to the caller. Those that were set
+    to simulated time are named once, with what that does not cover.
 
     Args:
         nodes: The nodes to serve.
@@ -57,9 +64,14 @@ def spin(
         survive: Reports what a callback raised, and the others go on; None raises it here.
     """
     executor = executor or make_executor()
+    simulated: list[Node] = []
     for node in nodes:
         executor.add_node(node)
         log_as(node)
+        if node.get_parameter('use_sim_time').value:
+            simulated.append(node)
+    if simulated:  # once for all nodes of a process
+        simulated[0].get_logger().warning(SIMULATED_TIME)
     try:
         # the unbounded spin() of some EventsExecutors burns a core and runs nothing
         while ok() and not stop.is_set():

@@ -42,6 +42,27 @@ def test_spin_serves_until_the_end(
         try_shutdown()
 
 
+@pytest.mark.parametrize('simulated', [False, True])
+def test_simulated_time_is_said_once(
+    isolation: Isolation, capfd: pytest.CaptureFixture[str], *, simulated: bool
+) -> None:
+    """Timers of a node stand still without /clock, and its cycles do not heed it."""
+    arguments = ['--ros-args', '-p', 'use_sim_time:=true'] if simulated else []
+    rclpy.init(args=arguments, domain_id=isolation.domain_id)
+    try:
+        nodes, stop = [rclpy.create_node(name) for name in ('one', 'two')], threading.Event()
+        ending = threading.Timer(0.3, stop.set)
+        ending.start()
+        spin(nodes, stop)
+        ending.join()
+        said = capfd.readouterr().err.count('use_sim_time is true: stamps follow /clock')
+        assert said == int(simulated)
+        for node in nodes:
+            node.destroy_node()
+    finally:
+        try_shutdown()
+
+
 @pytest.mark.parametrize('make', [make_executor, SingleThreadedExecutor])
 def test_what_a_callback_raises_ends_nothing_where_it_is_reported(
     isolation: Isolation, make: Callable[[], Executor], capfd: pytest.CaptureFixture[str]

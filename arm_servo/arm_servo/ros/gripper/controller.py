@@ -99,22 +99,26 @@ class GripperController:
         return self._gateway.request(request, self._prepare, goal.number)
 
     def _watch(self) -> None:
-        measured = self._gateway.snapshot.measured
         for interface, goals in self._servers:
-            for goal in goals.running:
-                self._note_begin(goal.command)
-                if measured is not None:
-                    goal.state = self._look(goal, measured)
-                goal.problem = self._problem(goal, goals.outcome(goal))
-                state = goal.state
-                if goal.problem or (state is not None and (state.reached or state.stalled)):
-                    if goal.command is not None and not self._succeeds(goal):
-                        self._gateway.cancel(goal.command, 'stalled')  # nothing moves after it
-                        self._abandoned = goal.command
-                    goals.end(goal)
-                elif state is not None:
-                    goal.handle.publish_feedback(interface.feedback(state))
+            goals.watch(partial(self._watch_goal, interface, goals))
         self._hold()
+
+    def _watch_goal(
+        self, interface: GripperInterface, goals: MotionGoals[_Goal], goal: _Goal
+    ) -> None:
+        measured = self._gateway.snapshot.measured
+        self._note_begin(goal.command)
+        if measured is not None:
+            goal.state = self._look(goal, measured)
+        goal.problem = self._problem(goal, goals.outcome(goal))
+        state = goal.state
+        if goal.problem or (state is not None and (state.reached or state.stalled)):
+            if goal.command is not None and not self._succeeds(goal):
+                self._gateway.cancel(goal.command, 'stalled')  # nothing moves after it
+                self._abandoned = goal.command
+            goals.end(goal)
+        elif state is not None:
+            goal.handle.publish_feedback(interface.feedback(state))
 
     def _note_begin(self, command: MotionCommand | None) -> None:
         if command is None or command.motion is None:

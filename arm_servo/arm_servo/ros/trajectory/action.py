@@ -51,17 +51,16 @@ class TrajectoryAction:
             conclude=self._conclude,
             fail=self._fail,
         )
-        node.create_timer(1.0 / rate, self._watch)
+        node.create_timer(1.0 / rate, lambda: self._goals.watch(self._look))
 
-    def _watch(self) -> None:
-        for goal in self._goals.running:
-            count = len(goal.handle.request.trajectory.points)
-            timeout = START_TIMEOUT + START_TIMEOUT_PER_POINT * count
-            goal.outcome = self._goals.outcome(goal, timeout)
-            if goal.outcome is not None:
-                self._goals.end(goal)
-            elif goal.command is not None and goal.command.execution is not None:
-                self._publish_feedback(goal.handle, goal.command.execution)
+    def _look(self, goal: MotionGoal) -> None:
+        count = len(goal.handle.request.trajectory.points)
+        timeout = START_TIMEOUT + START_TIMEOUT_PER_POINT * count
+        goal.outcome = self._goals.outcome(goal, timeout)
+        if goal.outcome is not None:
+            self._goals.end(goal)
+        elif goal.command is not None and goal.command.execution is not None:
+            self._publish_feedback(goal.handle, goal.command.execution)
 
     def _publish_feedback(self, handle: Any, execution: Execution) -> None:  # noqa: ANN401  # rclpy has no types here
         state = execution.feedback
