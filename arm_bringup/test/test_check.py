@@ -196,7 +196,7 @@ def test_without_limits_the_lines_to_copy_are_shown(robot: Robot) -> None:
     robot.limits.write_text('\n'.join(f'{finding}'.splitlines()[2:]), 'utf-8')
     found = check_robot(find_robot('gp110', robot.folder.parent))
     assert [each.problem.split(':')[0] for each in found] == [
-        'no max_jerk in the limits file, so 10/s of max_acceleration'
+        'no max_jerk in the limits file, so 20/s of max_acceleration'
     ]
 
 

@@ -49,8 +49,13 @@ KEYS = {
 DEFAULT_VELOCITY, DEFAULT_SLIDING_VELOCITY = 1.0, 0.1
 """Velocity where description and limits file have none, or 0, in [rad/s] and in [m/s]."""
 DEFAULT_ACCELERATION = 1.0  # acceleration where the limits file has none in [rad/s2], as in MoveIt
-DEFAULT_JERK_RATIO = 10.0
-"""Jerk over acceleration where the limits file has no jerk in [1/s]: 0.1 s to the full one."""
+DEFAULT_JERK_RATIO = 20.0
+"""Jerk over acceleration where the limits file has no jerk in [1/s].
+
+What MoveIt's time parameterization asks: it has points every 0.1 s, and the acceleration may
+change from one full one to the other between two of them.
+"""
+NO_JERK = f'no max_jerk in the limits file, so {DEFAULT_JERK_RATIO:g}/s of max_acceleration'
 
 TURN = 2.0 * math.pi  # a whole turn in [rad]
 ROUNDING_TOLERANCE = 1e-3  # how much a limit may exceed the description's for rounding, as a share
@@ -81,6 +86,8 @@ class JointLimits:
     velocity: Array  # greatest speeds in [rad/s]
     acceleration: Array  # greatest accelerations in [rad/s2]
     jerk: Array  # greatest jerks in [rad/s3]
+    # joints whose jerk is assumed: the limits file has none
+    assumed_jerk: frozenset[str] = frozenset()
 
     def __len__(self) -> int:
         """Return the number of joints."""
@@ -188,7 +195,8 @@ def merge_limits(
     lower, upper, velocity, acceleration, jerk = (
         frozen(column) for column in zip(*rows, strict=True)
     )
-    return JointLimits(tuple(names), lower, upper, velocity, acceleration, jerk)
+    assumed = frozenset(defaults.get(NO_JERK, ()))
+    return JointLimits(tuple(names), lower, upper, velocity, acceleration, jerk, assumed)
 
 
 @contextmanager
@@ -231,10 +239,7 @@ def _row(joint: Joint, table: Mapping[str, Any], defaults: dict[str, list[str]])
         f'no max_acceleration in the limits file, so {DEFAULT_ACCELERATION:g} {unit}/s2',
         DEFAULT_ACCELERATION,
     )
-    jerk = _positive(name, entry, 'jerk') or default(
-        f'no max_jerk in the limits file, so {DEFAULT_JERK_RATIO:g}/s of max_acceleration',
-        DEFAULT_JERK_RATIO * acceleration,
-    )
+    jerk = _positive(name, entry, 'jerk') or default(NO_JERK, DEFAULT_JERK_RATIO * acceleration)
     return lower, upper, velocity, acceleration, jerk
 
 

@@ -226,7 +226,7 @@ def test_what_no_file_says_has_a_default_that_is_noted_once() -> None:
     model = RobotModel(urdf.replace('velocity="2"', 'velocity="0"'), srdf, table)
     assert model.limits.velocity.tolist() == [1.0, 1.0, 0.1]
     assert model.limits.acceleration.tolist() == [1.0, 5.0, 1.0]
-    assert model.limits.jerk.tolist() == [10.0, 50.0, 10.0]
+    assert model.limits.jerk.tolist() == [20.0, 100.0, 20.0]
     defaults = [note for note in model.notes if note.startswith('no max_')]
     joints = [note.rpartition(': ')[2] for note in defaults]
     assert joints == ['j1, j2', 'j1', 'j1, j2, j3', 'j3', 'j3']

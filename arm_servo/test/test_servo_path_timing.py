@@ -11,12 +11,12 @@ import re
 import core_commands
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
-from model_robots import ready, robot, ROBOTS
+from model_robots import ready, robot, ROBOTS, table, texts
 import numpy as np
 import pytest
 from servo_streams import kept, PERIOD
 
-from arm_model import Array, JointLimits, RobotState
+from arm_model import Array, JointLimits, RobotModel, RobotState
 from arm_servo import ArmState, CoreSettings, Execution, ExecutionSettings, MotionCore, Phase
 from arm_trajectory import (
     GoalCode,
@@ -31,6 +31,15 @@ pytestmark = pytest.mark.slow
 EXACT = 5e-4  # what counts as on the path in [rad]: a cycle sees a step of the jerk as one
 
 FREE = CoreSettings(check_self_collision=False)
+
+
+WITHOUT_JERK = RobotModel(
+    *texts('panda'),
+    {
+        joint: {key: value for key, value in entry.items() if 'jerk' not in key}
+        for joint, entry in table('panda').items()
+    },
+)
 
 
 def core_of(name: str) -> MotionCore:
@@ -113,6 +122,38 @@ def test_time_optimal_plans_are_followed_exactly(
     assert off < EXACT
     assert states[-1].position == pytest.approx(goal.points[-1].positions, abs=1e-6)
     kept(limits, states)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6), size=st.floats(0.1, 1.5))
+def test_an_assumed_jerk_suffices_for_the_time_parameterization_of_moveit(
+    seed: int, size: float
+) -> None:
+    """Full speed and acceleration, a point every 0.1 s, and a limits file without max_jerk."""
+    limits, begin = WITHOUT_JERK.limits, ready('panda')
+    end = begin + np.random.default_rng(seed).uniform(-size, size, len(begin))
+    end = np.clip(end, limits.lower + 0.01, limits.upper - 0.01)
+    core = MotionCore(WITHOUT_JERK, FREE)
+    core.reset(begin)
+    assert not refusal(core, time_optimal(limits, begin, end, 'pva', 0.1))
+
+
+def test_a_refusal_for_an_assumed_jerk_names_it_as_assumed() -> None:
+    """The owner of the arm has a line to add to the limits file; one that has it is not asked."""
+    known = {name: entry | {'max_jerk': 20.0} for name, entry in table('panda').items()}
+    with_jerk = RobotModel(*texts('panda'), known)
+    for model, assumed in ((WITHOUT_JERK, True), (with_jerk, False)):
+        core = MotionCore(model, FREE)
+        core.reset(ready('panda'))
+        rate, bend = 80.0 * math.pi / 6.0, 0.9 * model.limits.acceleration  # fifty swings in 7.5 s
+        points = []
+        for time in np.linspace(0.0, 7.5, 376).tolist():
+            there = ready('panda') + bend * (1.0 - math.cos(rate * time)) / rate**2
+            speed, gain = bend * math.sin(rate * time) / rate, bend * math.cos(rate * time)
+            points.append(GoalPoint(time, tuple(there), tuple(speed), tuple(gain)))
+        reason = refusal(core, TrajectoryGoal(model.joints, points))
+        assert 'its limit of jerk is' in reason
+        assert ('(assumed, as the limits file has no max_jerk)' in reason) is assumed
 
 
 def swinging(name: str, size: float, frequency: float) -> TrajectoryGoal:

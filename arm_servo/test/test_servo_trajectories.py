@@ -428,6 +428,22 @@ def test_joints_in_any_order_and_some_of_them() -> None:
     assert states[-1].position == pytest.approx(expected, abs=1e-6)
 
 
+def test_joints_that_a_goal_of_some_leaves_out_stand_where_they_were_commanded_to() -> None:
+    """As joint_trajectory_controller: at its acceptance, also of an arm that moves then."""
+    start, names = ready('prbt'), robot('prbt').joints
+    core = core_of('prbt', ExecutionSettings(rules=GoalRules(partial=True)))
+    core_commands.follow(core, TrajectoryGoal(names, [GoalPoint(2.0, tuple(start + 0.3))]))
+    for step in range(100):
+        core.step(step * PERIOD, PERIOD)
+    accepted = core.state
+    assert accepted.velocity[0] > 0.05
+    goal = TrajectoryGoal([names[4]], [GoalPoint(1.5, (start[4],))])
+    states = follow_to_the_end(core, core_commands.follow(core, goal))
+    expected = np.array(accepted.position)
+    expected[4] = start[4]
+    assert states[-1].position == pytest.approx(expected, abs=1e-6)
+
+
 def test_a_turn_of_a_continuous_joint_is_no_error() -> None:
     """A drive that counts from -pi to pi is where it was sent, on the way and at the goal."""
     core = MotionCore(chain('cyyzyz'))

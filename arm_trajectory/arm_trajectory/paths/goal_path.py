@@ -226,9 +226,11 @@ def _time_deficit(demand: Demand, limits: JointLimits, factor: float) -> _TimeDe
     unit, quantity = QUANTITIES[demand.quantity]
     limit = (limits.velocity, limits.acceleration, limits.jerk)[demand.quantity][demand.joint]
     name = limits.names[demand.joint]
+    is_assumed = quantity == 'jerk' and name in limits.assumed_jerk
+    assumed = ' (assumed, as the limits file has no max_jerk)' if is_assumed else ''
     return _TimeDeficit(
         f'{name} would need {demand.value:.3f} {unit} at {demand.time:.3f} s, its limit of'
-        f' {quantity} is {limit:.3f}',
+        f' {quantity} is {limit:.3f}{assumed}',
         f'{quantity} of {name}',
         demand.time,
         factor,
