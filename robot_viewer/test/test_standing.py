@@ -155,7 +155,7 @@ class Watched:
             count_subscribers=lambda topic: 0,
             get_publishers_info_by_topic=lambda topic: [publisher],
         )
-        listening: Any = SimpleNamespace(add_latest=lambda _, topic, __: self.topics.append(topic))
+        listening: Any = SimpleNamespace(add=lambda _, topic, __: self.topics.append(topic))
         page: Any = SimpleNamespace(robot=None)
         self.body = Body(node, page, listening, {})
 

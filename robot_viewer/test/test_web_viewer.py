@@ -334,11 +334,37 @@ def test_who_does_not_look_takes_no_messages(
     robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
     robot.viewer.stop()
     robot.spin_until(lambda: len(robot.calls) == 2, 'halts')
-    robot.viewer._listening.add(JointState, 'more', lambda _: None, 1)
+    robot.viewer._listening.add(JointState, 'more', lambda _: None)
     assert not robot.node.count_subscribers('more')
     opened.append(True)
     robot.spin_until(lambda: listeners() == [2, 1, 1], 'subscriptions again')
     robot.spin_until(lambda: robot.node.count_subscribers('more') == 1, 'the new one')
+
+
+def test_each_message_between_two_pictures_counts(robot: Robot, opened: list[bool]) -> None:
+    """Of two that come together the joints of both are shown, and the first motion of the root."""
+    assert opened
+    robot.spin_until(lambda: bool(robot.node.count_subscribers('/tf')), 'subscriptions')
+    states = robot.node.create_publisher(JointState, 'joint_states', 10)
+    frames = robot.node.create_publisher(TFMessage, '/tf', 10)
+    robot.spin_until(lambda: states.get_subscription_count() == 2, 'the match')
+    robot.spin_until(lambda: frames.get_subscription_count() == 1, 'the match')
+    for x in (0.25, 0.5, 0.75):
+        robot.viewer._root = ''
+        robot.description.publish(String(data=TWO_SLIDERS))
+        robot.spin_until(lambda: robot.viewer._root == '0', 'the robot')
+        for joint in 'ab':
+            states.publish(JointState(name=[joint], position=[x]))
+        for child in '01':
+            frame = TransformStamped(child_frame_id=child)
+            frame.transform.translation.x = x
+            frames.publish(TFMessage(transforms=[frame]))
+
+        def is_shown(x: float = x) -> bool:
+            viewer = robot.viewer
+            return viewer._drawn == {'a': x, 'b': x} and viewer._shown_base.translation[0] == x
+
+        robot.spin_until(is_shown, f'{x} rad and m')
 
 
 def test_a_robot_that_walks_is_shown_where_it_is(robot: Robot, opened: list[bool]) -> None:

@@ -125,13 +125,13 @@ class Body:
         ):
             if topic not in self._found and self._node.count_publishers(topic):
                 self._found.add(topic)
-                self._listening.add_latest(kind, topic, take)
+                self._listening.add(kind, topic, take)
         if CONTACTS not in self._found and CONTACTS_TYPE in (
             end.topic_type for end in self._node.get_publishers_info_by_topic(CONTACTS)
         ):
             self._found.add(CONTACTS)
             kind = import_module('quad_msgs.msg').FootContacts
-            self._listening.add_latest(kind, CONTACTS, self._take_contacts)
+            self._listening.add(kind, CONTACTS, self._take_contacts)
         if self._poses is None and self._node.count_subscribers('body_pose'):
             self._poses = self._node.create_publisher(
                 PoseMessage, 'body_pose', QoSProfile(depth=1)

@@ -138,7 +138,7 @@ class Controllers:
         publisher = self._node.create_publisher(command, f'{name}{COMMAND}', QoSProfile(depth=2))
         controller = Controller(publisher)
         take = partial(self._take, controller)
-        self._listening.add_latest(state, f'{name}{STATE}', take)
+        self._listening.add(state, f'{name}{STATE}', take)
         return controller
 
     def _take(self, controller: Controller, message: Any) -> None:  # noqa: ANN401

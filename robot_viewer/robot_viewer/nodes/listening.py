@@ -1,30 +1,83 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Subscriptions that are there only while somebody looks: each message costs time in Python."""
+"""Subscriptions that are there while a page is open, and read when it is drawn."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable, Iterator
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
-from rclpy.qos import qos_profile_sensor_data, QoSProfile
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
 LINGER = 5.0
 """How long it goes on after the last look in [s]: a page that is loaded anew needs it at once."""
+NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+BETWEEN_LOOKS = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Of topics with several publishers: it keeps what comes from one look to the next."""
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A topic that is read.
+
+    Attributes:
+        kind: Class of its messages.
+        name: Its name.
+        take: Takes the newest message; for some it returns whether such ones are of no interest.
+        qos: Of the subscription.
+        by: Of messages that differ in this, each newest one is taken.
+    """
+
+    kind: Any
+    name: str
+    take: Callable[[Any], bool | None]
+    qos: QoSProfile
+    by: Callable[[bytes], Hashable]
+
+
+def joints_of(data: bytes) -> Hashable:
+    """Return the bytes of a JointState that name its joints."""
+    count = _behind(data, 12, 1)  # behind its stamp and frame
+    return data[12 : _behind(data, count + 4, _whole(data, count))]
+
+
+def frames_of(data: bytes) -> Hashable:
+    """Return the bytes of a TFMessage that name its first frames, and the length of all."""
+    return len(data), data[16 : _behind(data, 16, 2)]  # behind the first stamp
+
+
+def _behind(data: bytes, at: int, strings: int) -> int:
+    """Return the place behind some strings in CDR."""
+    for _ in range(strings):
+        at = (at + 4 + _whole(data, at) + 3) & ~3
+    return at
+
+
+def _whole(data: bytes, at: int) -> int:
+    return int.from_bytes(data[at : at + 4], 'little' if data[1] else 'big')
 
 
 class Listening:
-    """Subscribes to topics as long as somebody looks."""
+    """Reads topics as long as a page is open.
+
+    No executor serves the subscriptions: a wake-up for each message costs more than all else. At
+    each look the newest message of each kind is decoded.
+
+    Attributes:
+        group: Of the subscriptions.
+    """
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._makers: list[Callable[[], Subscription]] = []
-        self._made: list[Subscription] = []
-        self._latest: dict[tuple[Any, Callable[[Any], None]], bytes] = {}
+        self.group = ReentrantCallbackGroup()
+        self._topics: list[Topic] = []
+        self._made: list[tuple[Topic, Subscription, set[Hashable]]] = []
         self._last_look: float | None = None
 
     @property
@@ -35,28 +88,39 @@ class Listening:
     def add(
         self,
         kind: Any,  # noqa: ANN401  # message types have no type
-        topic: str,
-        take: Callable[[Any], None],
-        qos: QoSProfile | int,
-        *,
-        raw: bool = False,
+        name: str,
+        take: Callable[[Any], bool | None],
+        qos: QoSProfile = NEWEST,
+        by: Callable[[bytes], Hashable] = lambda _: None,
     ) -> None:
-        """Subscribe to a topic while a page is open."""
-        maker = partial(self._node.create_subscription, kind, topic, take, qos, raw=raw)
-        self._makers.append(maker)
+        """Read a topic while a page is open, see :class:`Topic`."""
+        self._topics.append(Topic(kind, name, take, qos, by))
         if self._made:
-            self._made.append(maker())
+            self._subscribe(self._topics[-1])
 
-    def add_latest(self, kind: Any, topic: str, take: Callable[[Any], None]) -> None:  # noqa: ANN401
-        """Subscribe likewise; only the last message before each :meth:`take_latest` is decoded."""
-        keep = partial(self._latest.__setitem__, (kind, take))
-        self.add(kind, topic, keep, qos_profile_sensor_data, raw=True)
+    def _subscribe(self, topic: Topic) -> None:
+        made = self._node.create_subscription(
+            topic.kind, topic.name, lambda _: None, topic.qos, callback_group=self.group, raw=True
+        )
+        self._made.append((topic, made, set()))
 
-    def take_latest(self) -> None:
-        """Process the last message of each topic that is new."""
-        while self._latest:
-            (kind, take), message = self._latest.popitem()
-            take(deserialize_message(message, kind))
+    def newest(self) -> Iterator[Callable[[], None]]:
+        """Yield what processes each message that is new."""
+        for topic, subscription, dropped in self._made:
+            found = dict[Hashable, bytes]()
+            with subscription.handle:
+                for _ in range(topic.qos.depth):
+                    taken = subscription.handle.take_message(topic.kind, True)
+                    if taken is None:
+                        break
+                    found[topic.by(taken[0])] = taken[0]
+            for key in (each for each in found if each not in dropped):
+                yield partial(self._process, topic, dropped, key, found[key])
+
+    @staticmethod
+    def _process(topic: Topic, dropped: set[Hashable], key: Hashable, data: bytes) -> None:
+        if topic.take(deserialize_message(data, topic.kind)):
+            dropped.add(key)
 
     def update(self, now: float, *, looked_at: bool) -> bool:
         """Begin or end; return whether it has just begun."""
@@ -64,10 +128,11 @@ class Listening:
             self._last_look = now
             begins = not self._made
             if begins:
-                self._made = [maker() for maker in self._makers]
+                for topic in self._topics:
+                    self._subscribe(topic)
             return begins
         if self._made and self._last_look is not None and now - self._last_look > LINGER:
-            for subscription in self._made:
+            for _, subscription, _ in self._made:
                 self._node.destroy_subscription(subscription)
             self._made = []
         return False

@@ -209,6 +209,11 @@ class MotionPlanning:
         """Whether a plan is executed."""
         return self._execution is not None
 
+    @property
+    def moves(self) -> bool:
+        """Whether a plan is executed, or a ghost goes along it."""
+        return self.busy or self._shown_since is not None
+
     def advance(self) -> None:
         """Cancel the execution when nothing holds its button any more."""
         if self.busy and time.monotonic() - self._held_at > RELEASED_AFTER:

@@ -5,11 +5,12 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
 import concurrent.futures
 from contextlib import suppress
 from functools import partial
 from importlib import import_module
+import math
 import threading
 import time
 from typing import Any
@@ -22,8 +23,8 @@ from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
 from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
-from rclpy.serialization import deserialize_message
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.subscription import Subscription
 from rclpy.task import Future
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -51,7 +52,7 @@ from .controllers import Controllers
 from .first_motion import FirstMotion
 from .grippers import Grippers
 from .judge import Judge
-from .listening import Listening
+from .listening import BETWEEN_LOOKS, frames_of, joints_of, Listening
 from .motion_planning import MotionPlanning
 from .serving import Border, serve
 from .watch import Watch
@@ -62,8 +63,12 @@ DRAW_PERIOD = 1.0 / 30.0
 """Time between two pictures, and between two looks at what was done on the page, in [s]."""
 LIST_PERIOD = 0.2
 """Time between two looks at numbers in [s]."""
-LOOK_TIME = 0.2
-"""Time in each second in [s] in which it looks whether /tf moves the root of the robot."""
+PLOT_PERIOD = 0.5
+"""Time between two drawings of curves in [s]."""
+REST_TIME, REST_TICKS = 1.0, 3
+"""Time in [s] without a motion after which every third picture is enough."""
+SEEN = 1e-4
+"""Least motion of a joint that is drawn in [rad] or [m]: what stands is noisy."""
 LIMIT_AGE = 1.0
 """Time in [s] for which a limit that the servo names is shown."""
 SCALES = ('command_in_type', 'scale.linear', 'override_velocity_scaling_factor')
@@ -72,7 +77,9 @@ MIN_OVERRIDE = 0.01
 """An override of the velocity below this is none, as in moveit_servo."""
 SERVO_STATUS_TYPE = 'moveit_msgs/msg/ServoStatus'
 GRAPH_PERIOD = 1.0
-"""Time between two looks at what the robot offers in [s]."""
+"""Time between two looks at the nodes there are in [s]."""
+SETTLED, SELDOM = 10, 3
+"""After that many looks at the same nodes, what they offer is looked at with each third one."""
 DRIVE_SERVICES = (
     'init',
     'enable',
@@ -123,6 +130,8 @@ class WebViewer(Node):
                 ' 127.0.0.1, or 0.0.0.0 for all of them'
             )
         self._orders: deque[Callable[[], object]] = deque()
+        self._ticks, self._moved_at, self._plotted_at = 0, -math.inf, -math.inf
+        self._nodes: list[tuple[str, str]] = []
         self._triggers = TriggerCalls(self, self._report)
         self._drives: dict[str, list[str]] = {}
         self._stops: set[str] = set()
@@ -140,7 +149,7 @@ class WebViewer(Node):
         self._independent: Sequence[str] = ()
         self._listening = Listening(self)
         self._base = self._shown_base = Transform()
-        self._root, self._root_moves = '', False
+        self._root, self._looks = '', 0  # at the same nodes
         self._jogs: Publisher | None = None
         self._joint_jogs: Publisher | None = None
         self._walks: Publisher | None = None
@@ -156,15 +165,23 @@ class WebViewer(Node):
         )
         self._planning = MotionPlanning(self, self.page, self._positions, self._order)
         self.create_subscription(String, 'robot_description', self._describe, LATCHED)
-        sensor = qos_profile_sensor_data
-        self._listening.add(JointState, 'joint_states', self._take_joints, sensor)
-        self._listening.add(TFMessage, '/tf', self._take_raw_transforms, sensor, raw=True)
-        self._listening.add(Log, '/rosout', self._take_log, ROSOUT)
+        for kind, name, take, qos, by in (
+            (JointState, 'joint_states', self._take_joints, BETWEEN_LOOKS, joints_of),
+            (TFMessage, '/tf', self._take_transforms, BETWEEN_LOOKS, self._frames_of),
+            (Log, '/rosout', self._take_log, ROSOUT, bytes),
+        ):
+            self._listening.add(kind, name, take, qos, by)
         self.create_subscription(DiagnosticArray, 'diagnostics', self._watch.take_statuses, 10)
         self.create_timer(DRAW_PERIOD, self._serve_page)
         self.create_timer(LIST_PERIOD, self._list)
         self.create_timer(GRAPH_PERIOD, self._look_around)
         self.seen_at = f'the robot is seen at {self.page.url}'
+
+    @property
+    def subscriptions(self) -> Iterator[Subscription]:
+        """Those that an executor serves; the others are read when the page is drawn."""
+        group = self._listening.group
+        yield from (each for each in super().subscriptions if each.callback_group is not group)
 
     # -- what is shown
 
@@ -174,7 +191,6 @@ class WebViewer(Node):
 
     def _show(self, tree: KinematicTree) -> None:
         self._root, self._judge.robot, self._drawn = tree.root, tree.name, {}
-        self._root_moves = False
         self._watch.forget()
         self._velocities = greatest_velocities(tree)
         self._independent = [joint.name for joint in tree.joints if joint.independent]
@@ -193,19 +209,19 @@ class WebViewer(Node):
         self._first_motion.take(positions)
         self._positions.update(positions)
 
-    def _take_raw_transforms(self, data: bytes) -> None:
-        """Decode a message; few of them as long as none moves the root: it is half of the load."""
-        if self._root_moves or time.monotonic() % 1.0 < LOOK_TIME:
-            self._take_transforms(deserialize_message(data, TFMessage))
+    def _frames_of(self, data: bytes) -> Hashable:
+        return self._root, frames_of(data)
 
-    def _take_transforms(self, message: TFMessage) -> None:
+    def _take_transforms(self, message: TFMessage) -> bool:
+        """Move the root; return whether a message with these frames says nothing of it."""
         for transform in message.transforms:
             if transform.child_frame_id == f'{self._prefix}{self._root}':
-                self._root_moves = True
                 place, turn = transform.transform.translation, transform.transform.rotation
                 self._base = Transform(
                     (place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w)
                 )
+                return False
+        return bool(self._root)
 
     def _take_servo(self, message: Any) -> None:  # noqa: ANN401  # moveit_msgs may not be there
         if message.code > 0:
@@ -221,11 +237,25 @@ class WebViewer(Node):
             at = message.stamp.sec + message.stamp.nanosec * 1e-9
             self.page.log(at, f'/{who}', message.msg, failed=message.level > WARN)
 
-    def _serve_page(self) -> None:
+    def _work(self) -> None:
         while self._orders:
-            self._orders.popleft()()
-        with self.border.around('a message or answer'):
-            self._listening.take_latest()
+            with self.border.around('a message or answer'):
+                self._orders.popleft()()
+
+    def _rests(self) -> bool:
+        """Whether nothing moves, on the page neither, and no button is held."""
+        parts = self._controllers.busy, self._first_motion.busy, self._planning.moves
+        held = any(parts) or self.page.live.held
+        return not held and time.monotonic() - self._moved_at > REST_TIME
+
+    def _serve_page(self) -> None:
+        self._ticks += 1
+        if self._ticks % REST_TICKS and self._rests():
+            return
+        self._work()
+        for process in self._listening.newest():
+            with self.border.around('a message or answer'):
+                process()
         self._controllers.advance(self._velocities)
         self._first_motion.advance()
         self._planning.advance()
@@ -243,11 +273,14 @@ class WebViewer(Node):
     def _draw(self) -> None:
         self._planning.draw()
         self._body.draw()
-        moved = {n: p for n, p in self._positions.items() if self._drawn.get(n) != p}
+        drawn = self._drawn.get
+        moved = {n: p for n, p in self._positions.items() if abs(p - drawn(n, math.inf)) > SEEN}
         if moved:
+            self._moved_at = time.monotonic()
             self._drawn.update(moved)
             self.page.show_joints(moved)
         if self._base != self._shown_base:
+            self._moved_at = time.monotonic()
             self._shown_base = self._base
             self.page.show_base(self._base)
 
@@ -263,7 +296,9 @@ class WebViewer(Node):
         self.page.follow(self._positions)
         self._body.list()
         self._first_motion.list()
-        self.page.plot(self._controllers.history, now)
+        if now - self._plotted_at > PLOT_PERIOD:
+            self._plotted_at = now
+            self.page.plot(self._controllers.history, now)
 
     def _judge_robot(self) -> None:
         limit, at = self._limit
@@ -284,6 +319,11 @@ class WebViewer(Node):
     # -- what the robot offers
 
     def _look_around(self) -> None:
+        nodes = sorted(self.get_node_names_and_namespaces())
+        self._looks = self._looks + 1 if nodes == self._nodes else 0
+        self._nodes = nodes
+        if self._looks > SETTLED and self._looks % SELDOM:
+            return  # to list all services is a quarter of the load of a page at rest
         services = dict(self.get_service_names_and_types())
         around = self.border.around
         with around('drives are not offered'):
@@ -367,7 +407,7 @@ class WebViewer(Node):
         if any(end.topic_type == SERVO_STATUS_TYPE for end in ends):
             self._servo_listens = True
             kind = import_module('moveit_msgs.msg').ServoStatus
-            self._listening.add_latest(kind, topic, self._take_servo)
+            self._listening.add(kind, topic, self._take_servo)
 
     def _offered(self) -> Offered:
         grippers = dict(self._grippers.named)
@@ -462,6 +502,8 @@ class WebViewer(Node):
 
     def _order(self, order: Callable[[], object]) -> None:
         self._orders.append(order)
+        if self.executor is not None:
+            self.executor.create_task(self._work)
 
     def _stop(self, answer: concurrent.futures.Future[Stop]) -> None:
         self.page.say('STOP: no answer from the robot yet', failed=None)

@@ -254,7 +254,9 @@ def start_position(joint: Joint) -> float:
 def put(node: SceneNodeHandle, pose: Transform) -> None:
     """Move a node of a scene."""
     x, y, z, w = pose.rotation
-    node.position, node.wxyz = pose.translation, (w, x, y, z)
+    node.wxyz = w, x, y, z
+    if tuple(node.position) != pose.translation:  # viser compares in 20 us
+        node.position = pose.translation
 
 
 def pose_of(node: SceneNodeHandle) -> Transform:
