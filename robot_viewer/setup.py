@@ -14,7 +14,6 @@ runpy.run_path(str(SHARED))['setup_package'](
             'python3-viser-pip',
             'python3-websockets',
         ],
-        'foxglove': ['foxglove-sdk>=0.30'],
     },
     programs=[
         'foxglove_bridge = robot_viewer.nodes.foxglove_bridge:main',

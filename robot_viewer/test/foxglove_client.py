@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A client of Foxglove's protocol that shares nothing with the server: websockets and rosbags.
+"""A client of Foxglove's protocol.
 
 https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md has operations and binary forms.
 """
@@ -17,21 +17,14 @@ import time
 from typing import Any
 
 from mcap_ros2._dynamic import generate_dynamic
-from rosbags.typesys import get_typestore, Stores
 from websockets.sync.client import connect
 from websockets.typing import Origin, Subprotocol
 
-TYPES = get_typestore(Stores.ROS2_JAZZY)
 TIMEOUT = 60.0  # [s]
 PROTOCOL = Subprotocol('foxglove.sdk.v1')
 FORMER = Subprotocol('foxglove.websocket.v1')
 
 Decoder = Callable[[bytes], Any]
-
-
-def encoded(kind: str, **fields: Any) -> bytes:
-    """Make a message of a public type in CDR."""
-    return bytes(TYPES.serialize_cdr(TYPES.types[kind](**fields), kind))
 
 
 class FoxgloveClient:
@@ -40,7 +33,6 @@ class FoxgloveClient:
     Attributes:
         info: The first message of the server.
         channels: Offered channels by topic.
-        services: Offered services by name.
         statuses: Texts of the server for people.
     """
 
@@ -68,7 +60,6 @@ class FoxgloveClient:
         self._received: dict[str, deque[bytes]] = defaultdict(deque)
         self._answers: dict[int, bytes | str] = {}
         self.channels: dict[str, dict[str, Any]] = {}
-        self.services: dict[str, dict[str, Any]] = {}
         self.statuses: list[str] = []
         self.info: dict[str, Any] = {}
         self.until(lambda: bool(self.info), 'serverInfo')
@@ -88,7 +79,8 @@ class FoxgloveClient:
         self.until(lambda: topic in self.channels, f'channel {topic}')
         number = next(self._numbers)
         self._subscribed[number] = topic
-        self._subscribe(number)
+        wanted = {'id': number, 'channelId': self.channels[topic]['id']}
+        self._send('subscribe', subscriptions=[wanted])
 
     def next_message(self, topic: str) -> Any:
         """Return the next message of a topic, decoded by the definition that the server sent."""
@@ -97,39 +89,6 @@ class FoxgloveClient:
         assert channel['encoding'] == 'cdr'
         assert channel['schemaEncoding'] == 'ros2msg'
         return decoder(channel['schemaName'], channel['schema'])(self._received[topic].popleft())
-
-    def advertise(self, topic: str, kind: str) -> int:
-        """Announce a channel of its own; return its number."""
-        number = next(self._numbers)
-        channel = {'id': number, 'topic': topic, 'encoding': 'cdr', 'schemaName': kind}
-        self._send('advertise', channels=[channel])
-        return number
-
-    def publish(self, channel: int, data: bytes) -> None:
-        """Send a message on a channel of its own."""
-        self._socket.send(struct.pack('<BI', 1, channel) + data)
-
-    def start_call(self, service: str, data: bytes) -> int:
-        """Call a service; return the number of the call."""
-        self.until(lambda: service in self.services, f'service {service}')
-        number = next(self._numbers)
-        head = struct.pack('<BIII', 2, self.services[service]['id'], number, 3)
-        self._socket.send(head + b'cdr' + data)
-        return number
-
-    def answered(self, call: int) -> bool:
-        """Whether an answer has come."""
-        return call in self._answers
-
-    def call(self, service: str, data: bytes) -> Any:
-        """Call a service; return the response, or the text of the failure."""
-        number = self.start_call(service, data)
-        self.until(lambda: self.answered(number), f'answer of {service}')
-        answer = self._answers[number]
-        if isinstance(answer, str):
-            return answer
-        schema = self.services[service]['response']
-        return decoder(schema['schemaName'], schema['schema'])(answer)
 
     def fetch(self, uri: str) -> bytes | str:
         """Fetch a file; return its bytes, or the text of the failure."""
@@ -164,39 +123,18 @@ class FoxgloveClient:
         elif operation == 'unadvertise':
             gone = set(message['channelIds'])
             self.channels = {t: c for t, c in self.channels.items() if c['id'] not in gone}
-        elif operation == 'advertiseServices':
-            self.services.update({each['name']: each for each in message['services']})
-        elif operation == 'unadvertiseServices':
-            gone = set(message['serviceIds'])
-            self.services = {n: s for n, s in self.services.items() if s['id'] not in gone}
-        elif operation == 'serviceCallFailure':
-            self._answers[message['callId']] = message['message']
         elif operation == 'status':
-            self._take_status(message['message'])
-
-    def _take_status(self, text: str) -> None:
-        self.statuses.append(text)
-        for number, topic in self._subscribed.items():
-            # foxglove-sdk offers a channel before it knows it itself
-            if text == f'Unknown channel ID: {self.channels[topic]["id"]}':
-                self._subscribe(number)
+            self.statuses.append(message['message'])
 
     def _take_binary(self, data: bytes) -> None:
         kind = data[0]
         if kind == 1:
             number, _ = struct.unpack_from('<IQ', data, 1)
             self._received[self._subscribed[number]].append(data[13:])
-        elif kind == 3:
-            _, call, length = struct.unpack_from('<III', data, 1)
-            self._answers[call] = data[13 + length :]
         elif kind == 4:
             request, status, length = struct.unpack_from('<IBI', data, 1)
             rest = data[10:]
             self._answers[request] = rest[:length].decode() if status else rest[length:]
-
-    def _subscribe(self, number: int) -> None:
-        wanted = {'id': number, 'channelId': self.channels[self._subscribed[number]]['id']}
-        self._send('subscribe', subscriptions=[wanted])
 
     def _send(self, operation: str, **values: object) -> None:
         self._socket.send(json.dumps({'op': operation, **values}))

@@ -27,7 +27,7 @@ PACKAGES = {
     if package.build_type == 'ament_python'
 }
 DISTRIBUTIONS = {'can': 'python-can', 'pinocchio': 'pin', 'serial': 'pyserial', 'yaml': 'PyYAML'}
-DISTRIBUTIONS |= {'foxglove': 'foxglove-sdk', 'mujoco': 'mujoco-core'}
+DISTRIBUTIONS |= {'mujoco': 'mujoco-core'}
 """Names on PyPI of what is imported under another one."""
 REQUIREMENTS: dict[str, list[str]] = runpy.run_path(str(LAYOUT.root / 'tools/setup_package.py'))[
     'REQUIREMENTS'
@@ -55,7 +55,6 @@ OPTIONAL = {
         *('control_msgs', 'moveit_msgs', 'pinocchio', 'shape_msgs'),
     },
     'quad_sim': {'python3-gymnasium-pip'},
-    'robot_viewer': {'foxglove-sdk'},
 }
 """Packages that are used where they are built, and that colcon need not build for this one."""
 FOR_PEOPLE = {'arm_bringup': {'canopen_tools'}}

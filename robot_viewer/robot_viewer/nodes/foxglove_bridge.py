@@ -1,25 +1,447 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run robot_viewer foxglove_bridge``: topics and services for Foxglove."""
+"""``ros2 run robot_viewer foxglove_bridge``: the topics of a robot for Foxglove and Lichtblick.
+
+A server of https://github.com/foxglove/ws-protocol that shows: no client moves a robot by it.
+"""
 
 from __future__ import annotations
 
+import asyncio
+from collections import deque
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import partial
+import hmac
+from http import HTTPStatus
+from importlib import import_module
+import itertools
+import json
 import os
+from pathlib import PurePosixPath
+import re
+import secrets
+import struct
 import threading
+from typing import Any
+from urllib.parse import parse_qs, unquote, urlsplit
 
-from node_runner import run_program
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
+from urdf_reader import find_mesh
+from websockets.asyncio.server import broadcast, ServerConnection
+from websockets.asyncio.server import serve as serve_websocket
+from websockets.asyncio.server import Server as WebSocketServer
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+from websockets.typing import Subprotocol
 
-from .foxglove import BridgeError
+from message_definitions import DefinitionError, message_definition
+from node_runner import (
+    destroyed_when_refused,
+    ParameterError,
+    ParameterReader,
+    refuse_misspelt,
+    run_program,
+)
+
+from ..loopback import is_loopback, shown_host
 from .serving import serve
 
 NAME = 'foxglove_bridge'
 NICENESS = 10
 """No viewer takes time that a control loop needs."""
-MISSING = (
-    'foxglove-sdk (MIT, 55 MB) is not installed; install it with '
-    '`(cd tools && python3 -m workspace build --with foxglove robot_viewer)`, '
-    'or `pip install foxglove-sdk`'
+PORT = 8765
+PROTOCOLS = [Subprotocol('foxglove.sdk.v1'), Subprotocol('foxglove.websocket.v1')]
+"""Of clients of today, and of those from before foxglove-sdk; what they share is all there is."""
+FOXGLOVE_ORIGINS = ('https://app.foxglove.dev', 'file://')
+"""Foxglove in a browser, and desktop programs, whose pages are files of their own."""
+MESHES = re.compile(
+    r'package://(?:[-\w%]+/)+[-.\w%]+\.(?:dae|fbx|glb|gltf|jpeg|jpg|mtl|obj|png|stl|tif|tiff'
+    r'|urdf|webp|xacro)'
 )
+"""Meshes and what belongs to them, of installed packages."""
+MESSAGE_DATA, ASSET = 1, 4
+"""First byte of a message of a topic, and of an answer to a request for a file."""
+WAITING = 10_000_000
+"""Bytes that wait for a slow client; messages of topics beyond are left out for it."""
+LOOK_PERIOD = 1.0
+"""Time between two looks at the graph in [s]."""
+UNKNOWN_DEPTH, MAX_DEPTH = 10, 25
+"""Depth for a publisher whose depth is unknown, since DDS does not report it, and the greatest of
+a subscription."""
+WARNING = 1
+"""Level of a status of the protocol."""
+
+
+class AssetError(ValueError):
+    """A file that is not sent."""
+
+
+def read_asset(uri: str) -> bytes:
+    """Read a mesh of a package, or what belongs to one.
+
+    Raises:
+        AssetError: It is something else, or leaves its package.
+        MeshFileError: There is no such package or file.
+        OSError: It cannot be read.
+    """
+    if not MESHES.fullmatch(uri):
+        raise AssetError(f'{uri} is no mesh or image of a package (package://)')
+    # also as %2e%2e, which is decoded before the file is looked for
+    if '..' in PurePosixPath(unquote(uri)).parts:
+        raise AssetError(f'{uri} leaves its package; write it without ..')
+    return find_mesh(uri).read_bytes()
+
+
+@dataclass(frozen=True, slots=True)
+class Admission:
+    """Decides who may connect.
+
+    A browser lets any page connect to a port of this computer, and names the page's site in the
+    header Origin, which the page cannot change. Programs send none.
+
+    Attributes:
+        origins: Sites whose pages may connect, besides those of this host; `*` for all.
+        token: What a client has to have in its URL; empty where none is needed.
+    """
+
+    origins: frozenset[str]
+    token: str
+
+    def refusal(self, path: str, origins: Sequence[str]) -> str:
+        """Return why a request is refused; empty when it is not."""
+        for origin in origins:
+            host = urlsplit(origin).hostname
+            local = host is not None and is_loopback(host)
+            if not (local or {origin, '*'} & self.origins):
+                return f'{origin} is not in allowed_origins; add it, if you trust that site'
+        given = parse_qs(urlsplit(path).query).get('token', [''])[0]
+        if not hmac.compare_digest(given.encode(), self.token.encode()) and self.token:
+            return 'open it by the URL that was printed at its start, with its token'
+        return ''
+
+
+@dataclass(eq=False, slots=True)
+class _Channel:
+    """A topic that is offered.
+
+    Attributes:
+        type: Name of its type.
+        kind: Class of its messages.
+        offer: What clients know of it.
+        subscription: There while a client wants it.
+        qos: Of the subscription.
+    """
+
+    type: str
+    kind: Any
+    offer: dict[str, object]
+    subscription: Subscription | None = None
+    qos: QoSProfile | None = None
+
+
+@dataclass(eq=False, slots=True)
+class _Client:
+    """A client, and the topics that it wants by the numbers that it gave them."""
+
+    connection: ServerConnection
+    topics: dict[int, str] = field(default_factory=dict)
+
+
+class Server:
+    """The clients, in a thread of their own.
+
+    Attributes:
+        port: Where it listens.
+    """
+
+    def __init__(
+        self, address: tuple[str, int], admission: Admission, wanted: Callable[[str], None]
+    ) -> None:
+        """Listen.
+
+        Args:
+            address: Host and port; port 0 for a free one.
+            admission: Decides who may connect.
+            wanted: Called with a topic that a client wants, or wants no more.
+
+        Raises:
+            OSError: The address cannot be bound.
+        """
+        self._admission, self._wanted = admission, wanted
+        self._clients: set[_Client] = set()
+        self._offers: dict[str, dict[str, object]] = {}
+        self._loop = asyncio.new_event_loop()
+        try:
+            self._server = self._loop.run_until_complete(self._listen(*address))
+        except BaseException:
+            self._loop.close()
+            raise
+        self.port: int = next(iter(self._server.sockets)).getsockname()[1]
+        self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
+        self._thread.start()
+
+    async def _listen(self, host: str, port: int) -> WebSocketServer:
+        return await serve_websocket(
+            self._serve,
+            host,
+            port,
+            subprotocols=PROTOCOLS,
+            process_request=self._admit,
+            compression=None,
+        )
+
+    # -- in any thread
+
+    @property
+    def wanted(self) -> frozenset[str]:
+        """The topics that clients want."""
+        return frozenset(t for each in tuple(self._clients) for t in tuple(each.topics.values()))
+
+    def offer(self, topic: str, offer: dict[str, object]) -> None:
+        """Offer a topic to all clients, also to those that come later."""
+        self._loop.call_soon_threadsafe(self._offer, topic, offer)
+
+    def withdraw(self, topic: str) -> None:
+        """Offer a topic no more."""
+        self._loop.call_soon_threadsafe(self._withdraw, topic)
+
+    def send(self, topic: str, stamp: int, data: bytes) -> None:
+        """Send a message that came at a time in [ns]."""
+        self._loop.call_soon_threadsafe(self._send, topic, stamp, data)
+
+    def warn(self, text: str) -> None:
+        """Show a text to all clients."""
+        self._loop.call_soon_threadsafe(
+            self._publish, 'status', {'level': WARNING, 'message': text}
+        )
+
+    def close(self) -> None:
+        """Close the port and every connection."""
+
+        async def close() -> None:
+            self._server.close()
+            await self._server.wait_closed()
+
+        asyncio.run_coroutine_threadsafe(close(), self._loop).result()
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+
+    # -- in its thread
+
+    def _admit(self, connection: ServerConnection, request: Request) -> Response | None:
+        refusal = self._admission.refusal(request.path, request.headers.get_all('Origin'))
+        return connection.respond(HTTPStatus.FORBIDDEN, f'{refusal}\n') if refusal else None
+
+    def _publish(self, operation: str, values: dict[str, object]) -> None:
+        text = json.dumps({'op': operation, **values})
+        broadcast([client.connection for client in self._clients], text)
+
+    def _offer(self, topic: str, offer: dict[str, object]) -> None:
+        self._offers[topic] = offer
+        self._publish('advertise', {'channels': [offer]})
+
+    def _withdraw(self, topic: str) -> None:
+        self._publish('unadvertise', {'channelIds': [self._offers.pop(topic)['id']]})
+
+    def _send(self, topic: str, stamp: int, data: bytes) -> None:
+        for client in self._clients:
+            if client.connection.transport.get_write_buffer_size() > WAITING:
+                continue
+            for number, wanted in client.topics.items():
+                if wanted == topic:
+                    head = struct.pack('<BIQ', MESSAGE_DATA, number, stamp)
+                    broadcast([client.connection], head + data)
+
+    async def _serve(self, connection: ServerConnection) -> None:
+        client = _Client(connection)
+        info = {
+            'op': 'serverInfo',
+            'name': NAME,
+            'capabilities': ['assets'],
+            'metadata': {'ROS_DISTRO': os.environ.get('ROS_DISTRO', 'jazzy')},
+        }
+        self._clients.add(client)
+        channels = list(self._offers.values())
+        broadcast([connection], json.dumps(info))
+        broadcast([connection], json.dumps({'op': 'advertise', 'channels': channels}))
+        try:
+            async for text in connection:
+                with suppress(KeyError, TypeError, ValueError):  # it is none of the protocol
+                    await self._take(client, json.loads(text))
+        except ConnectionClosed:
+            pass
+        finally:
+            self._clients.discard(client)
+            self._wanted('')
+
+    async def _take(self, client: _Client, message: dict[str, Any]) -> None:
+        match message['op']:
+            case 'subscribe':
+                topics = {offer['id']: topic for topic, offer in self._offers.items()}
+                for each in message['subscriptions']:
+                    if topic := topics.get(each['channelId'], ''):
+                        client.topics[each['id']] = topic
+                        self._wanted(topic)
+            case 'unsubscribe':
+                for number in message['subscriptionIds']:
+                    client.topics.pop(number, None)
+                self._wanted('')
+            case 'fetchAsset':
+                answer = await asyncio.to_thread(_asset, message['requestId'], message['uri'])
+                await client.connection.send(answer)
+
+
+def _asset(request: int, uri: str) -> bytes:
+    try:
+        data, failure = read_asset(uri), b''
+    except (OSError, ValueError) as error:
+        data, failure = b'', str(error).encode()
+    return struct.pack('<BIBI', ASSET, request, bool(failure), len(failure)) + failure + data
+
+
+class FoxgloveBridge(Node):
+    """Offers all topics, and subscribes to those that a client wants."""
+
+    @destroyed_when_refused
+    def __init__(self) -> None:
+        """Listen.
+
+        Raises:
+            ParameterError: A parameter is wrong, or the port is in use.
+        """
+        super().__init__(NAME)
+        read = ParameterReader(self)
+        address = read.text('address', '127.0.0.1', 'bound to it; not loopback: with a token')
+        port = read.whole('port', PORT, (0, 65535), 'of the server; 0: a free one')
+        origins = read.texts(
+            'allowed_origins',
+            list(FOXGLOVE_ORIGINS),
+            'sites whose pages may connect, besides those of this host; *: all',
+        )
+        refuse_misspelt(self)
+        self._channels: dict[str, _Channel] = {}
+        self._refused: set[tuple[str, str]] = set()
+        self._numbers = itertools.count(1)
+        self._fresh: deque[str] = deque()
+        token = '' if is_loopback(address) else secrets.token_urlsafe(24)
+        admission = Admission(frozenset(origins), token)
+        try:
+            self._server = Server((address, port), admission, self._want)
+        except OSError as error:
+            raise ParameterError(
+                f'port {port} of {address}: {error.strerror or error}; '
+                'choose another with -p port:=8766, or 0 for a free one'
+            ) from None
+        self.create_timer(LOOK_PERIOD, self._look)
+        self._look()
+        url = f'ws://{shown_host(address)}:{self._server.port}' + (token and f'/?token={token}')
+        self.seen_at = (
+            f'open {url} in Foxglove or Lichtblick (open connection, Foxglove WebSocket)'
+        )
+
+    def close(self) -> None:
+        """Close all connections."""
+        self._server.close()
+
+    def _want(self, topic: str) -> None:
+        """Subscribe for a client; called in the thread of the server."""
+        self._fresh.append(topic)
+        if self.executor is not None:
+            self.executor.create_task(self._match)
+
+    def _look(self) -> None:
+        """Offer what has appeared, and withdraw what has gone."""
+        there = {
+            name: types[0]
+            for name, types in self.get_topic_names_and_types()
+            if not any(part.startswith('_') for part in name.split('/'))  # hidden, in ROS
+        }
+        for name, channel in list(self._channels.items()):
+            if there.get(name) != channel.type:
+                self._unsubscribe(self._channels.pop(name))
+                self._server.withdraw(name)
+        for name, type_ in there.items():
+            if name not in self._channels and (name, type_) not in self._refused:
+                self._offer(name, type_)
+        self._match()
+
+    def _offer(self, name: str, type_: str) -> None:
+        try:
+            kind, definition = class_of(type_), message_definition(type_)
+        except (DefinitionError, LookupError) as error:
+            self._refused.add((name, type_))
+            self.get_logger().warning(f'{name} is not shown: {error}')
+            self._server.warn(f'{name} is not shown: {error}')
+            return
+        offer: dict[str, object] = {
+            'id': next(self._numbers),
+            'topic': name,
+            'encoding': 'cdr',
+            'schemaName': type_,
+            'schema': definition,
+            'schemaEncoding': 'ros2msg',
+        }
+        self._channels[name] = _Channel(type_, kind, offer)
+        self._server.offer(name, offer)
+
+    def _match(self) -> None:
+        """Subscribe to what clients want; to what is latched anew for one that is new."""
+        while self._fresh:
+            channel = self._channels.get(self._fresh.popleft())
+            qos = None if channel is None else channel.qos
+            if channel and qos and qos.durability == DurabilityPolicy.TRANSIENT_LOCAL:
+                self._unsubscribe(channel)
+        wanted = self._server.wanted
+        for name, offered in self._channels.items():
+            if name not in wanted:
+                self._unsubscribe(offered)
+            elif offered.qos != (qos := self._qos(name)):
+                self._unsubscribe(offered)
+                take = partial(self._pass, name)
+                offered.qos = qos
+                offered.subscription = self.create_subscription(
+                    offered.kind, name, take, qos, raw=True
+                )
+
+    def _unsubscribe(self, channel: _Channel) -> None:
+        if channel.subscription is not None:
+            self.destroy_subscription(channel.subscription)
+            channel.subscription = channel.qos = None
+
+    def _pass(self, topic: str, data: bytes) -> None:
+        self._server.send(topic, self.get_clock().now().nanoseconds, data)
+
+    def _qos(self, name: str) -> QoSProfile:
+        """Return what connects to all publishers, and gets what they keep where all keep it."""
+        offers = [each.qos_profile for each in self.get_publishers_info_by_topic(name)]
+        reliable = all(each.reliability == ReliabilityPolicy.RELIABLE for each in offers)
+        latched = all(each.durability == DurabilityPolicy.TRANSIENT_LOCAL for each in offers)
+        depth = sum(each.depth or UNKNOWN_DEPTH for each in offers)
+        return QoSProfile(
+            depth=min(max(depth, 1), MAX_DEPTH),
+            reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL
+            if latched and offers
+            else DurabilityPolicy.VOLATILE,
+        )
+
+
+def class_of(name: str) -> Any:  # noqa: ANN401  # message types have no type
+    """Return the class of a message by its name as `package/msg/Name`.
+
+    Raises:
+        LookupError: It is not installed.
+    """
+    try:
+        package, folder, base = name.split('/')
+        return getattr(import_module(f'{package}.{folder}'), base)
+    except (AttributeError, ImportError, ValueError):
+        raise LookupError(f'type {name} is not installed') from None
 
 
 def main() -> int:
@@ -28,16 +450,10 @@ def main() -> int:
     Returns:
         0, or 1 when it could not begin.
     """
-    return run_program(NAME, _serve, BridgeError)
+    return run_program(NAME, _serve)
 
 
 def _serve(stop: threading.Event) -> None:
-    try:
-        from .foxglove.node import FoxgloveBridge
-    except ModuleNotFoundError as error:
-        if error.name != 'foxglove':
-            raise
-        raise BridgeError(MISSING) from None
     os.setpriority(os.PRIO_PROCESS, 0, max(NICENESS, os.getpriority(os.PRIO_PROCESS, 0)))
-    node = FoxgloveBridge(NAME)
+    node = FoxgloveBridge()
     serve(node, node.seen_at, node.close, stop)
