@@ -7,9 +7,6 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    extras={
-        'first_motion': ['teleop'],  # whose evdev wants a compiler
-    },
     programs=[
         'candump = canopen_tools.candump:main',
         'canopen = canopen_tools.cli.main:main',

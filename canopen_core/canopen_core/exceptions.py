@@ -13,7 +13,6 @@
     ├── SdoError                     a device did not do what an SDO requested
     │   ├── SdoAbortError            the device (or we) aborted the transfer with a code
     │   └── SdoTimeoutError (TimeoutError)   the device did not answer
-    ├── LssError                     a device did not do what LSS requested
     ├── BootError                    a device did not come up; names the phase
     ├── DriveError                   a drive refused a command or did not reach a state in time
     └── LifecycleError               a managed node cannot make this transition now
@@ -94,13 +93,6 @@ class SdoAbortError(SdoError):
     def __init__(self, message: str, code: int) -> None:
         super().__init__(message)
         self.code = code  # abort code as transmitted (CiA 301, table 22)
-
-
-class LssError(CanopenError):
-    """A device did not do what layer setting services requested.
-
-    Scenarios: no device answers, several do, a node id or bit rate is refused.
-    """
 
 
 class BootError(CanopenError):

@@ -13,14 +13,12 @@ from canopen_core.standard import (
     CobId,
     drive_axes,
     is_drive,
-    lss,
     NmtCommand,
     NmtState,
     NODE_ID_MAX,
     NODE_ID_MIN,
     ObjectDictionary,
     sdo,
-    UNCONFIGURED,
 )
 
 from .deviations import Service
@@ -33,7 +31,6 @@ from .objects.object_store import ObjectStore
 from .objects.parameter_storage import ParameterMemory, ParameterStorage
 from .services.emcy_producer import EmcyProducer
 from .services.error_control import ErrorControl
-from .services.lss_slave import LssSlave
 from .services.nmt_slave import NmtSlave
 from .services.rpdo import Handler, RpdoEngine
 from .services.sdo_server import SdoServers
@@ -71,8 +68,7 @@ class Device:
         """Build a device that is switched off.
 
         Args:
-            node_id: CANopen node id, 1 to 127; 255 for one that LSS has to give an id first. An
-                id that LSS has stored in the memory is stronger.
+            node_id: CANopen node id, 1 to 127.
             dictionary: Its objects, as load_eds reads them.
             send: Takes the frames that it sends.
             boot_time: How long its start takes in [s].
@@ -84,13 +80,11 @@ class Device:
         Raises:
             ValueError: The node id is out of range.
         """
-        if not NODE_ID_MIN <= node_id <= NODE_ID_MAX and node_id != UNCONFIGURED:
+        if not NODE_ID_MIN <= node_id <= NODE_ID_MAX:
             raise ValueError(f'node id {node_id} is not {NODE_ID_MIN} to {NODE_ID_MAX}')
         self._memory = memory or ParameterMemory()
-        self._dictionary = dictionary
         self._handlers_changed = handlers_changed
-        self.first_id = node_id  # the one that it was made with; LSS may have changed it
-        self.node_id = self._memory.node_id or node_id  # CANopen node id; 255 while it has none
+        self.node_id = node_id  # CANopen node id
         # the handler of each identifier in the present NMT state; another mapping replaces it when
         # that changes
         self.handlers: Mapping[int, Handler] = {}
@@ -151,7 +145,6 @@ class Device:
         )
         self._storage = ParameterStorage(store, self._memory)
         self._storage.load()
-        self._lss = LssSlave(node_id, store, self._memory, send, nmt.initialise)
         self.clock = TimeConsumer(store, self._subscribe)  # what it knows of the network's time
         self._rpdos = RpdoEngine(
             store, self._subscribe, self._errors.set_error, self._sync.window_closed
@@ -223,7 +216,6 @@ class Device:
         self._tpdos.stop()
         for drive in self.drives:
             drive.reset(now)
-        self._lss.pending_id = self._memory.node_id or self.first_id
         self._nmt.switch_off()
         self._parts = [self.faults]
         self._subscribe()
@@ -256,9 +248,6 @@ class Device:
         self._error_control.stop()
         self._rpdos.stop(now)
         self._tpdos.stop()
-        if self._lss.pending_id != self.node_id:
-            self._renumber(self._lss.pending_id)
-        self._lss.reset()
         self.clock.reset()
         self.store.restore(*(ALL_OBJECTS if whole else COMMUNICATION_OBJECTS))
         self._errors.reset()
@@ -318,7 +307,6 @@ class Device:
         state = self._nmt.state
         handlers: dict[int, Handler] = {
             CobId.NMT: self._nmt.receive,
-            lss.REQUEST: self._lss.receive,
         }
         if state is not NmtState.BOOT_UP:
             watched = self._error_control
@@ -341,13 +329,6 @@ class Device:
         engine = self._tpdos if outgoing else self._rpdos
         number = 0 if frame.is_remote else engine.number_of(can_id)
         return Traffic(Service.PDO if number else Service.OTHER, outgoing, number)
-
-    def _renumber(self, node_id: int) -> None:
-        """Change the node id; the reset reads everything again that depends on it."""
-        self.node_id = node_id
-        self.store.renumber(self._dictionary.for_node(node_id))
-        for part in (self._nmt, self._sdo, self._error_control, self._lss):
-            part.node_id = node_id
 
     def _refresh(self, now: float) -> None:
         """Update the objects to the values of this time."""

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable
 
 from canopen_core.can import Frame
-from canopen_core.standard import ObjectDictionary, UNCONFIGURED
+from canopen_core.standard import ObjectDictionary
 
 from .device import Device, RateUnits
 from .drive.axis import ServoModel
@@ -61,7 +61,7 @@ class DeviceHost:
         Raises:
             ValueError: The node id is out of range, or another device has it.
         """
-        if node_id != UNCONFIGURED and any(d.node_id == node_id for d in self.devices):
+        if any(d.node_id == node_id for d in self.devices):
             raise ValueError(f'two devices with node id {node_id}')
 
         def send(frame: Frame) -> None:
@@ -109,13 +109,13 @@ class DeviceHost:
             device.postpone_watches(stalled)
 
     def device(self, node_id: int) -> Device:
-        """Return the device with a node id, also if LSS has given it another one since.
+        """Return the device with a node id.
 
         Raises:
             KeyError: There is none.
         """
         for device in self.devices:
-            if device.first_id == node_id:
+            if device.node_id == node_id:
                 return device
         raise KeyError(node_id)
 

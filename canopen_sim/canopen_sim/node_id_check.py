@@ -15,7 +15,7 @@ import time
 
 from canopen_core import BusError, CanopenError
 from canopen_core.can import Bus, Frame
-from canopen_core.standard import CobId, Index, sdo, UNCONFIGURED
+from canopen_core.standard import CobId, Index, sdo
 
 ANSWER_TIME = 0.15  # [s] a device answers an SDO within some milliseconds, unless it is too busy
 EVIDENCE = {CobId.SDO_RESPONSE: 'SDO response', CobId.HEARTBEAT: 'heartbeat or boot-up'}
@@ -30,12 +30,12 @@ class NodeIdCheck:
     ) -> None:
         """Request an answer of each; what was received before counts, too.
 
-        The bus has no other reader; a device without a node id cannot be there twice.
+        The bus has no other reader.
         """
         self.found: dict[int, str] = {}  # what was received from them, in words, by identifier
         self._bus = bus
         self._clock = clock
-        ids = [node_id for node_id in node_ids if node_id != UNCONFIGURED]
+        ids = [*node_ids]
         self._known = {
             base + node_id: f'{name} (0x{base + node_id:03X}) of node id {node_id}'
             for base, name in EVIDENCE.items()

@@ -84,7 +84,7 @@ def newest_process_data(frames: Sequence[Frame]) -> list[Frame]:
     """Return what the mailboxes of a CAN controller hold of frames that were not read in time.
 
     A device that stood still sees the newest set-point, and does not follow all those of the past.
-    Of SDO, NMT and LSS, whose clients wait for their answers, all is kept.
+    Of SDO and NMT, whose clients wait for their answers, all is kept.
     """
     newest = {frame.can_id: frame for frame in frames}
     return [

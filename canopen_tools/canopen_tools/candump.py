@@ -295,7 +295,7 @@ def _parser() -> argparse.ArgumentParser:
         action='append',
         default=[],
         metavar='TERMS',
-        help='show only these: nmt, sync, emcy, time, pdo, sdo, heartbeat, lss, error, other, '
+        help='show only these: nmt, sync, emcy, time, pdo, sdo, heartbeat, error, other, '
         'node:NAME, node:ID, 181, 180:780; several with commas, ^ before one leaves it out',
     )
     add(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import groupby
 import json
 
-from arm_canopen.config import Direction, FACTOR_OBJECTS, is_fixed, mapping_slots, RPDO, TPDO
+from arm_canopen.config import Direction, is_fixed, mapping_slots, RPDO, TPDO
 from canopen_core.standard import (
     AXIS_OFFSET,
     bit_length,
@@ -103,8 +103,7 @@ def bus_text(devices: Sequence[NewDevice], period_ms: int) -> str:
     lines.append('nodes:')
     for device, kind in zip(devices, kinds, strict=True):
         own = [f'node_id: {device.node_id}', *_units(device), *([] if are_alike else kind)]
-        found = [f'  # {device.found}'] if device.found else []
-        lines += [*found, f'  {device.name}:', *(f'    {line}' for line in own)]
+        lines += [f'  {device.name}:', *(f'    {line}' for line in own)]
     return '\n'.join(lines) + '\n'
 
 
@@ -146,12 +145,12 @@ def _kind(device: NewDevice, period_ms: int) -> Iterator[str]:
 
 
 def _mode(device: NewDevice) -> tuple[OperationMode, str]:
-    bits, source = device.number(Index.SUPPORTED_MODES), device.source(Index.SUPPORTED_MODES)
+    bits = device.number(Index.SUPPORTED_MODES)
     if device.mode is not None:
-        _check_offered(device, device.mode, bits, source)
+        _check_offered(device, device.mode, bits)
         return device.mode, 'as asked'
     offered = [mode for mode in POSITION_MODES if bits & mode.support_bit]
-    best = f'the best of 0x6502 in {source} (0x{bits:08X})'
+    best = f'the best of 0x6502 in the EDS (0x{bits:08X})'
     for mode in offered:
         target = device.eds.dictionary.get(*TARGET_OBJECTS[mode])
         if target is not None and RPDO.mappable(target):
@@ -166,7 +165,7 @@ def _mode(device: NewDevice) -> tuple[OperationMode, str]:
     )
 
 
-def _check_offered(device: NewDevice, mode: OperationMode, bits: int, source: str) -> None:
+def _check_offered(device: NewDevice, mode: OperationMode, bits: int) -> None:
     """Refuse a mode that the drive lacks by its own word, where its target is missing, too.
 
     One that has its target is left to the check, as EDS files err in 0x6502.
@@ -177,7 +176,7 @@ def _check_offered(device: NewDevice, mode: OperationMode, bits: int, source: st
         return
     has = ', '.join(str(int(each)) for each in OperationMode if bits & each.support_bit)
     raise NewBusError(
-        f'{device.name}: 0x6502 in {source} (0x{bits:X}) has no mode {int(mode)}'
+        f'{device.name}: 0x6502 in the EDS (0x{bits:X}) has no mode {int(mode)}'
         f' ({mode.title.lower()}), it has {has or "none of the standard"}; leave --mode'
         f' {device.name}={int(mode)} out for the best of these'
     )
@@ -210,15 +209,13 @@ def _units(device: NewDevice) -> Iterator[str]:
         if doubt := contradiction(device, units):
             yield f'# {doubt}'
     elif says_units(factors):
-        turn, source = factors.position_scale * TURN, device.source(*FACTOR_OBJECTS.values())
-        yield f'scale_from_factor_group: true  # read from the drive; {turn:g} a turn by {source}'
+        turn = factors.position_scale * TURN
+        yield f'scale_from_factor_group: true  # read from the drive; {turn:g} a turn by the EDS'
         if factors.acceleration_ratio is None:  # else it is read from the drive, too
             yield _acceleration(device, factors.velocity_scale)
     else:
-        eds = device.eds.path.name
-        speaker = f'neither the drive nor {eds} does' if device.found else f'{eds} does'
         raise NewBusError(
-            f'{device.name}: {speaker} not say how far an increment of the joint'
+            f'{device.name}: {device.eds.path.name} does not say how far an increment of the joint'
             ' is (0x608F or 0x6092, with the gear in 0x6091); give'
             f' --turn {device.name}=INCREMENTS for a turn of the joint with its gear, or'
             f' --metre {device.name}=INCREMENTS'
@@ -230,7 +227,7 @@ def _acceleration(device: NewDevice, velocity: float) -> str:
     ratio, objects = device.factors.acceleration_ratio, device.factors.acceleration_objects
     why = 'velocity units per second, where the manual says nothing else for 0x6083'
     if ratio is not None:
-        why = f'by {", ".join(f"0x{index:04X}" for index in objects)} of {device.source(*objects)}'
+        why = f'by {", ".join(f"0x{index:04X}" for index in objects)} of the EDS'
     return f'scale_acc_to_dev: {velocity * (ratio or 1.0)!r}  # {why}'
 
 

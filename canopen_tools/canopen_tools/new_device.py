@@ -1,25 +1,22 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is known of a device of a new bus: by its EDS, by itself, and by who makes the bus."""
+"""What is known of a device of a new bus: by its EDS, and by who makes the bus."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 import math
 
 from arm_canopen.config import (
-    FACTOR_OBJECTS,
     FactorGroup,
     is_coarse,
     NamedUnit,
-    position_unit,
     RPM,
     UNSET,
 )
 from canopen_core import CanopenError
 from canopen_core.eds import Eds
-from canopen_core.standard import Index, is_drive, OperationMode
+from canopen_core.standard import is_drive, OperationMode
 
 TURN = 2.0 * math.pi  # a turn in [rad]
 SAME = 0.01  # share by which two scales may differ and still say the same
@@ -57,10 +54,6 @@ class NewDevice:
     # turns of what the drive counts in rpm, or in the unit of angles that it names in 0x60A9, for
     # one turn or 1 m of the joint; None where nobody has said it
     rpm: float | None = None
-    # what the device itself holds, by index and sub-index; it counts before the defaults of its
-    # EDS
-    values: Mapping[tuple[int, int], int] = field(default_factory=dict)
-    found: str = ''  # who it is and why it has this EDS, where it was found on a bus; else empty
 
     @property
     def is_drive(self) -> bool:
@@ -69,7 +62,7 @@ class NewDevice:
 
     @property
     def factors(self) -> FactorGroup:
-        """The factor group by what the drive holds, else by the defaults of its EDS."""
+        """The factor group by the defaults of its EDS."""
         return FactorGroup.read(self.number)
 
     @property
@@ -88,8 +81,7 @@ class NewDevice:
         named, units = self.velocity_unit, _position_units(self) if self.is_drive else None
         if named is None or units is None or self.rpm is not None or _is_of_joint(self, units):
             return ''
-        source = self.source(Index.SI_UNIT_VELOCITY)
-        who = f'{self.name}: 0x60A9 of {source} has {named.text} as unit'
+        who = f'{self.name}: 0x60A9 of the EDS has {named.text} as unit'
         correct = 'or correct 0x60A9 in the EDS by the manual'
         if named.slides:
             return f'{who}, and the joint turns; give --metre where it slides, {correct}'
@@ -100,13 +92,8 @@ class NewDevice:
         )
 
     def number(self, index: int, subindex: int = 0) -> int:
-        """Return what an object holds, by the device or else the EDS; 0 where unknown."""
-        default = self.eds.dictionary.number(index, subindex) or 0
-        return self.values.get((index, subindex), default)
-
-    def source(self, *indices: int) -> str:
-        """Return who says what these objects hold, in words."""
-        return 'the drive' if any(index in indices for index, _ in self.values) else 'the EDS'
+        """Return what an object holds by the EDS; 0 where unknown."""
+        return self.eds.dictionary.number(index, subindex) or 0
 
 
 def says_units(factors: FactorGroup) -> bool:
@@ -124,7 +111,7 @@ def said_units(device: NewDevice) -> Units | None:
         return _with_turns(device, units, device.rpm)
     if named is None or not _is_of_joint(device, units):
         return units
-    said = f'0x60A9 of {device.source(Index.SI_UNIT_VELOCITY)}: its unit is {named.text}'
+    said = f'0x60A9 of the EDS: its unit is {named.text}'
     return replace(units, velocity=_velocity(named, units.scale), velocity_said=said)
 
 
@@ -136,19 +123,19 @@ def velocity_scale(device: NewDevice, units: Units) -> tuple[float, str]:
     """
     if device.open_velocity:
         raise NewBusError(device.open_velocity)
-    factor, source = device.factors.velocity_factor, device.source(Index.VELOCITY_FACTOR)
+    factor = device.factors.velocity_factor
     if units.velocity is not None:
         by_factor = abs(units.scale) * (factor or 1.0)
         is_same = math.isclose(by_factor, units.velocity, rel_tol=SAME)
         if not is_same and device.rpm is None and factor not in {None, UNSET}:
             raise NewBusError(
                 f'{device.name}: {units.velocity_said}, which is {units.velocity:g} for 1 of the'
-                f' joint per second, and by 0x6096 of {source} it is {by_factor:g}; correct the'
+                f' joint per second, and by 0x6096 of the EDS it is {by_factor:g}; correct the'
                 f' EDS by the manual, or give --rpm {device.name}=TURNS'
             )
         return math.copysign(units.velocity, units.scale), units.velocity_said
     if factor:
-        return units.scale * factor, f'by 0x6096 of {source}'
+        return units.scale * factor, 'by 0x6096 of the EDS'
     turns = '60 * turns per m' if units.slides else '60 * turns of the motor per turn / (2 pi)'
     said = 'increments per second, where the manual says nothing else'
     return units.scale, f'{said}; rpm: {turns}, by --rpm {device.name}=TURNS'
@@ -167,36 +154,29 @@ def contradiction(device: NewDevice, units: Units) -> str:
     if is_said and (units.slides or ratio_to_group < FAR):
         return ''
     return (
-        f'its factor group has {factors.position_scale:g} per rad: try which it is, canopen'
-        f' first-motion bus.yml {device.name}'
+        f'its factor group has {factors.position_scale:g} per rad: try which it is by a first'
+        ' motion on the page'
     )
 
 
 def _position_units(device: NewDevice) -> Units | None:
     """Return the units that somebody has said, else those that the drive names; None for none.
 
-    What it names in 0x60A8 counts where it was read from the drive: in an EDS this is a default
-    that the maker changes by parameters. Those of the factor group are written out where the
+    What an EDS names in 0x60A8 does not count: it is a default that the maker changes by
+    parameters. Those of the factor group are written out where the
     master would not read from the drive what velocities are.
     """
     if device.units is not None:
         return device.units
-    position = position_unit(device.values.get((Index.SI_UNIT_POSITION, 0)))
-    if position is not None:
-        per = 'm' if position.slides else 'rad'
-        said = f'0x60A8 of the drive: its unit is {position.text}; per {per}'
-        return Units(1.0 / position.size, said, position.slides)
     factors, named = device.factors, device.velocity_unit
     scale = factors.position_scale
     is_read = named is None or math.isclose(
         _velocity(named, scale), factors.velocity_scale, rel_tol=SAME
     )
-    is_written = not is_read or device.rpm is not None or _has_unlisted(device)
-    if not is_written or not says_units(factors):
+    if (is_read and device.rpm is None) or not says_units(factors):
         return None
-    source = device.source(*FACTOR_OBJECTS.values())
     objects = ', '.join(f'0x{index:04X}' for index in factors.position_objects)
-    return Units(scale, f'{objects} of {source}; per rad')
+    return Units(scale, f'{objects} of the EDS; per rad')
 
 
 def _is_of_joint(device: NewDevice, units: Units) -> bool:
@@ -229,19 +209,10 @@ def _with_turns(device: NewDevice, units: Units, turns: float) -> Units:
         formula = f'60 * {turns:g}' + ('' if units.slides else ' / (2 pi)')
         said = f'rpm, {said}: {formula}'
     else:
-        said = f'{unit.text} by 0x60A9 of {device.source(Index.SI_UNIT_VELOCITY)}, {said}'
+        said = f'{unit.text} by 0x60A9 of the EDS, {said}'
     if named is not None and not is_angle:
-        said += f'; 0x60A9 of {device.source(Index.SI_UNIT_VELOCITY)} has {named.text}'
+        said += f'; 0x60A9 of the EDS has {named.text}'
     return replace(units, velocity=turns * per / unit.size, velocity_said=said)
-
-
-def _has_unlisted(device: NewDevice) -> bool:
-    """Whether the drive has ratios that its EDS lacks, so that the master would not read them."""
-    known = device.eds.dictionary
-    return any(
-        (index, 1) in device.values and known.get(index, 1) is None
-        for index in FACTOR_OBJECTS.values()
-    )
 
 
 def _is_same(factors: FactorGroup, units: Units) -> bool:

@@ -44,10 +44,6 @@ GENERIC = [
     (0x705, '04', 'heartbeat node 5  stopped'),
     (0x705, '33', 'heartbeat node 5  unknown state 33'),
     (0x705, '', 'heartbeat node 5  unknown state'),
-    (0x7E5, '0401000000000000', 'LSS >  switch state global'),
-    (0x7E4, '4f00000000000000', 'LSS <  identify slave'),
-    (0x7E5, 'ff', 'LSS >  unknown command 0xFF'),
-    (0x7E5, '', 'LSS >  empty message'),
     (0x77F, '0505', 'heartbeat node 127  unknown state 05 05'),
     (0x001, '01', 'unknown'),
     (0x180, '01', 'unknown'),
@@ -130,7 +126,6 @@ def test_other_kinds_of_frames(frame: Frame, text: str) -> None:
         (0x702, '05', FrameKind.HEARTBEAT, False),
         (0x000, '05', FrameKind.NMT, True),
         (0x100, '', FrameKind.TIME, False),
-        (0x7E5, '04', FrameKind.LSS, False),
         (0x7FF, '04', FrameKind.OTHER, False),
     ],
 )

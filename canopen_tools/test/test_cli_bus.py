@@ -132,6 +132,15 @@ def test_scan_compares_with_bus_yml(
     assert lines[2].endswith('not on the bus')
 
 
+def test_two_devices_with_one_node_id(name: str, runner: DeviceRunner, capsys: Output) -> None:
+    """Both answer; what they share is named."""
+    left, _ = runner.host.devices
+    inject = partial(left.faults.inject, FaultInjection(Fault.NODE_ID_CONFLICT))
+    runner.call(lambda: inject(time.monotonic())).result(DEADLINE)
+    assert main(['scan', '--can', name, *LISTEN]) == 1
+    assert 'node 2: several devices answer' in capsys.readouterr().err
+
+
 @pytest.mark.usefixtures('runner', 'master')
 def test_scan_leaves_the_sdo_channels_to_a_master(name: str, witness: Bus, capsys: Output) -> None:
     """Beside a master it only listens, and says so; --query reads, with a warning."""

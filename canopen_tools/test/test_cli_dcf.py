@@ -211,7 +211,7 @@ def test_data_of_any_length_are_written() -> None:
 
 
 def test_the_bit_rate_is_one_that_the_file_of_the_master_supports(tmp_path: Path) -> None:
-    """Also 100 kbit/s, which LSS and EDS files have beside those of newer standards."""
+    """Also 100 kbit/s, which EDS files have beside those of newer standards."""
     config = load_text(tmp_path, edited('# master', 'baudrate: 100'))
     text = master_dcf(config, {})
     assert '\nBaudrate=100\n' in text

@@ -339,7 +339,7 @@ def test_a_turn_far_above_the_factor_group_is_doubted(
     """On the terminal, and beside the scale; a gear that the drive does not know is none."""
     eds, bus = written(tmp_path, 'drive.eds', SAMPLE), tmp_path / 'bus.yml'
     assert main(['new', f'arm={eds}@2', '--turn', f'arm={turn}', '--output', str(bus)]) == 0
-    words = 'its factor group has 100000 per rad: try which it is, canopen first-motion'
+    words = 'its factor group has 100000 per rad: try which it is by a first motion'
     assert (words in capsys.readouterr().out) is is_doubted
     assert (words in bus.read_text()) is is_doubted
 

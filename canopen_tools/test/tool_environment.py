@@ -21,7 +21,6 @@ ENVIRONMENT = os.environ | {
             'libraries/recording',
             'libraries/robot_primitives',
             'libraries/ros_runtime',
-            'libraries/teleop',
         )
     )
 }

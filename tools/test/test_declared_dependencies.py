@@ -37,7 +37,6 @@ ROSDEP = {re.split('[^\\w-]', lines[0])[0]: key for key, lines in REQUIREMENTS.i
 ON_PYPI = {*DISTRIBUTIONS, *ROSDEP}
 OF_TESTS = {
     'canopen': 'canopen-pip',
-    'cantools': 'python3-cantools-pip',
     'hypothesis': 'python3-hypothesis',
     'mcap_ros2': 'mcap-ros2-support',
     'onnx': 'python3-onnx-pip',

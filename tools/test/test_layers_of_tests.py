@@ -19,7 +19,6 @@ ROOT = Path(__file__).parents[2]
 SHIPPED_ROBOTS = {
     'arm_model/bench/bench_distances.py',
     'arm_model/test/model_robots.py',
-    'arm_planning/bench/bench_motions.py',
     'arm_planning/bench/bench_planning.py',
     'arm_planning/bench/planning_problems.py',
     'arm_servo/bench/servo_arms.py',

@@ -46,7 +46,7 @@ from .model.checks.drive_units import (
 from .model.checks.traffic import LoadEstimate, Traffic
 from .model.factor_group import FACTOR_ADDRESSES, FACTOR_OBJECTS, FactorGroup, UNSET
 from .model.pdo import Direction, RPDO, TPDO
-from .model.si_unit import NamedUnit, position_unit, RPM
+from .model.si_unit import NamedUnit, RPM
 from .resolve.bus import check_file, load_bus
 from .resolve.eds_files import DEFAULT_DRIVE
 from .resolve.pdo_mapping import eds_mapping, is_fixed, mapping_slots
@@ -97,7 +97,6 @@ __all__ = [
     'load_bus',
     'load_eds',
     'mapping_slots',
-    'position_unit',
     'rate_units',
     'reported_increments',
 ]

@@ -266,7 +266,7 @@ class BootProcess:
         raise BootError(
             f'two devices have node id {node_id}: each SDO of {self._node.name} is answered '
             'twice; it is not started, as both would move. Switch one of them off, and give it '
-            'another node id (canopen lss, or its switches)'
+            'another node id (by its switches, or the tool of its vendor)'
         )
 
     async def _check_identity(self, expected: Identity) -> None:

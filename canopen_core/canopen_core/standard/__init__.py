@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What CiA 301 and CiA 402 define: types, tables and codecs, without state or I/O."""
 
-from . import lss, sdo
+from . import sdo
 from .cob_id import (
+    BIT_RATES_KBIT,
     CAN_ID_MASK,
     COB_ID_EXTENDED,
     COB_ID_INVALID,
@@ -57,15 +58,11 @@ from .drive import (
 )
 from .emcy import Emergency, error_code_text, error_register_text
 from .io_profiles import (
-    ANALOG_EVENTS,
-    ANALOG_INPUTS,
     DIGITAL_OUTPUTS,
     EncoderObject,
     ERROR_OBJECTS,
     IO_GROUPS,
-    IoGroup,
 )
-from .lss import BIT_RATES_KBIT, UNCONFIGURED
 from .nmt import (
     ALL_NODES,
     COMMANDED_STATES,
@@ -109,8 +106,6 @@ from .time_of_day import decode_time_of_day, encode_time_of_day
 
 __all__ = [
     'ALL_NODES',
-    'ANALOG_EVENTS',
-    'ANALOG_INPUTS',
     'AXIS_OFFSET',
     'BIT_RATES_KBIT',
     'CAN_ID_MASK',
@@ -143,7 +138,6 @@ __all__ = [
     'TARGET_OBJECTS',
     'TIME_CONSUMER',
     'TIME_PRODUCER',
-    'UNCONFIGURED',
     'UNSIGNED_BITS',
     'AbortCode',
     'AccessType',
@@ -156,7 +150,6 @@ __all__ = [
     'Emergency',
     'EncoderObject',
     'Index',
-    'IoGroup',
     'MappedObject',
     'NmtCommand',
     'NmtState',
@@ -188,7 +181,6 @@ __all__ = [
     'is_setting',
     'is_signed',
     'is_state',
-    'lss',
     'mapped_place',
     'mode_title',
     'nmt_addressee',

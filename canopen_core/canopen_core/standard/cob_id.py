@@ -19,6 +19,12 @@ RTR_FORBIDDEN = 0x4000_0000  # bit 30 of a TPDO's COB-ID: no remote frame may re
 PREDEFINED_MAX = 4  # PDOs of each direction with a pre-defined COB-ID
 CAN_ID_MASK = 0x7FF  # 11-bit identifier
 
+BIT_RATES_KBIT = (10, 20, 50, 100, 125, 250, 500, 800, 1000)
+"""Bit rates in [kbit/s], as bus.yml and EDS files (``BaudRate_...``) name them.
+
+Newer issues of the standard reserve 100 kbit/s, which older devices have.
+"""
+
 
 class CobId(IntEnum):
     """Function codes as the COB-ID of node 0."""

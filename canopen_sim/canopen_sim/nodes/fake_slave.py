@@ -11,9 +11,8 @@ import sys
 from ament_index_python.packages import get_package_share_directory
 from rclpy.node import Node
 
-from canopen_core import CanopenError
 from canopen_core.eds import load_eds
-from canopen_core.standard import NODE_ID_MAX, NODE_ID_MIN, UNCONFIGURED
+from canopen_core.standard import NODE_ID_MAX, NODE_ID_MIN
 from node_runner import ParameterReader
 
 from ..host import DeviceHost
@@ -29,7 +28,7 @@ example:
   ros2 run canopen_sim fake_slave --ros-args -p node_id:=3 -p slave_config:=drive.eds
 
 parameters:
-  node_id             CANopen node id, 1 to 127; 255: LSS gives it one (default {DEFAULT_NODE_ID})
+  node_id             CANopen node id, 1 to 127 (default {DEFAULT_NODE_ID})
   slave_config        EDS of the device (default: the drive of arm_canopen/eds/cia402_drive.eds)
 """
 
@@ -49,22 +48,16 @@ def _populate(node: Node, host: DeviceHost) -> tuple[str, Mapping[str, int]]:
     node_id = read.whole(
         'node_id',
         DEFAULT_NODE_ID,
-        (NODE_ID_MIN, UNCONFIGURED),
-        'CANopen node id of the device; 255: LSS assigns it',
+        (NODE_ID_MIN, NODE_ID_MAX),
+        'CANopen node id of the device',
     )
-    if not NODE_ID_MIN <= node_id <= NODE_ID_MAX and node_id != UNCONFIGURED:
-        raise CanopenError(
-            f'node_id {node_id} is not {NODE_ID_MIN} to {NODE_ID_MAX}; {UNCONFIGURED} makes a '
-            'device to which LSS assigns one'
-        )
     path = read.text('slave_config', '', 'EDS of the device; empty for our own drive')
     eds = load_eds(path or default_eds())
     for warning in eds.warnings:
         node.get_logger().warning(str(warning))
     device = host.add(node_id, eds.dictionary, memory=memories(node)(node_id))
     kind = 'drive' if device.drive is not None else 'device'
-    which = 'without node id' if node_id == UNCONFIGURED else str(node_id)
-    return f'simulated {kind} {which} of {eds.path}', {'slave': node_id}
+    return f'simulated {kind} {node_id} of {eds.path}', {'slave': node_id}
 
 
 if __name__ == '__main__':

@@ -36,7 +36,7 @@ from .fault_services import FaultServices
 CAN_INTERFACES = (
     'can0, vcan0, udp_multicast:239.x.y.z[:port], auto, or INTERFACE:CHANNEL[@BITRATE]'
 )
-STORE_DIRECTORY = 'folder of what the devices store (0x1010, LSS); empty: until they end'
+STORE_DIRECTORY = 'folder of what the devices store (0x1010); empty: until they end'
 THREAD_PRIORITY = 30  # SCHED_FIFO: devices answer SYNC in time, and leave the master the way
 COMMON_HELP = f"""\
   can_interface_name  {CAN_INTERFACES}

@@ -211,12 +211,6 @@ class ObjectStore:
                 if address in self.saved:
                     variable.value = self.saved[address]
 
-    def renumber(self, dictionary: ObjectDictionary) -> None:
-        """Use the defaults that the same objects have for another node id."""
-        self.dictionary = dictionary
-        for entry in dictionary:
-            self._variables[entry.address].entry = entry
-
     def read(self, index: int, subindex: int = 0) -> bytes:
         """Return what an SDO upload yields.
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a device keeps without power: parameters (CiA 301, 7.5.2.13), node id, bit timing."""
+"""What a device keeps without power: parameters (CiA 301, 7.5.2.13)."""
 
 from __future__ import annotations
 
@@ -48,10 +48,6 @@ class ParameterMemory:
     def __init__(self) -> None:
         # saved objects as an SDO would transmit them, by index and sub-index
         self.values: dict[Address, bytes] = {}
-        # node id that was stored by LSS, None for the configured one
-        self.node_id: int | None = None
-        # bit rate that was stored by LSS, as index of CiA 305's table
-        self.bit_timing: int | None = None
 
     def commit(self) -> None:
         """Make the present content last."""
@@ -80,8 +76,6 @@ class ParameterFile(ParameterMemory):
         """Write the file: all of it, or nothing."""
         content = {
             'version': VERSION,
-            'node_id': self.node_id,
-            'bit_timing': self.bit_timing,
             'values': {
                 f'0x{index:04X}:{subindex:02X}': data.hex()
                 for (index, subindex), data in sorted(self.values.items())
@@ -101,21 +95,12 @@ class ParameterFile(ParameterMemory):
         values = content['values']
         if not isinstance(values, dict):
             raise TypeError('no values')
-        loaded = {_address(name): bytes.fromhex(data) for name, data in values.items()}
-        self.node_id = _number(content['node_id'])
-        self.bit_timing = _number(content['bit_timing'])
-        self.values.update(loaded)
+        self.values.update({_address(name): bytes.fromhex(data) for name, data in values.items()})
 
 
 def _address(name: str) -> Address:
     index, _, subindex = name.partition(':')
     return int(index, 16), int(subindex, 16)
-
-
-def _number(value: object) -> int | None:
-    if value is None or isinstance(value, int):
-        return value
-    raise TypeError(f'{value!r} is no number')
 
 
 class ParameterStorage:

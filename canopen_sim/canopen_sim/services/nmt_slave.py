@@ -12,7 +12,6 @@ from canopen_core.standard import (
     COMMANDED_STATES,
     NmtCommand,
     NmtState,
-    NODE_ID_MAX,
     parse_nmt,
     RESETS,
 )
@@ -37,7 +36,6 @@ class NmtSlave:
         """
         self.state = NmtState.BOOT_UP  # BOOT_UP stands for Initialisation
         self.deadline = 0.0  # when Initialisation ends, as steady time in [s]
-        # id of the device, 255 while it has none and stays in Initialisation
         self.node_id = node_id
         self._reset = reset
         self._changed = changed
@@ -77,16 +75,9 @@ class NmtSlave:
         self.deadline = 0.0
         self._powered = False
 
-    def initialise(self, now: float) -> None:
-        """Reset the communication from within."""
-        self._initialise(NmtCommand.RESET_COMMUNICATION, now)
-
     def _initialise(self, command: NmtCommand, now: float) -> None:
         self.state = NmtState.BOOT_UP
         self._reset(command, now)
-        if self.node_id > NODE_ID_MAX:  # LSS has to give it one first
-            self.deadline = NEVER
-            return
         self.deadline = now + self._boot_time
         if self._boot_time <= 0.0:
             self.advance(now)

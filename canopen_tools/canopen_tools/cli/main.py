@@ -18,11 +18,11 @@ import sys
 from canopen_core import CanopenError
 
 from ..ros_arguments import split_ros_arguments
-from . import check, dbc, dcf, diff, eds, first_motion, lss, new, objects, scan
+from . import check, dcf, diff, eds, new, objects, scan
 from .arguments import apply_parameters, SuggestingParser, UsageError
 from .output import warn
 
-VERBS = (check, eds, new, first_motion, scan, objects, diff, dcf, dbc, lss)
+VERBS = (check, eds, new, scan, objects, diff, dcf)
 INTERRUPTED = 130  # exit code of a program that Ctrl-C ended
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``canopen new``: a bus.yml of EDS files or of a live bus, each choice with its reason."""
+"""``canopen new``: a bus.yml of EDS files, each choice with its reason."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 import math
 from pathlib import Path
+import re
 import shutil
 import sys
-import tempfile
 from typing import TypeVar
 
+from canopen_core.eds import load_eds
 from canopen_core.standard import OperationMode
 
 from ..new_bus import bus_text, POSITION_MODES
 from ..new_device import contradiction, NewDevice, said_units, TURN, Units
-from .arguments import add_bus_argument, node_id, seconds, SubParsers, UsageError
+from .arguments import node_id, SubParsers, UsageError
 from .check import show_check
-from .new_scan import given_devices, scanned_devices
 from .output import print_line
-from .scan import LISTEN
 
 T = TypeVar('T')
+DEVICE = re.compile('(?P<name>[A-Za-z][A-Za-z0-9_]*)=(?P<file>.+)@(?P<node>[^@]+)')
 PERIOD_MS = 10  # time between two SYNC in [ms]
 INCREMENTS = 'a number of increments other than 0, such as 360000, -36000.5 or 2000*50'
 """What a person writes for a turn or a metre."""
@@ -34,42 +34,18 @@ def add_parser(parsers: SubParsers) -> None:
     """Add the verb."""
     parser = parsers.add_parser(
         'new',
-        help='write the bus.yml of a new robot from EDS files, or from what is on a bus',
-        description='Write a bus.yml from EDS files, or with --scan from the devices on a bus: '
-        'modes, PDOs, SYNC, heartbeats and units, each with its reason, and check it. What nobody '
-        'says is asked for. Exit code: 0, 1 with errors, 2 wrong usage.',
-        epilog='examples: canopen new shoulder=drive.eds@2 elbow=drive.eds@3 --turn elbow=360000; '
-        'canopen new --scan --can can0 eds_files/ shoulder@2 elbow@3',
+        help='write the bus.yml of a new robot from EDS files',
+        description='Write a bus.yml from EDS files: modes, PDOs, SYNC, heartbeats and units, '
+        'each with its reason, and check it. What neither they nor the options say is asked for. '
+        'Exit code: 0, 1 with errors, 2 wrong usage.',
+        epilog='example: canopen new shoulder=drive.eds@2 elbow=drive.eds@3 --turn elbow=360000',
     )
     add = parser.add_argument
     add(
         'devices',
         metavar='DEVICE',
-        nargs='*',
-        help='NAME=FILE.eds@NODE: name, EDS and node id of each; with --scan also a folder or '
-        'file of EDS files to choose from, and NAME@NODE for the name of a device',
-    )
-    add(
-        '--scan',
-        action='store_true',
-        help='take the devices that are on the bus, each with the EDS of its vendor, product and '
-        'revision, or the one that it has in 0x1021',
-    )
-    add_bus_argument(parser)
-    add(
-        '--without',
-        metavar='NODE',
-        type=node_id,
-        action='append',
-        default=[],
-        help='leave out a device that --scan finds',
-    )
-    add(
-        '--listen',
-        type=seconds,
-        default=LISTEN,
-        metavar='S',
-        help=f'how long --scan listens first in s (default: {LISTEN})',
+        nargs='+',
+        help='NAME=FILE.eds@NODE: name, EDS and node id of each',
     )
     add(
         '--turn',
@@ -118,19 +94,26 @@ def run(options: argparse.Namespace) -> int:
     output: Path = options.output
     if output.exists() and not options.force:
         raise UsageError(f'{output} is there already; choose another --output, or --force')
-    with tempfile.TemporaryDirectory() as stored:
-        devices = _with_choices(
-            options,
-            scanned_devices(options, Path(stored)) if options.scan else given_devices(options),
-        )
-        devices = [_asked_turns(_asked(each)) for each in devices]
-        _write(devices, bus_text(devices, options.period), output)
+    devices = _with_choices(options, [_device(text) for text in options.devices])
+    devices = [_asked_turns(_asked(each)) for each in devices]
+    _write(devices, bus_text(devices, options.period), output)
     print_line(f'{output} is written; what it says and why is in it')
     for device in devices:
         units = said_units(device) if device.is_drive else None
         if units is not None and (doubt := contradiction(device, units)):
             print_line(f'{device.name}: {units.scale:g} per rad, {doubt}')
     return show_check(output)
+
+
+def _device(text: str) -> NewDevice:
+    match = DEVICE.fullmatch(text)
+    if match is None:
+        raise UsageError(f'{text!r} is no device; write it as shoulder=drive.eds@2')
+    try:
+        node = node_id(match['node'])
+    except argparse.ArgumentTypeError as error:
+        raise UsageError(f'{text}: {error}') from error
+    return NewDevice(match['name'], node, load_eds(Path(match['file'])))
 
 
 def _write(devices: Sequence[NewDevice], text: str, output: Path) -> None:

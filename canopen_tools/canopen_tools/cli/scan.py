@@ -23,7 +23,6 @@ from canopen_core.standard import (
     sdo,
 )
 
-from ..lss_master import LssMaster
 from .arguments import add_bus_arguments, seconds, SubParsers
 from .output import counted, print_line, print_table, warn
 from .session import Session
@@ -128,9 +127,9 @@ def find_devices(
             if device.twice:
                 warn(
                     f'node {device.node_id}: several devices answer; switch all but one of them '
-                    'off, and give each a node id of its own (canopen lss, or its switches)'
+                    'off, and give each a node id of its own (by its switches, or the tool of its '
+                    'vendor)'
                 )
-        _find_unconfigured(session)
     return found
 
 
@@ -180,15 +179,6 @@ def _find_silent(session: Session, found: dict[int, Found]) -> None:
     session.listeners.remove(note)
     for node_id in sorted(answered & set(others)):
         found.setdefault(node_id, Found(node_id, session.states.get(node_id))).answers = True
-
-
-def _find_unconfigured(session: Session) -> None:
-    """Report that there is a device that no node id reaches, as it has none (CiA 305)."""
-    master = LssMaster(session.scheduler, session.send)
-    session.listeners.append(master.receive)
-    if session.run(master.has_unconfigured()):
-        warn('there is a device without node id; canopen lss scan lists it')
-    session.listeners.remove(master.receive)
 
 
 def _identify(session: Session, device: Found) -> None:

@@ -18,7 +18,6 @@ from canopen_core.standard import (
     decode_time_of_day,
     Emergency,
     Index,
-    lss,
     NmtCommand,
     NmtState,
     NODE_ID_MAX,
@@ -57,8 +56,6 @@ class FrameDescriber:
             CobId.NMT: self._nmt,
             CobId.SYNC: self._sync,
             CobId.TIME: self._time,
-            lss.REQUEST: lambda frame: _lss('LSS >', frame),
-            lss.RESPONSE: lambda frame: _lss('LSS <', frame),
         }
         self._functions: dict[int, Callable[[int, Frame], Description]] = {
             CobId.EMCY: self._emcy,
@@ -183,13 +180,6 @@ class FrameDescriber:
         step = (follower.request if is_request else follower.response)(frame.data)
         label, node = 'SDO >' if is_request else 'SDO <', self.node_name(node_id)
         return Description(FrameKind.SDO, label, node, step.text, step.is_abort, node_id)
-
-
-def _lss(label: str, frame: Frame) -> Description:
-    """Describe an LSS message, also one of a wrong length; its parameters stay bytes."""
-    data = frame.data
-    text = lss.Message(data[0], data[1:]).text if data else 'empty message'
-    return Description(FrameKind.LSS, label, '', text)
 
 
 def _cob_id(node: NodeConfig, index: Index) -> int | None:

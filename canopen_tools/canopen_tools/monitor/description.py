@@ -23,7 +23,6 @@ class FrameKind(Enum):
     PDO = 'pdo'
     SDO = 'sdo'
     HEARTBEAT = 'heartbeat'
-    LSS = 'lss'
     ERROR = 'error'  # error frame of the CAN controller
     OTHER = 'other'
 

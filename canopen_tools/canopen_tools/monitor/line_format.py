@@ -24,7 +24,6 @@ _COLORS: dict[FrameKind, str] = {
     FrameKind.PDO: '\x1b[36m',
     FrameKind.SDO: '\x1b[32m',
     FrameKind.HEARTBEAT: '\x1b[34m',
-    FrameKind.LSS: '\x1b[32m',
 }
 
 

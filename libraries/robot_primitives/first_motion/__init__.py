@@ -3,7 +3,7 @@
 """The first motion of a joint: guarded while it moves, then judged by what a person has seen.
 
 `guard` decides, `judgement` concludes, `correction` and `bus_edit` correct: without a
-clock, bus or terminal, so that a terminal and a page conclude the same.
+clock or bus.
 """
 
 from .bus_edit import BusEditError, edited, replace_file, yaml_text
@@ -13,8 +13,6 @@ from .joint_units import (
     FASTEST,
     FURTHEST,
     JointKind,
-    Quantity,
-    read_quantity,
     too_far,
     too_fast,
     too_few_increments,
@@ -37,7 +35,6 @@ __all__ = [
     'MotionPlan',
     'Order',
     'Outcome',
-    'Quantity',
     'Sample',
     'Seen',
     'Verdict',
@@ -45,7 +42,6 @@ __all__ = [
     'edited',
     'judge',
     'propose',
-    'read_quantity',
     'replace_file',
     'too_far',
     'too_fast',

@@ -4,12 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
 import math
-import re
-
-QUANTITY = re.compile(r'(?P<number>[+-]?(?:\d+(?:\.\d*)?|\.\d+))\s*(?P<unit>deg|rad|mm|m)?')
 
 
 class JointKind(Enum):
@@ -33,34 +29,6 @@ FASTEST = {JointKind.TURNS: math.radians(5.0), JointKind.SLIDES: 0.01}
 FURTHEST = {JointKind.TURNS: math.radians(20.0), JointKind.SLIDES: 0.05}
 """Distances likewise, in [rad] and [m]."""
 INCREMENTS_MIN = 4  # of the drive that a motion has to have to be seen
-UNITS: dict[str, tuple[JointKind, float]] = {
-    'deg': (JointKind.TURNS, math.pi / 180.0),
-    'rad': (JointKind.TURNS, 1.0),
-    'mm': (JointKind.SLIDES, 0.001),
-    'm': (JointKind.SLIDES, 1.0),
-}
-"""Kind of joint and size in [rad] or [m] of the units that can be written."""
-
-
-@dataclass(frozen=True, slots=True)
-class Quantity:
-    """A distance or speed that a person has written."""
-
-    kind: JointKind  # what the joint does
-    value: float  # in [rad] or [m], or those per second
-
-
-def read_quantity(text: str, kind: JointKind = JointKind.TURNS) -> Quantity:
-    """Read ``1deg``, ``0.02rad``, ``2mm``, or a number in the unit of a kind of joint.
-
-    Raises:
-        ValueError: It is none.
-    """
-    match = QUANTITY.fullmatch(text.strip())
-    if match is None:
-        raise ValueError(f'{text!r} is no distance; write 1deg, 0.02rad or 2mm')
-    found, size = UNITS[match['unit'] or kind.value]
-    return Quantity(found, float(match['number']) * size)
 
 
 def too_far(kind: JointKind, distance: float) -> str:

@@ -27,7 +27,6 @@ from first_motion import (
     MotionPlan,
     Order,
     Outcome,
-    read_quantity,
     replace_file,
     Sample,
     Seen,
@@ -382,27 +381,3 @@ def test_channels_and_devices_beside_the_sections() -> None:
     assert changed['b']['channels'][1] == values
     text = 'b:\n  node_id: 2\n'
     assert yaml.safe_load(edited(text, 'b', values, 'why', None))['b'] == {'node_id': 2, **values}
-
-
-@pytest.mark.parametrize(
-    ('text', 'kind', 'value'),
-    [
-        ('1deg', JointKind.TURNS, math.radians(1)),
-        ('-2', JointKind.TURNS, -math.radians(2)),
-        ('0.5 rad', JointKind.TURNS, 0.5),
-        ('2mm', JointKind.SLIDES, 0.002),
-        ('.01m', JointKind.SLIDES, 0.01),
-    ],
-)
-def test_quantities(text: str, kind: JointKind, value: float) -> None:
-    """In the units of people; without one, in degrees."""
-    found = read_quantity(text)
-    assert found.kind is kind
-    assert found.value == pytest.approx(value)
-
-
-@pytest.mark.parametrize('text', ['', 'far', '1cm', '1 2', 'nan'])
-def test_what_is_no_quantity(text: str) -> None:
-    """The remedy is in the message."""
-    with pytest.raises(ValueError, match='write 1deg'):
-        read_quantity(text)

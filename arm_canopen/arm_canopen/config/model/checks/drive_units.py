@@ -270,8 +270,8 @@ def _check_against_factors(subject: Subject, units: AxisUnits) -> None:
             subject.place(POSITION_KEY),
             f'1.0 is {units.increments:g} increments, and by the factor group of '
             f'the EDS only {abs(units.radians or 0.0):.4g} rad: one of them is wrong',
-            f"try which it is: canopen first-motion, or leave the scales out for '{FACTOR_KEY}: "
-            "true' (canopen new: without --turn)",
+            'try which it is by a first motion on the page, or leave the scales out for '
+            f"'{FACTOR_KEY}: true' (canopen new: without --turn)",
             about=units.name,
         )
 
