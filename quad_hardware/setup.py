@@ -14,6 +14,7 @@ runpy.run_path(str(SHARED))['setup_package'](
         'protocol = quad_hardware.protocol.page:main',
         'replay = quad_hardware.nodes.replay:main',
     ],
+    extras={'first_motion': ['teleop']},  # whose evdev wants a compiler
     commands=[
         'xgo-calibrate = quad_hardware.calibration.main:main',
         'xgo-doctor = quad_hardware.doctor.main:main',

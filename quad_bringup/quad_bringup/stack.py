@@ -140,8 +140,9 @@ def _simulator_options(stack: Stack) -> list[str]:
 
 def _bridge_parameters(stack: Stack) -> dict[str, str]:
     values = {'port': stack.port, 'protocol': stack.protocol, **stack.ros.frame_parameters}
-    if stack.simulate:  # its IMU is where the description has it
-        values |= {'imu.mounting_checked': 'true', 'imu.rates_checked': 'true'}
+    if stack.simulate:  # its joints and IMU are as the description has them
+        checked = 'joints_checked', 'imu.mounting_checked', 'imu.rates_checked'
+        values |= dict.fromkeys(checked, 'true')
     return values
 
 

@@ -102,6 +102,7 @@ def test_hardware_has_no_simulator_and_simulation_has(tmp_path: Path) -> None:
     for part, known in ((real, False), (simulated, True)):
         mounting = bridge_of(part).robot.estimator.mounting
         assert mounting.checked is mounting.rates_checked is known
+        assert bridge_of(part).robot.joints_checked is known
 
 
 @pytest.mark.parametrize(('preset', 'arm'), [('lite', False), ('mini', True)])

@@ -33,6 +33,13 @@ LINK, ROBOT, COMMANDS = 'serial link', 'robot', 'joint commands'
 """What a fault is of; diagnostics have the same names."""
 
 
+JOINTS_CHECKED = 'joints_checked'
+UNCHECKED_JOINTS = (
+    'the joints of this robot were never checked, so nothing moves: ros2 run quad_hardware '
+    'calibrate first-motion, then start with the file that it writes'
+)
+
+
 @dataclass(frozen=True, slots=True)
 class RobotSettings:
     """Which robot it is, and how it is read and commanded."""
@@ -48,6 +55,8 @@ class RobotSettings:
     # how the last bytes are written when a fault happens; None for not at all
     black_box: BlackBoxSettings | None = None
     serial_log: Path | None = None  # where all bytes are written to as they pass; None for nowhere
+    # each joint has moved as its servo says (calibrate first-motion); else nothing is commanded
+    joints_checked: bool = True
 
 
 class ObservedRobot:
@@ -93,6 +102,9 @@ class ObservedRobot:
         if state is None:
             self.on_refusal(self._estimator.refusal)
             return self._estimator.refusal
+        if not self._settings.joints_checked:
+            problem = f'{state.servo_problem}; ' if state.servo_problem else ''
+            state = replace(state, servo_problem=problem + UNCHECKED_JOINTS)
         self.latest = state
         self.on_state(state)
         return ''
@@ -184,6 +196,9 @@ class SerialRobot(ObservedRobot):
 
     def command(self, positions: Sequence[float]) -> bool:
         """Send targets of the first joints [rad], [m]; return whether they were sent."""
+        if not self._settings.joints_checked:
+            self.refuse(CommandError(UNCHECKED_JOINTS))
+            return False
         self.counters.received += 1
         now = time.monotonic()
         command = self._commander.take(positions, self._place(now), now)

@@ -66,6 +66,7 @@ class Rig(ABC):
                 '--ros-args',
                 *('-p', f'port:={port}'),
                 *('-p', 'diagnostics_period:=0.2'),
+                *('-p', 'joints_checked:=true'),
                 *arguments,
             ]
             self.node = self.start()

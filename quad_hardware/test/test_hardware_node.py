@@ -17,8 +17,10 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from isolation import Isolation, reserve
 import pytest
 from rclpy.qos import ReliabilityPolicy
+from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
+from node_runner import LATCHED
 from quad_description import FEET, movable_joints, Pose, pose_positions, robot_urdf
 from quad_hardware.joints import LimiterSettings
 from quad_hardware.joints.command import MAX_PERIOD
@@ -127,6 +129,20 @@ def test_a_servo_beyond_its_limits_is_left_there_and_reported(rig: NodeRig) -> N
     rig.stream(HOME, 0.8)
     assert rig.peer.angles[13] == pytest.approx(0.0, abs=0.1)
     assert rig.largest_step() <= LARGEST_STEP + 0.01
+
+
+def test_joints_that_were_never_checked_do_not_move(rig: NodeRig) -> None:
+    """Commands are refused, and the controller receives why the robot must not stand up."""
+    problems = rig.client.listen(String, '/servo_problem', LATCHED)
+    rig.restart('-p', 'joints_checked:=false')
+    rig.client.spin_until(
+        lambda: any('never checked' in problem.data for problem in problems), TIMEOUT, 'problem'
+    )
+    rig.command(POSE)
+    rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'calibrate first-motion')
+    assert rig.peer.commands == []
+    rig.restart()
+    rig.client.spin_until(lambda: problems[-1].data == '', TIMEOUT, 'no problem')
 
 
 def test_silence_holds_the_servos(rig: NodeRig) -> None:

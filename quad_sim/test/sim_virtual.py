@@ -4,7 +4,20 @@
 
 from __future__ import annotations
 
-from quad_hardware.protocol import Frame, Protocol, ROBOT_KINDS, StreamParser, V2
+from collections.abc import Mapping
+
+from quad_hardware.link.v1_dialect import V1Dialect
+from quad_hardware.link.v2_dialect import V2Dialect
+from quad_hardware.protocol import (
+    Frame,
+    LEG_MOTORS,
+    Protocol,
+    ROBOT_KINDS,
+    StreamParser,
+    V1,
+    V2,
+)
+from quad_hardware.report import Report
 from quad_sim.options import build, parse_arguments
 
 TICK = 0.001  # [s]
@@ -41,3 +54,59 @@ class VirtualRobot:
         """Send a frame and return what comes within 20 ms."""
         self.send(frame)
         return self.run(0.02)
+
+
+class Line:
+    """A robot on its serial line, bytes and all, in virtual time."""
+
+    def __init__(self, *arguments: str, protocol: Protocol) -> None:
+        self.robot = VirtualRobot(*arguments, protocol=protocol)
+        self.dialect = (V1Dialect if protocol is V1 else V2Dialect)(0.0)
+        self._reports: list[Report] = []
+        self._first: dict[int, float] = {}
+        self.swung: set[int] = set()  # motors that were sent anywhere
+
+    def now(self) -> float:
+        """Return the virtual time [s]."""
+        return self.robot.now
+
+    def wait_until(self, moment: float) -> None:
+        """Let the time pass."""
+        while self.robot.now < moment:
+            self._pass()
+
+    def _pass(self) -> float:
+        sent = -1.0
+        now, commanding = self.robot.now, self.dialect.pending
+        if data := self.dialect.step(now).send:
+            self.robot.line.receive(data, now)
+            if commanding and not self.dialect.pending:
+                sent = now + self.dialect.protocol.wire_time(len(data))
+        for frame in self.robot.run(TICK):
+            if report := self.dialect.handle_frame(frame, self.robot.now):
+                self._reports.append(report)
+        return sent
+
+    def command(self, angles: Mapping[int, float]) -> float:
+        """Send angles [deg]; return when they had left."""
+        self.swung |= {m for m, a in angles.items() if a != self._first.setdefault(m, a)}
+        self.dialect.command(angles)
+        while (sent := self._pass()) < 0.0:
+            pass
+        return sent
+
+    def rounded(self, motor: int, angle: float) -> float:
+        """Return an angle as the line brings it [deg]."""
+        span = self.dialect.spans.get(motor)
+        return angle if span is None else span.decode(span.encode(angle))
+
+    def reports(self) -> list[Report]:
+        """Return the reports since."""
+        reports, self._reports = self._reports, []
+        return reports
+
+    def angles(self) -> dict[int, float]:
+        """Return the angles of now [deg]."""
+        self.wait_until(self.robot.now + 0.1)
+        found = self._reports[-1].positions
+        return {motor: found[motor] for motor in LEG_MOTORS}

@@ -14,8 +14,10 @@ from typing import Any, cast
 from quad_description import LEGS, movable_joints, PRESETS, robot_urdf, run_command
 
 from ..exceptions import CommandError, HardwareError
-from ..joints import servo_of
+from ..joints import JointServo, servo_of
 from ..link import AUTO, DEFAULT_PORT, LinkOptions, MODEL_CHOICES, PROTOCOL_CHOICES
+from ..protocol import LEG_MOTORS
+from ..serial_robot import JOINTS_CHECKED
 from .imu import calibrate_imu
 from .parameter_file import imu_parameters, read_parameters, servo_parameters, write_parameters
 from .robot import limp_robot
@@ -68,7 +70,7 @@ def _joints(options: argparse.Namespace, console: Console) -> None:
         console.write('the servos hold again, where they are')
     if found == chosen and not options.zero_only:
         raise CancelledError('every joint was skipped; nothing was written')
-    write_parameters(options.output, servo_parameters(found))
+    write_parameters(options.output, {**servo_parameters(found), JOINTS_CHECKED: False})
 
 
 def _imu(options: argparse.Namespace, console: Console) -> None:
@@ -100,15 +102,46 @@ def _servos(options: argparse.Namespace, console: Console) -> None:
     known = {} if options.calibration is None else read_parameters(options.calibration)
     if options.calibration is not None and not known:
         raise CommandError(f'{options.calibration} is no file of calibrate joints')
-    joints = cast('Mapping[str, Mapping[str, Any]]', known.get('joints', {}))
-    servos = [
-        replace(servo_of(joint), **joints.get(joint.name, {})) for joint in movable_joints(urdf)
-    ]
+    servos = _calibrated(urdf, known)
     with limp_robot(_link(options), [servo.motor for servo in servos]) as robot:
         calibrate_servos(console, robot, servos, urdf, options.leg, repeat=options.repeat)
 
 
-_PARTS = {'joints': _joints, 'imu': _imu, 'odometry': _odometry, 'servos': _servos}
+def _calibrated(urdf: str, known: Mapping[str, object]) -> list[JointServo]:
+    """Return the servos of all joints, by the parameters that are known of them."""
+    joints = cast('Mapping[str, Mapping[str, Any]]', known.get('joints', {}))
+    return [
+        replace(servo_of(joint), **joints.get(joint.name, {})) for joint in movable_joints(urdf)
+    ]
+
+
+def _first_motion(options: argparse.Namespace, console: Console) -> None:
+    from operator_input import Keyboard, TerminalError
+
+    from .first_motion import check_joint
+
+    urdf = robot_urdf(options.preset, options.arm)
+    servos = _calibrated(urdf, read_parameters(options.output))
+    with limp_robot(_link(options), [servo.motor for servo in servos]) as robot:
+        console.prompt(
+            'Put the trunk on a stand, so that all legs hang free; each joint of them will move '
+            'by 10 degrees, while you hold a key. Enter begins; Ctrl-C leaves'
+        )
+        try:
+            for servo in (each for each in servos if each.motor in LEG_MOTORS):
+                check_joint(console, robot, Keyboard, servo)
+        except TerminalError as error:
+            raise CommandError(str(error)) from error
+    write_parameters(options.output, {JOINTS_CHECKED: True})
+
+
+_PARTS = {
+    'joints': _joints,
+    'first-motion': _first_motion,
+    'imu': _imu,
+    'odometry': _odometry,
+    'servos': _servos,
+}
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -117,13 +150,16 @@ def _parser() -> argparse.ArgumentParser:
     joints = kinds.add_parser(
         'joints', help='signs, offsets and limits; moves joints by hand', allow_abbrev=False
     )
+    first = kinds.add_parser(
+        'first-motion', help='each joint moves while a key is held', allow_abbrev=False
+    )
     imu = kinds.add_parser(
         'imu', help='how the IMU is mounted; tilts the robot by hand', allow_abbrev=False
     )
     servos = kinds.add_parser(
         'servos', help='stiffness, play and delay; one leg swings', allow_abbrev=False
     )
-    for kind in (joints, imu, servos):
+    for kind in (joints, first, imu, servos):
         kind.add_argument('--port', default=DEFAULT_PORT, help='of the robot (%(default)s)')
         kind.add_argument(
             '--protocol',
@@ -137,7 +173,7 @@ def _parser() -> argparse.ArgumentParser:
             default=AUTO,
             help='ranges of protocol v1 (%(default)s)',
         )
-    for kind in (joints, servos):
+    for kind in (joints, first, servos):
         kind.add_argument('--preset', choices=PRESETS, default='lite', help='(%(default)s)')
         kind.add_argument('--arm', action='store_true', help='with the arm on its back')
     servos.add_argument('--calibration', type=Path, help='file of calibrate joints')
@@ -154,7 +190,7 @@ def _parser() -> argparse.ArgumentParser:
     odometry.add_argument('--axis', choices=('x', 'y'), default='x', help='(%(default)s)')
     odometry.add_argument('--distance', type=_positive, default=1.0, help='[m] (%(default)s)')
     odometry.add_argument('--speed', type=_positive, default=0.15, help='[m/s] (%(default)s)')
-    for kind in (joints, imu, odometry):
+    for kind in (joints, first, imu, odometry):
         kind.add_argument(
             '--output', type=Path, default=DEFAULT_FILE, help='parameter file (%(default)s)'
         )

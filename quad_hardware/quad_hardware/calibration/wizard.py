@@ -134,7 +134,7 @@ def calibrate_joints(
 def _calibrate(
     console: Console, robot: LimpRobot, servo: JointServo, *, limits: bool
 ) -> JointServo:
-    zero_place, direction = _place_of(servo.joint)
+    zero_place, direction = place_of(servo.joint)
     while True:
         console.write(f'\n{servo.joint} (motor {servo.motor})')
         answer = console.prompt(f'  hold it at zero: {zero_place}. Enter; s skips it')
@@ -184,7 +184,8 @@ def _ends(console: Console, robot: LimpRobot, servo: JointServo) -> JointServo:
     return with_limits(servo, one, robot.angles()[servo.motor])
 
 
-def _place_of(joint: str) -> tuple[str, str]:
+def place_of(joint: str) -> tuple[str, str]:
+    """Return what zero of a joint looks like, and what moves it the positive way."""
     if joint.startswith('arm') and 'yaw' not in joint:
         return _ARM_PLACE
     return next((place for word, place in _PLACES.items() if word in joint), _ARM_PLACE)

@@ -24,7 +24,7 @@ from ..joints import JointMap, JointServo, LimiterSettings, LossReaction, servo_
 from ..link import AUTO, DEFAULT_PORT, LinkOptions, MODEL_CHOICES, PROTOCOL_CHOICES
 from ..link.vendor import is_installed, VENDOR
 from ..protocol import Protocol, PROTOCOLS
-from ..serial_robot import RobotSettings
+from ..serial_robot import JOINTS_CHECKED, RobotSettings
 
 THREAD_PRIORITY = 50  # SCHED_FIFO: replies of the robot are read and commands sent at once
 
@@ -104,6 +104,11 @@ def declare_parameters(node: Node) -> NodeSettings:
             'what the robot does when commands break off with a leg in the air',
         ),
         black_box=declare_black_box(read),
+        joints_checked=read.flag(
+            JOINTS_CHECKED,
+            default=False,
+            meaning='each joint has moved as its servo says (calibrate first-motion)',
+        ),
         serial_log=_serial_log(read),
     )
     settings = NodeSettings(
