@@ -19,6 +19,7 @@ import pytest
 from arm_model import (
     Box,
     Capsule,
+    Cells,
     Clearances,
     CollisionObject,
     compiled_scene,
@@ -66,6 +67,33 @@ def scene_with(shape: Shape, pose: Pose, name: str = 'panda') -> PlanningScene:
     return scene.with_contents(padding={link: PADDING})
 
 
+def crowd(seed: int) -> PlanningScene:
+    """An arm among many things and a cloud of cells; one link may touch one thing."""
+    draw = np.random.default_rng(seed)
+    shapes: list[Shape] = [
+        Box(0.03, 0.05, 0.1),
+        Sphere(0.03),
+        Cylinder(0.02, 0.2),
+        Cone(0.05, 0.1),
+    ]
+    shapes.append(Mesh(0.1 * draw.random((20, 3))))
+    cells = Cells(np.array(0.04 * (draw.integers(-30, 30, (50, 3)) + 0.5)), 0.04)
+    things = [
+        CollisionObject(f'thing{number}', shapes[number % len(shapes)], pose=place)
+        for number, place in enumerate(_places(draw, 24))
+    ]
+    tilted = Pose(rotation_of(np.array((0.1, 0.2, 0.3, 0.927))), draw.normal(0.0, 0.1, 3))
+    things.append(CollisionObject('cells', cells, pose=tilted))
+    scene = robot('panda').scene.with_contents(objects={thing.name: thing for thing in things})
+    return scene.allowing(list(scene.link_shapes)[-1], 'thing0')
+
+
+def _places(draw: np.random.Generator, count: int) -> list[Pose]:
+    turns = draw.normal(size=(count, 4))
+    turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+    return [Pose(rotation_of(turn), draw.uniform(-1.2, 1.2, 3)) for turn in turns.tolist()]
+
+
 def core(scene: PlanningScene) -> CompiledScene:
     """The compiled core of a scene; machines for tests have a compiler."""
     found = compiled_scene(scene)
@@ -77,7 +105,18 @@ def core(scene: PlanningScene) -> CompiledScene:
 @settings(max_examples=60, deadline=None)
 def test_distances_are_those_of_coal(shape: Shape, pose: Pose, seed: int) -> None:
     """Never above, hardly below; what overlaps there has no distance here."""
-    scene = scene_with(shape, pose)
+    agrees_with_coal(scene_with(shape, pose), seed)
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=15, deadline=None)
+def test_distances_in_a_crowd_are_those_of_coal(seed: int) -> None:
+    """Also where most shapes are not looked at one by one."""
+    agrees_with_coal(crowd(seed), seed)
+
+
+def agrees_with_coal(scene: PlanningScene, seed: int) -> None:
+    """Compare the distances at a random place."""
     limits = robot('panda').limits
     place = np.random.default_rng(seed).uniform(limits.lower, limits.upper)
     results = Clearances(scene).measure(place, range(len(scene.pairs)))
@@ -92,22 +131,26 @@ def test_distances_are_those_of_coal(shape: Shape, pose: Pose, seed: int) -> Non
         assert core(scene).clear(place, within) == bool((found >= within).all())
 
 
-@pytest.mark.parametrize('name', ['panda', 'prbt', 'gp110'])
+@pytest.mark.parametrize('name', ['panda', 'prbt', 'gp110', 'crowd'])
 def test_a_free_edge_is_free_between_its_ends(name: str) -> None:
     """And what is not keeps less than it must, where the core says."""
-    model, draw = robot(name), np.random.default_rng(1)
-    scene = scene_with(Box(0.2, 0.5, 0.5), Pose(np.eye(3), np.array([0.6, 0.0, 0.4])), name)
+    if name == 'crowd':
+        model, scene, edges, looks = robot('panda'), crowd(1), 20, 40
+    else:
+        box, there = Box(0.2, 0.5, 0.5), Pose(np.eye(3), np.array([0.6, 0.0, 0.4]))
+        model, scene, edges, looks = robot(name), scene_with(box, there, name), 60, 200
+    draw = np.random.default_rng(1)
     checked, reference = core(scene), Clearances(scene)
     required = np.full(len(scene.pairs), 1e-3)
     answers: list[bool] = []
-    while len(answers) < 60:
+    while len(answers) < edges:
         begin = draw.uniform(model.limits.lower, model.limits.upper)
         if not checked.clear(begin, 1e-3):
             continue
         end = begin + draw.normal(size=len(begin)) * 0.3
         share = checked.edge(begin, end, required)
         if share is None:
-            for place in np.linspace(begin, end, 200):
+            for place in np.linspace(begin, end, looks):
                 assert reference.least(place, 0.0).min() >= 0.0
         else:
             place = begin + share * (end - begin)

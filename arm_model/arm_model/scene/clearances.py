@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from ..arrays import Array, Native, Places
+from ..arrays import Array, Native
 from .planning_scene import PlanningScene
 
 AT_ONCE = 100
@@ -70,9 +70,6 @@ class Clearances:
         self._centers = [  # a plane has none
             each.aabb_center if np.isfinite(each.aabb_radius) else np.zeros(3) for each in shapes
         ]
-        self._pair_shapes: Places = np.array(
-            [(each.first, each.second) for each in scene.geometry.collisionPairs], int
-        ).reshape(-1, 2)
         self._distances: Array = np.full(len(scene.pairs), -np.inf)
         self._places: Array = np.zeros_like(scene.distance_rate_bounds)
 
@@ -126,7 +123,7 @@ class Clearances:
         self._place(positions)
         placed = zip(self._results.oMg, self._centers, strict=True)
         centers = np.array([placement.act(center) for placement, center in placed])
-        first, second = self._pair_shapes.T
+        first, second = self._scene.pair_shapes.T
         between = np.linalg.norm(centers[first] - centers[second], axis=1)
         apart: Array = between - self._radii[first] - self._radii[second]
         return apart

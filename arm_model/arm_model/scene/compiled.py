@@ -39,6 +39,7 @@ KINDS = {
     coal.Cone: 4,
     coal.Convex: 5,
     coal.Halfspace: 6,
+    coal.OcTree: 7,
 }
 """Numbers of the shapes in motions.c."""
 
@@ -64,6 +65,7 @@ class CompiledScene:
             joints,
             columns,
             shapes,
+            scene.geometry.ngeoms,
             pairs,
             points,
             *(_pointer(each) for each in arguments),
@@ -183,10 +185,10 @@ class CompiledSearch:
 
 
 def compiled_scene(scene: PlanningScene) -> CompiledScene | None:
-    """Return a scene for the compiled core; None without a core, or for octrees."""
+    """Return a scene for the compiled core; None without a core, or without pairs."""
     with LOADING:
         loaded = library()
-    if loaded is None or scene.of_cells.any() or not scene.pairs:
+    if loaded is None or not scene.pairs:
         return None
     return CompiledScene(loaded, scene)
 
@@ -202,7 +204,7 @@ def library() -> Native | None:
         getattr(loaded, name).restype = ctypes.c_void_p
     pointer, number, real = ctypes.c_void_p, ctypes.c_int, ctypes.c_double
     for name, arguments in {
-        'world_new': [number] * 5 + [pointer] * 15,
+        'world_new': [number] * 6 + [pointer] * 16,
         'world_free': [pointer],
         'world_least': [pointer, pointer, real, pointer],
         'world_state': [pointer, pointer, real],
@@ -247,7 +249,10 @@ def _screw(model: Native, joint: int) -> Array:
 
 
 def _shapes(scene: PlanningScene) -> Sequence[Array | Integers]:
-    """Return kinds, movers, placements, sizes, swept, starts of corners, corners, and pairs."""
+    """Return kinds, movers, placements, sizes, swept, owners, starts of corners, corners, pairs.
+
+    The cells of octrees are boxes behind all other shapes, owned by their octrees.
+    """
     things = list(scene.geometry.geometryObjects)
     kinds, sizes, swept, corners = [], [], [], []
     for thing in things:
@@ -261,20 +266,36 @@ def _shapes(scene: PlanningScene) -> Sequence[Array | Integers]:
             size = [*solid.n.tolist(), solid.d]
         rounded = radius if isinstance(solid, coal.Sphere | coal.Capsule) else 0.0
         sizes.append(size)
-        swept.append(rounded + solid.getSweptSphereRadius())
+        padding = 0.0 if isinstance(solid, coal.OcTree) else solid.getSweptSphereRadius()
+        swept.append(rounded + padding)
         corners.append(solid.points() if isinstance(solid, coal.Convex) else NO_POINTS)
-    counts = [len(each) for each in corners]
-    pairs = [(pair.first, pair.second) for pair in scene.geometry.collisionPairs]
+    placements = np.array([_numbers(thing.placement) for thing in things])
+    owners, middles, cells = _cells(scene)
+    counts = [*map(len, corners), *[0] * len(owners)]
     return [
-        np.array(kinds, np.int32),
-        np.array([thing.parentJoint - 1 for thing in things], np.int32),
-        np.array([_numbers(thing.placement) for thing in things]),
-        np.array(sizes),
-        np.array(swept),
+        np.array(kinds + [KINDS[coal.Box]] * len(owners), np.int32),
+        np.array([*(each.parentJoint - 1 for each in things), *[-1] * len(owners)], np.int32),
+        np.concatenate((placements, middles)),
+        np.concatenate((sizes, cells)),
+        np.concatenate((swept, np.zeros(len(owners)))),
+        np.concatenate((np.arange(len(things)), owners)).astype(np.int32),
         np.concatenate(((0,), np.cumsum(counts))).astype(np.int32),
         np.ascontiguousarray(np.concatenate(corners)),
-        np.array(pairs, np.int32),
+        scene.pair_shapes.astype(np.int32),
     ]
+
+
+def _cells(scene: PlanningScene) -> tuple[Array, Array, Array]:
+    """Return numbers of the octrees of cells (c), placements (c, 12) and sizes (c, 4)."""
+    owners, placements, sizes = [np.zeros(0)], [np.zeros((0, 12))], [np.zeros((0, 4))]
+    for number, cells in scene.octrees.items():
+        place, count = scene.geometry.geometryObjects[number].placement, len(cells.middles)
+        middles = cells.middles @ place.rotation.T + place.translation
+        turned = np.tile(place.rotation.ravel(), (count, 1))
+        owners.append(np.full(count, number))
+        placements.append(np.concatenate((turned, middles), axis=1))
+        sizes.append(np.tile((*[0.5 * cells.edge] * 3, 0.0), (count, 1)))
+    return np.concatenate(owners), np.concatenate(placements), np.concatenate(sizes)
 
 
 def _numbers(placement: pin.SE3) -> Array:

@@ -7,6 +7,9 @@
    min n.b of one shape and max n.a of the other. GJK only chooses n, so nothing depends on its
    convergence: "free" is certain, "not free" may be cautious where it did not converge.
 
+   What stands still is in a tree of boxes: a moving shape is compared with a node, and with what is
+   below it only where the node is too near to prove anything.
+
    Conventions: lengths in [m], angles in [rad]. A placement is 12 numbers, the rotation by rows and
    the origin. One world belongs to one thread. Functions that can fail for want of memory return
    -1 or a null pointer. */
@@ -15,8 +18,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BOX, POINT, SEGMENT, CYLINDER, CONE, HULL, HALF_SPACE };
-enum { MAX_GJK = 64 };
+enum { BOX, POINT, SEGMENT, CYLINDER, CONE, HULL, HALF_SPACE, CELLS };
+enum { MAX_GJK = 64, LEAF = 4, MAX_STACK = 256 }; /* LEAF: shapes below a node at most */
 
 #define CONVERGED 1e-5      /* gap between bounds of a distance that ends GJK [m] */
 #define CONVERGED_NEAR 1e-8 /* the same where shapes nearly touch [m] */
@@ -26,6 +29,9 @@ enum { MAX_GJK = 64 };
 #define OVERLAP -1.0        /* what stands for the distance of shapes that overlap [m] */
 #define MIN_MARGIN 1e-4     /* motion within a part that is not cut any further [m] */
 #define FAR 0.01            /* with a quarter of what is asked for: a bound that will do [m] */
+#ifndef COARSE
+#define COARSE 0.125        /* half length of a node that is opened, by the motion in doubt */
+#endif
 #define SAME 1e-9           /* distance of states that are one [rad] */
 
 typedef struct {
@@ -34,9 +40,24 @@ typedef struct {
   double size[4];            /* half lengths, or radius and half length, or plane */
   double swept;              /* how far the shape reaches beyond what the above describes */
   double local[12], world[12];
-  double middle[3], radius;  /* sphere that holds it, in its own frame; radius < 0 for none */
-  double center[3];          /* middle of that in the root link */
+  double middle[3], radius;  /* sphere that holds it, in its own frame */
+  double half[3];            /* half lengths of a box about that, without what is swept */
+  double center[3], span[3]; /* box along the axes of the root link that holds it */
+  int owner, mover;          /* number that its pairs know it by, and among what moves or -1 */
 } Shape;
+
+/* A box along the axes of the root link that holds shapes which stand still. */
+typedef struct {
+  double center[3], span[3];
+  int first, count; /* of those shapes, in `still` */
+  int below;        /* first of two nodes that share them, 0 for none */
+} Node;
+
+/* What may come near: a pair (mover < 0), or a moving shape and a node, or the one after all
+   nodes and what stands still. */
+typedef struct {
+  int mover, which;
+} Item;
 
 typedef struct {
   int first, second;
@@ -45,23 +66,27 @@ typedef struct {
 
 typedef struct {
   double middle, half;
-  int first, count; /* of the pairs in doubt, in the arena */
+  int first, count; /* of the items in doubt, in the arena; first < 0 for the roots */
 } Part;
 
 typedef struct {
-  int joints, columns, shapes, pairs, points;
+  int joints, columns, shapes, owners, pairs, points, movers, nodes, roots;
   double *factors, *offsets, *placements, *axes, *poses;
   int *parents, *slides;
   Shape *shape;
   Pair *pair;
   double *x, *y, *z, *dots; /* points of hulls, by coordinate */
   double *rates;            /* how fast each joint changes a pair's distance at most */
-  double *motions, *left, *state, *way, *turns; /* turns: four rows */
+  double *fastest;          /* the same of all pairs of a mover with what stands still */
+  double *state, *way, *turns; /* turns: four rows */
+  int *moving, *still, *pair_of; /* shapes; pair of a mover and an owner that stands still, or -1 */
+  Node *node;
+  Item *root;
   Part *parts;
   int part_room;
-  int *arena;
+  Item *arena;
   int arena_room;
-  int hit; /* pair that was found too near last */
+  Item hit; /* what was found too near last */
 } World;
 
 static double dot(const double *a, const double *b) {
@@ -228,10 +253,20 @@ static int reduce(double simplex[4][3], int count, double *v) {
   return left;
 }
 
-/* A lower bound of the distance of a pair: at least `enough`, or exact but for CONVERGED. */
-static double distance(World *w, int number, double enough) {
-  Pair *pair = w->pair + number;
-  const Shape *a = w->shape + pair->first, *b = w->shape + pair->second;
+/* A lower bound of the distance of two boxes along the same axes; -HUGE where they overlap. */
+static double between_boxes(const double *center, const double *span, const double *other,
+                            const double *its_span) {
+  double sum = 0.0;
+  for (int i = 0; i < 3; i++) {
+    double gap = fabs(center[i] - other[i]) - span[i] - its_span[i];
+    if (gap > 0.0) sum += gap * gap;
+  }
+  return sum > 0.0 ? sqrt(sum) : -HUGE;
+}
+
+/* A lower bound of the distance of two shapes: at least `enough`, or exact but for CONVERGED.
+   direction: the last one that parted them, in the frame of the first. */
+static double between(World *w, const Shape *a, const Shape *b, double *direction, double enough) {
   double swept = a->swept + b->swept, least = -HUGE, b_in_a[12], apart[3], v[3];
   double simplex[4][3];
   int count = 0;
@@ -250,6 +285,8 @@ static double distance(World *w, int number, double enough) {
   minus(b->center, a->center, apart);
   least = sqrt(dot(apart, apart)) - a->radius - b->radius; /* which hold what is swept, too */
   if (least >= enough) return least;
+  least = fmax(least, between_boxes(a->center, a->span, b->center, b->span));
+  if (least >= enough) return least;
   for (int i = 0; i < 3; i++) {
     for (int j = 0; j < 3; j++) {
       b_in_a[3 * i + j] = a->world[i] * b->world[j] + a->world[3 + i] * b->world[3 + j] +
@@ -258,7 +295,7 @@ static double distance(World *w, int number, double enough) {
   }
   minus(b->world + 9, a->world + 9, apart);
   turn_back(a->world, apart, b_in_a + 9);
-  memcpy(v, pair->direction, sizeof v);
+  memcpy(v, direction, sizeof v);
   if (dot(v, v) == 0.0) turn_back(a->world, apart, v);
   if (dot(v, v) == 0.0) v[0] = 1.0;
   for (int step = 0; step < MAX_GJK; step++) {
@@ -269,7 +306,7 @@ static double distance(World *w, int number, double enough) {
     gap = dot(d, simplex[count]) - swept;
     if (gap > least) {
       least = gap;
-      memcpy(pair->direction, d, sizeof d);
+      memcpy(direction, d, sizeof d);
       if (least >= enough) return least;
     }
     if (count && most - least <= (least < NEAR ? CONVERGED_NEAR : CONVERGED)) return least;
@@ -287,6 +324,17 @@ static double distance(World *w, int number, double enough) {
     if (step && length - swept >= most - 1e-14) return least; /* no nearer any more */
   }
   return least;
+}
+
+/* Put a shape where its joint has it. */
+static void put(Shape *s) {
+  turn(s->world, s->middle, s->center);
+  for (int i = 0; i < 3; i++) {
+    const double *row = s->world + 3 * i;
+    s->center[i] += s->world[9 + i];
+    s->span[i] = fabs(row[0]) * s->half[0] + fabs(row[1]) * s->half[1] +
+                 fabs(row[2]) * s->half[2] + s->swept;
+  }
 }
 
 /* Put all shapes where the joints have them. */
@@ -312,12 +360,10 @@ static void place(World *w, const double *q) {
     }
     compose(there, motion, w->poses + 12 * c);
   }
-  for (int i = 0; i < w->shapes; i++) {
-    Shape *s = w->shape + i;
-    if (s->joint < 0) continue;
+  for (int i = 0; i < w->movers; i++) {
+    Shape *s = w->shape + w->moving[i];
     compose(w->poses + 12 * s->joint, s->local, s->world);
-    turn(s->world, s->middle, s->center);
-    for (int j = 0; j < 3; j++) s->center[j] += s->world[9 + j];
+    put(s);
   }
 }
 
@@ -328,27 +374,34 @@ void world_free(World *w) {
   if (!w) return;
   free(w->factors), free(w->offsets), free(w->placements), free(w->axes), free(w->poses);
   free(w->parents), free(w->slides), free(w->shape), free(w->pair), free(w->x), free(w->y);
-  free(w->z), free(w->dots), free(w->rates), free(w->motions), free(w->left), free(w->state);
-  free(w->way), free(w->turns), free(w->parts), free(w->arena), free(w);
+  free(w->z), free(w->dots), free(w->rates), free(w->fastest), free(w->state), free(w->way);
+  free(w->turns), free(w->moving), free(w->still), free(w->pair_of), free(w->node);
+  free(w->root), free(w->parts), free(w->arena), free(w);
 }
 
-/* Fill in the sphere that holds a shape, with what is swept. */
+/* Fill in the sphere and the box that hold a shape, the sphere with what is swept. */
 static void enclose(const World *w, Shape *s) {
   double low[3], high[3];
   const double *size = s->size;
   s->radius = 0.0;
   switch (s->kind) {
-    case BOX: s->radius = sqrt(dot(size, size)); break;
-    case SEGMENT: s->radius = size[1]; break;
+    case BOX:
+      memcpy(s->half, size, sizeof s->half);
+      s->radius = sqrt(dot(size, size));
+      break;
+    case SEGMENT: s->radius = s->half[2] = size[1]; break;
     case CYLINDER:
-    case CONE: s->radius = hypot(size[0], size[1]); break;
+    case CONE:
+      s->half[0] = s->half[1] = size[0], s->half[2] = size[1];
+      s->radius = hypot(size[0], size[1]);
+      break;
     case HULL:
       for (int j = 0; j < 3; j++) {
         const double *axis = j == 0 ? w->x : j == 1 ? w->y : w->z;
         low[j] = HUGE, high[j] = -HUGE;
         for (int i = s->first; i < s->first + s->count; i++)
           low[j] = fmin(low[j], axis[i]), high[j] = fmax(high[j], axis[i]);
-        s->middle[j] = 0.5 * (low[j] + high[j]);
+        s->middle[j] = 0.5 * (low[j] + high[j]), s->half[j] = 0.5 * (high[j] - low[j]);
       }
       for (int i = s->first; i < s->first + s->count; i++) {
         double point[3] = {w->x[i], w->y[i], w->z[i]}, away[3];
@@ -361,28 +414,118 @@ static void enclose(const World *w, Shape *s) {
   s->radius += s->swept;
 }
 
-World *world_new(int joints, int columns, int shapes, int pairs, int points,
+/* Order shapes so that the one at a place has none above it before it, along an axis. */
+static void select_place(const World *w, int *these, int count, int place, int axis) {
+  int low = 0, high = count - 1;
+  while (low < high) {
+    double pivot = w->shape[these[(low + high) / 2]].center[axis];
+    int i = low, j = high;
+    while (i <= j) {
+      while (w->shape[these[i]].center[axis] < pivot) i++;
+      while (w->shape[these[j]].center[axis] > pivot) j--;
+      if (i <= j) {
+        int other = these[i];
+        these[i++] = these[j], these[j--] = other;
+      }
+    }
+    if (place <= j) high = j;
+    else if (place >= i) low = i;
+    else return;
+  }
+}
+
+/* Make a node of shapes that stand still, and those below it. */
+static void make_node(World *w, int number, int first, int count) {
+  Node *node = w->node + number;
+  int axis = 0, *these = w->still + first, below;
+  double low[3] = {HUGE, HUGE, HUGE}, high[3] = {-HUGE, -HUGE, -HUGE};
+  for (int i = 0; i < count; i++) {
+    const Shape *s = w->shape + these[i];
+    for (int j = 0; j < 3; j++) {
+      low[j] = fmin(low[j], s->center[j] - s->span[j]);
+      high[j] = fmax(high[j], s->center[j] + s->span[j]);
+    }
+  }
+  for (int j = 0; j < 3; j++) {
+    node->center[j] = 0.5 * (low[j] + high[j]), node->span[j] = 0.5 * (high[j] - low[j]);
+    if (node->span[j] > node->span[axis]) axis = j;
+  }
+  node->first = first, node->count = count, node->below = 0;
+  if (count <= LEAF) return;
+  node->below = below = w->nodes, w->nodes += 2;
+  select_place(w, these, count, count / 2, axis);
+  make_node(w, below, first, count / 2);
+  make_node(w, below + 1, first + count / 2, count - count / 2);
+}
+
+/* Sort the pairs: those of what moves and what stands still go by the tree. -1 without memory. */
+static int plant(World *w) {
+  int owners = w->owners, n = w->joints, stills = 0, with_tree = 0;
+  for (int i = 0; i < w->shapes; i++) {
+    if (w->shape[i].joint >= 0) w->shape[i].mover = w->movers, w->moving[w->movers++] = i;
+  }
+  w->pair_of = ints(w->movers * owners), w->fastest = doubles(w->movers * n);
+  w->root = calloc(w->pairs + w->movers + 1, sizeof *w->root);
+  if (!w->pair_of || !w->fastest || !w->root) return -1;
+  for (int i = 0; i < w->movers * owners; i++) w->pair_of[i] = -1;
+  for (int i = 0; i < w->pairs; i++) {
+    const Shape *a = w->shape + w->pair[i].first, *b = w->shape + w->pair[i].second;
+    const Shape *mover = a->mover >= 0 ? a : b, *other = mover == a ? b : a;
+    if (other->mover >= 0 || mover->kind == HALF_SPACE || other->kind == HALF_SPACE) {
+      w->root[w->roots++] = (Item){-1, i};
+      continue;
+    }
+    w->pair_of[mover->mover * owners + other->owner] = i;
+    for (int j = 0; j < n; j++) {
+      double *most = w->fastest + mover->mover * n + j;
+      *most = fmax(*most, w->rates[i * n + j]);
+    }
+  }
+  for (int i = 0; i < w->shapes; i++) {
+    const Shape *s = w->shape + i;
+    int paired = 0;
+    if (s->mover >= 0 || s->kind == HALF_SPACE || s->kind == CELLS) continue;
+    for (int m = 0; m < w->movers && !paired; m++) paired = w->pair_of[m * owners + s->owner] >= 0;
+    if (paired) w->still[stills++] = i;
+  }
+  w->node = calloc(2 * stills + 2, sizeof *w->node);
+  if (!w->node) return -1;
+  if (!stills) return 0;
+  w->nodes = 1;
+  make_node(w, 0, 0, stills);
+  for (int m = 0; m < w->movers; m++) {
+    with_tree = 0;
+    for (int i = 0; i < owners && !with_tree; i++) with_tree = w->pair_of[m * owners + i] >= 0;
+    if (with_tree) w->root[w->roots++] = (Item){m, 0};
+  }
+  return 0;
+}
+
+/* Make a world. owners: number of the shape that a cell is part of, of others their own; pairs
+   are of the first `known` shapes. */
+World *world_new(int joints, int columns, int shapes, int known, int pairs, int points,
                  const double *factors, const double *offsets, const int *parents,
                  const int *slides, const double *placements, const double *axes,
                  const int *kinds, const int *movers, const double *locals, const double *sizes,
-                 const double *swept, const int *starts, const double *corners,
-                 const int *members, const double *rates) {
+                 const double *swept, const int *owners, const int *starts,
+                 const double *corners, const int *members, const double *rates) {
   World *w = calloc(1, sizeof *w);
   if (!w) return NULL;
   w->joints = joints, w->columns = columns, w->shapes = shapes, w->pairs = pairs;
-  w->points = points, w->hit = -1;
+  w->points = points, w->owners = known, w->hit = (Item){-1, -1};
   w->factors = doubles(columns * joints), w->offsets = doubles(columns);
   w->placements = doubles(12 * columns), w->axes = doubles(3 * columns);
   w->poses = doubles(12 * columns), w->parents = ints(columns), w->slides = ints(columns);
   w->shape = calloc(shapes + 1, sizeof *w->shape), w->pair = calloc(pairs + 1, sizeof *w->pair);
   w->x = doubles(points), w->y = doubles(points), w->z = doubles(points);
-  w->dots = doubles(points), w->rates = doubles(pairs * joints), w->motions = doubles(pairs);
-  w->left = doubles(pairs), w->state = doubles(joints), w->way = doubles(joints);
-  w->turns = doubles(4 * joints), w->part_room = 64, w->arena_room = 4 * pairs + 64;
-  w->parts = calloc(w->part_room, sizeof *w->parts), w->arena = ints(w->arena_room);
+  w->dots = doubles(points), w->rates = doubles(pairs * joints), w->state = doubles(joints);
+  w->way = doubles(joints), w->turns = doubles(4 * joints), w->moving = ints(shapes);
+  w->still = ints(shapes), w->part_room = 64, w->arena_room = 1024;
+  w->parts = calloc(w->part_room, sizeof *w->parts);
+  w->arena = calloc(w->arena_room, sizeof *w->arena);
   if (!(w->factors && w->offsets && w->placements && w->axes && w->poses && w->parents &&
         w->slides && w->shape && w->pair && w->x && w->y && w->z && w->dots && w->rates &&
-        w->motions && w->left && w->state && w->way && w->turns && w->parts && w->arena)) {
+        w->state && w->way && w->turns && w->moving && w->still && w->parts && w->arena)) {
     world_free(w);
     return NULL;
   }
@@ -398,56 +541,154 @@ World *world_new(int joints, int columns, int shapes, int pairs, int points,
   for (int i = 0; i < shapes; i++) {
     Shape *s = w->shape + i;
     s->kind = kinds[i], s->joint = movers[i], s->swept = swept[i];
+    s->owner = owners[i], s->mover = -1;
     s->first = starts[i], s->count = starts[i + 1] - starts[i];
     memcpy(s->size, sizes + 4 * i, sizeof s->size);
     memcpy(s->local, locals + 12 * i, sizeof s->local);
     memcpy(s->world, s->local, sizeof s->world);
     enclose(w, s);
-    turn(s->world, s->middle, s->center);
-    for (int j = 0; j < 3; j++) s->center[j] += s->world[9 + j];
+    put(s);
   }
   for (int i = 0; i < pairs; i++)
     w->pair[i].first = members[2 * i], w->pair[i].second = members[2 * i + 1];
+  if (plant(w) < 0) {
+    world_free(w);
+    return NULL;
+  }
   return w;
 }
 
-/* Write lower bounds of all distances: exact ones below `within`. */
-void world_least(World *w, const double *q, double within, double *out) {
-  place(w, q);
-  for (int i = 0; i < w->pairs; i++) out[i] = distance(w, i, within);
+/* The pair to which an item belongs; -1 where it is a node, or what is not checked. */
+static int pair_of(const World *w, Item item) {
+  if (item.mover < 0) return item.which;
+  if (item.which < w->nodes) return -1;
+  return w->pair_of[item.mover * w->owners + w->shape[w->still[item.which - w->nodes]].owner];
 }
 
-/* The first pair whose distance is below what is required, -1 for none. */
-int world_state(World *w, const double *q, double required) {
+/* A lower bound of the distance of a pair, by the item that has its shapes. */
+static double distance(World *w, Item item, int pair, double enough) {
+  Pair *p = w->pair + pair;
+  const Shape *a = w->shape + p->first, *b = w->shape + p->second;
+  double none[3] = {0.0, 0.0, 0.0};
+  if (item.mover >= 0)
+    a = w->shape + w->moving[item.mover], b = w->shape + w->still[item.which - w->nodes];
+  return between(w, a, b, b - w->shape < w->owners ? p->direction : none, enough);
+}
+
+/* A lower bound of the distance of a moving shape from what is below a node. */
+static double node_distance(const World *w, Item item) {
+  const Shape *s = w->shape + w->moving[item.mover];
+  const Node *node = w->node + item.which;
+  static const double point[3] = {0.0, 0.0, 0.0};
+  return fmax(between_boxes(s->center, s->span, node->center, node->span),
+              between_boxes(s->center, point, node->center, node->span) - s->radius);
+}
+
+/* Whether a node is so large that what is below it may prove much more of a motion. */
+static int is_coarse(const World *w, Item item, double motion) {
+  const double *span = w->node[item.which].span;
+  return fmax(fmax(span[0], span[1]), span[2]) > COARSE * motion;
+}
+
+/* Write what is right below a node, and return how many. */
+static int open_node(const World *w, Item item, Item *out) {
+  const Node *node = w->node + item.which;
+  if (node->below) {
+    out[0] = (Item){item.mover, node->below}, out[1] = (Item){item.mover, node->below + 1};
+    return 2;
+  }
+  for (int i = 0; i < node->count; i++) out[i] = (Item){item.mover, w->nodes + node->first + i};
+  return node->count;
+}
+
+/* Look at all pairs: write lower bounds of their distances, exact ones below `within`; without
+   `out` return the first pair whose distance is below that, -1 for none. */
+static int look(World *w, const double *q, double within, double *out) {
   place(w, q);
-  for (int i = 0; i < w->pairs; i++) {
-    if (distance(w, i, required) < required) return i;
+  for (int i = 0; out && i < w->pairs; i++) out[i] = within;
+  for (int i = 0; i < w->roots; i++) {
+    Item stack[MAX_STACK] = {w->root[i]};
+    for (int count = 1; count > 0;) {
+      Item item = stack[--count];
+      int pair = pair_of(w, item);
+      double apart;
+      if (item.mover >= 0 && item.which < w->nodes) {
+        if (node_distance(w, item) < within) count += open_node(w, item, stack + count);
+        continue;
+      }
+      if (pair < 0) continue;
+      apart = distance(w, item, pair, within);
+      if (out) out[pair] = item.mover < 0 ? apart : fmin(out[pair], apart);
+      else if (apart < within) return pair;
+    }
   }
   return -1;
 }
 
-/* Sort pairs in doubt at a place into the arena; -1 where one is too near, -2 without memory.
-   `left` has the distances of those that stay in doubt. */
-static int doubtful(World *w, const Part *part, const double *required, const double *motions,
-                    double share, int *first) {
-  int kept = *first;
-  if (kept + part->count > w->arena_room) {
-    int room = 2 * (kept + part->count);
-    int *more = realloc(w->arena, sizeof(int) * room);
-    if (!more) return -2;
-    w->arena = more, w->arena_room = room;
-  }
+/* Write lower bounds of all distances: exact ones below `within`. */
+void world_least(World *w, const double *q, double within, double *out) {
+  look(w, q, within, out);
+}
+
+/* A pair whose distance is below what is required, -1 for none. */
+int world_state(World *w, const double *q, double required) {
+  return look(w, q, required, NULL);
+}
+
+/* How far shapes move at most, by how fast each joint does it and how far it turns. */
+static double moved_by(const double *rates, const double *turned, int n) {
+  double sum = 0.0;
+  for (int j = 0; j < n; j++) sum += rates[j] * turned[j];
+  return sum;
+}
+
+static double greatest(const double *values, int count) {
+  double most = -HUGE;
+  for (int i = 0; i < count; i++) most = values[i] > most ? values[i] : most;
+  return most;
+}
+
+/* Sort items in doubt at a place into the arena; -1 where one is too near, -2 without memory.
+
+   turned, share: how far the joints turn within the part, but for a factor; most: the greatest of
+   what is required; proved: least distance of what stays in doubt, or least share of its motion. */
+static int doubtful(World *w, const Part *part, const double *required, double most,
+                    const double *turned, double share, int of_motion, int first,
+                    double *proved) {
+  int kept = first, n = w->joints;
+  *proved = HUGE;
   for (int i = 0; i < part->count; i++) {
-    int pair = part->first < 0 ? i : w->arena[part->first + i];
-    double moved = share * motions[pair], need = fmax(moved, required[pair]);
-    double apart = distance(w, pair, fmin(need, fmax(required[pair], FAR + 0.25 * need)));
-    if (apart < required[pair]) {
-      w->hit = pair;
-      return -1;
+    Item stack[MAX_STACK] = {part->first < 0 ? w->root[i] : w->arena[part->first + i]};
+    for (int count = 1; count > 0;) {
+      Item item = stack[--count];
+      int pair = pair_of(w, item), is_node = item.mover >= 0 && item.which < w->nodes;
+      double moved, need, will_do, apart, keep;
+      if (pair < 0 && !is_node) continue;
+      keep = is_node ? most : required[pair];
+      moved = moved_by(is_node ? w->fastest + item.mover * n : w->rates + (size_t)pair * n,
+                       turned, n);
+      need = fmax(share * moved, keep);
+      will_do = fmin(need, fmax(keep, FAR + 0.25 * need));
+      apart = is_node ? node_distance(w, item) : distance(w, item, pair, will_do);
+      if (is_node && apart < will_do && (apart < keep || is_coarse(w, item, need))) {
+        count += open_node(w, item, stack + count);
+        continue;
+      }
+      if (apart < keep) {
+        w->hit = item;
+        return -1;
+      }
+      if (share * moved <= apart || share * moved <= MIN_MARGIN) continue;
+      *proved = fmin(*proved, of_motion ? apart / moved : apart);
+      if (kept == w->arena_room) {
+        Item *more = realloc(w->arena, sizeof *more * 2 * w->arena_room);
+        if (!more) return -2;
+        w->arena = more, w->arena_room *= 2;
+      }
+      w->arena[kept++] = item;
     }
-    if (moved > apart && moved > MIN_MARGIN) w->left[pair] = apart, w->arena[kept++] = pair;
   }
-  return kept - *first;
+  return kept - first;
 }
 
 static int push(World *w, int *count, Part part) {
@@ -463,31 +704,26 @@ static int push(World *w, int *count, Part part) {
 /* Whether a straight motion keeps what is required: 1, 0 with the share of the way, -1. */
 int world_edge(World *w, const double *begin, const double *end, const double *required,
                double *where) {
-  int queued = 0, room = 0;
-  for (int j = 0; j < w->joints; j++) w->way[j] = end[j] - begin[j];
-  for (int i = 0; i < w->pairs; i++) {
-    double sum = 0.0;
-    for (int j = 0; j < w->joints; j++) sum += w->rates[i * w->joints + j] * fabs(w->way[j]);
-    w->motions[i] = sum;
-  }
-  if (w->hit >= 0 && w->hit < w->pairs) { /* what was in the way last is often again */
+  int queued = 0, room = 0, hit = w->hit.which < 0 ? -1 : pair_of(w, w->hit);
+  double most = greatest(required, w->pairs);
+  for (int j = 0; j < w->joints; j++)
+    w->way[j] = end[j] - begin[j], w->turns[j] = fabs(w->way[j]);
+  if (hit >= 0) { /* what was in the way last is often again */
     place(w, end);
-    if (distance(w, w->hit, required[w->hit]) < required[w->hit]) return *where = 1.0, 0;
+    if (distance(w, w->hit, hit, required[hit]) < required[hit]) return *where = 1.0, 0;
   }
-  if (!push(w, &queued, (Part){0.5, 0.5, -1, w->pairs})) return -1;
+  if (!push(w, &queued, (Part){0.5, 0.5, -1, w->roots})) return -1;
   for (int next = 0; next < queued; next++) {
     Part part = w->parts[next];
     int first = room, kept;
-    double proved = HUGE, rest;
+    double proved, rest;
     for (int j = 0; j < w->joints; j++) w->state[j] = begin[j] + part.middle * w->way[j];
     place(w, w->state);
-    kept = doubtful(w, &part, required, w->motions, part.half, &first);
+    kept = doubtful(w, &part, required, most, w->turns, part.half, 1, first, &proved);
     if (kept == -1) return *where = part.middle, 0;
     if (kept < 0) return -1;
     if (!kept) continue;
     room = first + kept;
-    for (int i = first; i < room; i++)
-      proved = fmin(proved, w->left[w->arena[i]] / w->motions[w->arena[i]]);
     rest = 0.5 * (part.half - fmax(proved, 0.0));
     if (!push(w, &queued, (Part){part.middle - part.half + rest, rest, first, kept}) ||
         !push(w, &queued, (Part){part.middle + part.half - rest, rest, first, kept}))
@@ -519,16 +755,16 @@ int world_path(World *w, int segments, const double *starts, const double *coeff
                int cells, const double *times, const double *along, const double *turned,
                double first_part, const double *required, double *where) {
   int queued = 0, room = 0, count, n = w->joints;
-  double whole = along[cells - 1];
+  double whole = along[cells - 1], most = greatest(required, w->pairs);
   double *before = w->turns + n, *middle = w->turns + 2 * n, *after = w->turns + 3 * n;
   count = (int)fmax(ceil(whole / first_part), 1.0);
   for (int i = 0; i < count; i++) {
     double half = 0.5 * whole / count;
-    if (!push(w, &queued, (Part){(2 * i + 1) * half, half, -1, w->pairs})) return -1;
+    if (!push(w, &queued, (Part){(2 * i + 1) * half, half, -1, w->roots})) return -1;
   }
   for (int next = 0; next < queued; next++) {
     Part part = w->parts[next];
-    double when, late, proved = HUGE, rest;
+    double when, late, proved, rest;
     int first = room, kept, segment = 0;
     interpolated(along, times, cells, 1, part.middle, &when);
     interpolated(along, turned, cells, n, part.middle - part.half, before);
@@ -543,18 +779,11 @@ int world_path(World *w, int segments, const double *starts, const double *coeff
                     (c[4 * n] + late * c[5 * n]))));
     }
     place(w, w->state);
-    for (int i = 0; i < part.count; i++) {
-      int pair = part.first < 0 ? i : w->arena[part.first + i];
-      double sum = 0.0;
-      for (int j = 0; j < n; j++) sum += w->rates[pair * n + j] * w->turns[j];
-      w->motions[pair] = sum;
-    }
-    kept = doubtful(w, &part, required, w->motions, 1.0, &first);
+    kept = doubtful(w, &part, required, most, w->turns, 1.0, 0, first, &proved);
     if (kept == -1) return *where = when, 0;
     if (kept < 0) return -1;
     if (!kept) continue;
     room = first + kept;
-    for (int i = first; i < room; i++) proved = fmin(proved, w->left[w->arena[i]]);
     rest = 0.5 * (part.half - fmax(proved, 0.0));
     if (rest <= 0.0) continue;
     if (!push(w, &queued, (Part){part.middle - part.half + rest, rest, first, kept}) ||

@@ -11,18 +11,17 @@ from fnmatch import fnmatchcase
 from itertools import combinations, product
 from types import MappingProxyType
 
-import coal
 import numpy as np
 import pinocchio as pin
 
-from ..arrays import Array, Mask, Native
+from ..arrays import Array, Mask, Native, Places
 from ..exceptions import LinkNameError, ObjectNameError, SceneError
 from ..kinematics import Kinematics
 from ..pose import combined, inverse, Pose
 from .allowed_collisions import AllowedCollisionMatrix
 from .objects import AttachedBody, CollisionObject
 from .octomap import OCTOMAP_NAME
-from .shapes import check_padding, native, padded, PlacedShape
+from .shapes import Cells, check_padding, native, padded, PlacedShape
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +61,9 @@ class PlanningScene:
             world in [m], by link; against each other they do not, as in MoveIt.
         scale: The same of factors of their lengths.
         geometry: All shapes and their pairs, for pinocchio.
+        octrees: Cells of the shapes that are octrees, by their numbers in the geometry.
         pairs: Names of the link or object of each pair of shapes that is checked (k).
+        pair_shapes: Numbers of both shapes in the geometry (k, 2).
         of_cells: Mask of the pairs in which one shape is of an octree (k).
         relative_motion_sign: Sense in which each column of the kinematics moves the second shape
             of a pair against the first (k, columns): 1, -1, or 0.
@@ -95,25 +96,25 @@ class PlanningScene:
         self.scale = MappingProxyType(dict(scale or {}))
         self._refuse_names()
         self.geometry = pin.GeometryModel()
+        self.octrees: dict[int, Cells] = {}
         bodies = self._bodies()
         extents = np.array([_extent(each) for each in self.geometry.geometryObjects])
-        of_cells = [
-            isinstance(each.geometry, coal.OcTree) for each in self.geometry.geometryObjects
-        ]
         pairs = [
             # the octree first: coal turns the normal of the other order about
-            (second, first) if of_cells[second] else (first, second)
+            (second, first) if second in self.octrees else (first, second)
             for first, second in _candidates(bodies)
             if self._checks(bodies[first], bodies[second])
         ]
+        self.pair_shapes: Places = np.array(pairs, int).reshape(-1, 2)
         for pair in pairs:
             self.geometry.addCollisionPair(pin.CollisionPair(*pair))
         self.pairs: Sequence[tuple[str, str]] = tuple(
             (bodies[first].name, bodies[second].name) for first, second in pairs
         )
         self.relative_motion_sign, self.distance_rate_bounds = self._bounds(bodies, extents, pairs)
-        self.of_cells: Mask = np.array([of_cells[first] for first, _ in pairs], bool)
-        for array in (self.relative_motion_sign, self.distance_rate_bounds, self.of_cells):
+        self.of_cells: Mask = np.isin(self.pair_shapes[:, 0], list(self.octrees))
+        fixed = (self.relative_motion_sign, self.distance_rate_bounds)
+        for array in (*fixed, self.of_cells, self.pair_shapes):
             array.setflags(write=False)
 
     @property
@@ -392,6 +393,8 @@ class PlanningScene:
         model = self.kinematics.native
         frame_id = self.kinematics.frames[body.link] if body.link else 0
         in_joint = model.frames[frame_id].placement * place * _se3(placed.pose)
+        if isinstance(placed.shape, Cells):
+            self.octrees[self.geometry.ngeoms] = placed.shape
         name = f'{body.name}_{self.geometry.ngeoms}'
         self.geometry.addGeometryObject(
             pin.GeometryObject(name, body.joint, frame_id, in_joint, solid)
