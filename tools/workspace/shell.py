@@ -41,12 +41,18 @@ if [ "${RMW_IMPLEMENTATION:-rmw_fastrtps_cpp}" != rmw_fastrtps_cpp ]; then
 fi
 """
 _FRONT_END = """\
-#!{python}
+#!{python} -S
 \"\"\"The `ros2` command of this workspace, for a ROS that has none; written by the set-up.\"\"\"
 
 import os
 import sys
 
+if {library!r} in os.environ.get('LD_LIBRARY_PATH', '').split(os.pathsep):
+    sys.path.append({packages!r})
+else:  # without env.sh; what `site` runs for other packages takes a tenth of a command's time
+    import site
+
+    site.main()
 sys.path.insert(0, {folder!r})
 
 from ros2_frontend.main import main
@@ -105,5 +111,11 @@ def write_front_end(venv: Path, underlay: Underlay, folder: Path) -> None:
     if underlay.kind is UnderlayKind.SYSTEM and underlay.has_command('ros2'):
         command.unlink(missing_ok=True)
         return
-    text = _FRONT_END.format(python=venv / 'bin' / 'python', folder=str(folder))
+    found = (venv / 'lib').glob('python3*/site-packages')
+    text = _FRONT_END.format(
+        python=venv / 'bin' / 'python',
+        library=str(venv / 'lib'),
+        packages=str(next(found, venv)),
+        folder=str(folder),
+    )
     write_atomically(command, text, mode=0o755)

@@ -5,10 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, MutableMapping
+from pathlib import Path
 
-from .profile import is_own_profile, profile_file
 from .reach import NetworkChoiceError, Reach, read_interfaces, resolve_reach
 
+LOCALHOST_PROFILE = Path(__file__).with_name('dds_network_localhost.xml')
+"""The profile with loopback alone; all others are made from it."""
+PREFIX = 'dds_network_'  # how the file of every profile of this package begins
 NETWORK_VARIABLE = 'DDS_NETWORK'
 """Interfaces and peers that a person opens DDS to; empty or unset for none."""
 PROFILE_VARIABLE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
@@ -24,6 +27,11 @@ _OFF = 'OFF'
 # rmw leaves the transports and peers of the profile as they are. With LOCALHOST it adds a UDP
 # transport of its own, which uses every interface.
 _PROFILE_DECIDES = 'SYSTEM_DEFAULT'
+
+
+def is_own_profile(path: str) -> bool:
+    """Return whether a profile belongs to this package, in any checkout."""
+    return Path(path).name.startswith(PREFIX)
 
 
 def own_transports(environ: Mapping[str, str]) -> str:
@@ -63,7 +71,12 @@ def dds_variables(environ: Mapping[str, str], reach: Reach) -> dict[str, str]:
     """
     if own_transports(environ):
         return {}
-    variables = {PROFILE_VARIABLE: str(profile_file(reach))}
+    profile = LOCALHOST_PROFILE
+    if not reach.is_this_host:
+        from .profile import profile_file  # XML and hashes, which every program would import
+
+        profile = profile_file(reach)
+    variables = {PROFILE_VARIABLE: str(profile)}
     if environ.get(RANGE_VARIABLE) != _OFF:
         variables[RANGE_VARIABLE] = _PROFILE_DECIDES
     if environ.get(LOCALHOST_ONLY_VARIABLE) == '1':

@@ -11,29 +11,20 @@ import stat
 import tempfile
 import xml.etree.ElementTree as ET
 
+from .environment import LOCALHOST_PROFILE, PREFIX
 from .reach import NetworkChoiceError, Reach
 
-LOCALHOST_PROFILE = Path(__file__).with_name('dds_network_localhost.xml')
-"""The profile with loopback alone; all others are made from it."""
-PREFIX = 'dds_network_'  # how the file of every profile of this package begins
 # RTPS 2.2, 9.6.1.4.1; naming peers takes the place of this default
 _DISCOVERY_GROUP = '239.255.0.1'
 _NAMESPACE = 'http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles'
 
 
-def is_own_profile(path: str) -> bool:
-    """Return whether a profile belongs to this package, in any checkout."""
-    return Path(path).name.startswith(PREFIX)
-
-
 def profile_file(reach: Reach) -> Path:
-    """Return the file of a profile; write it if it does not exist.
+    """Return the file of a profile beyond loopback; write it if it does not exist.
 
     Raises:
         NetworkChoiceError: It cannot be written.
     """
-    if reach.is_this_host:
-        return LOCALHOST_PROFILE
     text = profile_text(reach)
     name = f'{PREFIX}{hashlib.sha256(text.encode()).hexdigest()[:16]}.xml'
     folder = Path(tempfile.gettempdir()) / f'dds_network-{os.getuid()}'

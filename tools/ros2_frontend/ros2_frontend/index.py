@@ -43,7 +43,7 @@ def prefix_of(package: str, message: str = "Package '{0}' not found") -> Path:
     """
     prefixes = package_prefixes()
     if package not in prefixes:
-        remedy = _remedy(package, Path(sys.prefix).parent) or hint(package, prefixes)
+        remedy = _remedy(package, Path(sys.executable).parents[2]) or hint(package, prefixes)
         raise UnknownNameError(message.format(package) + remedy)
     return Path(prefixes[package])
 

@@ -13,14 +13,31 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import importlib
 import os
 import signal
 import sys
+from types import ModuleType
+from typing import Any
 
 from .cli.commands import build
 from .cli.interrupts import signals_interrupt
 
 _BROKEN_PIPE = 128 + signal.SIGPIPE
+
+
+class _Later(ModuleType):
+    """A module that is imported when something of it is needed.
+
+    Generated messages import numpy, a quarter of the time of a command, and only those with arrays
+    of fixed length use it; rclpy imports yaml, for parameters in files. The lazy loader of
+    importlib would load them at ``import`` already.
+    """
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401  # as in ModuleType
+        del sys.modules[self.__name__]
+        vars(self).update(vars(importlib.import_module(self.__name__)))
+        return vars(self)[name]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -30,6 +47,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         SystemExit: From argparse, for `--help` (0) and for wrong arguments (2).
     """
     words = list(sys.argv[1:] if argv is None else argv)
+    for name in ('numpy', 'yaml'):
+        sys.modules.setdefault(name, _Later(name))
     try:
         with signals_interrupt():
             code = _run(words)

@@ -76,7 +76,7 @@ def test_a_package_of_the_workspace_is_to_be_built(
     ros2: Ros2, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No name that is like it, but what makes it known: a build, or the environment of one."""
-    monkeypatch.setattr('sys.prefix', str(tmp_path / '.venv'))
+    monkeypatch.setattr('sys.executable', str(tmp_path / '.venv' / 'bin' / 'python'))
     manifest = tmp_path / 'libraries/tool_pkg/package.xml'
     manifest.parent.mkdir(parents=True)
     manifest.touch()
