@@ -175,7 +175,8 @@ def test_a_simulated_robot_is_asked(isolation: Isolation, tmp_path: Path) -> Non
         robot.wait_for(f'at {link}')
         assert list(port_users(os.path.realpath(link))) == []
         findings = list(check_port(str(link)))
-        assert 'protocol v2 at 2000000 baud' in found(findings, 'robot').message
+        # the documented one of both that it speaks
+        assert 'protocol v1 at 115200 baud' in found(findings, 'robot').message
         assert found(findings, 'battery').severity is Severity.GOOD
         assert robot.is_running()
 

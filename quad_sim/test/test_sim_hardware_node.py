@@ -37,7 +37,8 @@ class XgoRig(Rig):
 @pytest.fixture(scope='module')
 def shared_rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[XgoRig]:
     """The node with a simulated robot, started once."""
-    with reserve() as isolation, XgoRig(isolation, tmp_path_factory.mktemp('xgo') / 'x') as rig:
+    port = tmp_path_factory.mktemp('xgo') / 'x'
+    with reserve() as isolation, XgoRig(isolation, port, '-p', 'protocol:=v2') as rig:
         yield rig
 
 

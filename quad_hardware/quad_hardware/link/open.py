@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Opens a robot: its protocol by its firmware version, at 2 Mbaud, then at 115200."""
+"""Opens a robot: its protocol by its firmware version, at 115200 baud, then at 2 Mbaud."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ from .schema import (
     Span,
 )
 
-PROTOCOLS = (V2, V1)  # in the order of probing
+PROTOCOLS = (V1, V2)  # in the order of probing: what is documented before what is assumed
 
 __all__ = [
     'ACTION_RESET',
