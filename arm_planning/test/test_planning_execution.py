@@ -235,7 +235,7 @@ def test_a_gripper_that_holds_something_begins_where_it_is(
     hand = controllers.Controller(('right',), KINDS['GripperCommand'], 'gripper_cmd')
     arm = controllers.Controller(('left',), FOLLOW, FOLLOW.namespace)
     bench = Bench(monkeypatch, {'arm': arm, 'hand': hand})
-    bench.turns['right'] = 0.1
+    bench.turns['right'] = 1
     bench.start()
     assert bench.clients['hand/gripper_cmd'].goal.command.position == 1.0
     bench = Bench(monkeypatch, {'arm': arm, 'hand': hand})

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Future
 from types import SimpleNamespace
 from typing import Any
 
@@ -24,6 +25,7 @@ class Listener:
         warnings: What was warned of.
         publishers: Of scenes for controllers.
         durability: Of the publisher of another move_group.
+        answers: Of get_planning_scene, to be given by the test; None where it is not offered.
         made: The listener.
     """
 
@@ -33,6 +35,7 @@ class Listener:
         self.warnings: list[str] = []
         self.publishers = 0
         self.durability = LATCHED.durability
+        self.answers: list[Future[Any]] | None = None
         logger = SimpleNamespace(
             error=lambda text, **_: self.errors.append(text),
             warning=lambda text, **_: self.warnings.append(text),
@@ -41,6 +44,9 @@ class Listener:
             get_logger=lambda: logger,
             create_subscription=lambda *_, **__: None,
             create_timer=lambda *_: None,
+            create_client=lambda *_: SimpleNamespace(
+                service_is_ready=lambda: self.answers is not None, call_async=self._call
+            ),
             count_publishers=lambda _topic: self.publishers,
             get_publishers_info_by_topic=lambda _topic: [
                 SimpleNamespace(qos_profile=SimpleNamespace(durability=self.durability))
@@ -50,6 +56,11 @@ class Listener:
         self._worker = SteppedWorker()
         gateways = [each.gateway for each in drives]
         self.made = SceneListener(node, gateways, worker=self._worker, clock=lambda: self._now)
+
+    def _call(self, _: object) -> Future[Any]:
+        assert self.answers is not None
+        self.answers.append(Future())
+        return self.answers[-1]
 
     def take(self, message: PlanningScene) -> None:
         """Deliver a message; nothing is built yet."""

@@ -12,6 +12,7 @@ from geometry_msgs.msg import Point, Pose
 from isolation import Isolation
 from model_robots import table, texts
 from moveit_msgs.msg import CollisionObject, LinkPadding, PlanningScene, PlanningSceneWorld
+from moveit_msgs.srv import GetPlanningScene
 import pytest
 from rclpy.serialization import serialize_message
 from ros_client import RosClient
@@ -164,6 +165,29 @@ def test_a_diff_before_any_whole_scene_counts_with_a_warning() -> None:
     listener.run()
     assert objects(drives) == {'cup'}
     assert 'start this node before move_group' in listener.warnings[0]
+
+
+def test_the_scene_of_a_move_group_that_began_before_is_requested_once() -> None:
+    """Diffs that came meanwhile count beyond it; where ours publishes, nothing is requested."""
+    drives = started(arm())
+    listener = Listener(drives)
+    listener.answers, listener.publishers = [], 1
+    listener.run(2.0)
+    assert listener.answers == []
+    listener.publishers = 0
+    diff = message('cup')
+    diff.is_diff = True
+    listener.take(diff)
+    listener.run()
+    (answer,) = listener.answers
+    whole = message('box')
+    whole.is_diff = True
+    answer.set_result(GetPlanningScene.Response(scene=whole))
+    for _ in range(5):
+        listener.run()
+    assert objects(drives) == {'box', 'cup'}
+    assert len(listener.answers) == 1
+    assert not listener.warnings
 
 
 @pytest.mark.scenario

@@ -4,12 +4,15 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from functools import partial
 import time
+from typing import Any
 
 from moveit_msgs.msg import PlanningScene
+from moveit_msgs.srv import GetPlanningScene
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
@@ -34,6 +37,8 @@ FOREIGN_TOPIC = 'monitored_planning_scene'
 """Where any move_group publishes its scene; it counts where nothing publishes the other topic."""
 
 FOREIGN_DEPTH = 100  # messages of MoveIt's monitor that may wait, as it keeps as many
+
+ASK_AFTER = 1.0  # time from the start in [s] in which a whole scene may come by itself
 
 LOOK_PERIOD = 0.1  # time between two looks where the joints are in [s]
 PLACE_TIMEOUT = 1.0  # time for which a scene waits for a group's position without a warning in [s]
@@ -88,8 +93,11 @@ class SceneListener:
             for number, gateway in enumerate(gateways)
         ]
         self._gateways = [*gateways, *unchecked]
-        self._received = clock()
+        self._begin = self._received = clock()
         self._is_complete = False  # whether a whole scene came
+        self._early = deque[PlanningScene](maxlen=FOREIGN_DEPTH)  # diffs that came before
+        self._has_asked = False
+        self._client = node.create_client(GetPlanningScene, 'get_planning_scene')
         self._unplaced = list(self._updaters)  # those of which no warning has said so
         self._assuming = list(self._updaters)  # the same for joints beside them
         self._placed: dict[SceneUpdater, float] = {}  # since when
@@ -123,14 +131,35 @@ class SceneListener:
         if not self._node.count_publishers(TOPIC):
             self._take(deserialize_message(data, PlanningScene))
 
+    def _ask(self) -> None:
+        """Request the whole scene, once, of a move_group that began before this node."""
+        waited = self._clock() - self._begin
+        if self._is_complete or self._has_asked or waited < ASK_AFTER:
+            return
+        if self._client.service_is_ready() and not self._node.count_publishers(TOPIC):
+            self._has_asked = True
+            asked = self._client.call_async(GetPlanningScene.Request())
+            asked.add_done_callback(self._answered)
+
+    def _answered(self, answer: Any) -> None:  # noqa: ANN401  # rclpy has no types here
+        response = answer.result()
+        if self._is_complete or response is None:
+            return
+        response.scene.is_diff = False
+        for message in (response.scene, *self._early):  # it may be older than those
+            self._take(message)
+
     def _take(self, message: PlanningScene) -> None:
         if message.is_diff and not self._is_complete:
-            self._node.get_logger().warning(
-                f'{FOREIGN_TOPIC}: a diff (is_diff) came before a whole scene: only what it names'
-                ' counts, and objects that were there before it do not; start this node before'
-                ' move_group, or have move_group publish a whole scene',
-                once=True,
-            )
+            self._early.append(message)
+            if not self._client.service_is_ready():
+                self._node.get_logger().warning(
+                    f'{FOREIGN_TOPIC}: a diff (is_diff) came before a whole scene: only what it'
+                    ' names counts, and objects that were there before it do not; start this node'
+                    ' before move_group, or have move_group offer get_planning_scene or publish a'
+                    ' whole scene',
+                    once=True,
+                )
         self._is_complete |= not message.is_diff
         self._received = self._clock()
         for updater in self._updaters:
@@ -152,6 +181,7 @@ class SceneListener:
                 if snapshot.source is not Source.NONE or reference.moving:
                     commanded.update(names)
         self._joints = self._joints.next(places, commanded)
+        self._ask()
         self._submit()
         self._warn_of_groups()
         self._warn_of_others()
