@@ -48,6 +48,7 @@ class RobotModel:
 
     Attributes:
         poses: Named poses of the SRDF, in the order of the joints.
+        world_frames: Frames to which a fixed virtual joint of the SRDF holds the root link.
         end_effectors: Tools of the SRDF that are fixed to a link of the group.
         notes: What was passed over in description and SRDF, in words.
         notes_beside_contact: Those that are not about pairs of links that touch.
@@ -86,6 +87,7 @@ class RobotModel:
         chosen = find_group(tree, semantic, group, tip)
         self.name, self.group = tree.name, chosen.name
         self.base, self.tip = chosen.base, chosen.tip
+        self.world_frames = semantic.world_frames
         self._tree = tree
         self.kinematics = Kinematics(tree, chosen.joints)
         self._model = self.kinematics.native

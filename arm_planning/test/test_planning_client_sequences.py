@@ -175,6 +175,19 @@ def test_a_motion_of_days_is_planned(rig: MoveGroupRig) -> None:
     assert len(points) < 10_000
 
 
+def test_the_pipeline_of_pilz_plans_ptp_where_no_planner_is_named(rig: MoveGroupRig) -> None:
+    """As it is with the planner's name, and not by the search of the other pipeline."""
+    pilz = {'pipeline_id': 'pilz_industrial_motion_planner'}
+    plans = [
+        rig.plan(motion_request(joint_goal(MOVED), **more)).trajectory.joint_trajectory.points
+        for more in (pilz, {**pilz, 'planner_id': 'PTP'}, {'planner_id': 'RRTConnect'})
+    ]
+    unnamed, named, searched = (
+        [(*p.positions, p.time_from_start) for p in each] for each in plans
+    )
+    assert unnamed == named != searched
+
+
 def test_goals_of_a_position_or_an_orientation_alone(rig: MoveGroupRig) -> None:
     """What is not named is free where it cannot stay."""
     back = Quaternion(y=-math.sin(1.2), w=math.cos(1.2))

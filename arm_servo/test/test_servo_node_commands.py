@@ -13,6 +13,7 @@ from typing import Any
 from control_msgs.msg import JointJog
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from isolation import Isolation
+from model_robots import table, texts
 import pytest
 import rclpy
 from rclpy.context import Context
@@ -21,12 +22,17 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from servo_drives import Drives
 
-from arm_servo import JogRequest, PoseCommand
+from arm_model import RobotModel
+from arm_servo import JogRequest, PoseCommand, TwistCommand
 from arm_servo.ros.servo.node import Servo
 from arm_servo.ros.servo.parameters import declare_servo, PREFIX
 
 TWIST, JOG, POSE = 'delta_twist_cmds', 'delta_joint_cmds', 'pose_target_cmds'
 TIMEOUT = 0.5
+WORLD = '<virtual_joint name="v" type="fixed" parent_frame="world" child_link="panda_link0"/>'
+URDF, SRDF = texts('panda')
+HELD = RobotModel(URDF, SRDF.replace('</robot>', f'{WORLD}</robot>'), table('panda'))
+"""The Panda, in the world of a virtual joint as the Setup Assistant writes it."""
 
 
 def parameter(name: str, value: float) -> Parameter:
@@ -46,7 +52,7 @@ class Topics:
         self.node = node
         self.prepared = 0
         self.requests: list[JogRequest] = []
-        self.drives = Drives()
+        self.drives = Drives(model=HELD)
         self.drives.attach()
         self.drives.run(2)
         gateway = self.drives.gateway
@@ -100,6 +106,16 @@ def test_a_stream_of_zeros_takes_no_drives_back(topics: Topics) -> None:
     assert topics.prepared == 0
     topics.send(TWIST, twist(0.5))
     assert topics.prepared == 1
+
+
+def test_the_world_of_the_srdf_is_a_frame(topics: Topics) -> None:
+    """The planning frame of MoveIt, in which its servo takes twists, is in no /tf."""
+    for frame in ('world', 'panda_link0', 'moon'):
+        message = twist(0.5)
+        message.header.frame_id = frame
+        topics.send(TWIST, message)
+    twists = [each.command for each in topics.requests if isinstance(each.command, TwistCommand)]
+    assert [(each.link, each.axes) for each in twists] == [(None, None)] * 2
 
 
 def test_displacements_that_come_faster_than_they_begin_add_up(topics: Topics) -> None:

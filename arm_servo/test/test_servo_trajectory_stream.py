@@ -115,7 +115,8 @@ def test_the_tolerance_at_the_goal_is_by_the_range_of_the_joint(node: Any) -> No
     """5 cm is not there for a slide of half a metre; an end effector may end at what it holds."""
     names = ('slide', 'turn', 'round')
     low, high = np.array([0.0, -3.0, -np.inf]), np.array([0.5, 3.0, np.inf])
-    limits = JointLimits(names, low, high, *(np.ones(3) for _ in range(3)))
+    one = np.ones(3)
+    limits = JointLimits(names, low, high, one, one, one)
     goal = declare_trajectory(node, names, limits).goal
     assert [goal[name].position for name in names] == pytest.approx([0.01, 0.05, 0.05])
 

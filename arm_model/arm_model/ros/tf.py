@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Collection
 from contextlib import suppress
 import math
 import threading
@@ -82,6 +83,7 @@ class TfListener:
         prefix: str = '',
         base: str = '',
         *,
+        world_frames: Collection[str] = (),
         on_demand: bool = False,
     ) -> None:
         """Prepare.
@@ -89,13 +91,15 @@ class TfListener:
         Args:
             prefix: Before the names of the robot's links in TF.
             base: Link in which :meth:`pose` is.
+            world_frames: Other names of the root link: those of the SRDF's virtual joint.
             on_demand: Whether messages are kept as they come and read when a frame is asked for:
                 robots publish the frames of their own links 100 times a second, and few requests
                 name others. Else it listens from the first frame on that is no link, and reads
                 each message as it comes, so that no control cycle reads many.
         """
         self._node, self._prefix, self._base = node, prefix, base
-        self._links = frozenset(kinematics.frames)
+        self._links = dict.fromkeys(world_frames, kinematics.root)
+        self._links |= {link: link for link in kinematics.frames}
         self._on_demand, self._is_listening = on_demand, False
         self._unread: deque[tuple[float, float, bytes]] = deque(maxlen=KEPT_MESSAGES)
         self._tree, self._lock = FrameTree(), threading.Lock()
@@ -104,8 +108,7 @@ class TfListener:
 
     def link(self, frame: str) -> str | None:
         """Return the link of the robot that a frame is, with or without its prefix."""
-        name = frame.removeprefix(self._prefix)
-        return name if name in self._links else None
+        return self._links.get(frame.removeprefix(self._prefix))
 
     def pose(self, frame: str) -> Pose:
         """Return the pose of a frame of TF in the base.

@@ -133,7 +133,13 @@ class Servo:
         self._parameters = parameters
         self._modes = ServoModes(node, self._stop, lambda: gateway.renew(Source.JOG))
         model = gateway.model
-        frames = TfListener(node, model.kinematics, parameters.frame_prefix, model.base)
+        frames = TfListener(
+            node,
+            model.kinematics,
+            parameters.frame_prefix,
+            model.base,
+            world_frames=model.world_frames,
+        )
         self.converter = CommandConverter(model, frames, parameters, read_scales(node))
         self._refusals = Refusals()
         self._status = node.create_publisher(ServoStatus, parameters.status_topic, 10)
