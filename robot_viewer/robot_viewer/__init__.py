@@ -3,16 +3,14 @@
 """What a viewer needs of a robot: /tf from its description and its joint positions.
 
 :class:`StatePublisher` computes which transforms follow from a JointState, as ROS'
-robot_state_publisher does; :class:`JointWatch` finds joints that are missing. Neither knows ROS;
-the nodes are in :mod:`.nodes`. Descriptions are read by urdf_reader.
+robot_state_publisher does. It knows no ROS; the nodes are in :mod:`.nodes`. Descriptions are read
+by urdf_reader.
 """
 
 from .state_publisher import (
     FrameTransform,
-    JointWatch,
     MessageProblem,
     Settings,
-    Severity,
     StatePublisher,
 )
 
@@ -20,9 +18,7 @@ __version__ = '0.1.0'
 
 __all__ = [
     'FrameTransform',
-    'JointWatch',
     'MessageProblem',
     'Settings',
-    'Severity',
     'StatePublisher',
 ]

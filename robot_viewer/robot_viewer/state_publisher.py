@@ -7,7 +7,7 @@ No ROS and no clock in here: stamps and the time come in as integers in [ns].
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 import math
@@ -24,17 +24,6 @@ from urdf_reader import (
 
 HIGHEST_FREQUENCY = 1000.0
 """Greatest ``publish_frequency`` in [Hz] (robot_state_publisher 3.3.3)."""
-SILENCE_TIMEOUT = 5.0
-"""Time in [s] after which a joint that was in no message is reported."""
-START_TIMEOUT = 30.0
-"""Time in [s] in which a publisher comes: a robot may take so long to start."""
-
-
-class Severity(Enum):
-    """How bad it is what :class:`JointWatch` reports."""
-
-    NOTE = 'note'
-    WARNING = 'warning'
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,63 +183,3 @@ class StatePublisher:
     def _named(self, joint: Joint, transform: Transform) -> FrameTransform:
         prefix = self.settings.frame_prefix
         return FrameTransform(prefix + joint.parent, prefix + joint.child, transform)
-
-
-class JointWatch:
-    """Finds why a robot falls apart in a viewer; reports each reason once.
-
-    Joints of the description may be in no message, and names of messages in no description.
-    """
-
-    def __init__(self, model: KinematicTree, now: float) -> None:
-        """Begin to watch."""
-        self._silent = {joint.name for joint in model.movable() if joint.mimic is None}
-        self._known = {joint.name for joint in model.joints}
-        self._unknown: set[str] = set()
-        self._reported: set[str] = set()
-        self._received = False
-        self._due = now + SILENCE_TIMEOUT
-        self._start_due = now + START_TIMEOUT
-        self._publisher_due = math.inf
-
-    def take(self, names: Iterable[str]) -> None:
-        """Add the names of a message."""
-        self._received = True
-        self._silent.difference_update(names)
-        self._unknown.update(name for name in names if name not in self._known)
-
-    def reports(self, now: float, topic: str, publishers: int) -> dict[str, Severity]:
-        """Return the texts that were not reported yet, with their severities."""
-        found = self._received_reports(topic) if self._received else {}
-        if not self._received and self._silent:
-            found = self._silence_reports(now, topic, publishers)
-        if now < self._due:
-            return {}
-        fresh = {text: how for text, how in found.items() if text not in self._reported}
-        self._reported.update(fresh)
-        return fresh
-
-    def _received_reports(self, topic: str) -> dict[str, Severity]:
-        silent, unknown = ', '.join(sorted(self._silent)), ', '.join(sorted(self._unknown))
-        found = {}
-        if silent:
-            text = f'{silent}: no /tf below these joints of the robot description'
-            found[f'no message on {topic} has {text}'] = Severity.WARNING
-        if unknown:
-            text = f'on {topic}, but not in the robot description: {unknown}'
-            found[text] = Severity.WARNING
-        return found
-
-    def _silence_reports(self, now: float, topic: str, publishers: int) -> dict[str, Severity]:
-        """Report a silent publisher, or that there is none yet."""
-        check = f'check the publisher (ros2 topic info {topic}) and ROS_DOMAIN_ID'
-        if publishers and self._publisher_due == math.inf:
-            self._publisher_due = now + SILENCE_TIMEOUT
-        begun = self._publisher_due < math.inf
-        if now >= (self._publisher_due if begun else self._start_due):
-            text = f'no message on {topic}, so no /tf of moving joints; {check}'
-            return {text: Severity.WARNING}
-        if begun:
-            return {}
-        why = 'as nobody publishes it: fine while the robot starts'
-        return {f'no message on {topic} yet, {why}; else {check}': Severity.NOTE}

@@ -112,11 +112,6 @@ def test_a_viewer_gets_description_fixed_and_moving_frames(
     assert node.stop() == 0
 
 
-def test_silence_on_joint_states_is_reported(start: StartNode, urdf: Path) -> None:
-    """After a few seconds, with the command that shows why."""
-    start(str(urdf)).wait_for(r'no message on /joint_states.*ros2 topic info')
-
-
 @pytest.mark.parametrize(
     ('arguments', 'words'),
     [

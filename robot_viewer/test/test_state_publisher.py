@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which transforms follow from which messages, and which joints are in none."""
+"""Which transforms follow from which messages."""
 
 from __future__ import annotations
 
@@ -13,14 +13,12 @@ import pytest
 from urdf_reader import read_urdf
 from urdf_robots import ARM, POSITIONS
 
-from robot_viewer import JointWatch, MessageProblem, Settings, Severity, StatePublisher
-from robot_viewer.state_publisher import SILENCE_TIMEOUT, START_TIMEOUT, Update
+from robot_viewer import MessageProblem, Settings, StatePublisher
+from robot_viewer.state_publisher import Update
 
 MS = 1_000_000
 """A millisecond in [ns]."""
 START = 10**18
-SOON, LATE, LATER = 0.5 * SILENCE_TIMEOUT, 1.1 * SILENCE_TIMEOUT, 5 * SILENCE_TIMEOUT
-TOPIC = '/dog/joint_states'
 
 
 def publisher(**options: object) -> StatePublisher:
@@ -176,63 +174,3 @@ def test_a_frequency_beyond_its_range_is_refused(frequency: float) -> None:
     """With the range."""
     with pytest.raises(ValueError, match='between 0 and 1000'):
         Settings(publish_frequency=frequency)
-
-
-@pytest.fixture
-def watch() -> JointWatch:
-    """Watch the test arm from time 0 on."""
-    return JointWatch(read_urdf(ARM), 0.0)
-
-
-def test_a_complete_robot_is_no_reason_to_speak(watch: JointWatch) -> None:
-    """A joint that follows another need not be in the message."""
-    watch.take(POSITIONS)
-    assert not watch.reports(LATE, TOPIC, 1)
-
-
-def test_joints_in_no_message_are_reported_once_and_not_too_early(
-    watch: JointWatch,
-) -> None:
-    """By name; messages may be partial, so they are put together."""
-    watch.take(['shoulder'])
-    watch.take(['roll', 'finger_joint'])
-    assert not watch.reports(SOON, TOPIC, 1)
-    (text,) = watch.reports(LATE, TOPIC, 1)
-    assert 'lift' in text
-    assert 'shoulder' not in text
-    assert not watch.reports(LATER, TOPIC, 1)
-
-
-def test_names_that_the_description_does_not_have_are_reported(watch: JointWatch) -> None:
-    """The usual case: all of them are spelt otherwise."""
-    watch.take(['Shoulder', *list(POSITIONS)[1:]])
-    silent, unknown = watch.reports(LATE, TOPIC, 1)
-    assert 'no message on /dog/joint_states has shoulder:' in silent
-    assert unknown.endswith(': Shoulder')
-
-
-def test_a_silent_publisher_is_reported_with_what_to_look_at(watch: JointWatch) -> None:
-    """Its time begins when it is there, however long that took."""
-    assert not watch.reports(LATE, TOPIC, 1)
-    assert not watch.reports(LATE + SOON, TOPIC, 1)
-    (text,) = watch.reports(LATE + LATE, TOPIC, 1)
-    assert f'ros2 topic info {TOPIC}' in text
-    assert not watch.reports(LATER, TOPIC, 1)
-
-
-def test_a_start_that_takes_long_is_no_reason_to_warn(watch: JointWatch) -> None:
-    """It is a note, once; and a warning when it is too long for a start."""
-    assert not watch.reports(SOON, TOPIC, 0)
-    ((note, severity),) = watch.reports(LATE, TOPIC, 0).items()
-    assert 'nobody publishes it: fine while the robot starts' in note
-    assert severity is Severity.NOTE
-    assert not watch.reports(LATE, TOPIC, 0)
-    ((text, severity),) = watch.reports(START_TIMEOUT + 0.1, TOPIC, 0).items()
-    assert f'ros2 topic info {TOPIC}' in text
-    assert severity is Severity.WARNING
-
-
-def test_a_robot_without_moving_joints_needs_no_messages() -> None:
-    """Silence is right."""
-    watch = JointWatch(read_urdf('<robot name="box"><link name="box"/></robot>'), 0.0)
-    assert not watch.reports(LATE, TOPIC, 1)

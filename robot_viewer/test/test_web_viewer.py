@@ -547,21 +547,6 @@ def test_the_page_keeps_what_the_robot_warns_of(robot: Robot) -> None:
         assert icon in page._log.html
 
 
-def test_sliders_publish_where_nobody_else_does(robot: Robot) -> None:
-    """As joint_state_publisher_gui; when somebody else comes, they end."""
-    robot.description.publish(String(data=ARM))
-    robot.spin_until(lambda: bool(robot.states), 'joint states of the sliders')
-    names = set(robot.states[-1].name)
-    assert names
-    other = robot.node.create_publisher(JointState, 'joint_states', 10)
-    robot.spin_until(lambda: robot.viewer._joint_states is None, 'the end of the sliders')
-    count = len(robot.states)
-    robot.viewer.publish_joints(dict.fromkeys(names, 0.0))
-    robot.spin_times(20)
-    assert len(robot.states) == count
-    robot.node.destroy_publisher(other)
-
-
 def test_a_robot_that_is_out_of_reach_is_said_to_be(
     robot: Robot, opened: list[bool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -588,7 +573,6 @@ def test_a_robot_that_is_out_of_reach_is_said_to_be(
     robot.spin_until(lambda: robot.node.count_subscribers('joint_states') == 1, 'a closed page')
     opened.append(True)
     robot.spin_until(gone, 'the words again')
-    assert not robot.node.count_publishers('joint_states'), 'no sliders for a robot that was there'
 
 
 def test_after_stop_the_page_moves_nothing_until_that_is_allowed(robot: Robot) -> None:

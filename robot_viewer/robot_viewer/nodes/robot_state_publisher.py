@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 import sys
-import time
 
 from geometry_msgs.msg import TransformStamped
 from rcl_interfaces.msg import SetParametersResult
@@ -35,10 +34,8 @@ from node_runner import (
 from ..state_publisher import (
     FrameTransform,
     HIGHEST_FREQUENCY,
-    JointWatch,
     MessageProblem,
     Settings,
-    Severity,
     StatePublisher,
 )
 
@@ -47,8 +44,6 @@ DESCRIPTION = 'robot_description'
 DEFAULTS = Settings()
 TF_DEPTH = 100
 """Queue of /tf, as tf2_ros has it."""
-WATCH_PERIOD = 1.0
-"""Time in [s] between two looks for missing joints."""
 
 
 class RobotStatePublisher(Node):
@@ -73,7 +68,7 @@ class RobotStatePublisher(Node):
         self._tf_static = self.create_publisher(TFMessage, '/tf_static', LATCHED)
         self._description = self.create_publisher(String, 'robot_description', LATCHED)
         self._apply()
-        self._subscription = self.create_subscription(
+        self.create_subscription(
             JointState,
             'joint_states',
             self._take,
@@ -82,7 +77,6 @@ class RobotStatePublisher(Node):
         )
         self.add_on_set_parameters_callback(check)
         self.add_post_set_parameters_callback(self._changed)
-        self.create_timer(WATCH_PERIOD, self._watch_joints)
 
     def _apply(self) -> None:
         text = str(self.get_parameter(DESCRIPTION).value)
@@ -91,7 +85,6 @@ class RobotStatePublisher(Node):
         except DescriptionError as error:
             raise DescriptionError(f'{DESCRIPTION}: {error}') from error
         self._core = StatePublisher(model, read_settings(self))
-        self._watch = JointWatch(model, time.monotonic())
         self._description.publish(String(data=text))
         fixed = self._core.fixed()
         self._tf_static.publish(_message(fixed, self.get_clock().now()))
@@ -114,7 +107,6 @@ class RobotStatePublisher(Node):
         stamp = message.header.stamp
         stamp_ns = stamp.sec * 1_000_000_000 + stamp.nanosec
         now = self.get_clock().now().nanoseconds
-        self._watch.take(message.name)
         update = self._core.update(message.name, message.position, stamp_ns, now)
         for problem in update.problems:
             self._warn(problem, message.name)
@@ -129,17 +121,6 @@ class RobotStatePublisher(Node):
             self.get_logger().warning(problem.value)
         else:
             self.get_logger().warning(f'{text} (logged once)', once=True)
-
-    def _watch_joints(self) -> None:
-        topic = self._subscription.topic_name
-        now, publishers = time.monotonic(), self.count_publishers(topic)
-        for text, severity in self._watch.reports(now, topic, publishers).items():
-            if (
-                severity is Severity.WARNING
-            ):  # a line of its own for each severity: rclpy refuses another one
-                self.get_logger().warning(text)
-            else:
-                self.get_logger().info(text)
 
 
 def _message(transforms: Iterable[FrameTransform], stamp: Time) -> TFMessage:

@@ -139,7 +139,6 @@ class WebViewer(Node):
         self._positions: dict[str, float] = {}
         self._drawn: dict[str, float] = {}
         self._watch = Watch()
-        self._own = False  # the page publishes joint states, as nobody else ever did
         self._robot_publishes = False
         self._limit = ('', 0.0)  # in words of the servo, and when
         self._servo_listens = False
@@ -153,7 +152,6 @@ class WebViewer(Node):
         self._jogs: Publisher | None = None
         self._joint_jogs: Publisher | None = None
         self._walks: Publisher | None = None
-        self._joint_states: Publisher | None = None
         self.page = RobotPage(host, port, self)
         self._controllers = Controllers(self, self._listening, self._say, self.page.end_target)
         self._grippers = Grippers(self, self._say)
@@ -203,8 +201,7 @@ class WebViewer(Node):
             self.get_logger().warning(f'not shown: {note}')
 
     def _take_joints(self, message: JointState) -> None:
-        if not self._own:
-            self._watch.take_joints(message)
+        self._watch.take_joints(message)
         positions = dict(zip(message.name, message.position, strict=False))
         self._first_motion.take(positions)
         self._positions.update(positions)
@@ -349,13 +346,8 @@ class WebViewer(Node):
             self._planning.look(services)
         with around('the body is not shown as a whole'):
             self._body.look()
-        others = self.count_publishers('joint_states') - (self._joint_states is not None)
-        self._robot_publishes |= bool(others)  # also while a link is cut, or when it has ended
-        self._own = not self._robot_publishes and bool(self._root)
-        if others and self._joint_states is not None:
-            self.destroy_publisher(self._joint_states)
-            self._joint_states = None
-        self.page.offer_sliders(offered=self._own)
+        # also while a link is cut, or when it has ended
+        self._robot_publishes |= bool(self.count_publishers('joint_states'))
 
     def _of_this_robot(self, services: Mapping[str, list[str]]) -> dict[str, list[str]]:
         """Return the services of nodes of the robot of this page, and of no other one."""
@@ -488,10 +480,6 @@ class WebViewer(Node):
         """Request a mode of a walking robot."""
         self._order(partial(self._request_mode, mode))
 
-    def publish_joints(self, positions: Mapping[str, float]) -> None:
-        """Publish joint states, where no other node does."""
-        self._order(partial(self._publish_joints, positions))
-
     def aim(self, targets: Mapping[str, float], share: float) -> None:
         """Move joints to targets as long as this comes."""
         self._order(partial(self._controllers.aim, targets, share, time.monotonic()))
@@ -576,15 +564,6 @@ class WebViewer(Node):
             self.get_logger().warning(f'{what}: {text}')
         else:
             self.get_logger().info(f'{what}: {text}')
-
-    def _publish_joints(self, positions: Mapping[str, float]) -> None:
-        if not self._own:
-            return
-        if self._joint_states is None:
-            self._joint_states = self.create_publisher(JointState, 'joint_states', 10)
-        message = JointState(name=list(positions), position=list(positions.values()))
-        message.header.stamp = self.get_clock().now().to_msg()
-        self._joint_states.publish(message)
 
 
 class _StopCalls:

@@ -62,9 +62,6 @@ class Actions(Protocol):
     def set_mode(self, mode: str) -> None:
         """Request a mode of a walking robot."""
 
-    def publish_joints(self, positions: Mapping[str, float]) -> None:
-        """Publish joint states."""
-
     def jog(self, twist: Twist, frame: str) -> None:
         """Command a share of the speed of jogging once, -1 to 1, along the axes of a frame."""
 

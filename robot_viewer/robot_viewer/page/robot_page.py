@@ -21,7 +21,6 @@ from viser import (
     GuiDropdownHandle,
     GuiFolderHandle,
     GuiHtmlHandle,
-    GuiSliderHandle,
     GuiTabGroupHandle,
     GuiTabHandle,
     Icon,
@@ -35,7 +34,7 @@ from .gate import Gate
 from .jog_panel import Actions, JogPanel, joint_texts, Offered, Velocity
 from .live import Hold, Live, RELEASED_AFTER
 from .overlay import Overlay
-from .robot_scene import Ground, RobotScene, start_position, travel
+from .robot_scene import Ground, RobotScene
 from .standing import feet_of
 from .style import (
     add_speed,
@@ -48,7 +47,6 @@ from .style import (
     sentence,
     status_line,
     THREE_COLUMNS,
-    value_of,
     WANTED,
     WARNING,
 )
@@ -203,7 +201,6 @@ class RobotPage:
             self._groups[group] = self._tabs.add_tab(group, ICONS[group])
             with self._groups[group]:
                 self._notes[group] = gui.add_html(sentence(NOTHING[group]))
-        self._sliders: dict[str, GuiSliderHandle[float]] = {}
         self._drives: dict[str, tuple[str, ...]] = {}
         self._offered = Offered()
         self._jog: JogPanel | None = None
@@ -406,26 +403,6 @@ class RobotPage:
 
     # -- what is offered
 
-    def offer_sliders(self, *, offered: bool) -> None:
-        """Offer sliders of the joints, where no other node publishes them."""
-        if self.robot is None or offered is bool(self._sliders):
-            return
-        if not offered:
-            for slider in self._sliders.values():
-                slider.remove()
-            self._sliders = {}
-            return
-        with self._groups['Drive']:
-            for joint in self.robot.tree.movable():
-                if joint.mimic is None:
-                    low, high = travel(joint)
-                    slider = self.server.gui.add_slider(
-                        joint.name, low, high, (high - low) / 1000.0, start_position(joint)
-                    )
-                    slider.on_update(lambda _: self._publish_sliders())
-                    self._sliders[joint.name] = slider
-        self._publish_sliders()
-
     def offer_drives(self, services: Mapping[str, Sequence[str]]) -> None:
         """Offer the services of drives: their names by the drive."""
         found = {name: tuple(verbs) for name, verbs in services.items()}
@@ -564,9 +541,6 @@ class RobotPage:
     def _request(self, mode: str, _: object) -> None:
         if not self.live.refuses(f'mode {mode}'):
             self._actions.set_mode(mode)
-
-    def _publish_sliders(self) -> None:
-        self._actions.publish_joints({n: value_of(each) for n, each in self._sliders.items()})
 
     # -- the log
 
