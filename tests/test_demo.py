@@ -7,7 +7,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 import re
 import signal
-import time
 from typing import TYPE_CHECKING
 
 from bus_recorder import BusRecorder
@@ -18,7 +17,6 @@ import psutil
 import pytest
 from ros_client import RosClient
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -117,26 +115,12 @@ def test_ctrl_c_in_the_middle_of_a_demo(isolation: Isolation) -> None:
             demo.wait_for('a square in the base frame', 90.0)
             demo.signal(signal.SIGINT)
             assert demo.wait(40.0) == 0, demo.output
-        assert any(line.startswith('peak jerk') for line in demo.lines), demo.output
+        assert any(line.startswith('bus and loop') for line in demo.lines), demo.output
         assert recorder.last_states() == dict.fromkeys(range(3, 9), OFF)
 
 
-def wait_for_silence(client: RosClient, topic: str, duration: float) -> None:
-    """Wait until no target has come for a time in [s]."""
-    targets = client.listen(Float64, topic)
-    seen, since = 0, time.monotonic()
-
-    def silent() -> bool:
-        nonlocal seen, since
-        if len(targets) != seen:
-            seen, since = len(targets), time.monotonic()
-        return time.monotonic() - since > duration
-
-    client.spin_until(silent, 10.0, 'silence')
-
-
 def test_a_drive_that_is_commanded_from_elsewhere_leaves_the_wave(isolation: Isolation) -> None:
-    """It goes where it was sent and stays there, the others wave on; asked to, it comes back."""
+    """It goes where it was sent and stays there; the others wave on."""
     with start(isolation, 'demo', 'panda') as demo, RosClient(isolation.domain_id) as client:
         demo.wait_for('waving', 40.0)
         states = client.listen(JointState, '/panda_joint1/joint_states')
@@ -151,14 +135,15 @@ def test_a_drive_that_is_commanded_from_elsewhere_leaves_the_wave(isolation: Iso
             COTargetDouble, '/panda_joint1/target', COTargetDouble.Request(target=1.2)
         )
         assert answer.success
-        demo.wait_for('panda_joint1 left the wave: it was halted or sent elsewhere', 15.0)
         wait_for(lambda position: abs(position - 1.2) < 0.01, 'target')
-        wait_for_silence(client, '/panda_joint1/target', 0.5)
-        assert client.trigger('/panda_joint1/cyclic_position_mode').success
-        assert client.trigger('/wave/start').success
-        wait_for(lambda position: position < 0.5, 'wave')
+        first = len(states)
+        client.spin_until(lambda: len(states) > first + 100, 15.0, 'a second of states')
+        assert all(abs(each.position[0] - 1.2) < 0.02 for each in states[first:])
+        others = client.listen(JointState, '/panda_joint2/joint_states')
+        client.spin_until(lambda: len(others) > 200, 15.0, 'two seconds of another joint')
+        places = [each.position[0] for each in others]
+        assert max(places) - min(places) > 0.1
         assert demo.stop() == 0, demo.output
-    assert demo.output.count('left the wave') == 1
 
 
 def test_bring_up_ends_when_the_master_dies(isolation: Isolation) -> None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the demos of an arm compute: the path of the wave, measures of a motion, cells of parts.
+"""What the demos of an arm compute: the path of the wave, cells of parts.
 
 tests/test_demo.py runs them.
 """
@@ -8,12 +8,11 @@ tests/test_demo.py runs them.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
 import io
 from itertools import pairwise
 import math
 from types import SimpleNamespace
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
@@ -23,17 +22,13 @@ from rich.console import Console
 from urdf_reader import JointRange
 
 from arm_bringup.examples.arm import ArmDemo
-from arm_bringup.examples.wave import Axis, MAX_VELOCITY, quintic_step, READY_WITHIN, STANDING
+from arm_bringup.examples.wave import Axis, MAX_VELOCITY, quintic_step
 from arm_bringup.exceptions import WaveError
 from arm_bringup.session import locate
-
-if TYPE_CHECKING:
-    from arm_bringup.examples.motion import Sample
 
 pytestmark = pytest.mark.slow
 
 PERIOD = 0.04  # [s] between targets
-OBSERVED = 5  # targets between two observations
 
 limits = st.builds(
     lambda lower, width, velocity: JointRange('elbow', lower, lower + width, velocity),
@@ -41,57 +36,6 @@ limits = st.builds(
     st.floats(0.01, 12),
     st.floats(0.05, 8),
 )
-
-
-class Drive:
-    """A drive that is where the wave sends it, unless something else has it."""
-
-    def __init__(self, joint: JointRange, start: float) -> None:
-        self.axis = Axis(joint, 0.9)
-        self.setpoint, self.mode, self.enabled, self.foreign = (
-            start,
-            'Cyclic position',
-            True,
-            False,
-        )
-        self.track = [start]
-        self.now = 0.0
-
-    def observe(self) -> None:
-        """Show the wave what /diagnostics has."""
-        values = {
-            'mode': self.mode,
-            'setpoint': f'{self.setpoint!r} rad',
-            'position': f'{self.setpoint!r} rad',
-            'following_error': '-0.01 rad',
-            'message': 'off',
-        }
-        self.axis.observe(values, self.now, enabled=self.enabled)
-
-    def run(self, duration: float) -> None:
-        """Go on for some time in [s]; what is known of the drive comes more rarely."""
-        for count in range(round(duration / PERIOD)):
-            if count % OBSERVED == 0:
-                self.observe()
-            self.now += PERIOD
-            if self.axis.active:
-                target = self.axis.target(self.now)
-                if not self.foreign:
-                    self.setpoint = target
-            self.track.append(self.setpoint)
-
-
-ELBOW = JointRange('elbow', -1.76, 1.76, 2.175)
-
-
-@pytest.fixture
-def waving() -> Drive:
-    """Return a drive that is in the wave."""
-    drive = Drive(ELBOW, 0.0)
-    drive.axis.ask()
-    drive.run(8.0)
-    assert drive.axis.active
-    return drive
 
 
 @given(st.floats(0, 1), st.floats(1e-4, 0.1))
@@ -109,76 +53,15 @@ def test_a_joint_moves_from_where_it_stands_no_faster_than_planned(
 ) -> None:
     """Through entry and swing; one beyond its limits goes in, and never farther out."""
     width = joint.upper - joint.lower
-    drive = Drive(joint, (joint.lower + joint.upper) / 2 + share * width)
-    drive.axis.ask()
-    drive.run(20.0)
-    track, axis = drive.track, drive.axis
+    axis, start = Axis(joint, 0.9), (joint.lower + joint.upper) / 2 + share * width
+    axis.enter(start, 0.0)
+    track = [axis.target(count * PERIOD) for count in range(500)]
     steps = [abs(after - before) for before, after in pairwise(track)]
+    assert track[0] == start
     assert max(steps) <= axis.velocity * PERIOD * (1 + 1e-9)
-    assert next(step for step in steps if step) <= 0.05 * axis.velocity * PERIOD  # from rest
-    assert min(track) >= min(track[0], joint.lower) - 1e-12
-    assert max(track) <= max(track[0], joint.upper) + 1e-12
-    assert axis.moved == pytest.approx(max(track) - min(track), abs=0.2 * axis.velocity)
-    assert (axis.error_max, axis.error_rms) == pytest.approx((0.01, 0.01))
-
-
-@pytest.mark.parametrize(
-    ('change', 'reason'),
-    [
-        ({'foreign': True}, 'its set-point stands at'),
-        ({'foreign': True, 'setpoint': 1.5}, 'its set-point stands at 1.500'),
-        ({'mode': 'Profile position'}, 'it is in mode Profile position'),
-        ({'enabled': False}, 'it is not enabled: off'),
-    ],
-    ids=['halted', 'sent elsewhere', 'mode', 'disabled'],
-)
-def test_a_drive_that_something_else_moves_leaves_until_it_is_asked_for(
-    waving: Drive, change: dict[str, Any], reason: str
-) -> None:
-    """Given back, it enters from where it stands then."""
-    vars(waving).update(change)
-    waving.run(2.0)
-    assert not waving.axis.active
-    assert reason in waving.axis.left
-    waving.mode, waving.enabled, waving.foreign = 'Cyclic position', True, False
-    rest = waving.setpoint
-    waving.run(1.0)
-    assert waving.setpoint == rest
-    waving.axis.ask()
-    waving.run(0.6)
-    assert waving.axis.active
-    assert waving.setpoint == pytest.approx(rest, abs=0.1)
-    waving.run(5.0)
-    assert abs(waving.setpoint - rest) > 0.1
-
-
-def test_a_drive_that_stands_for_a_moment_stays(waving: Drive) -> None:
-    """A message may come twice, or targets late."""
-    waving.foreign = True
-    waving.run((STANDING - 1) * OBSERVED * PERIOD)
-    waving.foreign = False
-    waving.run(3.0)
-    assert waving.axis.active
-
-
-@pytest.mark.parametrize(('late', 'enters'), [(-1.0, True), (1.0, False)])
-@pytest.mark.parametrize('moves', [True, False])
-def test_a_drive_that_moves_or_has_no_mode_yet_is_waited_for_a_little(
-    moves: bool, late: float, enters: bool
-) -> None:
-    """What is known of it may be older than the answer of its service; later is too late."""
-    drive = Drive(ELBOW, 0.0)
-    drive.axis.ask()
-    for _ in range(round((READY_WITHIN + late) / (OBSERVED * PERIOD))):
-        if moves:
-            drive.setpoint += 0.01
-        else:
-            drive.mode = 'Profile position'
-        drive.run(OBSERVED * PERIOD)
-    assert not drive.axis.active
-    drive.mode = 'Cyclic position'
-    drive.run(3 * OBSERVED * PERIOD)
-    assert drive.axis.active == enters
+    assert steps[0] <= 0.05 * axis.velocity * PERIOD  # from rest
+    assert min(track) >= min(start, joint.lower) - 1e-12
+    assert max(track) <= max(start, joint.upper) + 1e-12
 
 
 @given(limits, st.sampled_from(['range', 'velocity']))
@@ -200,39 +83,12 @@ def test_a_joint_without_a_range_or_a_limit_of_speed_swings_all_the_same() -> No
     assert Axis(JointRange('head_pan', -1.6, 1.6, 10000.0), 0.0).velocity == MAX_VELOCITY
 
 
-def samples(accelerations: list[float], late: float = 0.0) -> Iterator[Sample]:
-    """Return states of one joint whose tool moves at 0.1 m/s; some stamps are late in [s]."""
-    motion = pytest.importorskip('arm_bringup.examples.motion')
-    for count, acceleration in enumerate(accelerations):
-        one = np.array([acceleration])
-        tool = np.array([0.001 * count, 0.0, 0.0])
-        stamp = 0.01 * count + late * (count % 2)
-        yield motion.Sample(stamp, one, one, one, one, 1.0, tool, tool)
-
-
-@pytest.mark.parametrize('late', [0.0, 0.002])
-def test_speed_and_jerk_are_those_of_the_cycles(late: float) -> None:
-    """Set-points are those of the nominal times, however late a cycle is."""
-    motion = pytest.importorskip('arm_bringup.examples.motion')
-    some = [*samples([0.0, 0.1, 0.2, 0.2, -0.3], late)]
-    assert motion.tool_speed(some, 0.01) == pytest.approx(0.1)
-    jerks = [
-        motion.jerk_between(before, after, 0.01, np.array([100.0]))
-        for before, after in pairwise(some)
-    ]
-    assert jerks == pytest.approx([0.1, 0.1, 0.0, 0.5])
-    assert motion.tracking_error(some, 0.01) == pytest.approx(0.5)
-    assert motion.off_line(
-        [each.tool for each in some], some[0].tool, np.array([1.0, 1.0, 0])
-    ) == (pytest.approx(0.004 / math.sqrt(2)))
-
-
 @pytest.mark.parametrize('name', ['panda_hand', 'prbt', 'gp110'])
 def test_a_cell_suits_its_robot(name: str) -> None:
     """Home, and both poses above the part, are free of the pillar; the tip looks down."""
     plan = pytest.importorskip('arm_bringup.examples.plan')
     from arm_bringup.description import read_description, read_semantic
-    from arm_model import load_limits, RobotModel, start_pose
+    from arm_model import load_limits, RobotModel
 
     robot = locate(argparse.Namespace(robot=name, group=[], xacro_arg=[]))
     cell = plan.CELLS[name]
@@ -252,10 +108,6 @@ def test_a_cell_suits_its_robot(name: str) -> None:
         assert pose.position[2] > cell.part_at(place)[2] + cell.below
         assert math.dist(pose.position[:2], cell.part_at(place)[:2]) < 0.01
         assert pose.rotation[2, 2] == pytest.approx(-1.0, abs=0.01)
-    for thing in cell.obstacles():
-        if thing.id == plan.PILLAR:  # it stands upright whatever its yaw is
-            for at in (start_pose(model), *map(np.array, cell.above)):
-                assert plan.distance_of(model, thing, at) > 0.0
 
 
 @pytest.mark.parametrize(('width', 'height'), [(80, 24), (102, 24), (118, 40)])
