@@ -159,9 +159,12 @@ def test_several_of_one_name_are_listed(
 def test_what_cannot_be_started_says_why(
     ros2: Ros2, env: Mapping[str, str], tmp_path: Path
 ) -> None:
-    """A missing interpreter or prefix is no traceback."""
+    """A missing interpreter or prefix is no traceback; this process takes signals as before."""
+    numbers = (signal.SIGPIPE, signal.SIGTERM)
+    before = [signal.getsignal(number) for number in numbers]
     broken = ros2('run', 'demo', 'broken')
     assert broken.code == 1
     assert broken.err == f'Cannot run {tmp_path}/lib/demo/broken: No such file or directory\n'
     missing = ros2('run', '--prefix', 'no-such-debugger', 'demo', 'print_arguments')
     assert missing.err == 'Cannot run no-such-debugger: No such file or directory\n'
+    assert [signal.getsignal(number) for number in numbers] == before

@@ -56,11 +56,13 @@ def run(args: Namespace) -> NoReturn:
     sys.stdout.flush()
     sys.stderr.flush()
     # Python ignores SIGPIPE, and what is ignored stays ignored across exec
-    signal.signal(signal.SIGPIPE, signal.SIG_DFL)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    numbers = (signal.SIGPIPE, signal.SIGTERM)
+    before = [signal.signal(number, signal.SIG_DFL) for number in numbers]
     try:
         os.execvp(command[0], command)  # noqa: S606
     except OSError as error:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)  # else a closed pipe ends this process without a word
         raise FrontendError(f'Cannot run {command[0]}: {error.strerror}') from error
 
 
