@@ -16,8 +16,6 @@ import time
 from isolation import Isolation
 from processes import executable, RunningProcess
 import pytest
-from ros_client import RosClient
-from std_msgs.msg import String
 
 from canopen_core.can import open_bus
 from canopen_tools.cli.main import INTERRUPTED
@@ -26,6 +24,7 @@ from quad_pty_peer import PtyPeer
 pytestmark = [pytest.mark.scenario, pytest.mark.slow]
 
 POLICY = ['trot_imitation', '--walk', '0.1', '0', '0', '--duration', '600']
+DOCTOR = ['quad_hardware', 'doctor', '--port', '/dev/null']
 IGNORING = ['env', '--ignore-signal=INT']
 
 
@@ -33,26 +32,8 @@ IGNORING = ['env', '--ignore-signal=INT']
     ('command', 'begun', 'code'),
     [
         (['operator_input', 'show_gamepad', '--device', 'no such pad'], 'no gamepad yet', 0),
-        (
-            [
-                'quad_controller',
-                'check_policy',
-                'trot_imitation',
-                '--walk',
-                '0.1',
-                '0',
-                '0',
-                '--duration',
-                '600',
-            ],
-            'order of joints',
-            INTERRUPTED,
-        ),
-        (
-            ['quad_hardware', 'doctor', '--port', '/dev/null', '--duration', '300'],
-            '.',
-            INTERRUPTED,
-        ),
+        (['quad_controller', 'check_policy', *POLICY], 'order of joints', INTERRUPTED),
+        ([*DOCTOR, '--duration', '300'], '.', INTERRUPTED),
     ],
     ids=lambda each: each[1] if isinstance(each, list) else '',
 )
@@ -78,20 +59,6 @@ def test_a_scan_ends(isolation: Isolation) -> None:
             assert time.monotonic() < deadline, process.output
         process.signal(signal.SIGINT)
         assert process.wait(30.0) == INTERRUPTED
-
-
-def test_an_echo_ends(isolation: Isolation) -> None:
-    """While messages come."""
-    program = [*IGNORING, 'ros2', 'topic', 'echo', '/words', 'std_msgs/msg/String']
-    with (
-        RosClient(isolation.domain_id) as client,
-        RunningProcess(program, isolation.env) as process,
-    ):
-        publisher = client.node.create_publisher(String, '/words', 1)
-        client.node.create_timer(0.1, lambda: publisher.publish(String(data='here')))
-        client.spin_until(lambda: 'here' in process.output, 30.0, 'echo')
-        process.signal(signal.SIGINT)
-        assert process.wait(30.0) == signal.SIGINT, process.output  # as ros2cli
 
 
 def test_a_calibration_ends(isolation: Isolation, tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""One move_group of the Panda for all tests of a worker."""
+"""One move_group of the Panda for all tests."""
 
 from __future__ import annotations
 
@@ -9,6 +9,14 @@ from collections.abc import Iterator
 from isolation import reserve
 from move_group_rig import MoveGroupRig, panda_parameters
 import pytest
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Run all tests of a move_group in one worker: others would start one of their own."""
+    for item in items:
+        for shared in {'running_rig', 'panda'}.intersection(getattr(item, 'fixturenames', ())):
+            item.add_marker(pytest.mark.xdist_group(shared))
 
 
 @pytest.fixture(name='running_rig', scope='session')

@@ -34,13 +34,16 @@ from moveit_msgs.srv import (
 from planning_messages import box, pose_at
 from processes import executable, RunningProcess
 import pytest
+import rclpy
 from shape_msgs.msg import SolidPrimitive
 
+from arm_model import ArmError
 from arm_model.ros import seconds
 from arm_planning import ConfigError
 from arm_planning.moveit_config.known import MANAGER, misspelt
-from arm_planning.moveit_config.package import read_package
+from arm_planning.moveit_config.package import MoveItPackage, read_package
 from arm_planning.moveit_config.settings import of_nothing, read_settings
+from arm_planning.nodes import move_group
 
 FIXED = 'panda_joint8'
 FINGERS = ['panda_finger_joint1', 'panda_finger_joint2']
@@ -495,38 +498,37 @@ def test_parameters_of_moveits_launch_files_do_the_same(
         assert not rig.followed
 
 
-def refused(isolation: Isolation, *arguments: str) -> str:
-    """Return what a program that does not start prints."""
-    command = [executable('arm_planning', 'move_group'), *arguments]
+def refusal(package: MoveItPackage | None, *arguments: str) -> str:
+    """Return why the node does not start."""
+    rclpy.init(args=list(arguments))
+    try:
+        with pytest.raises(ArmError) as refused:
+            move_group.MoveGroup(package)
+    finally:
+        rclpy.shutdown()
+    return str(refused.value)
+
+
+def test_what_does_not_fit_the_robot_is_refused(isolation: Isolation, tmp_path: Path) -> None:
+    """With file and line, by the program itself."""
+    folder = moveit_package('panda', tmp_path)
+    path = folder / 'config' / CONTROLLERS
+    path.write_text(path.read_text().replace('- panda_joint7', '- panda_joint8', 1))
+    text = refusal(read_package(folder))
+    assert re.search(rf"{CONTROLLERS}:\d+: .*names 'panda_joint8'", text), text
+    path = folder / 'config' / LIMITS
+    path.write_text(path.read_text().replace('max_velocity: 2.175', 'max_velocity: 21.75', 1))
+    command = [executable('arm_planning', 'move_group'), '--moveit-config', str(folder)]
     with RunningProcess(command, isolation.env) as process:
         assert process.wait(60.0) == 1, process.output
-        return process.output
+        process.wait_for(rf'{LIMITS}:\d+: .*panda_joint1.*21.75 is wider')
 
 
-@pytest.mark.parametrize(
-    'case',
-    [
-        (LIMITS, 'max_velocity: 2.175', 'max_velocity: 21.75', 'panda_joint1.*21.75 is wider'),
-        (CONTROLLERS, '- panda_joint7', '- panda_joint8', "names 'panda_joint8'"),
-    ],
-)
-def test_what_does_not_fit_the_robot_is_refused(
-    isolation: Isolation, tmp_path: Path, case: tuple[str, str, str, str]
-) -> None:
-    """With file and line, by the program itself."""
-    file, before, after, words = case
-    folder = moveit_package('panda', tmp_path)
-    path = folder / 'config' / file
-    path.write_text(path.read_text().replace(before, after, 1))
-    output = refused(isolation, '--moveit-config', str(folder))
-    assert re.search(rf'{file}:\d+: .*{words}', output), output
-
-
-def test_a_limits_file_that_lacks_a_joint_is_refused(isolation: Isolation, tmp_path: Path) -> None:
+def test_a_limits_file_that_lacks_a_joint_is_refused(tmp_path: Path) -> None:
     """With its path, where the parameter joint_limits names it."""
     limits = tmp_path / 'limits.yaml'
     limits.write_text('joint_limits: {elbow: {}}')
     path = panda_parameters(tmp_path, joint_limits=str(limits))
-    output = refused(isolation, '--ros-args', '--params-file', str(path))
+    text = refusal(None, '--ros-args', '--params-file', str(path))
     words = rf'joint panda_joint1 is missing .*\(joint_limits: {re.escape(str(limits))}\)'
-    assert re.search(words, output), output
+    assert re.search(words, text), text

@@ -19,6 +19,8 @@ import pytest
 from arm_model import frozen, RobotModel
 from arm_planning.ik.solver import IkSolver
 
+pytestmark = pytest.mark.xdist_group('turns')
+
 JOINTS = [f'j{number}' for number in range(1, 8)]
 START = [-3.1, 0.4, -0.8, 0.3, 0.6, 0.2, 6.0]
 

@@ -25,6 +25,8 @@ from quad_hardware.replayed_robot import ReplayedRobot
 from quad_hardware.serial_robot import RobotSettings, SerialRobot
 from quad_pty_peer import PtyPeer
 
+pytestmark = pytest.mark.xdist_group('replayed_robot')
+
 URDF = robot_urdf()
 STAND = (0.0, 0.6, -0.3) * 4
 LIFTED = (0.0, 0.9, -0.9)  # of a leg in the air

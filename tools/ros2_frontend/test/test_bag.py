@@ -90,16 +90,13 @@ def test_every_message_is_recorded(env: Mapping[str, str], tmp_path: Path) -> No
     assert len(list(folder.glob('*.mcap'))) > 2
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_it_with_a_whole_recording(
-    env: Mapping[str, str], tmp_path: Path, number: signal.Signals
-) -> None:
-    """While messages arrive."""
+def test_a_signal_ends_it_with_a_whole_recording(env: Mapping[str, str], tmp_path: Path) -> None:
+    """While messages arrive: SIGTERM as Ctrl-C, which ends those of the other tests."""
     with record(env, tmp_path / 'bag', '--topics', '/numbers', '/loose') as recorder:
         recorder.wait_for(RECORDING)
         with source(env, 100_000) as publisher:
             publisher.wait_for('connected')
-            recorder.signal(number)
+            recorder.signal(signal.SIGTERM)
             assert recorder.wait() == 0
     numbers = read(tmp_path / 'bag').get('/numbers', [])
     assert numbers == list(range(len(numbers)))
