@@ -53,6 +53,8 @@ def controller() -> Node:
         (RobotStatePublisher, 'publish_frequncy:=9.0', "did you mean 'publish_frequency'"),
         (RobotStatePublisher, 'frame_prefix:=robot', 'no robot_description'),
         (RobotStatePublisher, 'robot_description:=<robot/>', '^robot_description: .*no <link>'),
+        (Display, 'motion:=dance', "motion is 'dance': it must be sweep, stand"),
+        (Display, 'preset:=rider', "preset is 'rider': it must be lite or mini"),
         (Display, 'rate:=1000', 'rate is 1000: it must be 1.0 to 200.0'),
         (JointStatePublisher, 'robot_description:=none', '^robot_description: .*no XML'),
         (JointStatePublisher, 'robot_descripton:=none', "did you mean 'robot_description'"),

@@ -305,8 +305,6 @@ def test_a_missing_joint_is_a_fault_that_is_cleared_by_its_service(robot: Robot)
         ('gait:=gallop', "gait is 'gallop': it must be trot, crawl or pace"),
         ('nominal_height:=0.5', 'do not reach'),
         ('loop_rate:=fast', "loop_rate is 'fast': it must be a number"),
-        ('arm_pose:=[0.5, 1.0]', 'arm_pose has 2 positions'),
-        ('swing_hight:=0.03', "did you mean 'swing_height'"),
     ],
 )
 def test_odd_parameters_are_refused_at_the_start(parameter: str, reason: str) -> None:

@@ -116,19 +116,9 @@ def test_the_display_publishes_what_viewers_need(listener: Listener, isolation: 
         process.communicate(timeout=20)
 
 
-@pytest.mark.parametrize(
-    ('parameter', 'message'),
-    [
-        ('motion:=dance', "motion is 'dance': it must be sweep, stand"),
-        ('preset:=rider', "preset is 'rider': it must be lite or mini"),
-        ('motoin:=lie', "did you mean 'motion'"),
-    ],
-)
-def test_a_wrong_parameter_ends_it_with_the_remedy(
-    isolation: Isolation, parameter: str, message: str
-) -> None:
+def test_a_wrong_parameter_ends_it_with_the_remedy(isolation: Isolation) -> None:
     """The node exits with 1 and says what is possible."""
-    process = display(isolation, parameter)
+    process = display(isolation, 'motoin:=lie')
     _, errors = process.communicate(timeout=30)
     assert process.returncode == 1
-    assert message in errors
+    assert "did you mean 'motion'" in errors
