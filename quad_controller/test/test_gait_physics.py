@@ -17,7 +17,9 @@ from quad_builds import go2_urdf
 from quad_controller import (
     BodyPose,
     Controller,
+    GaitGenerator,
     GaitParameters,
+    ParameterError,
     ServoModel,
     StateParameters,
     Velocity,
@@ -128,6 +130,13 @@ def test_a_robot_of_another_size_trots_by_its_own_urdf(velocity: Velocity) -> No
     assert travel.y == pytest.approx(velocity.y, abs=0.1)
     assert travel.yaw == pytest.approx(velocity.yaw, abs=0.1)
     assert travel.tilt < math.radians(12.0)
+
+
+def test_servos_that_cannot_carry_another_robot_are_refused() -> None:
+    """Those of the XGO under a robot of 15 kg, with what to set."""
+    robot = quadruped(go2_urdf())
+    with pytest.raises(ParameterError, match=r'sag by .* rad below .* kg; set servo_comp.*kp'):
+        GaitGenerator(robot, GaitParameters(nominal_height=0.28))
 
 
 @pytest.mark.parametrize('gait', ['crawl', 'pace'])

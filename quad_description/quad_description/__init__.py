@@ -20,7 +20,17 @@ from urdf_reader import DescriptionError
 
 from .backend import Backend
 from .command_line import run_command
-from .kinematics.leg import FEET, foot_position, jacobian, LegGeometry, LEGS, LegSolution, solve
+from .kinematics.leg import (
+    body_link,
+    FEET,
+    foot_link,
+    foot_position,
+    jacobian,
+    LegGeometry,
+    LEGS,
+    LegSolution,
+    solve,
+)
 from .kinematics.quadruped import Feet, FootPose, Quadruped, quadruped, raised_feet, Targets
 from .presets import (
     Pose,
@@ -68,6 +78,8 @@ __all__ = [
     'Quadruped',
     'RobotState',
     'Targets',
+    'body_link',
+    'foot_link',
     'foot_position',
     'jacobian',
     'movable_joints',

@@ -86,15 +86,15 @@ GO2_MASSES = {'hip': (0.678, 0.0, 0.0007), 'thigh': (1.152, -0.027, 0.005),
 
 
 def go2_urdf() -> str:
-    """Return a robot with lengths, masses and limits of a Unitree Go2, and our names."""
+    """Return a robot with lengths, masses, limits and names of a Unitree Go2."""
     parts = [
-        '<robot name="go2">' + body('base_link', 6.921, 0.0, 0.08) + '<link name="imu_link"/>'
-        '<joint name="imu" type="fixed"><parent link="base_link"/><child link="imu_link"/></joint>'
+        '<robot name="go2">' + body('base', 6.921, 0.0, 0.08) + '<link name="imu_link"/>'
+        '<joint name="imu" type="fixed"><parent link="base"/><child link="imu_link"/></joint>'
     ]
-    for name in LEGS:
-        front, side = (1 if name[0] == 'f' else -1), (1 if name[1] == 'l' else -1)
+    for name in ('FL', 'FR', 'RL', 'RR'):
+        front, side = (1 if name[0] == 'F' else -1), (1 if name[1] == 'L' else -1)
         places = {'x': 0.1934 * front, 'hip_y': 0.0465 * side, 'thigh_y': 0.0955 * side}
-        parent = 'base_link'
+        parent = 'base'
         for part, (xyz, axis, (lower, upper), effort, velocity) in GO2_JOINTS.items():
             link = f'{name}_{part}'
             parts.append(
@@ -105,7 +105,7 @@ def go2_urdf() -> str:
             )
             parent = link
         parts.append(
-            f'<joint name="{name}_foot" type="fixed"><parent link="{parent}"/>'
+            f'<joint name="{name}_foot_joint" type="fixed"><parent link="{parent}"/>'
             f'<child link="{name}_foot"/><origin xyz="0 0 -0.213"/></joint><link '
             f'name="{name}_foot"><inertial><mass value="0.04"/><inertia ixx="1e-5" iyy="1e-5" '
             'izz="1e-5" ixy="0" ixz="0" iyz="0"/></inertial><collision><geometry>'

@@ -189,6 +189,16 @@ def test_joints_may_have_any_names() -> None:
     assert robot.legs[0].joints[2] == 'left_front_knee'
 
 
+def test_links_may_be_named_as_others_do() -> None:
+    """The body is the root, and feet are found in the order of the legs."""
+    ours, theirs = quadruped(urdf()), urdf().replace('base_link', 'base')
+    for leg, name in zip(('fl', 'fr', 'bl', 'br'), ('FL', 'FR', 'RL', 'RR'), strict=True):
+        theirs = theirs.replace(f'{leg}_foot', f'{name}_foot')
+    robot = quadruped(theirs)
+    assert robot.feet([0.1] * 12) == ours.feet([0.1] * 12)
+    assert robot.foot_radius == ours.foot_radius
+
+
 def test_a_standing_robot_is_as_high_as_its_lowest_foot_says() -> None:
     """The feet are balls: their centres are a radius above the ground."""
     robot = quadruped(robot_urdf('mini'))

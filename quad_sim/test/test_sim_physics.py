@@ -318,7 +318,7 @@ def test_physics_that_blows_up_says_so(tmp_path: Path, monkeypatch: pytest.Monke
 @pytest.mark.parametrize(
     ('urdf', 'message'),
     [
-        ('<robot name="a"><link name="x"/></robot>', 'no link base_link'),
+        ('<robot name="a"><link name="x"/></robot>', 'the foot of leg fl is one link'),
         ('<robot', 'cannot be simulated|no XML'),
         (URDF.replace('imu_link', 'gyro_link'), 'no link imu_link'),
     ],

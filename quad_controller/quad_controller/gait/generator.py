@@ -90,7 +90,8 @@ class GaitGenerator:
 
         Raises:
             DescriptionError: The legs do not reach the nominal height.
-            ParameterError: They do not reach as far outwards or ahead.
+            ParameterError: They do not reach as far outwards or ahead, or the servos that are
+                compensated cannot carry it.
         """
         self._robot = robot
         self._parameters = parameters
@@ -114,6 +115,7 @@ class GaitGenerator:
         self._compensation = (
             ServoCompensation(robot, parameters.servo) if parameters.servo is not None else None
         )
+        _ = self.stand_targets  # refuses servos that cannot carry it
         self._unsettled = 0  # steps in which the compensation still sees the end of the gait
         self.velocity = self.goal = REST
         self.clamped = False

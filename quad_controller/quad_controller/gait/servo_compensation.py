@@ -16,10 +16,12 @@ from dataclasses import dataclass
 
 from quad_description import jacobian, Quadruped, Targets
 
+from ..exceptions import ParameterError
 from ..settings import setting
 
 GRAVITY = 9.81  # [m/s^2]
 LOOK = 2  # steps of the motion, after the newest one, that it looks at
+MAX_SAG = 1.0  # [rad] beyond which a servo carries nothing
 STEP_LOAD = 1.25  # of its share of the weight: what each of two legs carries; found in physics
 
 
@@ -52,9 +54,20 @@ class ServoCompensation:
         self._window.clear()
 
     def at_rest(self, targets: Targets) -> Targets:
-        """Return the set-points for standing still on all legs at some targets [rad]."""
+        """Return the set-points for standing still on all legs at some targets [rad].
+
+        Raises:
+            ParameterError: Servos that are so soft cannot carry the robot.
+        """
         moved = list(targets)
         self._carry(moved, targets, (True,) * len(self._robot.legs))
+        sag = max(abs(a - b) for a, b in zip(moved, targets, strict=True))
+        if sag > MAX_SAG:
+            raise ParameterError(
+                f'servos of {self._servo.kp:g} N m/rad sag by {sag:.1f} rad below '
+                f'{self._weight / GRAVITY:.1f} kg; set servo_compensation.kp to the stiffness of '
+                'those of this robot [N m/rad], or servo_compensation.enabled to false'
+            )
         return self._robot.clamp(moved)
 
     def step(self, targets: Targets, contacts: tuple[bool, ...], dt: float) -> Targets:

@@ -136,7 +136,14 @@ LEGS: Final = ('fl', 'fr', 'bl', 'br')
 FEET: Final = tuple(f'{leg}_foot' for leg in LEGS)
 """Links of the feet, in the order of the legs."""
 
-BASE: Final = 'base_link'  # link of the body
+BASE: Final = 'base_link'  # link of the body; else the root of the URDF is
+SPELLINGS: Final = {
+    'fl': ('fl', 'lf'),
+    'fr': ('fr', 'rf'),
+    'bl': ('bl', 'rl', 'hl', 'lh'),
+    'br': ('br', 'rr', 'hr', 'rh'),
+}
+"""How the legs are called in other URDFs, in small or large letters."""
 AXIS_TOLERANCE = 1e-6
 _TURNING = (JointKind.REVOLUTE, JointKind.CONTINUOUS)
 _EXPECTED: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.0, 0.0))
@@ -164,18 +171,39 @@ class LegGeometry:
     limits: tuple[JointLimits, JointLimits, JointLimits]  # ranges of the three joints
 
 
+def body_link(tree: KinematicTree) -> str:
+    """Return the link of the body."""
+    return BASE if BASE in tree.links else tree.root
+
+
+def foot_link(tree: KinematicTree, leg: str) -> str:
+    """Return the link of a foot: ``fl_foot``, or as others call it, ``FL_foot``, ``LF_FOOT``.
+
+    Raises:
+        DescriptionError: There is none, or several.
+    """
+    names = [f'{each}_foot' for each in SPELLINGS[leg]]
+    found = [link for link in tree.links if link.lower() in names]
+    if len(found) != 1:
+        raise DescriptionError(
+            f'the foot of leg {leg} is one link named {" or ".join(names)}, in small or large '
+            f'letters; the URDF has {" and ".join(found) or "none"}: rename its links'
+        )
+    return found[0]
+
+
 def leg_geometry(tree: KinematicTree, leg: str) -> LegGeometry:
-    """Derive the geometry of a leg from the joints between base_link and its foot.
+    """Derive the geometry of a leg from the joints between the body and its foot.
 
     Args:
-        leg: One of :data:`LEGS`; its foot is the link ``<leg>_foot``.
+        leg: One of :data:`LEGS`.
 
     Raises:
         DescriptionError: Other than three turning joints move the foot, an axis points
             elsewhere, or a length is zero.
     """
-    foot_link = f'{leg}_foot'
-    joints = [each for each in tree.chain(BASE, foot_link) if each.kind is not JointKind.FIXED]
+    body, end = body_link(tree), foot_link(tree, leg)
+    joints = [each for each in tree.chain(body, end) if each.kind is not JointKind.FIXED]
     names = tuple(joint.name for joint in joints)
     for joint in joints:
         if joint.kind not in _TURNING or joint.mimic is not None:
@@ -184,16 +212,15 @@ def leg_geometry(tree: KinematicTree, leg: str) -> LegGeometry:
             )
     if len(joints) != len(_EXPECTED):
         raise DescriptionError(
-            f'{len(joints)} joints move {foot_link} ({", ".join(names)}); a leg has hip, thigh '
-            'and calf'
+            f'{len(joints)} joints move {end} ({", ".join(names)}); a leg has hip, thigh and calf'
         )
-    poses = link_poses(tree, {}, BASE)
+    poses = link_poses(tree, {}, body)
     signs = [
         _sign(rotate(poses[joint.child].rotation, joint.axis), unit, joint.name)
         for joint, unit in zip(joints, _EXPECTED, strict=True)
     ]
     hip, thigh, calf = (poses[joint.child].translation for joint in joints)
-    foot = poses[foot_link].translation
+    foot = poses[end].translation
     thigh_length, thigh_pitch = _in_plane(thigh, calf)
     calf_length, calf_pitch = _in_plane(calf, foot)
     if min(thigh_length, calf_length) < AXIS_TOLERANCE:

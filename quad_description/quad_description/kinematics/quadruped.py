@@ -21,9 +21,10 @@ from urdf_reader import (
 
 from ..urdf import JointLimits, movable_joints
 from .leg import (
-    BASE,
+    body_link,
     calf_rotation,
     FEET,
+    foot_link,
     foot_position,
     leg_geometry,
     LegGeometry,
@@ -188,7 +189,9 @@ class Quadruped:
                 )
             placed = self.place(solutions, placed)
             named = dict(zip(self.names, placed, strict=True))
-            centre = centre_of_mass(self.tree.masses(), link_poses(self.tree, named, BASE))
+            centre = centre_of_mass(
+                self.tree.masses(), link_poses(self.tree, named, body_link(self.tree))
+            )
             if centre is None:
                 raise DescriptionError('the robot description has no masses (inertial/mass)')
             shift = centre[0] - self.hip_centre[0]
@@ -213,7 +216,8 @@ def quadruped(urdf: str) -> Quadruped:
     names = tuple(joint.name for joint in joints)
     legs = tuple(leg_geometry(tree, leg) for leg in LEGS)
     shapes = (*tree.collisions(), *tree.visuals())
-    feet = (each for each in shapes if each.link == FEET[0] and each.shape == 'sphere')
+    foot = foot_link(tree, LEGS[0])
+    feet = (each for each in shapes if each.link == foot and each.shape == 'sphere')
     return Quadruped(
         tree=tree,
         names=names,

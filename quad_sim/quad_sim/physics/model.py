@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 from urdf_reader import JointKind, read_urdf
 
-from quad_description import FEET, Joint, movable_joints
+from quad_description import body_link, FEET, foot_link, Joint, LEGS, movable_joints
 
 from ..exceptions import SetupError
 from ..plant.servo import JAW, ServoParameters
@@ -127,10 +127,24 @@ def _compiled(
 
 
 def _load(urdf: str) -> mujoco.MjSpec:
-    """Read the robot, but for frames on floating joints, for which MuJoCo has no place."""
-    spec = mujoco.MjSpec.from_string(urdf)
+    """Read the robot, with the names that the links have here.
+
+    Not what is only seen, whose meshes may be elsewhere, and frames on floating joints, for which
+    MuJoCo has no place.
+    """
+    tree = read_urdf(urdf)
+    root = ET.fromstring(urdf)  # noqa: S314  # read_urdf takes it, too
+    for element in root.findall('link'):
+        for visual in element.findall('visual'):
+            element.remove(visual)
+    spec = mujoco.MjSpec.from_string(ET.tostring(root, encoding='unicode'))
     spec.compiler.fusestatic = False  # feet and IMU stay links of their own
-    for joint in read_urdf(urdf).joints:
+    names = {body_link(tree): BASE, 'imu': IMU}
+    names |= {foot_link(tree, leg): foot for leg, foot in zip(LEGS, FEET, strict=True)}
+    for link, name in names.items():
+        if (body := spec.body(link)) is not None:
+            body.name = name
+    for joint in tree.joints:
         if joint.kind is JointKind.FLOATING:
             spec.delete(_body(spec, joint.child))
     return spec
