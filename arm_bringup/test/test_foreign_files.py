@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 import os
 from pathlib import Path
 import re
 
 import pytest
 from two_arms import ARMS, DRIVES, GRIPPER, write_two_arms
+import urdf_reader
 from urdf_reader import parse_srdf, read_urdf
 
 from arm_bringup.bringup import parse
@@ -282,3 +283,23 @@ def test_groups_that_cannot_be_moved_are_reported(
     """With those that there are, and where one is chosen."""
     with pytest.raises(RobotError, match=words):
         groups(folder, drives, settings)
+
+
+def test_a_xacro_file_is_expanded_once(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As bus, groups and nodes of one bring-up all read it; what changed is read anew."""
+    expand, expanded = urdf_reader.expand_xacro, list[Path]()
+
+    def counted(path: Path, *rest: Mapping[str, object] | None) -> str:
+        expanded.append(path)
+        return expand(path, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(urdf_reader, 'expand_xacro', counted)
+    (folder / 'arm.urdf').unlink()
+    for turn, link in enumerate(('base', 'tip'), 1):
+        (folder / 'arm.xacro').write_text(
+            f'<robot name="arm" {XACRO}><link name="{link}"/></robot>'
+        )
+        os.utime(folder / 'arm.xacro', (turn, turn))
+        for _ in range(2):
+            assert f'<link name="{link}"/>' in read_description(found(folder))
+        assert len(expanded) == turn
