@@ -82,7 +82,7 @@ def crowd(seed: int) -> PlanningScene:
         CollisionObject(f'thing{number}', shapes[number % len(shapes)], pose=place)
         for number, place in enumerate(_places(draw, 24))
     ]
-    tilted = Pose(rotation_of(np.array((0.1, 0.2, 0.3, 0.927))), draw.normal(0.0, 0.1, 3))
+    tilted = Pose(rotation_of((0.1, 0.2, 0.3, 0.927)), draw.normal(0.0, 0.1, 3))
     things.append(CollisionObject('cells', cells, pose=tilted))
     scene = robot('panda').scene.with_contents(objects={thing.name: thing for thing in things})
     return scene.allowing(list(scene.link_shapes)[-1], 'thing0')
