@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import closing
 import io
 from pathlib import Path
@@ -11,6 +12,7 @@ import re
 import shutil
 import subprocess
 import tempfile
+import time
 
 import can
 from can_strategies import frames
@@ -78,24 +80,184 @@ def test_round_trip(time: float, frame: Frame) -> None:
     assert found._replace(timestamp=frame.timestamp) == frame
 
 
+@pytest.mark.parametrize('suffix', ['.log', '.asc', '.blf', '.BLF', '.txt'])
+def test_every_format_keeps_frames_and_times(suffix: str, tmp_path: Path) -> None:
+    """Data frames, remote requests and both lengths of identifiers, to the tenth of a ms."""
+    sent = [
+        frame._replace(timestamp=10.0 + 0.25 * number)
+        for number, (_, frame) in enumerate(EXAMPLES)
+        if not frame.is_error
+    ]
+    found = list(read_log(written(sent, tmp_path, f'bus{suffix}')))
+    assert [frame._replace(timestamp=0.0) for frame in found] == [
+        frame._replace(timestamp=0.0) for frame in sent
+    ]
+    assert [frame.timestamp - found[0].timestamp for frame in found] == pytest.approx(
+        [frame.timestamp - sent[0].timestamp for frame in sent], abs=1e-4
+    )
+
+
 TPDO = Frame(0x181, b'\x27\x06')
 LONG = Frame(0x18FF1234, b'\x01', is_extended=True)
+POSTED = {
+    'candump -L': (
+        '$ candump -L can0 can1\n(1.500000) can0 181#2706\n(2.500000) can1 18FF1234#01\n',
+        [('can0', TPDO, 1.5), ('can1', LONG, 2.5)],
+    ),
+    "candump's screen": (
+        (
+            '  can0  181   [2]  27 06\n\n  can1  18FF1234   [1]  01\n'
+            '  can0  701   [1]  remote request\n'
+        ),
+        [
+            ('can0', TPDO, 0.0),
+            ('can1', LONG, 0.0),
+            ('can0', Frame(0x701, is_remote=True, remote_length=1), 0.0),
+        ],
+    ),
+    'candump -t z -a, in colours': (
+        (
+            " (000.000000)  can0  \x1b[31m181\x1b[0m   [2]  27 06                     ''.'\n"
+            ' (001.250000)  can0  080   [0] \n'
+        ),
+        [('can0', TPDO, 0.0), ('can0', Frame(0x80), 1.25)],
+    ),
+    'candump -t d': (
+        (
+            ' (000.000000)  can0  181   [2]  27 06\n (001.250000)  can0  080   [0]\n'
+            ' (000.500000)  can0  080   [0]\n'
+        ),
+        [('can0', TPDO, 0.0), ('can0', Frame(0x80), 1.25), ('can0', Frame(0x80), 1.75)],
+    ),
+    'candump -x -e -t a': (
+        (
+            ' (1700000000.500000)  can0  RX - -  181   [2]  27 06\n'
+            ' (1700000001.500000)  can0  RX - -  20000004   [2]  00 04   ERRORFRAME\n'
+            '\tcontroller-problem{rx-error-warning}\n'
+        ),
+        [
+            ('can0', TPDO, 1_700_000_000.5),
+            ('can0', Frame(4, b'\0\4', is_error=True), 1_700_000_001.5),
+        ],
+    ),
+    'PCAN 1.1': (
+        (
+            ';$FILEVERSION=1.1\n;$STARTTIME=25569.0\n;   Message Number\n'
+            '     1)      1500.0  Rx         0181  2  27 06 \n'
+            '     2)      2500.0  Tx     18FF1234  1  01 \n'
+            '     3)      3500.0  Rx         0701  1  RTR \n'
+        ),
+        [
+            ('1', TPDO, 1.5),
+            ('1', LONG, 2.5),
+            ('1', Frame(0x701, is_remote=True, remote_length=1), 3.5),
+        ],
+    ),
+    'PCAN 2.1': (
+        (
+            ';$FILEVERSION=2.1\n;$STARTTIME=25569.0\n;$COLUMNS=N,O,T,B,I,d,R,L,D\n'
+            '      1      1500.000 DT  1     0181 Rx  -  2    27 06\n'
+            '      2      2500.000 DT  2 18FF1234 Rx  -  1    01\n'
+        ),
+        [('1', TPDO, 1.5), ('2', LONG, 2.5)],
+    ),
+    'SavvyCAN': (
+        (
+            'Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n'
+            '1500000,00000181,false,Rx,0,2,27,06,\n2500000,18FF1234,true,Tx,1,1,01,\n'
+        ),
+        [('0', TPDO, 1.5), ('1', LONG, 2.5)],
+    ),
+    'python-can csv': (
+        'timestamp,arbitration_id,extended,remote,error,dlc,data\n1.5,0x181,0,0,0,2,JwY=\n',
+        [('', TPDO, 1.5)],
+    ),
+    'Vector, two channels and an error frame': (
+        (
+            'date Thu Jan 01 00:00:00.000 1970\nbase hex  timestamps absolute\n'
+            'internal events logged\nBegin Triggerblock Thu Jan 01 00:00:00.000 1970\n'
+            '   1.500000 1  181             Rx   d 2 27 06\n'
+            '   2.500000 2  18FF1234x       Rx   d 1 01\n'
+            '   3.500000 1  701             Rx   r 1\n'
+            '   4.500000 1  ErrorFrame\nEnd TriggerBlock\n'
+        ),
+        [
+            ('1', TPDO, 1.5),
+            ('2', LONG, 2.5),
+            ('1', Frame(0x701, is_remote=True, remote_length=1), 3.5),
+            ('1', Frame(0, is_error=True), 4.5),
+        ],
+    ),
+    'Vector, relative': (
+        (
+            'date Thu Jan 01 00:00:00.000 1970\nbase hex  timestamps relative\n'
+            'no internal events logged\n'
+            '   1.500000 1  181             Rx   d 2 27 06\n'
+            '   1.000000 1  18FF1234x       Rx   d 1 01\n'
+        ),
+        [('1', TPDO, 1.5), ('1', LONG, 2.5)],
+    ),
+    'a silent bus': ('\n', []),
+}
 
 
-def test_buses_of_a_log_are_kept_apart(tmp_path: Path) -> None:
-    """As candump -L shows them; lines that are none are passed over."""
+@pytest.fixture
+def utc() -> Iterator[None]:
+    """Set local time to UTC."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv('TZ', 'UTC')
+        time.tzset()
+        yield
+    time.tzset()
+
+
+@pytest.mark.usefixtures('utc')
+@pytest.mark.parametrize('encoding', ['utf-8', 'utf-8-sig', 'utf-16'])
+@pytest.mark.parametrize(('text', 'expected'), POSTED.values(), ids=POSTED)
+def test_logs_are_read_as_people_post_them(
+    text: str,
+    expected: list[tuple[str, Frame, float]],
+    encoding: str,
+    tmp_path: Path,
+) -> None:
+    """Whatever they are called: the buses, the times, and remote requests with their length."""
     path = tmp_path / 'posted.txt'
-    path.write_text('$ candump -L can0 can1\n(1.5) can0 181#2706\n(2.5) can1 18FF1234#01\n')
-    assert [*read_buses(path)] == [
-        ('can0', TPDO._replace(timestamp=1.5)),
-        ('can1', LONG._replace(timestamp=2.5)),
+    path.write_text(text, encoding)
+    found = list(read_buses(path))
+    assert [(bus, frame._replace(timestamp=0.0)) for bus, frame in found] == [
+        (bus, frame) for bus, frame, _ in expected
     ]
+    times = [frame.timestamp for _, frame in found]
+    assert times == pytest.approx([stamp for _, _, stamp in expected], abs=1e-6)
 
 
 REFUSED = {
-    'anything': ('Dear all,\nmy drive does not move.\n', "no log of candump.*'Dear all,'"),
-    'PCAN .trc': (';$FILEVERSION=1.1\n', r'no log of candump.*can_logconvert posted\.log '),
-    'CAN FD': ('(1.0) can0 181##12706\n', 'line 1: .*is a CAN FD frame'),
+    'anything': ('Dear all,\nmy drive does not move.\n', "no log of a known format.*'Dear all,'"),
+    'BUSMASTER': ('***BUSMASTER Ver 3.2.2***\n', r'BUSMASTER \.log is not read; read are candump'),
+    'MDF': ('MDF     4.10    ', r'ASAM MDF \(\.mf4\) is not read'),
+    'gzip': ('\x1f\x8b', 'gzip file is not read'),
+    'pcap': ('\xd4\xc3\xb2\xa1' + 60 * '\0', 'pcap is not read; read are candump'),
+    'pcapng': ('\x0a\x0d\x0d\x0a' + 60 * '\0', 'pcapng is not read; read are candump'),
+    'a damaged BLF': ('LOGG' + 200 * '\0', r'Vector \.blf: damaged after 0 frames'),
+    'FD in candump -L': ('(1.0) can0 181##12706\n', 'candump log: line 1: .*is a CAN FD frame'),
+    'FD on the screen': ('  can0  181  [12]  27 06\n', "candump's screen: line 1: .*CAN FD"),
+    'FD in .asc': (
+        (
+            'base hex  timestamps absolute\nno internal events logged\n'
+            '  1.5 CANFD 1 Rx 181 1 0 9 12 00 01 02 03 04 05 06 07 08 09 0a 0b 0 0 3000 0\n'
+        ),
+        r'Vector \.asc: it has CAN FD frames',
+    ),
+    'FD in .trc': (
+        (
+            ';$FILEVERSION=2.0\n;$STARTTIME=25569.0\n;$COLUMNS=N,O,T,I,d,l,D\n'
+            '      1      1500.000 FD     0181 Rx 12   00 01 02 03 04 05 06 07 08 09 0A 0B\n'
+        ),
+        r'PCAN \.trc: it has CAN FD frames',
+    ),
+    'cut bytes': ('  can0  181   [2]  27\n', 'line 1: .*has no 2 bytes in hexadecimal'),
+    'bits': ('  can0  181   [1]  00100111\n', 'has no 1 bytes in hexadecimal'),
+    'a damaged csv': ('Time Stamp,ID,Extended,Bus,LEN,D1\n1,181,0,0,1,xy\n', 'SavvyCAN csv: dam'),
 }
 
 
@@ -111,10 +273,28 @@ def test_what_cannot_be_read_is_named(text: str, words: str, tmp_path: Path) -> 
 def test_one_bus_of_a_log_is_read_as_one(tmp_path: Path) -> None:
     """Frames of two buses are not mixed: one is named, or the log is refused."""
     path = tmp_path / 'bus.log'
-    path.write_text('(1.5) can0 181#2706\n(2.5) can1 18FF1234#01\n')
+    path.write_text(POSTED['candump -L'][0])
     assert [frame.can_id for frame in read_log(path, 'can1')] == [LONG.can_id]
     with pytest.raises(CodecError, match='frames of can0 and can1; choose one'):
         list(read_log(path))
+
+
+@pytest.mark.parametrize('milliseconds', [7, 70, 700])
+def test_the_start_of_an_asc_has_three_digits(milliseconds: int, tmp_path: Path) -> None:
+    """python-can writes .7 for 7 ms, up to 0.9 s from the truth: written right, and read both."""
+    start = 1.7e9 + milliseconds / 1000
+    path = tmp_path / 'bus.asc'
+    with closing(LogWriter(path, 'can0', 0.0)) as log:
+        log.write([TPDO._replace(timestamp=start)])
+    assert f'.{milliseconds:03d} ' in path.read_text().splitlines()[3]
+    (message,) = can.ASCReader(path, relative_timestamp=False)
+    assert message.timestamp == pytest.approx(start, abs=1e-4)
+    theirs = tmp_path / 'theirs.asc'
+    with can.ASCWriter(theirs) as writer:
+        writer.on_message_received(can.Message(arbitration_id=0x181, timestamp=start))
+    for each in (path, theirs):
+        (frame,) = read_log(each)
+        assert frame.timestamp == pytest.approx(start, abs=1e-4)
 
 
 def test_a_pause_between_two_clocks_does_not_move_a_log(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -131,10 +311,10 @@ def test_a_pause_between_two_clocks_does_not_move_a_log(monkeypatch: pytest.Monk
     assert bus.wall_clock_offset() == pytest.approx(1.7e9, abs=1e-3)
 
 
-@pytest.mark.parametrize('suffix', ['.pcap', '.asc', '.BLF'])
-def test_other_formats_are_not_written(suffix: str, tmp_path: Path) -> None:
-    """The refusal says what converts a log."""
-    with pytest.raises(CodecError, match=rf'can_logconvert bus\.log bus\{suffix}'):
+@pytest.mark.parametrize('suffix', ['.pcap', '.cap', '.pcapng'])
+def test_captures_are_not_written(suffix: str, tmp_path: Path) -> None:
+    """Wireshark opens logs of candump."""
+    with pytest.raises(CodecError, match='no capture is written'):
         written([], tmp_path, f'bus{suffix}')
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import argparse
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import closing, ExitStack, suppress
 from itertools import chain, islice
 import math
@@ -43,6 +43,7 @@ examples:
   candump can0 --filter emcy,node:joint1              EMCY of all devices, all of joint1
   candump can0 --log today.log --quiet --timeout 60   record a minute
   candump --read today.log --bus-config bus.yml       show what was recorded
+  candump --read pcan.trc --log bus.asc --quiet       convert a log
 """
 _NODE_WIDTH = len('all nodes')
 _LOOK_AHEAD = 1000  # frames of a log in which its buses show
@@ -147,18 +148,42 @@ def _run(options: argparse.Namespace) -> None:
 
 
 def _show_log(options: argparse.Namespace, config: BusConfig | None) -> None:
-    """Show a log as if its frames came now; its times are of the wall clock."""
+    """Show a log as if its frames came now, or convert it; its times are of the wall clock."""
     path, wanted = Path(options.read), options.interface
     logged = read_buses(path)
     first = list(islice(logged, _LOOK_AHEAD))
     found = dict.fromkeys(each.interface for each in first)
-    screen = _screen(options, config, 0.0, found if len(found) > 1 and not wanted else ())
-    for interface, frame in chain(first, logged):
-        found[interface] = None
-        if wanted in ('', interface) and not screen.show([frame], interface):
-            return
+    several = found if len(found) > 1 and not wanted else ()
+    with ExitStack() as stack:
+        log = None
+        if options.log:
+            _refuse_conversion(path, Path(options.log), several)
+            name = wanted or next(iter(found), '')
+            log = stack.enter_context(_log(options, name, 0.0))
+        screen = _screen(options, config, 0.0, several)
+        for interface, frame in chain(first, logged):
+            if interface not in found:
+                found[interface] = None
+                if log is not None:
+                    _refuse_conversion(path, Path(options.log), () if wanted else found)
+            if wanted not in ('', interface):
+                continue
+            if log is not None:
+                log.write([frame])
+            if not screen.show([frame], interface):
+                return
     if wanted and wanted not in found:
         raise CodecError(f'{path} has no frames of {wanted}, but of {", ".join(found)}')
+
+
+def _refuse_conversion(source: Path, target: Path, buses: Collection[str]) -> None:
+    if target.resolve() == source.resolve():
+        raise CodecError(f'{source} would be overwritten; give --log another file')
+    if len(buses) > 1:
+        raise CodecError(
+            f'{source} has frames of {", ".join(buses)}, and {target} is of one bus; choose it '
+            'with --interface'
+        )
 
 
 def _show_bus(options: argparse.Namespace, config: BusConfig | None) -> None:
@@ -168,7 +193,7 @@ def _show_bus(options: argparse.Namespace, config: BusConfig | None) -> None:
         bus = stack.enter_context(open_bus(options.bus))
         log = None
         if options.log:
-            log = stack.enter_context(closing(LogWriter(Path(options.log), bus.name, offset)))
+            log = stack.enter_context(_log(options, bus.name, offset))
         listener = Listener(bus, options.timeout)
         for number in (signal.SIGINT, signal.SIGTERM):
             stack.callback(signal.signal, number, signal.signal(number, listener.stop))
@@ -209,6 +234,12 @@ def _print_counters(bus: Bus) -> None:
     _print_note(f'{counters.received} frames, {counters.lost} lost{malformed}')
 
 
+def _log(options: argparse.Namespace, name: str, offset: float) -> closing[LogWriter]:
+    if Path(options.log).suffix.lower() == '.asc':
+        _print_note('an .asc does not keep what an error frame was about; a .log does')
+    return closing(LogWriter(Path(options.log), name, offset))
+
+
 def _print_note(text: str) -> None:
     """Write for a person, beside the frames."""
     with suppress(BrokenPipeError):
@@ -233,16 +264,23 @@ def _parser() -> argparse.ArgumentParser:
         'otherwise multicast on this host), or INTERFACE:CHANNEL[@BITRATE] of python-can',
     )
     add('--bus-config', metavar='FILE', help='bus.yml that names devices and objects')
-    log = parser.add_mutually_exclusive_group()
-    log.add_argument(
-        '--log', metavar='FILE', help="write all frames, shown or not, as can-utils' candump -L"
+    add(
+        '--log',
+        metavar='FILE',
+        help="write all frames, shown or not, as can-utils' candump -L; FILE.asc and FILE.blf in "
+        "Vector's formats",
     )
-    log.add_argument('--read', metavar='FILE', help='show such a log instead of a bus')
+    add(
+        '--read',
+        metavar='FILE',
+        help="show a log instead of a bus: of these formats, what candump prints, PCAN's .trc, "
+        'csv of SavvyCAN or python-can; with --log it is converted',
+    )
     add(
         '--interface',
         default='',
         metavar='NAME',
-        help='of a log of several buses: the one to show, as the log names it, such as can1',
+        help='of a log of several buses: the one to show, as the log names it, such as can1 or 2',
     )
     add('-n', '--count', type=_positive(int), help='end after so many frames shown')
     add(

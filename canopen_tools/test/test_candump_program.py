@@ -160,9 +160,10 @@ def run_main(capsys: Output, *arguments: str) -> tuple[int, str, str]:
     return code, captured.out, captured.err
 
 
-def test_a_log_is_shown_like_a_bus(capsys: Output, tmp_path: Path) -> None:
-    """--read describes what was logged, with the times of the log."""
-    path = tmp_path / 'bus.log'
+@pytest.mark.parametrize('suffix', ['.log', '.asc', '.blf', ''])
+def test_a_log_is_shown_like_a_bus(suffix: str, capsys: Output, tmp_path: Path) -> None:
+    """--read describes what was logged in any format, with the times of the log."""
+    path = tmp_path / f'bus{suffix}'
     with closing(LogWriter(path, 'can0', 1.7e9)) as log:
         log.write(frame._replace(timestamp=float(n)) for n, frame in enumerate(FRAMES))
     code, out, _ = run_main(capsys, '--read', str(path), '-t', 'a', '--filter', '^sync', '-n', '2')
@@ -205,13 +206,28 @@ def test_each_bus_of_a_log_has_a_column_or_is_chosen(capsys: Output, tmp_path: P
     assert 'has no frames of can7, but of can0, vcan1' in err
 
 
-def test_a_log_is_not_read_and_written_at_once(capsys: Output, tmp_path: Path) -> None:
-    """No log becomes itself."""
-    source = tmp_path / 'bus.log'
+@pytest.mark.parametrize('suffix', ['.asc', '.blf', '.log'])
+def test_a_log_is_converted(suffix: str, capsys: Output, tmp_path: Path) -> None:
+    """With its times; of several buses one has to be named, and no log becomes itself."""
+    source, target = tmp_path / 'screen.txt', tmp_path / f'bus{suffix}'
+    source.write_text(
+        ' (1700000000.250000)  can0  702   [1]  05\n (1700000001.000000)  can0  080   [0]\n'
+    )
+    code, out, err = run_main(capsys, '--read', str(source), '--log', str(target), '--quiet')
+    assert (code, out) == (0, '')
+    assert ('.asc does not keep what an error frame was about' in err) == (suffix == '.asc')
+    frames = list(read_log(target))
+    assert unstamped(frames) == [Frame(0x702, b'\x05'), Frame(0x080)]
+    assert [frame.timestamp for frame in frames] == pytest.approx([1.7e9 + 0.25, 1.7e9 + 1.0])
     source.write_text(TWO_BUSES)
-    with pytest.raises(SystemExit):
-        run_main(capsys, '--read', str(source), '--log', str(source))
-    assert 'not allowed with argument' in capsys.readouterr().err
+    before = target.read_bytes()
+    code, _, err = run_main(capsys, '--read', str(source), '--log', str(target))
+    assert (code, target.read_bytes()) == (1, before)
+    assert 'can0, vcan1' in err
+    assert '--interface' in err
+    code, _, err = run_main(capsys, '--read', str(source), '--log', str(source))
+    assert code == 1
+    assert 'would be overwritten' in err
     assert source.read_text() == TWO_BUSES
 
 
@@ -262,7 +278,7 @@ def test_quiet_prints_nothing_and_still_logs(capsys: Output, tmp_path: Path) -> 
         (['paecan:x'], 'no interface paecan'),
         (['--bus-config', 'nowhere/bus.yml'], 'nowhere/bus.yml'),
         (['--read', 'nowhere.log'], 'nowhere.log'),
-        (['--read', str(REPOSITORY / 'LICENSE')], 'no log of candump'),
+        (['--read', str(REPOSITORY / 'LICENSE')], 'no log of a known format'),
         (['udp_multicast:239.1.2.3', '--log', 'nowhere/bus.log'], 'nowhere/bus.log'),
     ],
 )

@@ -52,7 +52,7 @@ example:
   ros2 run arm_canopen replay --ros-args -p bus_config:=bus.yml -p log:=can.log -p rate:=0.2
 
 parameters:
-  log                 file of a black box or of candump (required)
+  log                 file of a black box or of candump, ASC, BLF, TRC or csv (required)
   interface           of a log of several buses: the one to play, as the log names it
   bus_config          the bus.yml of that bus (required)
   rate                how many seconds of the log go by in one (default 1.0)
@@ -248,7 +248,7 @@ def _refusal(found: Sequence[str]) -> CanopenError:
 
 def _declare(node: Node) -> Parameters:
     read = ParameterReader(node)
-    log = read.text('log', '', 'log of a bus: black box or candump')
+    log = read.text('log', '', 'log of a bus: black box, candump, ASC, BLF, TRC or csv')
     parameters = Parameters(
         log=Path(log),
         interface=read.text(

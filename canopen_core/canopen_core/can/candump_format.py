@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What can-utils' ``candump`` writes: lines of its logs (``-L``, ``-l``).
+"""What can-utils' ``candump`` writes: lines of its logs (``-L``, ``-l``), and of its screen.
 
 python-can takes error frames of such a log for data frames, and writes the same for all of them.
 """
@@ -8,6 +8,8 @@ python-can takes error frames of such a log for data frames, and writes the same
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from datetime import datetime
+from itertools import accumulate, pairwise
 import re
 from typing import NamedTuple
 
@@ -16,7 +18,7 @@ from .frame import checked, Frame
 
 _ERROR_FLAG = 0x2000_0000
 _STANDARD_DIGITS = 3
-_LINE = re.compile(r'\(\d+\.\d+\)\s+\S+\s+[0-9A-Fa-f]+#')
+LOG_LINE = re.compile(r'\(\d+\.\d+\)\s+\S+\s+[0-9A-Fa-f]+#')
 """How a line of a log begins."""
 _LINE = re.compile(
     r'\((?P<time>\d+\.\d+)\)\s+(?P<interface>\S+)\s+'
@@ -24,6 +26,16 @@ _LINE = re.compile(
     r'(?:[Rr](?P<remote>[0-8]?)|(?P<data>(?:[0-9A-Fa-f]{2}\.?){0,8}))'
     r'(?:\s+[RT])?\s*'
 )
+SCREEN_LINE = re.compile(
+    r'\s*(?:\((?P<time>[-\d:. ]+)\)\s+)?(?P<interface>\S+)\s+'
+    r'(?:[RT]X\s+\S\s+\S\s+)?'  # direction and flags of CAN FD: candump -x
+    r'(?P<id>[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})\s+\[(?P<length>\d+)\]'
+)
+"""How a line of the screen begins."""
+_BYTES = re.compile(
+    r'(?:\s+([0-9A-Fa-f]{2}(?:\s[0-9A-Fa-f]{2})*))?(?:\s+(?:\'.*\'|ERRORFRAME))?\s*'
+)
+_COLOR = re.compile(r'\x1b\[[0-9;]*m')
 _PLAYABLE = re.compile(r'[A-Za-z0-9_.-]{1,15}')  # names that a network interface can have
 _STAND_IN = 'vcan0'
 
@@ -80,6 +92,52 @@ def parse_line(line: str) -> LoggedFrame:
     data = bytes.fromhex((match['data'] or '').replace('.', ''))
     remote = None if match['remote'] is None else int(match['remote'] or 0)
     return _logged(match['interface'], match['id'], data, remote, float(match['time']))
+
+
+def read_screen(lines: Iterable[str]) -> Iterator[LoggedFrame]:
+    """Read what candump prints, with or without times; other lines are skipped.
+
+    Raises:
+        CodecError: A line is no classic CAN frame; the message has its number.
+    """
+    found: list[LoggedFrame] = []
+    for number, line in enumerate(lines, start=1):
+        text = _COLOR.sub('', line).rstrip()
+        match = SCREEN_LINE.match(text)
+        if match is None:
+            continue
+        try:
+            found.append(_shown(match, text[match.end() :]))
+        except CodecError as error:
+            raise CodecError(f'line {number}: {text.strip()!r} {error}') from error
+    times = [logged.frame.timestamp for logged in found]
+    if any(later < before for before, later in pairwise(times)):  # candump -t d: since the last
+        times = list(accumulate(times))
+    for logged, time in zip(found, times, strict=True):
+        yield logged._replace(frame=logged.frame._replace(timestamp=time))
+
+
+def _shown(match: re.Match[str], content: str) -> LoggedFrame:
+    length, remote = int(match['length']), None
+    if len(match['length']) > 1:  # two digits, as candump prints them
+        raise CodecError('is a CAN FD frame; only classic CAN is supported')
+    if content.strip().startswith('remote request'):
+        content, remote = '', length
+    shown = _BYTES.fullmatch(content)
+    data = bytes.fromhex(shown[1] or '') if shown is not None else b''
+    if shown is None or len(data) != (0 if remote is not None else length):
+        raise CodecError(f'has no {length} bytes in hexadecimal')
+    return _logged(match['interface'], match['id'], data, remote, _seconds(match['time']))
+
+
+def _seconds(time: str | None) -> float:
+    """Return a time of the screen in [s]: since 1970, the start or the last, or local time."""
+    if time is None:
+        return 0.0
+    try:
+        return float(time) if '-' not in time else datetime.fromisoformat(time).timestamp()
+    except ValueError as error:
+        raise CodecError(f'has the time {time!r}') from error
 
 
 def _logged(

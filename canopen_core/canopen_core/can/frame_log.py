@@ -1,22 +1,65 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Logs of a bus as ``candump -L`` writes them (can-utils: canplayer, log2asc; Wireshark).
+"""Logs of a bus in formats that can-utils and other tools read.
 
-python-can's ``can_logconvert`` makes them of other formats (.asc, .blf, .trc, .csv), and others
-of them.
+Written by the suffix of the file:
+
+- ``.asc``: Vector's text format (can-utils: asc2log)
+- ``.blf``: Vector's binary format
+- ``.log`` and all others: as ``candump -L`` writes it (can-utils: canplayer, log2asc; Wireshark)
+
+Read, by what is in the file: these, what candump prints, PCAN's .trc, and csv of SavvyCAN and
+python-can. python-can does what is not done here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+import csv
+from dataclasses import dataclass
+import io
 from pathlib import Path
+import re
+import struct
+from typing import TextIO
+import zlib
+
+import can
+from can.io.blf import BLFParseError
 
 from ..exceptions import CodecError
-from .candump_format import format_line, log_channel, LoggedFrame, read_lines
-from .frame import Frame
+from .adapter import from_message, to_message
+from .candump_format import (
+    format_line,
+    log_channel,
+    LOG_LINE,
+    LoggedFrame,
+    read_lines,
+    read_screen,
+    SCREEN_LINE,
+)
+from .frame import checked, Frame
 
-_OTHERS = {'.asc', '.blf', '.cap', '.csv', '.mf4', '.pcap', '.pcapng', '.trc'}
-_CONVERT = 'convert it by python-can: can_logconvert'
+_DAMAGE = (ValueError, LookupError, struct.error, zlib.error, BLFParseError)
+_MICROSECOND = 1e-6  # [s]
+_HEAD_SIZE = 1 << 16  # [byte] in which the format of a log shows
+_ASC_TIME = re.compile(r'(?i)((?:date|begin triggerblock)\s.*:\d\d)\.(\d{1,2})(?=\s)')
+
+
+class AscFile(io.TextIOWrapper):
+    """Text of an .asc, in which python-can's writer loses zeros: 7 ms of its start are ``.7``."""
+
+    def readline(self, size: int = -1, /) -> str:  # type: ignore[override]  # as its base has it
+        """Return the next line with three digits of milliseconds."""
+        return _with_milliseconds(super().readline(size))
+
+    def write(self, text: str) -> int:
+        """Write with three digits of milliseconds."""
+        return super().write(_with_milliseconds(text))
+
+
+def _with_milliseconds(text: str) -> str:
+    return _ASC_TIME.sub(lambda match: f'{match[1]}.{int(match[2]):03d}', text)
 
 
 class LogWriter:
@@ -27,40 +70,55 @@ class LogWriter:
     """
 
     def __init__(self, path: Path, bus_name: str, wall_offset: float) -> None:
-        """Open a file; wall_offset is wall minus steady clock in [s].
-
-        Raises:
-            CodecError: The suffix is that of another format.
-        """
-        if path.suffix.lower() in _OTHERS:
-            own = path.with_suffix('.log')
-            raise CodecError(
-                f'{path}: logs are written as candump writes them; name it {own.name}, which '
-                f'Wireshark opens, and {_CONVERT} {own.name} {path.name}'
-            )
+        """Open a file, its format by its suffix; wall_offset is wall minus steady clock in [s]."""
+        suffix = path.suffix.lower()
+        self._writer: can.ASCWriter | can.BLFWriter | None = None
         self._channel, self._offset = log_channel(bus_name), wall_offset
-        self._text = path.open('w', encoding='ascii')
+        if suffix == '.asc':
+            self._writer = can.ASCWriter(AscFile(path.open('wb'), encoding='utf-8'))
+        elif suffix == '.blf':
+            self._writer = can.BLFWriter(path)
+        elif suffix in {'.pcap', '.cap', '.pcapng'}:
+            raise CodecError(f'{path}: no capture is written; name it .log, Wireshark opens those')
+        else:
+            self._text = path.open('w', encoding='ascii')
 
     def write(self, frames: Iterable[Frame]) -> None:
         """Write frames with their own time stamps."""
         for frame in frames:
-            line = format_line(frame, frame.timestamp + self._offset, self._channel)
-            self._text.write(line)
-        self._text.flush()
+            stamp = frame.timestamp + self._offset
+            if self._writer is None:
+                self._text.write(format_line(frame, stamp, self._channel))
+            else:
+                self._writer.on_message_received(to_message(frame, stamp))
+        (self._text if self._writer is None else self._writer.file).flush()
 
     def close(self) -> None:
-        """Close the file."""
-        self._text.close()
+        """Write what is left, and close the file."""
+        if self._writer is None:
+            self._text.close()
+        else:
+            self._writer.stop()
+
+
+@dataclass(frozen=True, slots=True)
+class _TextFormat:
+    """A format of text."""
+
+    name: str  # for messages
+    begins: re.Pattern[str]  # what its first line that counts begins with
+    # reads it; None where only its name is known
+    read: Callable[[TextIO], Iterator[LoggedFrame]] | None = None
 
 
 def read_log(path: Path, interface: str = '') -> Iterator[Frame]:
-    """Yield the frames of one bus; their time stamps are on the wall clock.
+    """Yield the frames of one bus; their time stamps are on the wall clock where the log has it.
 
-    The log names its bus; empty means the only one.
+    The format shows in what the log contains. It names its bus; empty means the only one.
 
     Raises:
-        CodecError: The log is damaged, of another format, has CAN FD frames, or those of another
-            bus besides; the message names the line.
+        CodecError: The log is damaged, of an unknown format, has CAN FD frames, or those of
+            another bus besides; the message names the format and the place.
         OSError: It cannot be read.
     """
     first = ''
@@ -81,21 +139,128 @@ def read_buses(path: Path) -> Iterator[LoggedFrame]:
     Raises:
         CodecError, OSError: As of :func:`read_log`.
     """
-    number = 0
+    with path.open('rb') as file:
+        head = file.read(_HEAD_SIZE)
+    number, name = 0, ''
     try:
-        with path.open(encoding='utf-8', errors='replace') as file:
-            for logged in read_lines(file):
-                yield logged
-                number += 1
+        name, frames = _opened(path, head)
+        for logged in frames:
+            yield logged
+            number += 1
     except CodecError as error:
-        raise CodecError(f'{path}: {error}') from error
-    if not number and (first := _first_line(path)):
-        raise CodecError(
-            f'{path}: no log of candump, it begins with {first[:60]!r}; {_CONVERT} {path.name} '
-            f'{path.stem}_candump.log'
-        )
+        raise CodecError(f'{path}: {name}: {error}' if name else f'{path}: {error}') from error
+    except _DAMAGE as error:
+        raise CodecError(f'{path}: {name}: damaged after {number} frames: {error}') from error
 
 
-def _first_line(path: Path) -> str:
-    with path.open(encoding='utf-8', errors='replace') as file:
-        return next((line.strip() for line in file if line.strip()), '')
+def _opened(path: Path, head: bytes) -> tuple[str, Iterator[LoggedFrame]]:
+    """Return the name of the format of a log, and its frames."""
+    for magic, name, reader in _BINARY:
+        if head.startswith(magic):
+            if reader is None:
+                raise CodecError(f'{name} is not read; {_KNOWN}')
+            return name, _read_binary(path, reader)
+    encoding = 'utf-16' if head.startswith((b'\xff\xfe', b'\xfe\xff')) else 'utf-8-sig'
+    lines = head.decode(encoding, 'replace').splitlines()
+    for line in lines:
+        for text_format in _TEXT:
+            if not text_format.begins.match(line):
+                continue
+            if text_format.read is None:
+                raise CodecError(f'{text_format.name} is not read; {_KNOWN}')
+            file = AscFile(path.open('rb'), encoding=encoding, errors='replace')
+            return text_format.name, _closing(file, text_format.read)
+    first = next((line.strip() for line in lines if line.strip()), '')
+    if not first:
+        return '', iter(())  # a log of a silent bus
+    raise CodecError(f'no log of a known format, it begins with {first[:60]!r}; {_KNOWN}')
+
+
+def _read_binary(
+    path: Path, reader: Callable[[Path], Iterable[can.Message]]
+) -> Iterator[LoggedFrame]:
+    """Open a log when its first frame is read, so that its format has a name by then."""
+    yield from _logged(reader(path), _name_of_channel)
+
+
+def _closing(
+    file: TextIO, read: Callable[[TextIO], Iterator[LoggedFrame]]
+) -> Iterator[LoggedFrame]:
+    with file:
+        yield from read(file)
+
+
+def _logged(
+    messages: Iterable[can.Message], name: Callable[[can.Message], str] = lambda message: ''
+) -> Iterator[LoggedFrame]:
+    """Yield the messages of a reader of python-can."""
+    for message in messages:
+        if message.is_fd:
+            raise CodecError('it has CAN FD frames; only classic CAN is supported')
+        frame = from_message(message, message.timestamp)
+        yield LoggedFrame(name(message), frame if frame.is_error else checked(frame))
+
+
+def _read_asc(file: TextIO) -> Iterator[LoggedFrame]:
+    reader = can.ASCReader(file, relative_timestamp=False)
+    elapsed = 0.0
+    for logged in _logged(reader, _name_of_channel):
+        time_stamp = logged.frame.timestamp
+        if reader.timestamps_format == 'relative':  # to the line before
+            elapsed += time_stamp - reader.start_time
+            time_stamp = reader.start_time + elapsed
+        yield logged._replace(frame=logged.frame._replace(timestamp=time_stamp))
+
+
+def _channel(message: can.Message) -> str:
+    return str(message.channel)
+
+
+def _name_of_channel(message: can.Message) -> str:
+    """Return the number of a channel as Vector counts it, from 1; empty without one."""
+    return f'{message.channel + 1}' if isinstance(message.channel, int) else ''
+
+
+def _read_savvycan(file: TextIO) -> Iterator[LoggedFrame]:
+    """Read SavvyCAN's own csv, of GVRET: times in microseconds, identifiers in hexadecimal."""
+    for row in csv.DictReader(file, skipinitialspace=True):
+        length = int(row['LEN'])
+        if length > _CLASSIC_MAX:
+            raise CodecError('it has CAN FD frames; only classic CAN is supported')
+        data = bytes(int(row[f'D{number}'], 16) for number in range(1, length + 1))
+        is_extended = row['Extended'].strip().lower() in {'true', '1'}
+        stamp = int(row['Time Stamp']) * _MICROSECOND
+        frame = checked(Frame(int(row['ID'], 16), data, stamp, is_extended))
+        yield LoggedFrame(row['Bus'].strip(), frame)
+
+
+def _pattern(text: str) -> re.Pattern[str]:
+    return re.compile(rf'\s*(?:{text})', re.IGNORECASE)
+
+
+_CLASSIC_MAX = 8  # [byte]
+_BINARY: tuple[tuple[bytes, str, Callable[[Path], Iterable[can.Message]] | None], ...] = (
+    (b'LOGG', 'Vector .blf', can.BLFReader),
+    (b'\xd4\xc3\xb2\xa1', 'pcap', None),  # of little-endian machines
+    (b'\x0a\x0d\x0d\x0a', 'pcapng', None),
+    (b'MDF ', 'ASAM MDF (.mf4)', None),
+    (b'\x1f\x8b', 'a gzip file', None),
+    (b'PK', 'a zip file', None),
+)
+_TEXT = (
+    _TextFormat('Vector .asc', _pattern(r'date\s+\w+\s+\w|base\s+(?:hex|dec)\b'), _read_asc),
+    _TextFormat('PCAN .trc', _pattern(';'), lambda file: _logged(can.TRCReader(file), _channel)),
+    _TextFormat('SavvyCAN csv', _pattern('Time Stamp,ID,Extended'), _read_savvycan),
+    _TextFormat(
+        'python-can csv',
+        _pattern('timestamp,arbitration_id,'),
+        lambda file: _logged(can.CSVReader(file)),
+    ),
+    _TextFormat('BUSMASTER .log', _pattern(r'\*\*\*BUSMASTER')),
+    _TextFormat('candump log', LOG_LINE, read_lines),
+    _TextFormat("candump's screen", SCREEN_LINE, read_screen),
+)
+_KNOWN = (
+    'read are candump (its logs and its screen), PCAN .trc, Vector .asc and .blf, csv of SavvyCAN '
+    'and python-can; SavvyCAN converts others to its csv'
+)
