@@ -1,13 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Definitions of messages and services (`ros2msg`), and what their Python classes need."""
+"""Definitions of messages (`ros2msg`), and what their Python classes need."""
 
 from .installed import (
     concatenated,
     DefinitionError,
     message_definition,
     nested_type,
-    service_definitions,
 )
 from .type_support import load_type_support
 
@@ -17,5 +16,4 @@ __all__ = [
     'load_type_support',
     'message_definition',
     'nested_type',
-    'service_definitions',
 ]

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 import os
 from pathlib import Path
 import re
@@ -15,8 +14,6 @@ import re
 _FIELD = re.compile(r'(?:(?P<package>[a-z]\w*)/)?(?:msg/)?(?P<name>[A-Z]\w*)(?:\[[^\]]*\])?\s+\w')
 
 _NESTED = '=' * 80  # before each nested definition
-
-_SEPARATOR = '---'  # between request and response of a service
 
 
 def nested_type(line: str, package: str) -> str | None:
@@ -59,19 +56,6 @@ class DefinitionError(LookupError):
     """A type that is not installed, or defined in IDL only."""
 
 
-@dataclass(frozen=True, slots=True)
-class ServiceDefinitions:
-    """Definitions of a service, each followed by those of nested messages.
-
-    Attributes:
-        request: Definition of the request.
-        response: Definition of the response.
-    """
-
-    request: str
-    response: str
-
-
 def message_definition(name: str) -> str:
     """Return the definition of an installed message with those of all messages in it.
 
@@ -84,32 +68,10 @@ def message_definition(name: str) -> str:
     return concatenated(name, _read)
 
 
-def service_definitions(name: str) -> ServiceDefinitions:
-    """Return the definitions of request and response of an installed service.
-
-    Args:
-        name: `package/srv/Name`.
-
-    Raises:
-        DefinitionError: It, or a message in it, is not installed, or has no .srv or .msg file.
-    """
-    lines = _read(name).splitlines()
-    middle = next((i for i, line in enumerate(lines) if line.strip() == _SEPARATOR), None)
-    if middle is None:
-        raise DefinitionError(f'{name}: no line {_SEPARATOR} in its .srv file')
-
-    def half(text: str) -> str:
-        return concatenated(name, lambda each: text if each == name else _read(each))
-
-    return ServiceDefinitions(
-        half('\n'.join(lines[:middle])), half('\n'.join(lines[middle + 1 :]))
-    )
-
-
 def _read(name: str) -> str:
     parts = name.split('/')
-    if len(parts) != 3 or parts[1] not in {'msg', 'srv'}:
-        raise DefinitionError(f'{name}: write package/msg/Name or package/srv/Name')
+    if len(parts) != 3 or parts[1] != 'msg':
+        raise DefinitionError(f'{name}: write package/msg/Name')
     package, folder, base = parts
     prefixes = filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))
     for prefix in prefixes:

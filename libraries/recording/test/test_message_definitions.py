@@ -13,7 +13,6 @@ from message_definitions import (
     DefinitionError,
     message_definition,
     nested_type,
-    service_definitions,
 )
 
 LINE = '=' * 80
@@ -55,20 +54,9 @@ def prefix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Install a package in the second of two prefixes."""
     share = tmp_path / 'second' / 'share' / 'demo'
     (share / 'msg').mkdir(parents=True)
-    (share / 'srv').mkdir()
     (share / 'msg' / 'Leaf.msg').write_text('int32 value\n')
-    (share / 'srv' / 'Grow.srv').write_text('Leaf leaf # --- no\n---\nLeaf[] leaves\nbool ok\n')
-    (share / 'srv' / 'Half.srv').write_text('bool ok\n')
     monkeypatch.setenv('AMENT_PREFIX_PATH', f'{tmp_path / "first"}:{tmp_path / "second"}')
     return share
-
-
-def test_a_service_has_two_definitions(prefix: Path) -> None:
-    """Each with the messages of its own fields."""
-    assert prefix.is_dir()
-    found = service_definitions('demo/srv/Grow')
-    assert found.request == f'Leaf leaf # --- no\n{LINE}\nMSG: demo/msg/Leaf\nint32 value\n'
-    assert found.response == f'Leaf[] leaves\nbool ok\n{LINE}\nMSG: demo/msg/Leaf\nint32 value\n'
 
 
 @pytest.mark.parametrize(
@@ -87,19 +75,8 @@ def test_what_is_not_installed_is_named(prefix: Path, name: str, reason: str) ->
         message_definition(name)
 
 
-def test_half_a_service_is_refused(prefix: Path) -> None:
-    """It could not be called."""
-    assert prefix.is_dir()
-    with pytest.raises(DefinitionError, match='no line ---'):
-        service_definitions('demo/srv/Half')
-
-
 def test_definitions_of_ros() -> None:
     """The Header has a time of another package in it."""
     text = message_definition('std_msgs/msg/Header')
     assert 'MSG: builtin_interfaces/msg/Time' in text
     assert 'string frame_id' in text
-    found = service_definitions('std_srvs/srv/SetBool')
-    assert 'bool data' in found.request
-    assert 'bool success' in found.response
-    assert 'bool success' not in found.request
