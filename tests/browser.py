@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 import importlib.util
 import io
+import os
 from pathlib import Path
 import re
 import shlex
@@ -46,7 +47,7 @@ PAGE_URL = r'the robot is seen at (http://localhost:\d+)$'
 """What a bring-up or demo prints of its page."""
 FEW_PICTURES = """
 const draw = window.requestAnimationFrame.bind(window);
-window.requestAnimationFrame = (act) => setTimeout(() => draw(act), 150);
+window.requestAnimationFrame = (act) => setTimeout(() => draw(act), 400);
 """
 """A page draws a few times a second: without a graphics card the robot needs the processor."""
 PICTURES = Path(__file__).parents[1] / 'build' / 'screenshots'
@@ -190,16 +191,18 @@ def texts() -> Iterator[str]:
                 yield page.locator('body').inner_text(timeout=TEXT_TIMEOUT)
 
 
-def picture(page: Page, name: str) -> bytes:
-    """Take a picture of the whole page, keep it, and return it as PNG."""
-    PICTURES.mkdir(parents=True, exist_ok=True)
-    return page.screenshot(path=PICTURES / f'{name}.png', timeout=3 * PAGE_TIMEOUT)
+def picture(page: Page, name: str) -> None:
+    """Keep a picture of the whole page, where SCREENSHOTS is set: one takes seconds."""
+    if os.environ.get('SCREENSHOTS'):
+        PICTURES.mkdir(parents=True, exist_ok=True)
+        page.screenshot(path=PICTURES / f'{name}.png', timeout=3 * PAGE_TIMEOUT)
 
 
-def colors_of_scene(png: bytes) -> int:
+def colors_of_scene(page: Page) -> int:
     """Count the pixels of the scene that have a colour: floor and sky are grey."""
     from PIL import Image
 
+    png = page.screenshot(timeout=3 * PAGE_TIMEOUT)
     image = Image.open(io.BytesIO(png)).convert('HSV')
     width, height = image.size
     scene = image.crop((0, TOP, width - PANEL, height - BELOW))  # without STOP and the panel
