@@ -158,6 +158,7 @@ class AxisState:
         position_inc: The same (0x6064).
         velocity_dev: 0x606C; None where no PDO carries it, or it is unknown.
         error: 0x603F in words when it was faulted last, else empty.
+        held_torque: 0x6077 in device units, while a torque takes over that no TPDO brings.
     """
 
     def __init__(
@@ -181,6 +182,7 @@ class AxisState:
         self.position = self.position_inc = math.nan
         self.velocity_dev: float | None = None
         self.error = ''
+        self.held_torque = 0
         self._scheduler = scheduler
         self._looked: tuple[int, float] | None = None  # statusword and position, by SDO
         self._looked_at = -math.inf
@@ -382,6 +384,17 @@ class AxisState:
         before = self.state.title
         return f'{statusword_text(self.undecoded)}, no state of CiA 402 (before: {before})'
 
+    async def read_torque(self) -> int:
+        """Return 0x6077 in device units by SDO, where no TPDO brings it; else 0."""
+        index = self.at(Index.TORQUE_ACTUAL)
+        if self._torque is not None or (index, 0) not in self.node.config.dictionary:
+            return 0
+        try:
+            value = await self.node.objects.read_object(index)
+        except (SdoError, CodecError):
+            return 0
+        return value if isinstance(value, int) else 0
+
     async def read_error_code(self) -> None:
         """Read 0x603F, so that the answer can name the error."""
         index = self.at(Index.ERROR_CODE)
@@ -539,7 +552,7 @@ class AxisState:
             clamp(position_inc, INT32_MAX),
             velocity,
             clamp(velocity_dev, INT32_MAX),
-            clamp(self.torque_dev, INT16_MAX),
+            clamp(self.torque_dev or self.held_torque, INT16_MAX),
         )
 
     def status(

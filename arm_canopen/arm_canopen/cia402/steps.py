@@ -252,16 +252,20 @@ class AxisSteps:
         leave = enabled and switching_state is not DriveState.OPERATION_ENABLED
         axis.released(Refusal(RefusalCause.MODE_SELECTED, mode.number.title))
         await self.come_to_rest()
-        await self._preload(mode, 'is not switched')
-        if leave:
-            await self.reach(switching_state)
-        if mode.number is OperationMode.INTERPOLATED_POSITION:
-            await self._clear_buffer()
+        if enabled and not leave and mode.number in TORQUE_MODES:
+            axis.view.held_torque = await axis.view.read_torque()  # else it would drop its load
         try:
+            await self._preload(mode, 'is not switched')
+            if leave:
+                await self.reach(switching_state)
+            if mode.number is OperationMode.INTERPOLATED_POSITION:
+                await self._clear_buffer()
             await self._show(mode)
         except BaseException:  # also when it is cancelled: it stays halted in either mode
             axis.select_back(before)
             raise
+        finally:
+            axis.view.held_torque = 0
         axis.halt.release()
         if leave:
             await self.reach(DriveState.OPERATION_ENABLED)

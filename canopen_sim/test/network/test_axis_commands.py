@@ -65,9 +65,11 @@ def with_modes(**changes: Any) -> VirtualNetwork:
     return booted(full_drive(**changes))
 
 
-def test_a_switch_to_torque_keeps_the_load() -> None:
+@pytest.mark.parametrize('mapped', [True, False], ids=['TPDO', 'SDO'])
+def test_a_switch_to_torque_keeps_the_load(*, mapped: bool) -> None:
     """Mode 10 begins with the torque that holds the axis, not with zero."""
-    net = with_modes()
+    config = full_drive()
+    net = booted(config if mapped else replace(config, tpdos=config.tpdos[:2]))
     net.enable(OperationMode.CYCLIC_POSITION)
     drive = net.simulated()
     drive.set_load(150, net.now)
