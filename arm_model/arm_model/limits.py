@@ -33,7 +33,6 @@ from typing import Any
 
 import numpy as np
 from urdf_reader import Joint, JointKind, KinematicTree
-import yaml
 
 from .arrays import Array, frozen, Mask
 from .exceptions import LimitsError
@@ -148,6 +147,8 @@ def load_limits(path: Path | str) -> Mapping[str, Any]:
     Raises:
         LimitsError: The file cannot be read, or has no table ``joint_limits``.
     """
+    import yaml  # which nodes do not need: they have limits as parameters
+
     try:
         document = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
     except (OSError, yaml.YAMLError) as error:
