@@ -389,3 +389,11 @@ def test_targets_of_before_the_torque_count_with_it() -> None:
     robot.set_torque(True, hold=False)
     robot.step(0.5)
     assert robot.joint_positions == pytest.approx(held, abs=0.03)
+
+
+def test_a_held_trunk_stays_where_it_is() -> None:
+    """Its legs do not pull it down, however long a person takes with them."""
+    robot = Robot(robot_urdf('lite'), held=True)
+    height = robot.base_pose.position[2]
+    robot.step(40.0)
+    assert robot.base_pose.position[2] == pytest.approx(height, abs=0.01)

@@ -171,9 +171,10 @@ def _add_base(spec: mujoco.MjSpec) -> None:
 
 
 def _hold(spec: mujoco.MjSpec) -> None:
-    """Make the trunk too heavy to be moved by its legs, and spare it gravity."""
+    """Make the trunk too heavy to be moved by its legs, and spare all of it their weight."""
     base = _body(spec, BASE)
-    base.mass, base.gravcomp = HELD_MASS, 1.0
+    legs = sum(float(body.mass) for body in spec.bodies if body.name != BASE)
+    base.mass, base.gravcomp = HELD_MASS, 1.0 + legs / HELD_MASS
     base.fullinertia = [*[HELD_MASS] * 3, 0.0, 0.0, 0.0]
 
 
