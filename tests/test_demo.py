@@ -5,13 +5,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import json
 import re
+import shutil
 import signal
 from typing import TYPE_CHECKING
 
 from bus_recorder import BusRecorder
 from canopen_interfaces.srv import COTargetDouble
-from manual_page import missing_in_run
+from manual_page import CHECKOUT, missing_in_run
 from processes import find_children, RunningProcess
 import psutil
 import pytest
@@ -20,6 +22,7 @@ from sensor_msgs.msg import JointState
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from pathlib import Path
 
     from isolation import Isolation
 
@@ -106,6 +109,25 @@ def test_a_demo_prints_what_the_manual_shows(isolation: Isolation, demo: Demo) -
     gone, alive = psutil.wait_procs(started, timeout=5.0)
     assert not alive
     assert len(gone) >= 3
+
+
+@pytest.mark.timeout(400)
+def test_the_demo_of_an_arm_of_others_says_what_it_leaves_out(
+    isolation: Isolation, tmp_path: Path
+) -> None:
+    """No place to pick and place is searched for; the arm moves there and back around a box."""
+    robots = CHECKOUT / 'arm_bringup' / 'robots' / 'gp110'
+    files = {'description': 'gp110.urdf.xacro', 'semantic': 'gp110.srdf', 'limits': 'limits.yaml'}
+    for name in ('bus.yml', 'cia402_slave.eds'):
+        shutil.copy(robots / name, tmp_path)
+    named = {key: str(robots / name) for key, name in files.items()}
+    (tmp_path / 'robot.yaml').write_text(json.dumps(named), encoding='utf-8')
+    with start(isolation, 'plan_demo', f'{tmp_path}/', '--duration', '1') as demo:
+        demo.wait_for('home, by free motion', 120.0)
+        demo.wait_for('to the farthest pose, by free motion', 60.0)
+        assert demo.wait(240.0) == 0, demo.output
+    assert re.search(r'^pick and place +left out: no place', demo.output, re.MULTILINE)
+    assert re.search(r'^box in the way +at rest', demo.output, re.MULTILINE), demo.output
 
 
 def test_ctrl_c_in_the_middle_of_a_demo(isolation: Isolation) -> None:

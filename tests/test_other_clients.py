@@ -142,6 +142,20 @@ print('tilt', abs(dog.read_roll()) < 15.0, abs(dog.read_pitch()) < 15.0, flush=T
 """
 
 
+MUJOCO = """
+import sys
+
+import mujoco
+
+model = mujoco.MjModel.from_xml_path(sys.argv[1])
+data = mujoco.MjData(model)
+mujoco.mj_resetDataKeyframe(model, data, model.key('stand').id)
+mujoco.mj_step(model, data, 200)
+print(mujoco.__version__, *data.qpos)
+"""
+DCFCHK = 'from dcf.cli import main; main()'
+
+
 def installed(command: Sequence[str | Path], folder: Path) -> Path:
     """Install pinned packages into a folder; skip the test where no registry can be reached."""
     done = subprocess.run(
@@ -239,3 +253,37 @@ def test_xgolib(isolation: Isolation, tmp_path: Path) -> None:
         assert vendor.wait(TIMEOUT) == 0, vendor.output
         assert re.search(r'^L\S* \d+ 1[25]$', vendor.output, re.MULTILINE), vendor.output
         assert 'tilt True True' in vendor.output
+
+
+def test_dcf_tools(isolation: Isolation, tmp_path: Path) -> None:
+    """The checker of Lely's own tools finds nothing in a master.dcf."""
+    env = isolation.env | from_pypi('dcf-tools==2.4.2', tmp_path)
+    bus = CHECKOUT / 'arm_bringup' / 'robots' / 'gp110' / 'bus.yml'
+    export = ['ros2', 'run', 'canopen_tools', 'canopen', 'dcf', bus, '--out', tmp_path]
+    for command in (export, [sys.executable, '-c', DCFCHK, tmp_path / 'master.dcf']):
+        done = subprocess.run(
+            command, check=False, capture_output=True, text=True, timeout=TIMEOUT, env=env
+        )
+        assert done.returncode == 0, done.stderr
+    assert not done.stderr
+
+
+def test_mujoco_of_the_major_version_before(isolation: Isolation, tmp_path: Path) -> None:
+    """The exported robot moves in it as in the one that is installed here."""
+    earlier = isolation.env | from_pypi('mujoco==3.17.0', tmp_path)
+    model = tmp_path / 'xgo.xml'
+    export = ['ros2', 'run', 'quad_sim', 'export_mjcf', model, '--floor']
+    subprocess.run(export, check=True, timeout=TIMEOUT, env=isolation.env)
+    (old, *before), (new, *now) = (
+        subprocess.run(
+            [sys.executable, '-c', MUJOCO, model],
+            check=True,
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT,
+            env=env,
+        ).stdout.split()
+        for env in (earlier, isolation.env)
+    )
+    assert old == '3.17.0' != new
+    assert [float(each) for each in before] == pytest.approx([float(each) for each in now])
