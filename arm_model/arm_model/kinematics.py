@@ -201,6 +201,9 @@ def _full(tree: KinematicTree) -> Native:
     try:
         model = pin.buildModelFromXML(tree.bare_urdf(CONTINUOUS_BOUND))
     except (RuntimeError, ValueError, ArithmeticError) as error:
+        limits = ((joint.name, joint.limit) for joint in tree.joints)
+        if lacking := [name for name, limit in limits if limit and 'effort' not in limit]:
+            raise ModelError(f'joint {lacking[0]}: <limit> has no effort; write 0') from error
         raise ModelError(f'the robot description makes no kinematic tree: {error}') from error
     for frame in model.frames:  # pinocchio confuses a link and a joint of one name
         if frame.type == pin.FrameType.BODY:

@@ -201,6 +201,10 @@ BROKEN: dict[str, tuple[Callable[[Texts], Texts], str]] = {
     'srdf no xml': (lambda t: (t[0], '<robot', t[2]), 'SRDF is no XML'),
     'urdf no xml': (lambda t: ('<robot', *t[1:]), 'description is no XML'),
     'unknown tip': (lambda t: (t[0], t[1].replace('"tip"', '"top"'), t[2]), "'top'"),
+    'no effort': (
+        lambda t: (t[0].replace(LIMIT, LIMIT.replace(' effort="1"', '')), *t[1:]),
+        'joint j1: <limit> has no effort',
+    ),
     'no limit': (lambda t: (t[0].replace(LIMIT, ''), *t[1:]), 'needs <limit'),
 }
 
