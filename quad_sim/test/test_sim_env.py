@@ -279,7 +279,7 @@ def test_an_action_that_is_not_finite_or_complete_is_refused(action: np.ndarray)
         (lambda: RewardWeights(tracking=math.nan), 'tracking'),
         (lambda: RewardWeights(turning_width=0.0), 'turning_width'),
         (lambda: WalkingEnv(duration=0.01), 'duration'),
-        (lambda: WalkingEnv(randomization=Randomization(delay=(0.0, 0.02))), 'less than a period'),
+        (lambda: Randomization(bumps=(0.0, 1.5)), 'bumps'),
         (lambda: WalkingEnv().reset(options={'command': (0.1, 0.2)}), 'x and y'),
         (lambda: WalkingEnv().reset(options={'command': (0.1, math.nan, 0.0)}), 'x and y'),
         (lambda: WalkingEnv().reset(options={'comand': (0.1, 0.0, 0.0)}), 'comand'),
@@ -365,8 +365,8 @@ def test_ranges_of_many_are_changed_on_the_way() -> None:
         second, _ = envs.reset(seed=3)
         assert np.abs(first[:, 3:5]).max() < 0.03
         assert np.abs(second[:, 3:5]).min() > 0.15
-        with pytest.raises(SimulationError, match='delay'):
-            envs.call('vary', Randomization(delay=(0.0, 0.5)))
+        with pytest.raises(SimulationError, match='nothing'):
+            envs.call('nothing')
     finally:
         envs.close()
 

@@ -366,6 +366,22 @@ def test_a_servo_does_not_pull_within_its_free_width(step: float, torque: float)
     assert robot.joint_torques[calf] == pytest.approx(torque, abs=0.005)
 
 
+def test_a_leg_stops_at_another_one() -> None:
+    """A hind leg that is sent through the front one stays behind it; alone it gets there."""
+    hind = {'bl_thigh_joint': -0.9, 'bl_calf_joint': -0.4}
+    front = {'fl_thigh_joint': 1.4, 'fl_calf_joint': -0.8}
+    short = []
+    for goal in (hind, hind | front):
+        robot = Robot(URDF, ServoModel.FIRM, held=True)
+        robot.set_targets(goal, 0.5)
+        robot.step(2.0)
+        thigh = robot.joint_positions[robot.joint_names.index('bl_thigh_joint')]
+        short.append(thigh - goal['bl_thigh_joint'])
+    alone, behind = short
+    assert alone < 0.02
+    assert behind > 0.3
+
+
 def test_a_target_comes_with_the_next_refresh_after_its_delay() -> None:
     """One that makes no sense is refused at once, and not when it comes."""
     robot = Robot(URDF, ServoParameters(stiffness=5.0, delay=0.01, refresh=0.04))

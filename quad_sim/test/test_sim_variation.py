@@ -36,12 +36,14 @@ def settled(robot: Robot) -> tuple[object, ...]:
 def test_a_varied_robot_is_the_one_that_was_made_so() -> None:
     """Softer servos on smoother ground are what those arguments make."""
     varied = Robot(robot_urdf(), FIRM)
-    varied.reset(variation=Variation(friction=0.3, stiffness=0.5, damping=2.0))
+    late = {'delay': 0.03, 'backlash': 0.02, 'refresh': 0.04}
+    varied.reset(variation=Variation(friction=0.3, stiffness=0.5, damping=2.0, **late))
     softer = ServoParameters(
         stiffness=0.5 * FIRM.stiffness,
-        velocity_gain=2.0 * FIRM.velocity_gain,
+        velocity_gain=FIRM.velocity_gain,  # half as stiff, twice as damped
         damping=2.0 * FIRM.damping,
         interpolation=FIRM.interpolation,
+        **late,
     )
     made = Robot(robot_urdf(), softer, Terrain(friction=0.3))
     assert settled(varied) == settled(made)
@@ -158,3 +160,21 @@ def test_a_file_that_cannot_be_written_is_reported(
     said = capsys.readouterr().err
     assert 'No such file' in said
     assert '--servo' in said
+
+
+def test_bumps_are_as_high_as_the_variation_says() -> None:
+    """A robot that slides over them is shaken more by higher ones, and not by none."""
+    ground = Terrain(friction=0.05, roughness=0.02, seed=1)
+
+    def largest_tilt(bumps: float) -> float:
+        robot, tilt = Robot(robot_urdf(), FIRM, ground), 0.0
+        robot.reset(variation=Variation(bumps=bumps))
+        robot.kick((1.0, 0.0, 0.0))
+        for _ in range(50):
+            robot.step(0.02)
+            tilt = max(tilt, robot.base_pose.tilt)
+        return tilt
+
+    none, half, all_ = map(largest_tilt, (0.0, 0.5, 1.0))
+    assert none < 0.01
+    assert 0.03 < half < all_

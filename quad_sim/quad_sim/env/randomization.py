@@ -15,7 +15,11 @@ from ..physics.variation import Variation
 from ..plant.state import BOARD, Noise, NONE
 
 Range = tuple[float, float]
-_VARIED = ('friction', 'trunk_mass', 'stiffness', 'damping')  # as in Variation
+# as in Variation
+_VARIED = (
+    *('friction', 'trunk_mass', 'stiffness', 'damping'),
+    *('delay', 'backlash', 'refresh', 'bumps'),
+)
 _FIXED = {'kick_interval', 'noise'}  # no ranges
 
 
@@ -35,9 +39,12 @@ class Randomization:
 
     friction: Range = (0.4, 1.3)  # under the feet
     trunk_mass: Range = (0.9, 1.25)  # factor of the mass of the trunk
-    stiffness: Range = (0.8, 1.2)  # factor of the servos' stiffness
+    stiffness: Range = (0.8, 1.2)  # factor of the servos' stiffness; alike likely in ratio
     damping: Range = (0.8, 1.2)  # factor of their damping
-    delay: Range = (0.0, 0.015)  # from a target to the servos in [s], less than a period
+    delay: Range = (0.0, 0.04)  # of targets, beside that of the servos, in [s]
+    backlash: Range = (0.0, 0.01)  # free play, beside that of the servos, in [rad]
+    refresh: Range = (0.0, 0.04)  # time between two targets, beside that of the servos, in [s]
+    bumps: Range = (0.0, 1.0)  # factor of the height of the terrain's
     gyro_bias: Range = (-0.05, 0.05)  # of each axis of the gyro in [rad/s]
     level_bias: Range = (-0.02, 0.02)  # of measured roll and pitch in [rad]
     kick: Range = (-0.4, 0.4)  # change of the velocity at once, ahead and to the side, in [m/s]
@@ -49,15 +56,16 @@ class Randomization:
         for field in fields(self):
             if field.name not in _FIXED:
                 check_range(field.name, getattr(self, field.name))
-        Variation(*(getattr(self, name)[0] for name in _VARIED))  # refuses what no robot has
-        if self.delay[0] < 0.0:
-            raise SetupError(f'delay {self.delay} s: give 0 or more')
+        for end in (0, 1):  # refuses what no robot has
+            Variation(*(getattr(self, name)[end] for name in _VARIED))
         if not 0.0 <= self.kick_interval < math.inf:
             raise SetupError(f'kick_interval {self.kick_interval} s: give 0 or a finite time')
 
     def variation(self, random: np.random.Generator) -> Variation:
         """Draw a robot and its ground."""
-        return Variation(*(float(random.uniform(*getattr(self, name))) for name in _VARIED))
+        drawn = {name: float(random.uniform(*getattr(self, name))) for name in _VARIED}
+        softest, stiffest = map(math.log, self.stiffness)
+        return Variation(**drawn | {'stiffness': math.exp(random.uniform(softest, stiffest))})
 
     def scaled(self, share: float) -> Randomization:
         """Return ranges that are nearer to the robot as it is; kicks are weaker. Noise stays.
@@ -89,6 +97,9 @@ NO_RANDOMIZATION = Randomization(
     stiffness=(1.0, 1.0),
     damping=(1.0, 1.0),
     delay=(0.0, 0.0),
+    backlash=(0.0, 0.0),
+    refresh=(0.0, 0.0),
+    bumps=(1.0, 1.0),
     gyro_bias=(0.0, 0.0),
     level_bias=(0.0, 0.0),
     kick=(0.0, 0.0),

@@ -28,6 +28,7 @@ from quad_description.rotations import down_in_body, Vector
 
 from ..exceptions import SetupError, TargetError
 from ..physics import ImuBias, Robot
+from ..physics.robot import TIMESTEP
 from ..plant.servo import ServoModel, ServoParameters
 from ..plant.terrain import FLAT, Terrain
 from .randomization import check_range, NO_RANDOMIZATION, Randomization, Range
@@ -97,6 +98,7 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         command: Velocity that is commanded: ahead and to the left in [m/s], turning in [rad/s].
         stand: Joint positions of a robot that stands in [rad].
         state: What its sensors measured last.
+        variation: How the robot and its ground differ in this episode.
     """
 
     def __init__(
@@ -110,15 +112,17 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         period: float = PERIOD,
         duration: float = 20.0,
         terrain: Terrain = FLAT,
+        timestep: float = TIMESTEP,
     ) -> None:
         """Put the robot on the ground.
 
         Args:
             terrain: The ground; the robot begins on a level part of it.
             duration: Longest time of an episode in [s].
+            timestep: Of the integration in [s].
 
         Raises:
-            SetupError: A time is not above 0, or a target may come later than its step ends.
+            SetupError: A time is not above 0.
             DescriptionError: There is no such preset.
         """
         if not (0.0 < period < math.inf and period <= duration < math.inf):
@@ -126,7 +130,7 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
                 f'period {period} s, duration {duration} s: give 0 < period < duration'
             )
         urdf = robot_urdf(preset)
-        self.robot = Robot(urdf, servo, terrain, noise=randomization.noise)
+        self.robot = Robot(urdf, servo, terrain, timestep=timestep, noise=randomization.noise)
         self.period = period
         self.vary(randomization)
         limits = [joint.limits for joint in movable_joints(urdf)]
@@ -186,22 +190,14 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         return self._observation(), sum(terms.values()), fallen, is_over and not fallen, info
 
     def vary(self, randomization: Randomization) -> None:
-        """Change the ranges from the next episode on; noise stays as it was made.
-
-        Raises:
-            SetupError: A target may come later than its step ends.
-        """
-        if randomization.delay[1] >= self.period:
-            raise SetupError(
-                f'delay {randomization.delay} s: give less than a period, {self.period} s'
-            )
+        """Change the ranges from the next episode on; noise stays as it was made."""
         self._randomization = randomization
 
     def _begin(self, command: Vector | None) -> None:
         ranges, random = self._randomization, self.np_random
         seed = int(random.integers(2**31))
-        self.robot.reset(seed=seed, variation=ranges.variation(random))
-        self._delay = float(random.uniform(*ranges.delay))
+        self.variation = ranges.variation(random)
+        self.robot.reset(seed=seed, variation=self.variation)
         x, y, z = random.uniform(*ranges.gyro_bias, 3).tolist()
         self._bias = ImuBias((x, y, z), *random.uniform(*ranges.level_bias, 2).tolist())
         # of the step before; what the set-points are at the start of an episode
@@ -222,10 +218,8 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         robot, ranges, random = self.robot, self._randomization, self.np_random
         if ranges.kick_interval and random.random() < self.period / ranges.kick_interval:
             robot.kick((*random.uniform(*ranges.kick, 2).tolist(), 0.0))
-        if self._delay:
-            robot.step(self._delay)
         robot.set_targets((self.stand + wanted).astype(np.float64))
-        robot.step(self.period - self._delay)
+        robot.step(self.period)
         pose = robot.base_pose
         motion = Motion(
             velocity=robot.base_velocity,

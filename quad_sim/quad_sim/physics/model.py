@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """A MuJoCo model from the robot's URDF: free base, floor, servos and sensors.
 
-The parts of the robot touch the floor and not each other: joint limits keep the legs apart, and
-the shapes of the links are only drawings.
+All parts of the robot touch the floor. Its legs touch each other and the trunk; the parts of one
+leg, which its joint limits keep apart, and an arm touch nothing of the robot.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 from typing import Final
 from xml.etree import ElementTree as ET
 
@@ -32,7 +33,7 @@ HELD_MASS = 1e4  # [kg], [kg m2] of a trunk that nothing moves
 
 _TOUCH_MARGIN = 0.002  # [m] how far the region that feels the ground reaches beyond the foot
 
-_ALL, _FEET_ONLY = 1, 2
+_ALL, _FEET_ONLY, _LEGS = 1, 2, 4
 """Bits of what touches what: shapes of whole links on bumps would cost six times the rest."""
 
 _BUMP_CELL = 0.05  # [m] between two heights of rough ground
@@ -114,6 +115,7 @@ def _compiled(
         spec = _load(urdf)
         _set_options(spec, timestep)
         _add_base(spec)
+        _let_legs_collide(spec)
         if held:
             _hold(spec)
         if terrain is not None:
@@ -168,6 +170,19 @@ def _add_base(spec: mujoco.MjSpec) -> None:
     _body(spec, BASE).add_freejoint(name='base')
     for geom in spec.geoms:
         geom.contype, geom.conaffinity = 0, _ALL
+
+
+def _let_legs_collide(spec: mujoco.MjSpec) -> None:
+    for geom in _body(spec, BASE).geoms:
+        geom.conaffinity |= _LEGS
+    for foot in FEET:
+        leg = [_body(spec, foot)]
+        while leg[-1].parent.name != BASE:
+            leg.append(leg[-1].parent)
+        for geom in (geom for body in leg for geom in body.geoms):
+            geom.contype, geom.conaffinity = _LEGS, geom.conaffinity | _LEGS
+        for one, other in combinations(leg, 2):
+            spec.add_exclude(bodyname1=one.name, bodyname2=other.name)
 
 
 def _hold(spec: mujoco.MjSpec) -> None:
@@ -257,7 +272,7 @@ def _add_sensors(spec: mujoco.MjSpec) -> None:
     for foot in FEET:
         body = _body(spec, foot)
         body.geoms[0].name = foot
-        body.geoms[0].conaffinity = _ALL | _FEET_ONLY
+        body.geoms[0].conaffinity |= _FEET_ONLY
         radius = float(body.geoms[0].size[0]) + _TOUCH_MARGIN
         body.add_site(name=foot, size=[radius] * 3)
         spec.add_sensor(

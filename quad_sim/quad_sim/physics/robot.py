@@ -84,14 +84,10 @@ class Robot:
         self._inertial = InertialUnit(self._model, self._data)
         self._varied = VariedModel(self._model)
         self._ramp = TargetRamp(joints, timestep, np.zeros(len(joints)))
-        self._delay = round(self._servo.delay / timestep)  # steps
-        self._refresh = max(round(self._servo.refresh / timestep), 1)  # steps
-        # what the error of a joint has to exceed before its servo pulls; a jaw has no play
-        hinges = [
+        self._hinges = [
             int(self._model.joint(name).type[0]) == mujoco.mjtJoint.mjJNT_HINGE
             for name in self.joint_names
         ]
-        self._free = np.where(hinges, self._servo.free_width, 0.0)
         self._random = np.random.default_rng(seed)
         self.reset(pose=pose, seed=seed)
 
@@ -121,6 +117,12 @@ class Robot:
         if not 0.0 <= drop <= MAX_DROP:
             raise SetupError(f'drop {drop} m: give 0 to {MAX_DROP:g}')
         self._varied.vary(self._data, variation)
+        servo, timestep = self._servo, self._model.opt.timestep
+        self._delay = round((servo.delay + variation.delay) / timestep)  # steps
+        self._refresh = max(round((servo.refresh + variation.refresh) / timestep), 1)  # steps
+        # what the error of a joint has to exceed before its servo pulls; a jaw has no play
+        free = servo.free_width + 0.5 * variation.backlash
+        self._free, self._has_play = np.where(self._hinges, free, 0.0), free > 0.0
         self._gains = self._model.actuator_gainprm.copy(), self._model.actuator_biasprm.copy()
         mujoco.mj_resetData(self._model, self._data)
         self._random = np.random.default_rng(seed)
@@ -348,7 +350,7 @@ class Robot:
     def _set_points(self) -> Array:
         """Return what the servos pull to: nowhere within their free width."""
         values = self._ramp.values
-        if not self._servo.free_width:
+        if not self._has_play:
             return values
         error = values - self._data.qpos[self._qpos]
         pulled: Array = values - np.minimum(np.maximum(error, -self._free), self._free)
