@@ -23,7 +23,7 @@ from quad_pty_peer import PtyPeer
 
 pytestmark = [pytest.mark.scenario, pytest.mark.slow]
 
-POLICY = ['trot_imitation', '--walk', '0.1', '0', '0', '--duration', '600']
+POLICY = ['trot_ppo', '--walk', '0.1', '0', '0', '--duration', '600']
 DOCTOR = ['quad_hardware', 'doctor', '--port', '/dev/null']
 IGNORING = ['env', '--ignore-signal=INT']
 

@@ -276,7 +276,7 @@ def test_a_robot_answers_the_doctor(environment: Environment, tmp_path: Path) ->
 
 def test_a_policy_walks(environment: Environment) -> None:
     """The shipped policy is found without the index of ament, and walks in physics."""
-    argv = ('trot_imitation', '--walk', '0.2', '0', '0', '--duration', '1')
+    argv = ('trot_ppo', '--walk', '0.2', '0', '0', '--duration', '1', '--servo', 'firm')
     done = environment.run('quad-check-policy', *argv)
     assert done.returncode == 0, done.stdout + done.stderr
 

@@ -28,12 +28,11 @@ GROUNDS = {
     f'pushed by {TIPPING_PUSH:g} m/s': Conditions(push=TIPPING_PUSH),
     'rough, 2 cm': Conditions(roughness=0.02),
     '20 % heavier': Conditions(trunk_mass=1.2),
-    'wire of 20 ms': Conditions(delay=0.02),
     'rough and pushed': Conditions(roughness=0.02, push=TIPPING_PUSH),
 }
 STIFFNESSES = (1.1, 1.7, 2.45, 4.0, 8.0, 10.0)  # [N m/rad]
 DELAYS = (0.02, 0.04, 0.06)  # [s]
-SERVO_COMMANDS = (Velocity(0.2), Velocity(-0.15), Velocity(0.0, 0.1), Velocity(0.0, 0.0, 1.0))
+SERVO_COMMANDS = (Velocity(0.2), Velocity(-0.15), Velocity(0.0, -0.1), Velocity(0.0, 0.0, -1.0))
 HEADINGS = (
     *('', 'ground', 'forward [m/s]', 'lateral [m/s]', 'turn [rad/s]'),
     *('falls/min', 'success', 'transport'),

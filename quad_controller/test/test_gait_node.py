@@ -220,7 +220,7 @@ def test_a_shipped_policy_is_found_checked_watched_and_recorded(
     The recording has them, and replay_policy finds the same ones.
     """
     with ExitStack() as stack:
-        words = ['-p', 'policy:=trot_imitation', '-p', 'policy_dry_run:=true']
+        words = ['-p', 'policy:=trot_ppo', '-p', 'policy_dry_run:=true']
         words += ['-p', f'record:={tmp_path}']
         process = stack.enter_context(RunningProcess([*NODE, *words], isolation.env))
         client = stack.enter_context(RosClient(isolation.domain_id))
@@ -268,9 +268,9 @@ def test_another_policy_is_loaded_while_it_walks(robot: Robot, tmp_path: Path) -
     robot.until_state('walk')
     assert 'neither a file nor shipped' in robot.load('no_such').message
     assert 'not in the robot: fl_hip' in robot.load(str(renamed)).message
-    answer = robot.load('trot_imitation')
+    answer = robot.load('trot_ppo')
     assert answer.success, answer.message
-    assert 'stands, then follows trot_imitation.onnx; sha256 ' in answer.message
+    assert 'stands, then follows trot_ppo.onnx; sha256 ' in answer.message
     robot.until_state('policy')
     robot.process.wait_for('error of 0.50 rad/s rms, and nothing says with what noise')
     robot.client.spin_until(lambda: bool(reports), 20.0, 'the report')

@@ -34,7 +34,7 @@ from quad_gait_rig import ARM_ROBOT, ROBOT, tilted, UPRIGHT
 
 pytestmark = pytest.mark.slow
 
-SHIPPED = find_policy('trot_imitation')
+SHIPPED = find_policy('trot_ppo')
 PERIOD = 0.02  # [s]
 STILL = JointSample(STAND, (0.0,) * 12)
 JOINTS = list(ROBOT.names)

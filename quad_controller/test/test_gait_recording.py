@@ -19,24 +19,20 @@ from quad_controller import (
     load_policy,
     Output,
     ParameterError,
-    PolicyError,
     PolicyOptions,
     replay_policy,
     StateParameters,
     Velocity,
 )
 from quad_controller.nodes.recorder import Recorder
-from quad_controller.policy import onnx_file
-from quad_controller.policy.observation import ObservationStatistics, STATISTICS_KEY
 from quad_controller.policy.options import GravitySource
 from quad_controller.policy.runner import PolicyRunner
 from quad_controller.recording import inputs_of, PolicyRun, read_recording, TOPIC, unpack
-from quad_controller.replay_policy import feed, statistics_of
+from quad_controller.replay_policy import feed
 from quad_description import JointSample, RobotState
 from quad_gait_physics import FIRM, firm, MODEL
 from quad_gait_rig import PERIOD, ROBOT, STANDING, UPRIGHT
 from quad_msgs.msg import ControllerStep
-from quad_sim import Terrain
 from quad_sim.physics import PhysicsBackend
 from rosbag_files import BagReader, METADATA_FILE
 
@@ -50,21 +46,15 @@ AS_SHIPPED = PolicyOptions()
 def shipped(options: PolicyOptions = AS_SHIPPED) -> PolicyRunner:
     """Return the policy that is shipped, anew."""
     stand = GaitGenerator(MODEL, FIRM).stand_targets
-    return load_policy(find_policy('trot_imitation'), MODEL, stand, options, PERIOD).runner
+    return load_policy(find_policy('trot_ppo'), MODEL, stand, options, PERIOD).runner
 
 
-def walk(
-    folder: Path,
-    seconds: float,
-    *,
-    options: PolicyOptions = AS_SHIPPED,
-    terrain: Terrain | None = None,
-) -> Path:
+def walk(folder: Path, seconds: float, *, options: PolicyOptions = AS_SHIPPED) -> Path:
     """Record a walk in physics: standing up by the gait, then by the policy that is shipped."""
     policy = shipped(options)
-    backend = PhysicsBackend(firm() if terrain is None else firm(terrain), PERIOD)
+    backend = PhysicsBackend(firm(), PERIOD)
     controller = Controller(MODEL, FIRM, StateParameters(), policy=policy)
-    run = PolicyRun('trot_imitation', options, PERIOD)
+    run = PolicyRun('trot_ppo', options, PERIOD)
     recorder = Recorder(folder, run.about, backlog=10_000)
     assert not run.keep_contract(folder)
     state = backend.observe()
@@ -148,9 +138,8 @@ def test_a_recorded_walk_is_answered_the_same(
     assert [(each.topic.name, each.count) for each in reader.metadata.topics] == [(TOPIC, 250)]
     assert replay_policy.run([str(folder)]) == 0
     printed = capsys.readouterr().out
-    assert 'trot_imitation.onnx' in printed
+    assert 'trot_ppo.onnx' in printed
     assert 'the same' in printed
-    assert 'the file has no observation_statistics' in printed
     steps = read_recording(folder)
     asked = [step for step in steps if len(step['action'])]
     assert len(asked) > 100
@@ -185,7 +174,7 @@ def test_a_policy_is_replayed_as_it_was_run(
     assert replay_policy.run([str(folder), '--contract', str(other)]) == 1
     assert 'NOT the same' in capsys.readouterr().out
     # a model that is named is another one: what was set for the recorded one is not its
-    named = shutil.copy(find_policy('trot_imitation'), tmp_path / 'named.onnx')
+    named = shutil.copy(find_policy('trot_ppo'), tmp_path / 'named.onnx')
     assert replay_policy.run([str(folder), str(named)]) == 1
     assert 'NOT the same' in capsys.readouterr().out
 
@@ -205,44 +194,6 @@ def test_options_that_are_none_are_refused(text: str, reason: str) -> None:
     with pytest.raises(ParameterError, match=reason):
         PolicyOptions.from_json(text)
     assert PolicyOptions.from_json('{"low_pass": 5.0}') == PolicyOptions(low_pass=5.0)
-
-
-@pytest.mark.slow
-def test_a_slope_leaves_what_was_seen_on_the_level(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """By a reference recording, and by statistics in the model: gravity is what differs."""
-    level = walk(tmp_path / 'level', 5.0)
-    slope = walk(tmp_path / 'slope', 5.0, terrain=Terrain(angle=0.2))
-    model = str(find_policy('trot_imitation'))
-    assert replay_policy.run([str(level), model, '--reference', str(level)]) == 0
-    assert 'LEAVES' not in capsys.readouterr().out
-    assert replay_policy.run([str(slope), model, '--reference', str(level)]) == 1
-    lines = capsys.readouterr().out.splitlines()
-    assert any('gravity' in line and 'LEAVES' in line for line in lines)
-    runner = shipped()
-    found = statistics_of(runner, read_recording(level))
-    own = tmp_path / 'own.onnx'
-    data = find_policy('trot_imitation').read_bytes()
-    own.write_bytes(onnx_file.with_metadata(data, STATISTICS_KEY, found.to_json()))
-    assert replay_policy.run([str(slope), str(own)]) == 1
-    printed = capsys.readouterr().out
-    assert 'reference: training' in printed
-    assert 'no answer of this file is in the recording' in printed
-    assert any('gravity' in line and 'LEAVES' in line for line in printed.splitlines())
-
-
-def test_statistics_of_another_width_are_refused() -> None:
-    """So are those that are no numbers; none are none."""
-    found = ObservationStatistics.of(np.arange(12.0).reshape(4, 3))
-    again = ObservationStatistics.from_metadata({STATISTICS_KEY: found.to_json()}, 3)
-    assert again is not None
-    assert again.mean.tolist() == [4.5, 5.5, 6.5]
-    assert again.most.tolist() == [9.0, 10.0, 11.0]
-    assert ObservationStatistics.from_metadata({}, 3) is None
-    for text, width in ((found.to_json(), 4), ('{"mean": 1}', 3), ('no', 3)):
-        with pytest.raises(PolicyError, match='observation_statistics'):
-            ObservationStatistics.from_metadata({STATISTICS_KEY: text}, width)
 
 
 def test_what_is_no_recording_is_refused(

@@ -133,7 +133,7 @@ def test_a_policy_that_misses_a_measurement_is_refused_before_the_robot_stands()
 def test_gait_policy_and_gait_walk_on_in_physics() -> None:
     """From one to the other at 0.15 m/s, the robot goes on as commanded and stays level."""
     stand = GaitGenerator(MODEL, FIRM).stand_targets
-    path = find_policy('trot_imitation')
+    path = find_policy('trot_ppo')
     policy = load_policy(path, MODEL, stand, PolicyOptions(), PERIOD).runner
     rig = PhysicsRig(firm(), FIRM)
     rig.mode('walk')

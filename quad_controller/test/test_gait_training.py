@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The training in small: its teacher is the gait, and what it writes can be loaded."""
+"""The training in small: what is trained is what runs, and what it writes can be loaded."""
 
 from __future__ import annotations
 
@@ -11,37 +11,48 @@ from pathlib import Path
 import subprocess
 import sys
 
-from contract_env import (
-    contract_of,
-    metadata_of,
-    PERIOD,
-    TaughtEnv,
-    walking_contract,
-    walking_env,
-)
+from contract_env import contract_of, PERIOD, PLANT, walking_env
 import numpy as np
-from policy_export import export
 import pytest
 
 from quad_controller import (
     Controller,
+    find_policy,
     GaitGenerator,
     GaitParameters,
+    load_policy,
     PolicyOptions,
     StateParameters,
     Velocity,
 )
-from quad_controller.policy.check import check_contract
-from quad_controller.policy.contract.mjlab import read_metadata
 from quad_controller.policy.contract.model import build_contract
-from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy.runner import PolicyRunner
 from quad_gait_physics import MODEL
-from quad_gait_policies import FakeNetwork, random_layers
+from quad_gait_policies import FakeNetwork
 from quad_sim.env import NO_RANDOMIZATION, WalkingEnv
 
 pytestmark = pytest.mark.slow
 TRAINING = Path(__file__).parents[1] / 'training'
+CONTRACT = build_contract(contract_of(find_policy('trot_ppo'), 'a test'))
+
+
+def test_servos_and_sensors_differ_in_each_episode() -> None:
+    """From 1 to 12 N m/rad and up to 60 ms late; half of them in the bytes of protocol v1."""
+    env = walking_env(CONTRACT, PLANT)
+    robots, rounded = [], 0
+    for seed in range(30):
+        env.reset(seed=seed)
+        robots.append(env.simulation.variation)
+        seen = np.degrees(env.inputs.joints.positions[0]) if env.inputs.joints else math.nan
+        byte = (seen + 31.0) * 255.0 / 62.0  # of the span of a hip
+        rounded += abs(byte - round(byte)) < 1e-6
+    stiffness = [3.5 * each.stiffness for each in robots]
+    assert 1.0 <= min(stiffness) < 1.7
+    assert 8.0 < max(stiffness) <= 12.0
+    assert 0.05 < max(each.delay for each in robots) <= 0.06
+    assert max(each.backlash for each in robots) > math.radians(1.2)
+    assert max(each.refresh for each in robots) > 0.035
+    assert 7 < rounded < 23
 
 
 def test_walking_as_commanded_is_worth_more() -> None:
@@ -68,7 +79,7 @@ def test_walking_as_commanded_is_worth_more() -> None:
 
 def test_what_is_trained_is_what_runs() -> None:
     """Observations and targets of the environment are those of the controller."""
-    env = walking_env(NO_RANDOMIZATION)
+    env = walking_env(CONTRACT, NO_RANDOMIZATION)
     seen, _ = env.reset(seed=1, options={'command': (0.2, 0.0, 0.3)})
     runner = PolicyRunner(
         FakeNetwork({}), env.contract, MODEL, options=PolicyOptions(), period=PERIOD
@@ -86,60 +97,31 @@ def test_what_is_trained_is_what_runs() -> None:
         slow = np.abs(np.array(targets) - before) < 0.19  # others the limiter of speeds cuts
         sent = env.simulation.robot.joint_targets
         assert slow.any()
-        assert sent[slow] == pytest.approx(np.array(targets)[slow], abs=1e-6)
+        # to half a step of the widest byte of protocol v1
+        assert sent[slow] == pytest.approx(np.array(targets)[slow], abs=math.radians(0.32))
         runner.advance(PERIOD)
-
-
-@pytest.mark.parametrize('velocity', [Velocity(0.2), Velocity(0.1, 0.05), Velocity(yaw=0.6)])
-def test_the_teacher_beside_the_robot_walks_it(velocity: Velocity) -> None:
-    """Its answers, as actions of the contract, go as commanded and do not fall."""
-    practice = walking_env(NO_RANDOMIZATION)
-    env = TaughtEnv(practice)
-    robot = practice.simulation.robot
-    seen, _ = env.reset(seed=1, options={'command': tuple(velocity)})
-    for _ in range(200):
-        seen, _, fallen, _, _ = env.step(seen[-12:])
-        assert not fallen
-    pose = robot.base_pose
-    way = math.hypot(*pose.position[:2])
-    assert way == pytest.approx(4.0 * math.hypot(velocity.x, velocity.y), abs=0.12)
-    assert pose.roll_pitch_yaw[2] == pytest.approx(4.0 * velocity.yaw, abs=0.5)
-
-
-def test_the_contract_is_in_the_file(tmp_path: Path) -> None:
-    """What is written fits the robot in all that it says, and nothing is left open."""
-    path, values = tmp_path / 'random.onnx', walking_contract(MODEL, 'a test')
-    export(random_layers((47, 8, 12), np.random.default_rng(0)), path, metadata_of(values))
-    network = OnnxNetwork(path)
-    document = read_metadata(network.metadata)
-    contract = build_contract(document)
-    assert contract == contract_of(values)
-    assert contract.kind == 'a test'
-    stand = GaitGenerator(MODEL, GaitParameters()).stand_targets
-    for row in check_contract(
-        network, contract, MODEL, stand,
-        document=document, hold_missing=False, period=PERIOD,
-    ):  # fmt: skip
-        assert row.verdict.value == 'ok', row
 
 
 @pytest.mark.skipif(
     find_spec('skrl') is None, reason='`make train` installs what a training needs'
 )
 def test_a_short_training_ends_with_a_policy_that_is_checked(tmp_path: Path) -> None:
-    """The command trains, writes both policies, curves and figures, and says what it found."""
+    """The command goes on with the example; policy, curves and figures are written, and judged."""
     command = [
-        *(sys.executable, str(TRAINING / 'train.py'), '--minutes', '0.6', '--environments', '16'),
-        *('--way', '3', '--rounds', '4', '--output', str(tmp_path)),
+        *(sys.executable, str(TRAINING / 'train.py'), '--minutes', '0.3', '--environments', '16'),
+        *('--way', '2', '--output', str(tmp_path)),
     ]
     done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert 'falls' in done.stdout
-    assert 'accepted' in done.stdout
-    for name in ('imitation', 'practice', 'walk'):
-        contract = build_contract(read_metadata(OnnxNetwork(tmp_path / f'{name}.onnx').metadata))
-        assert contract == contract_of(walking_contract(MODEL, contract.kind))
-        assert 'imitation' in contract.kind
+    assert done.returncode in {0, 1}, done.stdout + done.stderr
+    assert 'randomized' in done.stdout
+    assert f'check_policy: {"refused" if done.returncode else "accepted"}' in done.stdout
+    stand = GaitGenerator(MODEL, GaitParameters()).stand_targets
+    trained, example = (
+        load_policy(path, MODEL, stand, PolicyOptions(), PERIOD)
+        for path in (tmp_path / 'walk.onnx', find_policy('trot_ppo'))
+    )
+    assert trained.contract.terms == example.contract.terms
+    assert trained.digest != example.digest
     assert list((tmp_path / 'curves').glob('events.out.tfevents.*'))
     assert ',policy,forward,' in (tmp_path / 'figures.csv').read_text()
 

@@ -8,127 +8,63 @@ limiter of speeds.
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import gymnasium
 from gymnasium import spaces
 import numpy as np
 
-from quad_controller import BodyPose, Gait, GaitParameters, PolicyOptions, Velocity
-from quad_controller.gait.body import feet_in_body
-from quad_controller.gait.parameters import LOW_AND_WIDE
-from quad_controller.gait.stepping import arc, swing_way, SwingLift
-from quad_controller.policy.contract.document import document_of
-from quad_controller.policy.contract.mjlab import CONTRACT_KEY
-from quad_controller.policy.contract.model import build_contract, PolicyContract, Source
+from quad_controller import PolicyOptions, Velocity
+from quad_controller.policy.contract.document import ContractDocument, document_of
+from quad_controller.policy.contract.mjlab import read_metadata
+from quad_controller.policy.contract.model import PolicyContract
 from quad_controller.policy.network import Floats, OnnxNetwork
 from quad_controller.policy.observation import Situation
 from quad_controller.policy.runner import PolicyRunner
 from quad_controller.states.motion import StepLimiter
-from quad_description import Quadruped, quadruped, robot_urdf, Targets
-from quad_description.rotations import Vector
-from quad_sim import ServoModel
-from quad_sim.env import CommandRanges, Randomization, WalkingEnv
+from quad_description import ImuSample, JointSample, quadruped, robot_urdf
+from quad_hardware.estimation import EstimatorSettings
+from quad_hardware.estimation.filters import AttitudeRate, JointRate
+from quad_hardware.protocol import ANGLE_SPANS, Model, MOTOR_OF_JOINT
+from quad_sim import ServoModel, Terrain
+from quad_sim.env import Randomization, WalkingEnv
 
 PERIOD = 0.02  # [s]
-SCALE = 0.25  # [rad] for an action of one
-PHASE_THRESHOLD = 0.02  # slower commands have no phase
-
-Values = dict[str, Any]
-
-
-def contract_of(values: Values) -> PolicyContract:
-    """Return the contract that values say."""
-    return build_contract(document_of(values, 'training'))
-
-
-def metadata_of(values: Values) -> dict[str, str]:
-    """Return the metadata of a file that has its contract."""
-    return {CONTRACT_KEY: document_of(values, '').to_yaml()}
-
-
-class GaitTeacher:
-    """Answers the joint targets of a trot that has been going on at a velocity for long."""
-
-    def __init__(self, robot: Quadruped, parameters: GaitParameters) -> None:
-        """Use the trot of some parameters."""
-        self._robot, self._parameters = robot, parameters
-        self.schedule = parameters.schedule(Gait.TROT, robot.leg_length)
-        self._neutral = parameters.stance(robot, [0.0] * len(robot.names))
-        self._lift = SwingLift(robot, self._neutral, self.schedule, parameters.swing_height)
-
-    @property
-    def stand(self) -> Targets:
-        """Joint targets of a robot that stands [rad]."""
-        return self.targets(Velocity(), 0.0, (0.0, 0.0))
-
-    def targets(self, velocity: Velocity, phase: float, tilt: tuple[float, float]) -> Targets:
-        """Return the joint targets in [rad].
-
-        Args:
-            phase: Share of the period that has passed.
-            tilt: Measured roll and pitch in [rad].
-        """
-        feet = [
-            self._foot(place, offset, velocity, phase)
-            for place, offset in zip(self._neutral, self.schedule.offsets, strict=True)
-        ]
-        gain = self._parameters.level_gain
-        pose = BodyPose(roll=_bounded(-gain * tilt[0]), pitch=_bounded(-gain * tilt[1]))
-        moved = feet_in_body(feet, pose, self._robot.hip_centre)
-        return self._robot.place(self._robot.solve(moved), [0.0] * len(self._robot.names))
-
-    def _foot(self, place: Vector, offset: float, velocity: Velocity, phase: float) -> Vector:
-        schedule = self.schedule
-        over_x = velocity.x - velocity.yaw * place[1]
-        over_y = velocity.y + velocity.yaw * place[0]
-        part = math.fmod(phase + offset, 1.0)
-        if part < schedule.duty:
-            time = schedule.stance_duration * (0.5 - part / schedule.duty)
-            return place[0] + over_x * time, place[1] + over_y * time, place[2]
-        part = (part - schedule.duty) / (1.0 - schedule.duty)
-        x, y = (swing_way(over, part, schedule) for over in (over_x, over_y))
-        scale = min(1.0, math.hypot(over_x, over_y) / 0.03)
-        lift = self._lift.height(over_x, over_y) * scale * arc(part)
-        return place[0] + x, place[1] + y, place[2] + lift
+V1_SHARE = 0.5  # of the episodes that go through the bytes of protocol v1; the others are v2's
+TIMESTEP = 0.004  # [s] of the physics
+ROUGH = Terrain(roughness=0.02, seed=2)  # the highest bumps that are practised on
+SERVO = replace(
+    ServoModel.NOMINAL.parameters, stiffness=3.5, velocity_gain=0.06, delay=0.0, backlash=0.0
+)
+"""What stiffness, delay and backlash are varied from."""
+PLANT = Randomization(
+    friction=(0.35, 1.3),
+    trunk_mass=(0.9, 1.3),
+    stiffness=(1.0 / SERVO.stiffness, 12.0 / SERVO.stiffness),
+    delay=(0.0, 0.06),
+    backlash=(0.0, 0.026),
+    refresh=(0.0, 0.04),
+    kick=(-1.6, 1.6),
+    kick_interval=2.0,
+)
+"""What differs in the end: servos of 1 to 12 N m/rad, with up to 1.5 degrees of play."""
 
 
-def _bounded(angle: float) -> float:
-    return min(max(angle, -0.2), 0.2)
-
-
-def walking_contract(robot: Quadruped, kind: str = '') -> Values:
-    """Return the contract of a policy that walks, as it is written into its file.
+def contract_of(path: Path, kind: str) -> ContractDocument:
+    """Return the contract of an ONNX file, for a policy that is trained on the plant from there.
 
     Args:
         kind: How the policy is made, for people.
+
+    Raises:
+        PolicyError: The file cannot be read.
     """
-    teacher = GaitTeacher(robot, LOW_AND_WIDE)
-    ranges, servo = CommandRanges(), ServoModel.FIRM.parameters
-    terms = {
-        'angular_velocity': {'source': 'angular_velocity', 'frame': 'base'},
-        'gravity': {'source': 'gravity'},
-        'command': {'source': 'command'},
-        'phase': {
-            'source': 'phase',
-            'phase_period': round(teacher.schedule.period, 3),
-            'phase_threshold': PHASE_THRESHOLD,
-        },
-        'positions': {'source': 'joint_positions', 'relative': True},
-        'velocities': {'source': 'joint_velocities'},
-        'last_action': {'source': 'last_action'},
-    }
-    return {
-        'kind': kind,
-        'joints': list(robot.names),
-        'default_positions': [round(position, 3) + 0.0 for position in teacher.stand],
-        'period': PERIOD,
-        'observation': {'terms': terms},
-        'action': {'scale': SCALE},
-        'gains': {'stiffness': servo.stiffness, 'damping': servo.velocity_gain},
-        'commands': {'x': list(ranges.x), 'y': list(ranges.y), 'yaw': list(ranges.yaw)},
-    }
+    gains = {'stiffness': SERVO.stiffness, 'damping': SERVO.velocity_gain}
+    own = document_of({'kind': kind, 'gains': gains}, 'training')
+    return own.over(read_metadata(OnnxNetwork(path).metadata))
 
 
 class NoNetwork(OnnxNetwork):
@@ -144,16 +80,20 @@ class NoNetwork(OnnxNetwork):
 class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
     """Walking with the observations and actions of a contract."""
 
-    def __init__(self, env: WalkingEnv, values: Values) -> None:
-        """Wrap an environment by the values of a contract."""
+    def __init__(self, env: WalkingEnv, contract: PolicyContract) -> None:
+        """Wrap an environment."""
         super().__init__(env)
         self.simulation = env  # the environment below
         robot = quadruped(robot_urdf())
-        self.contract = contract_of(values)
+        self.contract = contract
         self._runner = PolicyRunner(
             NoNetwork(), self.contract, robot, options=PolicyOptions(), period=PERIOD
         )
         self._limiter = StepLimiter(robot.limits, PERIOD)
+        self._names = robot.names
+        spans = [ANGLE_SPANS[Model.LITE][MOTOR_OF_JOINT[name]] for name in robot.names]
+        self._lowest = np.radians([span.low for span in spans])  # [rad] of the bytes of v1
+        self._byte = np.radians([span.high - span.low for span in spans]) / 255.0
         count = len(robot.names)
         self.action_space = spaces.Box(-np.inf, np.inf, (count,), np.float32)
         self.observation_space = spaces.Box(-np.inf, np.inf, (self.contract.width,), np.float32)
@@ -166,65 +106,57 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
         start = tuple(self.simulation.robot.joint_targets.tolist())
         self._runner.reset(start)
         self._limiter.start(start)
+        settings = EstimatorSettings()
+        self._joint_rate = JointRate(settings.joint_cutoff)
+        self._attitude_rate = AttitudeRate(settings.rate_cutoff)
+        self._by_v1 = self.simulation.np_random.random() < V1_SHARE
+        self._sense()
         self._runner.advance(float(self.simulation.np_random.uniform()))
         return self._observe(), info
 
     def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Do what an answer of the network means, and let a period pass."""
         wanted = self._runner.act(np.asarray(action, np.float32), PERIOD)
-        targets = np.array(self._limiter.step(wanted, PERIOD), np.float32)
+        sent = self._limiter.step(wanted, PERIOD)
+        targets = np.array(self._on_wire(sent) if self._by_v1 else sent, np.float32)
         _, reward, fallen, over, info = self.simulation.step(targets - self.simulation.stand)
         self._runner.advance(PERIOD)
+        self._sense()
         return self._observe(), float(reward), fallen, over, info
 
-    @property
-    def inputs(self) -> Situation:
-        """What is measured and commanded now."""
+    def _sense(self) -> None:
+        """Take a report, as the bridge reads it from the bytes of a protocol."""
         state = self.simulation.state
-        return Situation(state.joints, state.imu, Velocity(*self.simulation.command))
+        joints, imu = state.joints, state.imu
+        if joints is None or imu is None:
+            raise ValueError('a robot in physics measures its joints and its attitude')
+        if self._by_v1:
+            positions = self._on_wire(joints.positions)
+            named = dict(zip(self._names, positions, strict=True))
+            rates = self._joint_rate.update(state.time, named)
+            joints = JointSample(positions, tuple(rates.values()), state.time)
+        else:
+            turning = self._attitude_rate.update(state.time, imu.orientation)
+            imu = ImuSample(imu.orientation, turning, imu.acceleration)
+        self.inputs = Situation(joints, imu, Velocity(*self.simulation.command))
+
+    def _on_wire(self, positions: Sequence[float]) -> tuple[float, ...]:
+        """Return positions in the steps of the bytes of protocol v1."""
+        steps = np.round((np.asarray(positions) - self._lowest) / self._byte)
+        return tuple((self._lowest + steps * self._byte).tolist())
 
     def _observe(self) -> Floats:
         seen: Floats = self._runner.observe(self.inputs)[0].copy()
         return seen
 
 
-class TaughtEnv(gymnasium.ObservationWrapper[Floats, Floats, Floats]):
-    """With what the teacher would do behind each observation, at the phase that is observed."""
-
-    def __init__(self, env: ContractEnv) -> None:
-        """Wrap an environment."""
-        super().__init__(env)
-        self._env = env
-        self._teacher = GaitTeacher(quadruped(robot_urdf()), LOW_AND_WIDE)
-        terms = env.contract.terms
-        place = [term.source for term in terms].index(Source.PHASE)
-        self._phase = sum(term.width for term in terms[:place])
-        action = env.contract.action
-        self._offset, self._scale = np.array(action.offset), np.array(action.scale)
-        width = env.contract.width + len(action.offset)
-        self.observation_space = spaces.Box(-np.inf, np.inf, (width,), np.float32)
-
-    def observation(self, observation: Floats) -> Floats:
-        """Return an observation with the action of the teacher behind it."""
-        inputs = self._env.inputs
-        if inputs.imu is None:
-            raise ValueError('a robot in physics measures its attitude')
-        sine, cosine = observation[self._phase : self._phase + 2].tolist()
-        targets = self._teacher.targets(
-            inputs.velocity if math.hypot(sine, cosine) > 0.0 else Velocity(),
-            math.atan2(sine, cosine) / math.tau % 1.0,
-            inputs.imu.roll_pitch_yaw[:2],
-        )
-        wanted = (np.array(targets) - self._offset) / self._scale
-        return np.concatenate([observation, wanted.astype(np.float32)])
-
-
-def walking_env(randomization: Randomization) -> ContractEnv:
-    """Make an environment to practise walking in."""
-    env = WalkingEnv(servo=ServoModel.FIRM, randomization=randomization, period=PERIOD)
-    return ContractEnv(env, walking_contract(quadruped(robot_urdf())))
-
-
-def taught_walking_env(randomization: Randomization) -> TaughtEnv:
-    """Make an environment in which the teacher of walking is beside the robot."""
-    return TaughtEnv(walking_env(randomization))
+def walking_env(contract: PolicyContract, randomization: Randomization) -> ContractEnv:
+    """Make an environment on the plant of the training, on rough ground, through the estimator."""
+    env = WalkingEnv(
+        servo=SERVO,
+        randomization=randomization,
+        period=PERIOD,
+        terrain=ROUGH,
+        timestep=TIMESTEP,
+    )
+    return ContractEnv(env, contract)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 from flax import linen
@@ -12,8 +13,12 @@ import gymnasium
 import jax
 import jax.numpy as jnp
 import numpy as np
+import onnx
+from onnx import numpy_helper
 from policy_export import Floats, Layers
 from skrl.models.jax import DeterministicMixin, GaussianMixin, Model
+
+from quad_controller.exceptions import PolicyError
 
 HIDDEN = (128, 128)
 
@@ -81,12 +86,6 @@ class Normaliser:
         """Take both."""
         self.mean, self.deviation = mean, deviation
 
-    @classmethod
-    def of(cls, observations: Floats) -> Normaliser:
-        """Return that of some rows; what hardly ever changes is not blown up."""
-        deviation = np.maximum(observations.std(axis=0), 0.05).astype(np.float32)
-        return cls(observations.mean(axis=0).astype(np.float32), deviation)
-
     def __call__(self, values: Any, *, train: bool = False, inverse: bool = False) -> Any:  # noqa: ANN401
         """Return normalised observations."""
         return None if values is None else (values - self.mean) / self.deviation
@@ -101,10 +100,32 @@ def explore(actor: Actor, deviation: float) -> None:
     )
 
 
-def answer(actor: Actor, params: Any, observations: jax.Array) -> jax.Array:  # noqa: ANN401
-    """Return the mean actions for normalised observations."""
-    mean, _ = actor.apply(params, {'observations': observations}, 'policy')
-    return jnp.asarray(mean)
+def learned_in(path: Path, actor: Actor) -> Normaliser:
+    """Give an actor the layers of an ONNX file that :func:`policy_export.export` wrote.
+
+    Returns:
+        The normalisation of its observations.
+
+    Raises:
+        PolicyError: It has other layers.
+    """
+    found = {each.name: numpy_helper.to_array(each) for each in onnx.load(path).graph.initializer}
+    params = actor.state_dict.params
+    layers: dict[str, Any] = dict(params['params'])
+    for place in range(len(HIDDEN) + 1):
+        own, kernel, bias = (
+            layers[f'Dense_{place}'],
+            *(found.get(f'{kind}{place}', np.zeros(0)) for kind in ('weight', 'bias')),
+        )
+        if (kernel.shape, bias.shape) != (own['kernel'].shape, own['bias'].shape):
+            raise PolicyError(
+                f'policy {path} does not have the layers of this training '
+                f'({" and ".join(map(str, HIDDEN))} units): begin with trot_ppo, or with a policy '
+                'that this training wrote'
+            )
+        layers[f'Dense_{place}'] = {'kernel': jnp.array(kernel), 'bias': jnp.array(bias)}
+    actor.state_dict = actor.state_dict.replace(params={**params, 'params': layers})
+    return Normaliser(found['mean'], found['deviation'])
 
 
 def layers_of(actor: Actor, normaliser: Normaliser) -> Layers:

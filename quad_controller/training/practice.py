@@ -27,7 +27,7 @@ STEPS_UNKNOWN = 1_000_000_000  # skrl wants to know how many; here the clock end
 
 
 class Practice:
-    """Goes on with a policy that does already what its teacher did."""
+    """Goes on with a policy that walks already."""
 
     def __init__(
         self,

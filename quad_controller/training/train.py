@@ -2,28 +2,29 @@
 # SPDX-License-Identifier: Apache-2.0
 """Trains a policy that walks, checks it and compares it: ``make train`` calls it.
 
-It begins with an imitation of a teacher and goes on with PPO. The folder that it prints has both
-policies with their contracts, the better one as walk.onnx, curves for TensorBoard, and figures.
+It goes on with a policy by PPO, on servos, grounds and sensors that differ. The folder that it
+prints has the policy with its contract as walk.onnx, curves for TensorBoard, and figures.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 import math
 import os
 from pathlib import Path
-import shutil
 import sys
 import time
 
 from progress import Progress
 
+from quad_controller.exceptions import PolicyError
+from quad_controller.policy.load import find_policy
 from quad_controller.policy_check.main import MAX_DURATION, MIN_DURATION
 from quad_controller.policy_check.main import run as check_policy
 from quad_description import run_command
 
-SERVO = 'firm'  # what it is trained with
+SERVO = 'nominal'  # what it is checked with
 WALKS = ((0.2, 0.0, 0.3), (0.0, 0.1, 0.0), (-0.15, 0.0, -0.5))
 """Velocities that a policy has to walk: x, y in [m/s], yaw in [rad/s]."""
 
@@ -43,36 +44,30 @@ def run(arguments: Sequence[str]) -> int:
     progress = Progress(options.minutes)
     progress.say(f'{options.minutes:g} min, seed {options.seed}: {folder}')
     progress.say(f'curves: tensorboard --logdir {folder}')
-    policies = train(
-        folder,
-        progress,
-        seed=options.seed,
-        environments=options.environments,
-        rounds=options.rounds,
-    )
-    return _judge(folder, policies, progress, options.way)
+    path = folder / 'walk.onnx'
+    try:
+        start = find_policy(options.start)
+        train(start, path, progress, seed=options.seed, environments=options.environments)
+    except PolicyError as error:
+        progress.say(str(error))
+        return 1
+    return _judge(path, progress, options.way)
 
 
-def _judge(folder: Path, policies: Mapping[str, Path], progress: Progress, duration: float) -> int:
-    """Check the policies, and compare the better one with the gait.
+def _judge(path: Path, progress: Progress, duration: float) -> int:
+    """Check a policy, and compare it with the gait.
 
     Args:
-        policies: Their files by name; the last that is accepted is the best.
         duration: Of each command of the comparison [s].
 
     Returns:
-        The exit code of check_policy for the one that is chosen.
+        The exit code of check_policy.
     """
-    codes = {name: max(_check(path, progress, walk) for walk in WALKS)
-             for name, path in policies.items()}  # fmt: skip
-    chosen = [name for name in codes if codes[name] == min(codes.values())][-1]
-    path = folder / 'walk.onnx'
-    shutil.copyfile(policies[chosen], path)
-    figures = ['--duration', f'{duration:g}', '--report', str(folder / 'figures.csv')]
+    code = max(_check(path, progress, walk) for walk in WALKS)
+    figures = ['--duration', f'{duration:g}', '--report', str(path.with_name('figures.csv'))]
     check_policy([str(path), '--servo', SERVO, '--compare', *figures])
-    verdict = 'accepted' if codes[chosen] == 0 else 'refused'
-    progress.say(f'{path} is what {chosen} made; check_policy: {verdict}')
-    return codes[chosen]
+    progress.say(f'{path}; check_policy: {"refused" if code else "accepted"}')
+    return code
 
 
 def _check(path: Path, progress: Progress, walk: Sequence[float]) -> int:
@@ -93,7 +88,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--minutes', type=_positive, default=30.0, help='how long it learns')
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--environments', type=int, default=64, help='at once')
-    parser.add_argument('--rounds', type=int, default=6, help='of the imitation')
+    parser.add_argument(
+        '--from',
+        dest='start',
+        default='trot_ppo',
+        metavar='POLICY',
+        help='ONNX file of this training, or a name that is shipped; default: %(default)s',
+    )
     parser.add_argument('--way', type=_duration, default=4.0, help='of each command compared [s]')
     parser.add_argument('--output', type=Path, metavar='FOLDER', help='for policy and curves')
     return parser

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What trials of a controller need of the simulation: bumps, delays, biases, meter, real time."""
+"""What trials of a controller need of the simulation: bumps, delays, meter, real time."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from quad_sim import CommandTiming, ServedRobot, ServoModel, SimulationError, Te
 from quad_sim.env import WalkingEnv
 from quad_sim.line.command_times import CommandTimes
 from quad_sim.options import build, parse_arguments
-from quad_sim.physics import ImuBias, Meter, PhysicsBackend, Robot, Variation
+from quad_sim.physics import Meter, PhysicsBackend, Robot, Variation
 
 URDF = robot_urdf()
 DEADLINE = 60.0  # [s]
@@ -99,19 +99,6 @@ def test_targets_arrive_after_their_delay_and_in_their_order(delay: float, late:
     backend.reset()
     backend.step(None)
     assert robot._ramp.goal == pytest.approx(stand), 'what was on the way before a reset is gone'
-
-
-def test_an_imu_may_be_off_all_the_time() -> None:
-    """Attitude and gyro by what was said, the position not."""
-    robot = Robot(URDF)
-    plain = PhysicsBackend(robot).reset()
-    off = PhysicsBackend(robot, bias=ImuBias((0.1, -0.2, 0.3), 0.05, -0.04)).reset()
-    assert off.position == plain.position
-    assert plain.imu is not None
-    assert off.imu is not None
-    assert off.imu.roll_pitch_yaw == pytest.approx((0.05, -0.04, 0.0), abs=1e-6)
-    assert off.imu.angular_velocity == pytest.approx((0.1, -0.2, 0.3), abs=1e-6)
-    assert plain.imu.roll_pitch_yaw == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
 
 
 def test_the_meter_adds_up_way_work_and_limits() -> None:

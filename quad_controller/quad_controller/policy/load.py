@@ -17,7 +17,7 @@ from .contract.files import read_contract_file
 from .contract.mjlab import CONTRACT_KEY, read_metadata
 from .contract.model import build_contract, PolicyContract, Source
 from .network import Floats, OnnxNetwork
-from .observation import Situation, STATISTICS_KEY
+from .observation import Situation
 from .options import ImuFrame, PolicyOptions
 from .report import Report, Row
 from .runner import PolicyRunner
@@ -44,7 +44,7 @@ class LoadedPolicy:
         lines += [
             f'metadata {key}: {value}'
             for key, value in sorted(self.metadata.items())
-            if key not in {CONTRACT_KEY, STATISTICS_KEY}
+            if key != CONTRACT_KEY
         ]
         return '\n'.join(lines)
 

@@ -1,15 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Makes the observation of a policy, as its contract says: terms, scales, clips, history.
-
-And what a policy observed in its training: the range of each number.
-"""
+"""Makes the observation of a policy, as its contract says: terms, scales, clips, history."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-import json
 import math
 
 import numpy as np
@@ -18,7 +14,6 @@ import numpy.typing as npt
 from quad_description import FEET, ImuSample, JointSample
 from quad_description.rotations import Vector
 
-from ..exceptions import PolicyError
 from ..gait.body import BodyPose, UPRIGHT
 from ..gait.velocity import Velocity
 from .contract.model import (
@@ -38,10 +33,6 @@ STANDARD_GRAVITY = 9.80665  # [m/s^2]
 TRUSTED = 0.5  # [m/s^2] off 1 g up to which the accelerometer is blended in
 PLAUSIBLE = 2.0  # [m/s^2] off 1 g up to which it is believed at all
 BLEND_WEIGHT = 0.1
-
-STATISTICS_KEY = 'observation_statistics'
-"""Key in the metadata of a model: a JSON object with lists of mean, std, min and max."""
-DIGITS = 5  # of each number in the metadata
 
 
 def gravity(imu: ImuSample, source: GravitySource) -> Vector:
@@ -249,56 +240,3 @@ def _clip(numbers: Floats, lowest: npt.ArrayLike, highest: npt.ArrayLike) -> Non
 
 def _joined(rows: Sequence[Sequence[float]]) -> Floats:
     return np.array([number for row in rows for number in row], np.float32)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ObservationStatistics:
-    """Of each number of an observation, as the network is given it."""
-
-    mean: Floats  # means
-    std: Floats  # standard deviations
-    least: Floats  # smallest values
-    most: Floats  # largest values
-
-    @classmethod
-    def of(cls, rows: npt.NDArray[np.floating]) -> ObservationStatistics:
-        """Return those of some observations, one in each row.
-
-        Raises:
-            ValueError: There is none.
-        """
-        if not len(rows):
-            raise ValueError('statistics need one observation at least')
-        values = np.asarray(rows, np.float64)
-        found = (values.mean(0), values.std(0), values.min(0), values.max(0))
-        mean, std, least, most = (np.asarray(each, np.float32) for each in found)
-        return cls(mean, std, least, most)
-
-    @classmethod
-    def from_metadata(
-        cls, metadata: Mapping[str, str], width: int
-    ) -> ObservationStatistics | None:
-        """Return those that a model has; None when it has none.
-
-        Raises:
-            PolicyError: They are no such object, or of another width.
-        """
-        if STATISTICS_KEY not in metadata:
-            return None
-        try:
-            found = json.loads(metadata[STATISTICS_KEY])
-            arrays = [np.array(found[key], np.float32) for key in ('mean', 'std', 'min', 'max')]
-        except (ValueError, KeyError, TypeError) as error:
-            raise PolicyError(f'metadata {STATISTICS_KEY} cannot be read: {error}') from error
-        if any(array.shape != (width,) for array in arrays):
-            raise PolicyError(f'metadata {STATISTICS_KEY} is not for {width} numbers')
-        return cls(*arrays)
-
-    def to_json(self) -> str:
-        """Return it as metadata have it."""
-        named = {'mean': self.mean, 'std': self.std, 'min': self.least, 'max': self.most}
-        rounded = {
-            key: [float(f'{value:.{DIGITS}g}') for value in array.tolist()]
-            for key, array in named.items()
-        }
-        return json.dumps(rounded, separators=(',', ':'))

@@ -23,7 +23,7 @@ from quad_sim import (
     SimulationError,
     Terrain,
 )
-from quad_sim.physics import ImuBias, Meter, Metered, PhysicsBackend, Robot, Variation
+from quad_sim.physics import Meter, Metered, PhysicsBackend, Robot, Variation
 
 from ..exceptions import CheckError
 from ..gait.parameters import GaitParameters
@@ -40,11 +40,6 @@ class Conditions:
     """How robot and ground differ."""
 
     trunk_mass: float = 1.0  # factor of the mass of the trunk
-    friction: float | None = None  # of the ground; None leaves it as it is
-    # from targets that are sent to servos that have them in [s]; None leaves it as it is
-    delay: float | None = None
-    gyro_bias: float = 0.0  # of each axis of the gyro in [rad/s]
-    level_bias: float = 0.0  # of measured roll and pitch in [rad]
     push: float = 0.0  # change of the velocity at once, to any side, every two seconds, in [m/s]
     roughness: float = 0.0  # height of the highest bumps of the ground in [m]
 
@@ -54,37 +49,6 @@ AS_MADE = Conditions()
 
 TIPPING_PUSH = 1.3
 """A push that tips the gait in about half of the cases, in [m/s]."""
-
-
-@dataclass(frozen=True, slots=True)
-class Sweep:
-    """One parameter and the values that are tried."""
-
-    name: str  # an attribute of :class:`Conditions`
-    title: str  # what a person reads
-    unit: str  # of the values as they are shown
-    values: tuple[float, ...]  # in their order
-    factor: float = 1.0  # from a value to how it is shown
-
-    def conditions(self, value: float) -> Conditions:
-        """Return what differs at a value."""
-        return replace(AS_MADE, **{self.name: value})
-
-    def text(self, value: float) -> str:
-        """Return a value as it is shown."""
-        return f'{value * self.factor:g}'
-
-
-SWEEPS = (
-    Sweep('trunk_mass', 'mass of the trunk', '%', (0.8, 1.0, 1.2, 2.0, 3.0), 100.0),
-    Sweep('friction', 'friction of the ground', '', (0.03, 0.06, 0.12, 0.3, 0.8)),
-    Sweep('delay', 'delay of targets', 'ms', (0.0, 0.02, 0.04, 0.08), 1e3),
-    Sweep('gyro_bias', 'bias of the gyro', 'rad/s', (0.0, 0.3, 0.6, 1.2)),
-    Sweep('level_bias', 'bias of roll and pitch', 'mrad', (0.0, 0.06, 0.12, 0.24), 1e3),
-    Sweep('push', 'pushes every 2 s', 'm/s', (0.0, 0.8, 1.2, 1.6, 2.0)),
-    Sweep('roughness', 'rough ground', 'mm', (0.0, 0.01, 0.02, 0.03), 1e3),
-)
-"""What is tried: up to where the gait or what was trained for it has trouble."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,16 +92,9 @@ class PhysicsArena:
         """
         urdf = choice.urdf
         ground = Terrain(roughness=conditions.roughness, seed=1)
-        servo = parse_servo(choice.servo)
-        if conditions.delay is not None:
-            servo = replace(servo, delay=conditions.delay)
-        self._robot = Robot(urdf, servo, ground)
-        self._variation = Variation(conditions.friction, conditions.trunk_mass)
-        gyro, level = conditions.gyro_bias, conditions.level_bias
-        self.backend: Backend = PhysicsBackend(
-            self._robot,
-            bias=ImuBias((gyro, gyro, gyro), level, level) if gyro or level else None,
-        )
+        self._robot = Robot(urdf, parse_servo(choice.servo), ground)
+        self._variation = Variation(trunk_mass=conditions.trunk_mass)
+        self.backend: Backend = PhysicsBackend(self._robot)
         self._meter = Meter(self._robot, urdf)
 
     def stand(self) -> RobotState:

@@ -124,19 +124,20 @@ class CourseFigures:
 
 
 def course_for(ranges: CommandRanges | None) -> tuple[Velocity, ...]:
-    """Return three speeds of each axis that a policy was trained for.
+    """Return three speeds of each axis that a policy was trained for, and one backward.
 
     Args:
         ranges: What it is commanded within; None for no limits.
     """
     commands = []
-    limits = [most for _, most in ranges.axes] if ranges is not None else [math.inf] * len(AXES)
-    for axis, most in zip(AXES.values(), limits, strict=True):
-        top = min(getattr(TOP, axis), most)
-        if top > 0.0:
-            commands += [
-                Velocity(**{axis: round(top * part / SPEEDS, 4)}) for part in range(1, SPEEDS + 1)
-            ]
+    limits = [(-math.inf, math.inf)] * len(AXES) if ranges is None else ranges.axes
+    for axis, (least, most) in zip(AXES.values(), limits, strict=True):
+        for reach, sign, parts in ((most, 1.0, range(1, SPEEDS + 1)), (-least, -1.0, [2])):
+            top = min(getattr(TOP, axis), reach)
+            if top > 0.0:
+                commands += [
+                    Velocity(**{axis: sign * round(top * part / SPEEDS, 4)}) for part in parts
+                ]
     return tuple(commands)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import csv
 from dataclasses import dataclass, field
 import math
-from typing import TextIO, TYPE_CHECKING
+from typing import TextIO
 
 import numpy as np
 
@@ -17,9 +17,6 @@ from ..policy.contract.model import PolicyContract, Source
 from ..policy.network import Floats, OnnxNetwork
 from ..policy.observation import observed_places
 from .course import AXES, axis_of, CourseFigures, Passage
-
-if TYPE_CHECKING:
-    from .arenas import Sweep
 
 MAX_LACK, MAX_EXCESS = 0.5, 0.2
 """Shares of what is commanded along an axis that may be missing, and be too much."""
@@ -148,20 +145,11 @@ class Compared:
     gait: CourseFigures  # what the gait came to
 
 
-@dataclass(frozen=True, slots=True)
-class Swept:
-    """What a sweep of one parameter came to."""
-
-    sweep: Sweep  # what was tried
-    results: tuple[Compared, ...]  # for each of its values
-
-
 @dataclass(slots=True)
 class Findings:
     """All that was found of a policy."""
 
     courses: list[Compared] = field(default_factory=list)  # courses that policy and gait walked
-    sweeps: list[Swept] = field(default_factory=list)  # what was tried besides
     # single walks: commanded, went in [m/s] and [rad/s], largest tilt in [rad]
     walks: list[tuple[Velocity, Velocity, float]] = field(default_factory=list)
     reasons: list[str] = field(default_factory=list)  # why it does not stand up
@@ -218,20 +206,6 @@ def figures_table(compared: Compared) -> Table:
     return rows
 
 
-def sweep_table(swept: Swept) -> Table:
-    """Return falls and errors at each value."""
-    sweep = swept.sweep
-    heading = f'{sweep.title} [{sweep.unit}]' if sweep.unit else sweep.title
-    table: Table = [(heading, f'{POLICY}, falls/min', 'off by [m/s]')]
-    table[0] += (f'{GAIT}, falls/min', 'off by [m/s]')
-    for value, result in zip(sweep.values, swept.results, strict=True):
-        cells = [sweep.text(value)]
-        for each in (result.policy, result.gait):
-            cells += [_number(each.falls_per_minute, '.1f'), _number(each.mean('error'), '.3f')]
-        table.append(tuple(cells))
-    return table
-
-
 CSV_COLUMNS = (
     *('tried', 'walker', 'axis', 'commanded x [m/s]', 'commanded y [m/s]'),
     *('commanded yaw [rad/s]', 'went x [m/s]', 'went y [m/s]', 'went yaw [rad/s]'),
@@ -248,15 +222,9 @@ def write_csv(file: TextIO, findings: Findings) -> None:
     for commanded, went, tilt in findings.walks:
         row = 'walk', POLICY, axis_of(commanded), *commanded, *went, tilt
         writer.writerow([*row, *[''] * (len(CSV_COLUMNS) - len(row))])
-    named = [(each.title, each) for each in findings.courses]
-    named += [
-        (f'{swept.sweep.title} {each.title} {swept.sweep.unit}'.rstrip(), each)
-        for swept in findings.sweeps
-        for each in swept.results
-    ]
-    for title, compared in named:
+    for compared in findings.courses:
         for who, course in ((POLICY, compared.policy), (GAIT, compared.gait)):
-            writer.writerows(_csv_row(title, who, each) for each in course.passages)
+            writer.writerows(_csv_row(compared.title, who, each) for each in course.passages)
 
 
 def _csv_row(title: str, who: str, passage: Passage) -> list[str | float]:

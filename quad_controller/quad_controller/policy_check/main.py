@@ -33,8 +33,6 @@ from .findings import (
     figures_table,
     Findings,
     is_too_late,
-    sweep_table,
-    Swept,
     timing_notes,
     tracking_table,
     unseen_terms,
@@ -50,11 +48,10 @@ NOMINAL = 'nominal'
 
 MIN_DURATION, MAX_DURATION = 0.5, 600.0
 """Times of a walk in [s]."""
-WALK_DURATION, COMPARE_DURATION, SWEEP_DURATION = 10.0, 4.0, 3.0
+WALK_DURATION, COMPARE_DURATION = 10.0, 4.0
 """Of each command in virtual time in [s]."""
-MINUTES, MIN_MINUTES, MAX_MINUTES = 2.0, 0.7, 120.0
+MINUTES, MIN_MINUTES, MAX_MINUTES = 2.0, 0.8, 120.0
 """Of the chain, in real time."""
-SWEEP_COMMANDS = (Velocity(0.2, 0.0, 0.3), Velocity(-0.15), Velocity(0.0, 0.1))
 
 
 class ExitCode(IntEnum):
@@ -82,7 +79,7 @@ def run(arguments: Sequence[str]) -> int:
         _print(str(error))
     for note in found.notes:
         _print(f'note: {note}')
-    if found.courses or found.sweeps:
+    if found.courses:
         _print(_verdict(options.policy, found.reasons))
     if options.report is not None:
         with options.report.open('w', encoding='utf-8', newline='') as file:
@@ -127,10 +124,10 @@ def _policy_options(options: argparse.Namespace) -> PolicyOptions:
 def _try_out(options: argparse.Namespace, loaded: LoadedPolicy, found: Findings) -> None:
     """Make a policy walk in all ways that the command line names."""
     compare = options.compare or (options.report and not (options.walk or options.chain))
-    if not (options.walk or compare or options.chain or options.sweep):
+    if not (options.walk or compare or options.chain):
         return
     try:
-        from .arenas import PhysicsArena, RobotChoice, SWEEPS
+        from .arenas import PhysicsArena, RobotChoice
         from .trial import Candidate, chain_duration, run_chain, run_trials, Trial
     except ImportError as error:
         raise CheckError(f'a walk needs quad_sim and MuJoCo: {error}') from error
@@ -144,20 +141,6 @@ def _try_out(options: argparse.Namespace, loaded: LoadedPolicy, found: Findings)
         duration = options.duration or COMPARE_DURATION
         mine, other = run_trials([Trial(who, commands, duration) for who in both])
         _add_course(found, Compared('in physics with ideal sensors, in virtual time', mine, other))
-    if options.sweep:
-        trials = [
-            Trial(who, SWEEP_COMMANDS, options.duration or SWEEP_DURATION, sweep.conditions(value))
-            for sweep in SWEEPS
-            for value in sweep.values
-            for who in both
-        ]
-        figures = iter(run_trials(trials))
-        for sweep in SWEEPS:
-            pairs = [(sweep.text(value), next(figures), next(figures)) for value in sweep.values]
-            swept = Swept(sweep, tuple(Compared(*pair) for pair in pairs))
-            found.sweeps.append(swept)
-            _print(f'\n{table_text(sweep_table(swept), numbers=True)}')
-        found.notes += [note for swept in found.sweeps for note in _weaker(swept)]
     if options.chain:
         duration = chain_duration(options.minutes, len(both), len(commands))
         title = (
@@ -200,17 +183,6 @@ def _walk(
     elif not loaded.contract.recurrence:
         network = OnnxNetwork(find_policy(options.policy))
         found.notes += unseen_terms(network, loaded.contract, walked.observed)
-
-
-def _weaker(swept: Swept) -> list[str]:
-    """Return where the policy falls and the gait does not."""
-    where = [each.title for each in swept.results if each.policy.falls and not each.gait.falls]
-    unit = f' {swept.sweep.unit}' if swept.sweep.unit else ''
-    return (
-        [f'{swept.sweep.title} of {", ".join(where)}{unit}: it falls, the gait does not']
-        if where
-        else []
-    )
 
 
 def _verdict(name: str, reasons: Sequence[str]) -> str:
@@ -272,10 +244,12 @@ def _parser() -> argparse.ArgumentParser:
         '--duration',
         type=_number('duration [s]', MIN_DURATION, MAX_DURATION),
         help=f'of --walk ({WALK_DURATION:g}), of each command of --compare '
-        f'({COMPARE_DURATION:g}) and of --sweep ({SWEEP_DURATION:g}) [s]',
+        f'({COMPARE_DURATION:g}) [s]',
     )
     ways.add_argument(
-        '--compare', action='store_true', help='three speeds of each axis, in virtual time'
+        '--compare',
+        action='store_true',
+        help='three speeds of each axis and one backward, in virtual time',
     )
     ways.add_argument(
         '--chain',
@@ -287,11 +261,6 @@ def _parser() -> argparse.ArgumentParser:
         type=_number('time [min]', MIN_MINUTES, MAX_MINUTES),
         default=MINUTES,
         help='of --chain (default: %(default)g)',
-    )
-    ways.add_argument(
-        '--sweep',
-        action='store_true',
-        help='mass, friction, delay, biases of the IMU, pushes, rough ground: one at a time',
     )
     parser.add_argument(
         '--report',

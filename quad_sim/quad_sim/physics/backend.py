@@ -44,17 +44,10 @@ class PhysicsBackend(Backend):
         self,
         robot: Robot,
         period: float = PERIOD,
-        *,
-        bias: ImuBias | None = None,
     ) -> None:
-        """Observe a robot.
-
-        Args:
-            bias: Of the IMU; None for none.
-        """
+        """Observe a robot."""
         self.robot, self.period = robot, period
         self.names = robot.joint_names
-        self._bias = bias
 
     def reset(self) -> RobotState:
         """Stand on the ground again."""
@@ -77,13 +70,9 @@ class PhysicsBackend(Backend):
         robot = self.robot
         pose = robot.base_pose
         positions, velocities = robot.joint_positions, robot.joint_velocities
-        orientation, rates, bias = pose.orientation, robot.base_velocity.angular, self._bias
-        if bias is not None:
-            orientation = bias.orientation(*pose.roll_pitch_yaw)
-            rates = bias.rates(rates)
         return RobotState(
             JointSample(tuple(positions.tolist()), tuple(velocities.tolist()), robot.time),
-            ImuSample(orientation, rates, robot.imu.specific_force),
+            ImuSample(pose.orientation, robot.base_velocity.angular, robot.imu.specific_force),
             position=pose.position,
             linear_velocity=robot.base_velocity.linear,
             foot_contacts=robot.foot_contacts,
