@@ -25,6 +25,7 @@ from quad_sim import ServoModel
 
 GROUNDS = {
     'level': AS_MADE,
+    'bytes of v1': Conditions(v1=True),
     f'pushed by {TIPPING_PUSH:g} m/s': Conditions(push=TIPPING_PUSH),
     'rough, 2 cm': Conditions(roughness=0.02),
     '20 % heavier': Conditions(trunk_mass=1.2),

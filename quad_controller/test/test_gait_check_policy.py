@@ -24,7 +24,7 @@ from quad_gait_rig import ROBOT
 SHIPPED = str(find_policy('trot_ppo'))
 TURN = ['--walk', '0.2', '0', '0.3', '--duration', '4', '--servo', 'firm']
 """A way and a turn, for which left is not right."""
-DAMPING = -0.2
+DAMPING = -0.3
 """Of an action by the angular velocity in [s/rad]."""
 MIRRORS = {
     name: name[0] + name[1].translate(str.maketrans('lr', 'rl')) + name[2:] for name in ROBOT.names

@@ -44,7 +44,7 @@ def test_servos_and_sensors_differ_in_each_episode() -> None:
         env.reset(seed=seed)
         robots.append(env.simulation.variation)
         seen = np.degrees(env.inputs.joints.positions[0]) if env.inputs.joints else math.nan
-        byte = (seen + 31.0) * 255.0 / 62.0  # of the span of a hip
+        byte = (seen + 30.0) * 255.0 / 60.0  # of the span of a hip
         rounded += abs(byte - round(byte)) < 1e-6
     stiffness = [3.5 * each.stiffness for each in robots]
     assert 1.0 <= min(stiffness) < 1.7

@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from quad_controller import find_policy, Velocity
+from quad_controller import find_policy, GaitGenerator, GaitParameters, Velocity
 from quad_controller.exceptions import CheckError
 from quad_controller.gait.parameters import LOW_AND_WIDE
 from quad_controller.gait.velocity import REST
@@ -59,6 +59,7 @@ from quad_sim import CommandTiming, ServedRobot
 from quad_sim.physics import Metered, PhysicsBackend, Robot
 
 DEADLINE = 90.0  # [s]
+STAND_TARGETS = GaitGenerator(ROBOT, GaitParameters()).stand_targets
 FAIR = Passage(Velocity(0.2), Velocity(0.19), 10.0, 0, 0.05, 0.02, 0.0, 0.05, 5.0)
 
 
@@ -118,6 +119,23 @@ def test_the_trained_policy_falls_less_than_half_as_often_as_the_gait() -> None:
     assert trained.falls <= 0.5 * gait.falls
     assert level.falls == 0
     assert level.mean('error') < 0.03
+
+
+@pytest.mark.slow
+def test_protocol_v1_costs_the_gait_no_speed() -> None:
+    """Positions come in steps of a byte, and velocities from their differences."""
+    backend = PhysicsArena(RobotChoice(), Conditions(v1=True)).backend
+    state = backend.reset()
+    for step in range(20):
+        state = backend.step([*STAND_TARGETS[:-1], STAND_TARGETS[-1] + 0.02 * step])
+    assert state.joints is not None
+    degrees = math.degrees(state.joints.positions[0])
+    steps = (degrees + 30.0) * 255.0 / 60.0  # a hip goes from -30 to 30 degrees in 255 steps
+    assert steps == pytest.approx(round(steps), abs=1e-6)
+    assert state.joints.velocity_error > 0.1  # [rad/s]
+    pair = [Trial(Candidate(), (Velocity(0.2),), 3.0, Conditions(v1=v1)) for v1 in (False, True)]
+    plain, rounded = run_trials(pair)
+    assert rounded.mean('error') < plain.mean('error') + 0.02
 
 
 class Interrupted(PhysicsArena):

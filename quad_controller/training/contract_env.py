@@ -8,7 +8,6 @@ limiter of speeds.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,11 +23,10 @@ from quad_controller.policy.contract.model import PolicyContract
 from quad_controller.policy.network import Floats, OnnxNetwork
 from quad_controller.policy.observation import Situation
 from quad_controller.policy.runner import PolicyRunner
+from quad_controller.policy_check.arenas import JointBytes
 from quad_controller.states.motion import StepLimiter
-from quad_description import ImuSample, JointSample, quadruped, robot_urdf
-from quad_hardware.estimation import EstimatorSettings
-from quad_hardware.estimation.filters import AttitudeRate, JointRate
-from quad_hardware.protocol import ANGLE_SPANS, Model, MOTOR_OF_JOINT
+from quad_description import ImuSample, quadruped, robot_urdf
+from quad_hardware.estimation import AttitudeRate, EstimatorSettings
 from quad_sim import ServoModel, Terrain
 from quad_sim.env import Randomization, WalkingEnv
 
@@ -90,10 +88,7 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
             NoNetwork(), self.contract, robot, options=PolicyOptions(), period=PERIOD
         )
         self._limiter = StepLimiter(robot.limits, PERIOD)
-        self._names = robot.names
-        spans = [ANGLE_SPANS[Model.LITE][MOTOR_OF_JOINT[name]] for name in robot.names]
-        self._lowest = np.radians([span.low for span in spans])  # [rad] of the bytes of v1
-        self._byte = np.radians([span.high - span.low for span in spans]) / 255.0
+        self._bytes = JointBytes(robot_urdf())
         count = len(robot.names)
         self.action_space = spaces.Box(-np.inf, np.inf, (count,), np.float32)
         self.observation_space = spaces.Box(-np.inf, np.inf, (self.contract.width,), np.float32)
@@ -106,9 +101,8 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
         start = tuple(self.simulation.robot.joint_targets.tolist())
         self._runner.reset(start)
         self._limiter.start(start)
-        settings = EstimatorSettings()
-        self._joint_rate = JointRate(settings.joint_cutoff)
-        self._attitude_rate = AttitudeRate(settings.rate_cutoff)
+        self._bytes.reset()
+        self._attitude_rate = AttitudeRate(EstimatorSettings().rate_cutoff)
         self._by_v1 = self.simulation.np_random.random() < V1_SHARE
         self._sense()
         self._runner.advance(float(self.simulation.np_random.uniform()))
@@ -118,7 +112,7 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
         """Do what an answer of the network means, and let a period pass."""
         wanted = self._runner.act(np.asarray(action, np.float32), PERIOD)
         sent = self._limiter.step(wanted, PERIOD)
-        targets = np.array(self._on_wire(sent) if self._by_v1 else sent, np.float32)
+        targets = np.array(self._bytes.rounded(sent) if self._by_v1 else sent, np.float32)
         _, reward, fallen, over, info = self.simulation.step(targets - self.simulation.stand)
         self._runner.advance(PERIOD)
         self._sense()
@@ -131,19 +125,11 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
         if joints is None or imu is None:
             raise ValueError('a robot in physics measures its joints and its attitude')
         if self._by_v1:
-            positions = self._on_wire(joints.positions)
-            named = dict(zip(self._names, positions, strict=True))
-            rates = self._joint_rate.update(state.time, named)
-            joints = JointSample(positions, tuple(rates.values()), state.time)
+            joints = self._bytes.read(joints.positions, state.time)
         else:
             turning = self._attitude_rate.update(state.time, imu.orientation)
             imu = ImuSample(imu.orientation, turning, imu.acceleration)
         self.inputs = Situation(joints, imu, Velocity(*self.simulation.command))
-
-    def _on_wire(self, positions: Sequence[float]) -> tuple[float, ...]:
-        """Return positions in the steps of the bytes of protocol v1."""
-        steps = np.round((np.asarray(positions) - self._lowest) / self._byte)
-        return tuple((self._lowest + steps * self._byte).tolist())
 
     def _observe(self) -> Floats:
         seen: Floats = self._runner.observe(self.inputs)[0].copy()

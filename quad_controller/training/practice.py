@@ -64,8 +64,9 @@ class Practice:
         self._observed, _ = self._wrapped.reset()
 
     def until(self, progress: Callable[[], float]) -> Iterator[str]:
-        """Practise until progress is 1; yield what came of each update, for people."""
-        while (passed := progress()) < 1.0:
+        """Practise, at least once, until progress is 1; yield the figures of each update."""
+        passed = 0.0
+        while passed < 1.0:
             self._vary(passed)
             before = self._actor.state_dict
             came = self._rollout()
@@ -74,6 +75,7 @@ class Practice:
                 # a judge that knows nothing yet would spoil what has been learned
                 self._actor.state_dict = before
             yield came
+            passed = progress()
 
     def close(self) -> None:
         """Write the curves out."""

@@ -12,10 +12,14 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 import time
 
-from quad_description import Backend, robot_urdf, RobotState
+import numpy as np
+
+from quad_description import Backend, JointSample, movable_joints, robot_urdf, RobotState
 from quad_hardware import CommandError, HardwareError, NoAnswerError
 from quad_hardware.backend import robot_at
-from quad_hardware.protocol import V2
+from quad_hardware.estimation import EstimatorSettings, JointRate
+from quad_hardware.joints import servo_of
+from quad_hardware.protocol import ANGLE_SPANS, Model, V2
 from quad_sim import (
     CommandTiming,
     parse_servo,
@@ -42,6 +46,7 @@ class Conditions:
     trunk_mass: float = 1.0  # factor of the mass of the trunk
     push: float = 0.0  # change of the velocity at once, to any side, every two seconds, in [m/s]
     roughness: float = 0.0  # height of the highest bumps of the ground in [m]
+    v1: bool = False  # targets and positions pass through the bytes of protocol v1
 
 
 AS_MADE = Conditions()
@@ -81,6 +86,60 @@ def servo_response(servo: str) -> ServoResponse:
     )
 
 
+class JointBytes:
+    """Joints as protocol v1 carries them: positions in bytes, velocities differentiated."""
+
+    def __init__(self, urdf: str) -> None:
+        servos = [servo_of(joint) for joint in movable_joints(urdf)]
+        spans = [ANGLE_SPANS[Model.LITE][servo.motor] for servo in servos]
+        self._names = [servo.joint for servo in servos]
+        ends = [
+            (servo.position(span.low), servo.position(span.high))
+            for servo, span in zip(servos, spans, strict=True)
+        ]
+        self._lowest, highest = np.array(ends).T
+        self._step = (highest - self._lowest) / 255.0
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the positions so far."""
+        self._rate = JointRate(EstimatorSettings().joint_cutoff)
+
+    def rounded(self, positions: Sequence[float]) -> tuple[float, ...]:
+        """Return positions [rad] after a byte each."""
+        steps = np.round((np.asarray(positions) - self._lowest) / self._step)
+        return tuple((self._lowest + steps * self._step).tolist())
+
+    def read(self, positions: Sequence[float], time: float) -> JointSample:
+        """Return what the bridge estimates of positions [rad]."""
+        seen = self.rounded(positions)
+        rates = self._rate.update(time, dict(zip(self._names, seen, strict=True)))
+        return JointSample(seen, tuple(rates.values()), time, velocity_error=self._rate.error)
+
+
+class BytesBackend(PhysicsBackend):
+    """A robot in physics behind the bytes of protocol v1, in virtual time."""
+
+    def __init__(self, robot: Robot, urdf: str) -> None:
+        super().__init__(robot)
+        self._bytes = JointBytes(urdf)
+
+    def reset(self) -> RobotState:
+        """Stand on the ground again."""
+        self._bytes.reset()
+        return super().reset()
+
+    def step(self, targets: Sequence[float] | None) -> RobotState:
+        """Send targets, and let a period pass."""
+        return super().step(targets and self._bytes.rounded(targets))
+
+    def observe(self) -> RobotState:
+        """Return the state as far as the bytes carry it."""
+        state = super().observe()
+        positions = () if state.joints is None else state.joints.positions
+        return replace(state, joints=self._bytes.read(positions, state.time))
+
+
 class PhysicsArena:
     """A robot in physics, in virtual time."""
 
@@ -94,7 +153,9 @@ class PhysicsArena:
         ground = Terrain(roughness=conditions.roughness, seed=1)
         self._robot = Robot(urdf, parse_servo(choice.servo), ground)
         self._variation = Variation(trunk_mass=conditions.trunk_mass)
-        self.backend: Backend = PhysicsBackend(self._robot)
+        self.backend: Backend = (
+            BytesBackend(self._robot, urdf) if conditions.v1 else PhysicsBackend(self._robot)
+        )
         self._meter = Meter(self._robot, urdf)
 
     def stand(self) -> RobotState:

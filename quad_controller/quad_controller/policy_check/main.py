@@ -127,20 +127,23 @@ def _try_out(options: argparse.Namespace, loaded: LoadedPolicy, found: Findings)
     if not (options.walk or compare or options.chain):
         return
     try:
-        from .arenas import PhysicsArena, RobotChoice
+        from .arenas import Conditions, PhysicsArena, RobotChoice
         from .trial import Candidate, chain_duration, run_chain, run_trials, Trial
     except ImportError as error:
         raise CheckError(f'a walk needs quad_sim and MuJoCo: {error}') from error
     choice = RobotChoice(options.preset, options.arm, options.servo)
     policy = Candidate(find_policy(options.policy), _policy_options(options), choice)
     both = policy, Candidate(robot=choice)
+    conditions = Conditions(v1=options.v1)
     if options.walk is not None:
-        _walk(options, loaded, PhysicsArena(choice), found)
+        _walk(options, loaded, PhysicsArena(choice, conditions), found)
     commands = course_for(loaded.contract.commands)
     if compare:
         duration = options.duration or COMPARE_DURATION
-        mine, other = run_trials([Trial(who, commands, duration) for who in both])
-        _add_course(found, Compared('in physics with ideal sensors, in virtual time', mine, other))
+        mine, other = run_trials([Trial(who, commands, duration, conditions) for who in both])
+        sensors = 'the bytes of protocol v1' if options.v1 else 'ideal sensors'
+        title = f'in physics with {sensors}, in virtual time'
+        _add_course(found, Compared(title, mine, other))
     if options.chain:
         duration = chain_duration(options.minutes, len(both), len(commands))
         title = (
@@ -261,6 +264,12 @@ def _parser() -> argparse.ArgumentParser:
         type=_number('time [min]', MIN_MINUTES, MAX_MINUTES),
         default=MINUTES,
         help='of --chain (default: %(default)g)',
+    )
+    ways.add_argument(
+        '--v1',
+        action='store_true',
+        help='--walk and --compare through the bytes of protocol v1, with differentiated joint '
+        'velocities',
     )
     parser.add_argument(
         '--report',
