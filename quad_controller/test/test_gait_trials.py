@@ -109,7 +109,7 @@ def test_falls_are_counted_and_walked_on_after() -> None:
 
 @pytest.mark.slow
 def test_the_trained_policy_falls_less_than_half_as_often_as_the_gait() -> None:
-    """Under pushes that tip the gait also in the stance of the teacher; unpushed it goes along."""
+    """On firm servos, under pushes that tip the low and wide gait, too; unpushed it goes along."""
     firm, commands = RobotChoice(servo='firm'), (Velocity(0.2), Velocity(yaw=1.0))
     policy = Candidate(find_policy('trot_ppo'), robot=firm)
     pushed, walkers = Conditions(push=2.0), (Candidate(gait=LOW_AND_WIDE, robot=firm), policy)
