@@ -23,9 +23,9 @@ from quad_controller.policy.contract.model import PolicyContract
 from quad_controller.policy.network import Floats, OnnxNetwork
 from quad_controller.policy.observation import Situation
 from quad_controller.policy.runner import PolicyRunner
-from quad_controller.policy_check.arenas import JointBytes
 from quad_controller.states.motion import StepLimiter
 from quad_description import ImuSample, quadruped, robot_urdf
+from quad_hardware.backend import JointBytes
 from quad_hardware.estimation import AttitudeRate, EstimatorSettings
 from quad_sim import ServoModel, Terrain
 from quad_sim.env import Randomization, WalkingEnv

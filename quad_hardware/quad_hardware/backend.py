@@ -10,13 +10,13 @@ from pathlib import Path
 import threading
 import time
 
-from quad_description import Backend, movable_joints, RobotState
+from quad_description import Backend, JointSample, movable_joints, RobotState
 
-from .estimation import EstimatorSettings, ImuMounting
+from .estimation import EstimatorSettings, ImuMounting, JointRate
 from .exceptions import CommandError, NoAnswerError, RecordingError
 from .joints import JointMap, servo_of
 from .link import LinkOptions, LinkState, STALE_TIME
-from .protocol import Protocol, PROTOCOLS
+from .protocol import ANGLE_SPANS, Model, Protocol, PROTOCOLS
 from .recording import read_serial_log
 from .replayed_robot import ReplayedRobot
 from .serial_robot import RobotSettings, SerialRobot
@@ -178,3 +178,33 @@ def _settings_of(link: LinkOptions, urdf: str, *, imu_checked: bool) -> RobotSet
 
 def _log_link(state: LinkState, detail: str) -> None:
     _log.info('%s: %s', state.value, detail)
+
+
+class JointBytes:
+    """Joints of an XGO lite as protocol v1 carries them: positions in bytes, velocities estimated.
+
+    For simulations without a serial line.
+    """
+
+    def __init__(self, urdf: str) -> None:
+        self._servos = [servo_of(joint) for joint in movable_joints(urdf)]
+        self._spans = [ANGLE_SPANS[Model.LITE][servo.motor] for servo in self._servos]
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the positions so far."""
+        self._rate = JointRate(EstimatorSettings().joint_cutoff)
+
+    def rounded(self, positions: Sequence[float]) -> tuple[float, ...]:
+        """Return positions in the order of the URDF [rad] after a byte each."""
+        return tuple(
+            servo.position(span.decode(span.encode(servo.angle(position))))
+            for servo, span, position in zip(self._servos, self._spans, positions, strict=True)
+        )
+
+    def read(self, positions: Sequence[float], time: float) -> JointSample:
+        """Return what the bridge estimates of positions [rad] at a time [s]."""
+        seen = self.rounded(positions)
+        named = {servo.joint: each for servo, each in zip(self._servos, seen, strict=True)}
+        rates = tuple(self._rate.update(time, named).values())
+        return JointSample(seen, rates, time, velocity_error=self._rate.error)

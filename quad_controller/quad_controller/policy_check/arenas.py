@@ -12,14 +12,10 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 import time
 
-import numpy as np
-
-from quad_description import Backend, JointSample, movable_joints, robot_urdf, RobotState
+from quad_description import Backend, robot_urdf, RobotState
 from quad_hardware import CommandError, HardwareError, NoAnswerError
-from quad_hardware.backend import robot_at
-from quad_hardware.estimation import EstimatorSettings, JointRate
-from quad_hardware.joints import servo_of
-from quad_hardware.protocol import ANGLE_SPANS, Model, V2
+from quad_hardware.backend import JointBytes, robot_at
+from quad_hardware.protocol import V2
 from quad_sim import (
     CommandTiming,
     parse_servo,
@@ -84,37 +80,6 @@ def servo_response(servo: str) -> ServoResponse:
         parameters.armature,
         parameters.delay + 0.5 * parameters.interpolation,  # the mean of a ramp
     )
-
-
-class JointBytes:
-    """Joints as protocol v1 carries them: positions in bytes, velocities differentiated."""
-
-    def __init__(self, urdf: str) -> None:
-        servos = [servo_of(joint) for joint in movable_joints(urdf)]
-        spans = [ANGLE_SPANS[Model.LITE][servo.motor] for servo in servos]
-        self._names = [servo.joint for servo in servos]
-        ends = [
-            (servo.position(span.low), servo.position(span.high))
-            for servo, span in zip(servos, spans, strict=True)
-        ]
-        self._lowest, highest = np.array(ends).T
-        self._step = (highest - self._lowest) / 255.0
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget the positions so far."""
-        self._rate = JointRate(EstimatorSettings().joint_cutoff)
-
-    def rounded(self, positions: Sequence[float]) -> tuple[float, ...]:
-        """Return positions [rad] after a byte each."""
-        steps = np.round((np.asarray(positions) - self._lowest) / self._step)
-        return tuple((self._lowest + steps * self._step).tolist())
-
-    def read(self, positions: Sequence[float], time: float) -> JointSample:
-        """Return what the bridge estimates of positions [rad]."""
-        seen = self.rounded(positions)
-        rates = self._rate.update(time, dict(zip(self._names, seen, strict=True)))
-        return JointSample(seen, tuple(rates.values()), time, velocity_error=self._rate.error)
 
 
 class BytesBackend(PhysicsBackend):
