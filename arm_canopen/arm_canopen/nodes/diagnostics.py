@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from types import MappingProxyType
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
@@ -52,11 +53,12 @@ def bus_diagnostics(
     load: LoadFigures,
     cycle: CycleFigures,
     recording: Callable[[str], str],
+    io: Mapping[str, dict[str, str]] = MappingProxyType({}),
 ) -> list[DiagnosticStatus]:
     """Describe a bus with its cycle, each device that is no drive, and each axis of the others.
 
     ``recording`` returns the last file of the black box with a fault of a device, of any for an
-    empty name; empty before one.
+    empty name; empty before one. ``io`` has what I/O modules and encoders show, by device.
     """
     controller = network.controller
     level, message = _bus_level(controller, counters, load)
@@ -97,22 +99,29 @@ def bus_diagnostics(
         if device.name in drives:
             statuses += [drive_diagnostic(bus, axis, file) for axis in drives[device.name]]
         else:
-            statuses.append(device_diagnostic(bus, node_status(device, now), file))
+            status, shown = node_status(device, now), io.get(device.name)
+            statuses.append(device_diagnostic(bus, status, file, shown))
     return statuses
 
 
-def device_diagnostic(bus: str, status: NodeStatus, recording: str = '') -> DiagnosticStatus:
+def device_diagnostic(
+    bus: str, status: NodeStatus, recording: str = '', io: dict[str, str] | None = None
+) -> DiagnosticStatus:
     """Describe a device that is no drive.
 
-    ``recording`` is the last file of the black box with a fault of it, empty before one.
+    ``recording`` is the last file of the black box with a fault of it, empty before one; ``io``
+    is what an I/O module or an encoder shows.
     """
+    io = io or {}
     level, message = _device_level(status)
+    if not status.online and 'outputs_on_loss' in io:
+        message += f'; its outputs: {io["outputs_on_loss"]}'
     return DiagnosticStatus(
         level=level,
         name=f'{status.name}: device',
         message=message,
         hardware_id=f'{bus}/{status.node_id}',
-        values=_values(_device_values(status) | {'black_box': recording}),
+        values=_values(_device_values(status) | io | {'black_box': recording}),
     )
 
 

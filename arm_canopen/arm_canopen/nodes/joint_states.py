@@ -23,7 +23,7 @@ from .output_thread import OutputThread
 
 
 class Measured(Protocol):
-    """An axis of a drive, as of the last cycle, in user units."""
+    """An axis of a drive or an encoder, as of the last cycle, in user units."""
 
     @property
     def name(self) -> str:

@@ -25,6 +25,7 @@ from .axis_services import offer_drive
 from .device_node import DeviceNode
 from .device_topics import log_bus_event
 from .diagnostics import bus_diagnostics, DiagnosticsPublisher
+from .io_topics import EncoderTopics, offer_io
 from .joint_states import BusJointStates
 from .managed_bus import ManagedBus
 from .master_node import MasterServices
@@ -78,6 +79,12 @@ class MasterProcess:
             offer_drive(self._devices[name], axes, self._thread, file)
             for name, axes in self._axes.items()
         ]
+        self._io = {
+            name: io
+            for name, each in self._devices.items()
+            if (io := offer_io(each, self._thread)) is not None
+        }
+        drives += [io.joint_states for io in self._io.values() if isinstance(io, EncoderTopics)]
         self._joint_states = BusJointStates(node, drives, self._output)
         self._network.on_feedback = self._joint_states.feedback
         services = MasterServices(node, self._thread, self._output)
@@ -173,6 +180,7 @@ class MasterProcess:
             load=self._master.load.figures(now),
             cycle=self._thread.figures(),
             recording=self._recording,
+            io={name: each.diagnostics() for name, each in self._io.items()},
         )
 
     def _recording(self, device: str) -> str:

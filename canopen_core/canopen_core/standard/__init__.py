@@ -58,10 +58,13 @@ from .drive import (
 )
 from .emcy import Emergency, error_code_text, error_register_text
 from .io_profiles import (
+    ANALOG_EVENTS,
+    ANALOG_INPUTS,
     DIGITAL_OUTPUTS,
     EncoderObject,
     ERROR_OBJECTS,
     IO_GROUPS,
+    IoGroup,
 )
 from .nmt import (
     ALL_NODES,
@@ -106,6 +109,8 @@ from .time_of_day import decode_time_of_day, encode_time_of_day
 
 __all__ = [
     'ALL_NODES',
+    'ANALOG_EVENTS',
+    'ANALOG_INPUTS',
     'AXIS_OFFSET',
     'BIT_RATES_KBIT',
     'CAN_ID_MASK',
@@ -150,6 +155,7 @@ __all__ = [
     'Emergency',
     'EncoderObject',
     'Index',
+    'IoGroup',
     'MappedObject',
     'NmtCommand',
     'NmtState',

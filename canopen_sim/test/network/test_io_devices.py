@@ -4,13 +4,17 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
+import re
+import shutil
 import struct
 
 from bus_rig import VirtualNetwork
 import pytest
 
 from arm_canopen import (
+    BusConfig,
     CanopenDevice,
     CanopenError,
     CodecError,
@@ -19,6 +23,7 @@ from arm_canopen import (
     SdoAbortError,
     SdoTimeoutError,
 )
+from arm_canopen.config import check_bus
 from canopen_core.standard import NmtCommand
 from canopen_sim import Fault, FaultInjection
 
@@ -175,3 +180,65 @@ def test_an_encoder_turns_and_is_preset(net: VirtualNetwork) -> None:
     encoder.sdo.write('Simulated speed', -100)
     net.run(0.1)
     assert encoder.read(0x6030, 1) == -100
+
+
+def edited(folder: Path, old: str, new: str) -> BusConfig:
+    """Load the example with a piece of it replaced."""
+    text = BUS_YML.read_text()
+    assert old in text
+    for eds in BUS_YML.parent.glob('cia40*.eds'):
+        shutil.copy(eds, folder)
+    (folder / 'bus.yml').write_text(text.replace(old, new))
+    return load_bus(folder / 'bus.yml')
+
+
+@pytest.mark.parametrize(
+    ('old', 'new', 'said'),
+    [
+        (
+            IO,
+            f'{IO}\n    tpdo: {{1: {{enabled: false}}}}',
+            '0x6000:01, 0x6000:02: .*digital_inputs',
+        ),
+        (IO, f'{IO}\n    rpdo: {{2: {{enabled: false}}}}', '0x6411:01, .* ~/analog_outputs'),
+        (IO, f'{IO}\n    heartbeat_consumer: false', 'its outputs stay as they are'),
+        (IO, f'{IO}\n    sdo: [{{index: 0x6423, value: 0}}]', 'TPDO 2 .* 0x6423 is FALSE'),
+        ('sync_period: 10000', 'sync_period: 0', 'no SYNC, with which ~/joint_states'),
+        (
+            'transmission: 1}',
+            'transmission: 1, mapping: [{index: 0x6030, sub_index: 1}]}',
+            r'0x6004:00 \(position\): no ~/joint_states',
+        ),
+        (
+            'transmission: 1}',
+            'transmission: 1, mapping: [{index: 0x6004}]}',
+            r'0x6030:01 \(speed\): the velocity',
+        ),
+    ],
+)
+def test_check_names_what_the_topics_would_lack(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    """One warning, by the profile; the example as it stands has none."""
+    assert check_bus(load_bus(BUS_YML)).warnings == ()
+    (warning,) = check_bus(edited(tmp_path, old, new)).warnings
+    assert re.search(said, warning.message)
+    assert warning.remedy
+
+
+@pytest.mark.parametrize(
+    ('keys', 'position', 'velocity'),
+    [
+        ('', math.tau / 4096, math.tau / 4096),
+        ('sdo: [{index: 0x6001, value: 1000}]', math.tau / 1000, math.tau / 1000),
+        ('scale_pos_from_dev: 0.5', 0.5, 0.5),
+        ('scale_vel_from_dev: 0.25', math.tau / 4096, 0.25),
+    ],
+)
+def test_the_scale_of_an_encoder(
+    tmp_path: Path, keys: str, position: float, velocity: float
+) -> None:
+    """Of bus.yml, else radians by the units per revolution that it has after the boot."""
+    axis = edited(tmp_path, ENCODER, f'{ENCODER}\n    {keys}').node('encoder').drive
+    assert axis.scale_pos_from_dev == pytest.approx(position)
+    assert axis.scale_vel_from_dev == pytest.approx(velocity)

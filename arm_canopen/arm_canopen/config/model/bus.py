@@ -300,6 +300,11 @@ class NodeConfig:
         return self.guard_time > 0.0 and not self.heartbeat_producer
 
     @property
+    def life_guarding(self) -> bool:
+        """Whether the device takes the master for lost without its guarding requests."""
+        return self.uses_node_guarding and self.life_time_factor > 0
+
+    @property
     def drive(self) -> DriveConfig:
         """The first axis, which is the only one of most drives."""
         return self.axes[0]

@@ -7,13 +7,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from itertools import product
+import math
 
 from canopen_core import Findings, Place
 from canopen_core.eds import Eds
 from canopen_core.standard import (
     AXIS_OFFSET,
     DataType,
+    DeviceProfile,
     drive_axes,
+    EncoderObject,
     Index,
     is_drive,
     is_signed,
@@ -121,6 +124,8 @@ class DeviceReader:
         if node.is_drive:
             self._check_profile(node)
             self._check_axes(node)
+        if profile_number(dictionary) == DeviceProfile.ENCODER:
+            node = replace(node, axes=(self._encoder_axis(node),))
         if not node_id:
             return None
         self._check_period(master)
@@ -158,6 +163,16 @@ class DeviceReader:
             revision_number=self.settings.revision_number,
             serial_number=self.settings.serial_number,
         )
+
+    def _encoder_axis(self, node: NodeConfig) -> DriveConfig:
+        """Return the scales of an encoder: of bus.yml, else in rad by its units per revolution."""
+        axis, given = node.drive, self._section.entries
+        units = node.value_after_boot(EncoderObject.UNITS_PER_REVOLUTION)
+        if 'scale_pos_from_dev' not in given and units:
+            axis = replace(axis, scale_pos_from_dev=math.tau / float(units))
+        if 'scale_vel_from_dev' not in given:
+            axis = replace(axis, scale_vel_from_dev=axis.scale_pos_from_dev)
+        return axis
 
     def _heartbeat_producer(self, dictionary: ObjectDictionary) -> float:
         """Return the period of the device's heartbeat in [s]."""

@@ -16,6 +16,7 @@ from canopen_core import Findings, Problem
 from ..bus import BusConfig
 from .drive_units import axis_units, AxisUnits, check_units
 from .drives import check_drive
+from .io_devices import check_io_device
 from .network import (
     check_heartbeats,
     check_identifiers,
@@ -34,6 +35,7 @@ HIGH_LOAD = 0.7
 
 DEVICE_CHECKS: tuple[Callable[[Subject], None], ...] = (
     check_drive,
+    check_io_device,
     check_units,
     check_pdos,
     check_heartbeats,
