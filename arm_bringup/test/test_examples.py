@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the demos of an arm compute: the path of the wave, cells of parts.
+"""What the demos of an arm compute: the path of the wave, measures of a motion, cells of parts.
 
 tests/test_demo.py runs them.
 """
@@ -83,12 +83,26 @@ def test_a_joint_without_a_range_or_a_limit_of_speed_swings_all_the_same() -> No
     assert Axis(JointRange('head_pan', -1.6, 1.6, 10000.0), 0.0).velocity == MAX_VELOCITY
 
 
+def test_speed_is_that_of_the_cycles_however_late_they_are() -> None:
+    """Set-points are those of the nominal times."""
+    motion = pytest.importorskip('arm_bringup.examples.motion')
+    one = np.zeros(1)
+    tools = [np.array([0.001 * count, 0.0, 0.0]) for count in range(5)]
+    some = [
+        motion.Sample(0.01 * count + 0.002 * (count % 2), one, one, one, 1.0, tool, tool)
+        for count, tool in enumerate(tools)
+    ]
+    assert motion.tool_speed(some, 0.01) == pytest.approx(0.1)
+    off = motion.off_line(tools, tools[0], np.array([1.0, 1.0, 0]))
+    assert off == pytest.approx(0.004 / math.sqrt(2))
+
+
 @pytest.mark.parametrize('name', ['panda_hand', 'prbt', 'gp110'])
 def test_a_cell_suits_its_robot(name: str) -> None:
     """Home, and both poses above the part, are free of the pillar; the tip looks down."""
     plan = pytest.importorskip('arm_bringup.examples.plan')
     from arm_bringup.description import read_description, read_semantic
-    from arm_model import load_limits, RobotModel
+    from arm_model import load_limits, RobotModel, start_pose
 
     robot = locate(argparse.Namespace(robot=name, group=[], xacro_arg=[]))
     cell = plan.CELLS[name]
@@ -108,6 +122,10 @@ def test_a_cell_suits_its_robot(name: str) -> None:
         assert pose.position[2] > cell.part_at(place)[2] + cell.below
         assert math.dist(pose.position[:2], cell.part_at(place)[:2]) < 0.01
         assert pose.rotation[2, 2] == pytest.approx(-1.0, abs=0.01)
+    for thing in cell.obstacles():
+        if thing.id == plan.PILLAR:  # it stands upright whatever its yaw is
+            for at in (start_pose(model), *map(np.array, cell.above)):
+                assert plan.distance_of(model, thing, at) > 0.0
 
 
 @pytest.mark.parametrize(('width', 'height'), [(80, 24), (102, 24), (118, 40)])

@@ -12,6 +12,7 @@ import argparse
 from collections.abc import Callable, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass
+from itertools import product
 import json
 import math
 import os
@@ -41,7 +42,9 @@ from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 from urdf_reader import JointRange, read_urdf
 
-from arm_model import ArmError, Array, load_limits, RobotModel, start_pose
+import arm_model
+from arm_model import ArmError, Array, Clearances, load_limits, RobotModel, start_pose
+from arm_model.ros import seconds
 from arm_planning import PlanningCode
 from node_runner import LATCHED
 from node_runner.action_goals import GoalClient
@@ -59,6 +62,8 @@ from .arm import ActionRun, ANSWER_TIMEOUT, ArmDemo, EndRequested, parse, QUEUE,
 
 SLOW, CAREFUL, FREE = 0.1, 0.2, 0.5
 """Shares of the limits at which the arm meets a box, follows lines, moves freely."""
+LONG = 15.0
+"""Time in [s] in which a box can appear on a way: an arm of low limits meets it less slowly."""
 PLANNING_TIME, IK_TIMEOUT = 5.0, 0.5
 """Longest time for planning, as MoveGroupInterface asks for, and for inverse kinematics in [s]."""
 JOINT_TOLERANCE, POSITION_TOLERANCE, TURN_TOLERANCE = 1e-4, 1e-4, 1e-3
@@ -70,13 +75,18 @@ DURATION_MARGIN = 20.0  # how much longer than planned a motion may take on a bu
 WORST_JOINT, WORST_PLACE, STILL = 5e-3, 2e-3, 1e-2
 """Farthest that a joint may stand from its goal in [rad] or [m], that a tool or the part may be
 from theirs in [m], and that joints move of an arm that was refused a motion in [rad] or [m]."""
-EARLY, BOX_AT, BOX_EDGE = 0.15, 0.6, 0.06
-"""Shares of the way after which a box appears, and at which it stands; and its edge as a share of
-the arm's reach."""
+EARLY, CHOSEN = 0.15, 0.25
+"""Shares of the way after which a box appears, and after which the arm is still clear of it."""
 AT_REST, REST_STATES, SHORT_REST_STATES = 5e-4, 16, 4
 """An arm rests whose joints move less than so far in [rad] or [m], in so many joint states; what
 is planned anew while a motion goes on may follow the rest within a tenth of a second."""
+EDGES, SHARES, ROOM = (0.08, 0.06, 0.04, 0.03, 0.02), (0.6, 0.5, 0.7, 0.45), 0.06
+"""Edges of a box in the way as shares of the arm's reach, the largest that is possible is taken;
+where on a path it appears; and its least distance from both ends, as a share of the reach."""
 LEAST_TURN = 1.0  # how far a joint must turn for a box to have room on its way in [rad]
+LEAST_REACH, LEAST_WAY, TURN, FAR = 0.05, 0.25, 2.0, 1.0
+"""Reach of an arm that is shorter in [m]; least way of the tip to a pose as a share of it; turn
+of the first joint in [rad] or [m]; and the distance beyond which all count as this in [m]."""
 GAP, APPROACH = 0.003, 0.1
 """Room below the part in [m]; straight approach and retreat as a share of the reach."""
 PART, PILLAR, VISITOR = 'part', 'pillar', 'visitor'
@@ -181,7 +191,7 @@ CELLS = {
 
 
 class Plan(ArmDemo):
-    """Pick, place, a box in the way, a blocked goal."""
+    """Pick, place, a box in the way, a blocked goal; without a cell the box alone."""
 
     beside = ', and move_group'
     label = 'plan'
@@ -211,14 +221,9 @@ class Plan(ArmDemo):
             folder=robot.description.parent,
         )
         cell = CELLS.get(robot.name)
-        if cell is None or cell.group != self.group:
-            raise RobotError(
-                f'no places for group {self.group} of {robot.name} are known; there are those of '
-                f'{", ".join(CELLS)}, in CELLS of {Path(__file__).name}'
-            )
-        self.cell = cell
+        self.cell = cell if cell is not None and cell.group == self.group else None
         self.home = start_pose(self.model)
-        if self.cell.gripper:
+        if self.cell is not None and self.cell.gripper:
             group, joint, opened, _ = self.cell.gripper
             self.model = self.model.with_others({joint: opened})
             self.gripper_action = f'{controller_names(robot, groups)[group]}/gripper_cmd'
@@ -239,7 +244,7 @@ class Plan(ArmDemo):
         self._apply = node.create_client(ApplyPlanningScene, 'apply_planning_scene')
         self._ik = node.create_client(GetPositionIK, 'compute_ik')
         self._validity = node.create_client(GetStateValidity, 'check_state_validity')
-        if self.cell.gripper:
+        if self.cell is not None and self.cell.gripper:
             self._gripper = GoalClient(node, GripperCommand, self.gripper_action)
         node.create_subscription(JointState, 'joint_states', self._take_joints, QUEUE)
         path, scene = 'display_planned_path', 'monitored_planning_scene'
@@ -272,8 +277,9 @@ class Plan(ArmDemo):
     def _begin(self) -> None:
         self.enter('putting the scene up')
         self.wait_moving(lambda: self.states > 0, SETTLE_TIMEOUT, 'joint states')
-        part = box(PART, self.cell.part, self.cell.part_at(0))
-        self._add(*self.cell.obstacles(), part)
+        if self.cell is not None:
+            part = box(PART, self.cell.part, self.cell.part_at(0))
+            self._add(*self.cell.obstacles(), part)
         home = self._joints(self.home)
         self.enter('home, by free motion')
         deadline = time.monotonic() + START_TIMEOUT
@@ -283,7 +289,13 @@ class Plan(ArmDemo):
         self._judge('home', goal, home)
 
     def _parts(self) -> None:
-        cell = self.cell
+        if self.cell is None:
+            self.add('pick and place', 'left out: no place for it is known for this arm')
+            self._go_there_and_back()
+        else:
+            self._pick_and_place(self.cell)
+
+    def _pick_and_place(self, cell: Cell) -> None:
         source, target = self._place, 1 - self._place
         home = self._joints(self.home)
         self._pick(cell, source)
@@ -352,33 +364,77 @@ class Plan(ArmDemo):
         above = cell.tip_at(place, APPROACH * cell.reach)
         return self._go(name, self._solve(above, cell.above[place], free=True), FREE)
 
-    def _meet(self, target: Mapping[str, float]) -> None:
-        """Put a box in the way of a motion: the arm stops, and the goal is reached around it."""
+    def _meet(self, target: Mapping[str, float], speed: float = SLOW) -> None:
+        """Put a box in the way of a motion: the arm stops, and the goal is reached around it.
+
+        Args:
+            target: Where the motion ends, by joint.
+            speed: Share of the limits at which the arm moves.
+        """
         name = 'box in the way'
         self.enter('slowly on, until a box appears in the way')
-        goal = self._send(target, SLOW, replan=True)
+        shown = len(self.paths)
+        goal = self._send(target, speed, replan=True)
         end = np.array([target[joint] for joint in self.model.joints])
         begin = self._here()
 
+        def begins() -> bool:
+            executes = any(each.state == 'MONITOR' for each in goal.feedback)
+            return goal.done or (executes and len(self.paths) > shown)
+
         def on_the_way() -> bool:
-            done = np.abs(self._here() - begin).max() / np.abs(end - begin).max()
+            done = np.abs(self._here() - begin).max() / max(np.abs(end - begin).max(), 1e-9)
             return goal.done or done > EARLY
 
+        self.wait_moving(begins, MOTION_TIMEOUT, 'motion')
+        rows = [] if goal.done else self._rows(self.paths[-1])
+        rows = rows[int(CHOSEN * len(rows)) :]
+        visitor = box_ahead(self.model, rows) if rows else None  # it takes its time: before
         self.wait_moving(on_the_way, MOTION_TIMEOUT, 'motion')
+        least = 0.5 * ROOM * max(self.model.reach, LEAST_REACH)
+        if goal.done or (visitor and distance_of(self.model, visitor, self._here()) < least):
+            visitor = None
+        if visitor is None:
+            self._finish(name, goal, target)
+            report = self.add if self.cell is None else self.problem
+            report(name, 'no place was found for a box in its way')
+            return
         self.enter('a box is in the way: stop before it, plan anew, go around')
         appeared = time.monotonic()
-        tip = self.model.kinematics.link_pose(self.model.tip, begin + BOX_AT * (end - begin))
-        edge = BOX_EDGE * self.cell.reach
-        self._change(box(VISITOR, (edge, edge, edge), (*tip.position.tolist(), 0.0)))
+        self._change(visitor)
         at_rest, stop = self._rest(goal), 'not seen to rest'
         if not goal.done:
-            stop = f'at rest {at_rest - appeared:.1f} s after it came'
+            room = 1e3 * distance_of(self.model, visitor, self._here())
+            stop = f'at rest {at_rest - appeared:.1f} s after it came, {room:.0f} mm before it'
         planning_time = self._finish(name, goal, target)
         plans = sum(each.state == 'PLANNING' for each in goal.feedback)
         if plans < 2:  # once, and once more
             self.problem(name, f'planned {plans} times: nothing was in the way')
         self.add(name, f'{stop}, planned anew in {_ms(planning_time)} ({plans} plans)')
         self._change(CollisionObject(id=VISITOR, operation=CollisionObject.REMOVE))
+
+    def _go_there_and_back(self) -> None:
+        """Move to the farthest pose that is known, and back around a box."""
+        limits, turn = self.model.limits, TURN * np.eye(len(self.home))[0]
+        turned = [np.clip(self.home + way, limits.lower, limits.upper) for way in (turn, -turn)]
+        poses = [
+            pose
+            for pose in (*self.model.poses.values(), *turned)
+            if self.model.clearance(pose) > GAP
+        ]
+        tip = self.model.pose(self.home).position
+
+        def way(pose: Array) -> float:
+            return math.dist(self.model.pose(pose).position, tip)
+
+        far = max(poses, key=way, default=self.home)
+        if way(far) < LEAST_WAY * max(self.model.reach, LEAST_REACH):
+            self.add('box in the way', 'left out: no pose is known that is far from home')
+            return
+        self.enter('to the farthest pose, by free motion')
+        self._go('there', self._joints(far), FREE)
+        lasted = seconds(self.paths[-1].trajectory[-1].joint_trajectory.points[-1].time_from_start)
+        self._meet(self._joints(self.home), float(np.clip(FREE * lasted / LONG, SLOW, FREE)))
 
     def _refused(self, name: str, target: Mapping[str, float], obstacle: str) -> None:
         """Judge a goal that is in contact: it is refused, the obstacle is named, nothing moves."""
@@ -472,6 +528,15 @@ class Plan(ArmDemo):
 
     def _joints(self, positions: Array) -> dict[str, float]:
         return dict(zip(self.model.joints, positions.tolist(), strict=True))
+
+    def _rows(self, path: DisplayTrajectory) -> list[Array]:
+        """Return positions of the arm on a path."""
+        rows = []
+        for each in path.trajectory:
+            names = list(each.joint_trajectory.joint_names)
+            order = [names.index(joint) for joint in self.model.joints]
+            rows += [np.array(point.positions)[order] for point in each.joint_trajectory.points]
+        return rows
 
     def _send(
         self, target: Mapping[str, float] | Pose, speed: float, *, replan: bool = False
@@ -635,6 +700,40 @@ def box(name: str, edges: Sequence[float], place: Sequence[float]) -> CollisionO
     message.primitives = [SolidPrimitive(type=SolidPrimitive.BOX, dimensions=list(edges))]
     message.primitive_poses = [Pose()]
     return message
+
+
+def cube_at(model: RobotModel, name: str, edge: float, positions: Array) -> CollisionObject:
+    """Return a cube around the tip of an arm at joint positions."""
+    place = model.kinematics.link_pose(model.tip, positions).position
+    return box(name, (edge, edge, edge), (*place.tolist(), 0.0))
+
+
+def with_box(model: RobotModel, thing: CollisionObject) -> arm_model.PlanningScene:
+    """Return the scene of an arm with an upright box in it."""
+    at = thing.pose.position
+    pose = arm_model.Pose(arm_model.ORIGIN.rotation, arm_model.frozen([at.x, at.y, at.z]))
+    shape = arm_model.Box(*thing.primitives[0].dimensions)
+    return model.scene.with_object(arm_model.CollisionObject(thing.id, shape, pose=pose))
+
+
+def distance_of(model: RobotModel, thing: CollisionObject, positions: Array) -> float:
+    """Return the distance of a box from an arm in [m]; negative where they touch."""
+    scene = with_box(model, thing)
+    distances = Clearances(scene).least(positions, FAR).tolist()
+    pairs = zip(scene.pairs, distances, strict=True)
+    return min((distance for pair, distance in pairs if thing.id in pair), default=FAR)
+
+
+def box_ahead(model: RobotModel, rows: Sequence[Array]) -> CollisionObject | None:
+    """Return a box into which an arm would run on its way, clear of both ends of that."""
+    reach = max(model.reach, LEAST_REACH)
+    for edge, share in product(EDGES, SHARES):
+        at = rows[int(share * (len(rows) - 1))]
+        thing = cube_at(model, VISITOR, edge * reach, at)
+        room = min(distance_of(model, thing, each) for each in (rows[0], rows[-1]))
+        if distance_of(model, thing, at) < 0.0 and room > ROOM * reach:
+            return thing
+    return None
 
 
 def with_gripper(arguments: argparse.Namespace) -> Robot:
