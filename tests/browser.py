@@ -47,7 +47,7 @@ PAGE_URL = r'the robot is seen at (http://localhost:\d+)$'
 """What a bring-up or demo prints of its page."""
 FEW_PICTURES = """
 const draw = window.requestAnimationFrame.bind(window);
-window.requestAnimationFrame = (act) => setTimeout(() => draw(act), 400);
+window.requestAnimationFrame = (act) => setTimeout(() => draw(act), 200);
 """
 """A page draws a few times a second: without a graphics card the robot needs the processor."""
 PICTURES = Path(__file__).parents[1] / 'build' / 'screenshots'

@@ -259,8 +259,8 @@ def test_dcf_tools(isolation: Isolation, tmp_path: Path) -> None:
     """The checker of Lely's own tools finds nothing in a master.dcf."""
     env = isolation.env | from_pypi('dcf-tools==2.4.2', tmp_path)
     bus = CHECKOUT / 'arm_bringup' / 'robots' / 'gp110' / 'bus.yml'
-    export = ['ros2', 'run', 'canopen_tools', 'canopen', 'dcf', bus, '--out', tmp_path]
-    for command in (export, [sys.executable, '-c', DCFCHK, tmp_path / 'master.dcf']):
+    export = ['ros2', 'run', 'canopen_tools', 'canopen', 'dcf', str(bus), '--out', str(tmp_path)]
+    for command in (export, [sys.executable, '-c', DCFCHK, str(tmp_path / 'master.dcf')]):
         done = subprocess.run(
             command, check=False, capture_output=True, text=True, timeout=TIMEOUT, env=env
         )
@@ -272,7 +272,7 @@ def test_mujoco_of_the_major_version_before(isolation: Isolation, tmp_path: Path
     """The exported robot moves in it as in the one that is installed here."""
     earlier = isolation.env | from_pypi('mujoco==3.17.0', tmp_path)
     model = tmp_path / 'xgo.xml'
-    export = ['ros2', 'run', 'quad_sim', 'export_mjcf', model, '--floor']
+    export = ['ros2', 'run', 'quad_sim', 'export_mjcf', str(model), '--floor']
     subprocess.run(export, check=True, timeout=TIMEOUT, env=isolation.env)
     (old, *before), (new, *now) = (
         subprocess.run(

@@ -7,11 +7,15 @@ from __future__ import annotations
 from collections.abc import Mapping, MutableMapping
 from pathlib import Path
 
-from .reach import NetworkChoiceError, Reach, read_interfaces, resolve_reach
+from .reach import (
+    LOCALHOST_PROFILE,
+    NetworkChoiceError,
+    PREFIX,
+    Reach,
+    read_interfaces,
+    resolve_reach,
+)
 
-LOCALHOST_PROFILE = Path(__file__).with_name('dds_network_localhost.xml')
-"""The profile with loopback alone; all others are made from it."""
-PREFIX = 'dds_network_'  # how the file of every profile of this package begins
 NETWORK_VARIABLE = 'DDS_NETWORK'
 """Interfaces and peers that a person opens DDS to; empty or unset for none."""
 PROFILE_VARIABLE = 'FASTRTPS_DEFAULT_PROFILES_FILE'

@@ -11,8 +11,7 @@ import stat
 import tempfile
 import xml.etree.ElementTree as ET
 
-from .environment import LOCALHOST_PROFILE, PREFIX
-from .reach import NetworkChoiceError, Reach
+from .reach import LOCALHOST_PROFILE, NetworkChoiceError, PREFIX, Reach
 
 # RTPS 2.2, 9.6.1.4.1; naming peers takes the place of this default
 _DISCOVERY_GROUP = '239.255.0.1'

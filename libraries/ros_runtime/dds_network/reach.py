@@ -13,6 +13,10 @@ import re
 import socket
 import struct
 
+LOCALHOST_PROFILE = Path(__file__).with_name('dds_network_localhost.xml')
+"""The profile with loopback alone; all others are made from it."""
+PREFIX = 'dds_network_'  # how the file of every profile of this package begins
+
 _SIOCGIFFLAGS = 0x8913
 _SIOCGIFADDR = 0x8915  # linux/sockios.h: the first IPv4 address of an interface
 _IFREQ_SIZE = 40  # [byte] struct ifreq
