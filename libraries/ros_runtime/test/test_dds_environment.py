@@ -21,9 +21,8 @@ from dds_network import (
     restrict_dds,
     selected_reach,
 )
-from dds_network.environment import LOCALHOST_PROFILE
 from dds_network.profile import profile_file, profile_text
-from dds_network.reach import has_link, read_interfaces, resolve_reach
+from dds_network.reach import has_link, LOCALHOST_PROFILE, read_interfaces, resolve_reach
 from dds_network.shell import main
 
 OPEN = Reach((Interface('eth0', '10.0.0.5'),), ('10.0.0.9',))
