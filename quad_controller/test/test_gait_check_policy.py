@@ -167,6 +167,8 @@ def test_a_wrong_layout_of_the_history_is_found(
         (['--report', '/nowhere/at/all.csv'], 'No such file'),
         (['--minutes', '0.1'], 'must be 0.8 to 120'),
         (['--servo', 'soft'], 'give nominal or firm'),
+        (['--v1'], '--v1 needs --walk or --compare'),
+        (['--chain', '--v1'], '--chain speaks v2'),
     ],
 )
 def test_wrong_use_ends_with_two(

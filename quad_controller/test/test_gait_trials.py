@@ -124,15 +124,16 @@ def test_the_trained_policy_falls_less_than_half_as_often_as_the_gait() -> None:
 @pytest.mark.slow
 def test_protocol_v1_costs_the_gait_no_speed() -> None:
     """Positions come in steps of a byte, and velocities from their differences."""
-    backend = PhysicsArena(RobotChoice(), Conditions(v1=True)).backend
-    state = backend.reset()
-    for step in range(20):
-        state = backend.step([*STAND_TARGETS[:-1], STAND_TARGETS[-1] + 0.02 * step])
-    assert state.joints is not None
-    degrees = math.degrees(state.joints.positions[0])
-    steps = (degrees + 30.0) * 255.0 / 60.0  # a hip goes from -30 to 30 degrees in 255 steps
-    assert steps == pytest.approx(round(steps), abs=1e-6)
-    assert state.joints.velocity_error > 0.1  # [rad/s]
+    for preset, widest in (('lite', 30.0), ('mini', 31.0)):  # of a hip [deg], in 255 steps
+        backend = PhysicsArena(RobotChoice(preset), Conditions(v1=True)).backend
+        state = backend.reset()
+        for step in range(20):
+            state = backend.step([*STAND_TARGETS[:-1], STAND_TARGETS[-1] + 0.02 * step])
+        assert state.joints is not None
+        degrees = math.degrees(state.joints.positions[0])
+        steps = (degrees + widest) * 255.0 / (2.0 * widest)
+        assert steps == pytest.approx(round(steps), abs=1e-6)
+        assert state.joints.velocity_error > 0.1  # [rad/s]
     pair = [Trial(Candidate(), (Velocity(0.2),), 3.0, Conditions(v1=v1)) for v1 in (False, True)]
     plain, rounded = run_trials(pair)
     assert rounded.mean('error') < plain.mean('error') + 0.02

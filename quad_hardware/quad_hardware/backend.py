@@ -181,14 +181,14 @@ def _log_link(state: LinkState, detail: str) -> None:
 
 
 class JointBytes:
-    """Joints of an XGO lite as protocol v1 carries them: positions in bytes, velocities estimated.
+    """Joints of an XGO as protocol v1 carries them: positions in bytes, velocities estimated.
 
     For simulations without a serial line.
     """
 
-    def __init__(self, urdf: str) -> None:
+    def __init__(self, urdf: str, model: Model = Model.LITE) -> None:
         self._servos = [servo_of(joint) for joint in movable_joints(urdf)]
-        self._spans = [ANGLE_SPANS[Model.LITE][servo.motor] for servo in self._servos]
+        self._spans = [ANGLE_SPANS[model][servo.motor] for servo in self._servos]
         self.reset()
 
     def reset(self) -> None:

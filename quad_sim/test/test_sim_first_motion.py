@@ -96,3 +96,22 @@ def test_leaving_writes_nothing() -> None:
     line = Line('--held', '--start', 'stand', protocol=V2)
     with pytest.raises(CancelledError, match='nothing was written'):
         check_joint(Script(), line, lambda: nullcontext(Leaving(line)), SERVOS['fl_thigh_joint'])
+
+
+def test_a_key_that_is_not_held_writes_nothing_and_blames_no_joint() -> None:
+    """Enter comes before the joint has moved."""
+
+    class Entering(Fingers):
+        def wait(self, timeout: float) -> list[KeyEvent]:
+            super().wait(timeout)
+            return [KeyEvent('enter', KeyAction.PRESSED, 0.0)]
+
+    line = Line('--held', '--start', 'stand', protocol=V2)
+    with pytest.raises(CancelledError, match='the key was not held; nothing was written'):
+        check_joint(Script(), line, lambda: nullcontext(Entering(line)), SERVOS['fl_thigh_joint'])
+
+
+def test_a_scale_that_is_wrong_is_that_of_another_robot() -> None:
+    """The person sees three times the angle."""
+    with pytest.raises(CommandError, match='give --model lite or mini'):
+        checked(SERVOS['fl_thigh_joint'], V2, '+', 'n', '30')

@@ -18,6 +18,8 @@ from .network import Floats, OnnxNetwork
 from .observation import ObservationBuilder, Observed, Situation
 from .options import PolicyOptions
 
+TOLERANCE = 1.1  # share of its noise that velocities may have: the period of reports jitters
+
 
 @dataclass(frozen=True, slots=True)
 class PolicyStep:
@@ -106,14 +108,15 @@ class PolicyRunner:
         """
         noise = self.contract.velocity_noise
         error = 0.0 if joints is None else joints.velocity_error
-        needed = self.contract.needs(Source.JOINT_VELOCITIES) and error > (noise or 0.0)
+        exceeds = error > TOLERANCE * (noise or 0.0)
+        needed = self.contract.needs(Source.JOINT_VELOCITIES) and exceeds
         if not needed or (stated and noise is None):
             return ''
         trained = 'nothing says with what noise' if noise is None else f'with {noise:.3g} rad/s'
         return (
             f'joint velocities have an error of {error:.2f} rad/s rms, and {trained} the policy '
             'was trained; use protocol v2 or more reports a second (rate of the hardware node), '
-            'or set noise [rad/s rms] of joint_velocities in policy_contract to what it stands'
+            'or set noise [rad/s rms] of joint_velocities in policy_contract to what it tolerates'
         )
 
     def reset(self, others: Targets) -> None:

@@ -15,7 +15,7 @@ import time
 from quad_description import Backend, robot_urdf, RobotState
 from quad_hardware import CommandError, HardwareError, NoAnswerError
 from quad_hardware.backend import JointBytes, robot_at
-from quad_hardware.protocol import V2
+from quad_hardware.protocol import Model, V2
 from quad_sim import (
     CommandTiming,
     parse_servo,
@@ -85,9 +85,9 @@ def servo_response(servo: str) -> ServoResponse:
 class BytesBackend(PhysicsBackend):
     """A robot in physics behind the bytes of protocol v1, in virtual time."""
 
-    def __init__(self, robot: Robot, urdf: str) -> None:
+    def __init__(self, robot: Robot, choice: RobotChoice) -> None:
         super().__init__(robot)
-        self._bytes = JointBytes(urdf)
+        self._bytes = JointBytes(choice.urdf, Model(choice.preset))
 
     def reset(self) -> RobotState:
         """Stand on the ground again."""
@@ -119,7 +119,7 @@ class PhysicsArena:
         self._robot = Robot(urdf, parse_servo(choice.servo), ground)
         self._variation = Variation(trunk_mass=conditions.trunk_mass)
         self.backend: Backend = (
-            BytesBackend(self._robot, urdf) if conditions.v1 else PhysicsBackend(self._robot)
+            BytesBackend(self._robot, choice) if conditions.v1 else PhysicsBackend(self._robot)
         )
         self._meter = Meter(self._robot, urdf)
 

@@ -65,7 +65,10 @@ class ExitCode(IntEnum):
 
 def run(arguments: Sequence[str]) -> int:
     """Check a policy and print what was found; return an :class:`ExitCode`."""
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    if options.v1 and (options.chain or not (options.walk or options.compare or options.report)):
+        parser.error('--v1 needs --walk or --compare; --chain speaks v2')
     found = Findings()
     try:
         loaded = _load(options)

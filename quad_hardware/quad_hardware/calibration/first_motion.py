@@ -16,6 +16,7 @@ from first_motion import (
     MotionGuard,
     MotionPlan,
     Order,
+    Outcome,
     Sample,
     Seen,
     Verdict,
@@ -32,11 +33,15 @@ SPEED = math.radians(5.0)  # [rad/s]
 PLAY = math.radians(1.0)  # [rad] of a servo, and of a byte of protocol v1: no motion
 PERIOD = 0.03  # [s] between two looks at the robot
 REPORT_TIMEOUT = 0.5  # [s] without a report, after which nothing moves on
+OTHER_RANGES = (
+    'its angles count otherwise: give --model lite or mini, and look at joints.{joint}.motor'
+)
 QUIT = frozenset({'q', 'escape', 'ctrl+c'})
 REMEDIES = {
     Verdict.OTHER_JOINT: 'two motor ids are exchanged: look at joints.{joint}.motor',
     Verdict.NO_MOTION: 'look at its cable, its torque, and what doctor finds',
     Verdict.ENCODER_ONLY: 'look whether its horn turns on the shaft',
+    **dict.fromkeys((Verdict.WRONG_SCALE, Verdict.WRONG_SIGN_AND_SCALE), OTHER_RANGES),
     Verdict.NOT_REPORTED: 'its servo reports no position: look at its cable',
 }
 """What to do, where ``calibrate joints`` does not find it."""
@@ -95,8 +100,10 @@ def check_joint(
     with keyboard() as keys:
         _move(robot, keys, servo, guard, angles)
     reported = servo.position(robot.angles().get(servo.motor, math.nan)) - start
+    if guard.outcome is Outcome.IDLE:
+        raise CancelledError(f'{servo.joint}: {guard.outcome.value}; nothing was written')
     if not guard.outcome.is_judged:
-        raise CommandError(f'{servo.joint}: {guard.detail}; {_remedy(servo)}')
+        raise CommandError(f'{servo.joint}: {guard.outcome.value}; {_remedy(servo)}')
     seen = _ask_seen(console, servo, reported)
     found = judge(JointKind.TURNS, distance, reported, seen, DriveFacts(1.0))
     console.write(f'  {found.verdict.value}')

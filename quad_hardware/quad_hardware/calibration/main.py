@@ -116,10 +116,12 @@ def _calibrated(urdf: str, known: Mapping[str, object]) -> list[JointServo]:
 
 
 def _first_motion(options: argparse.Namespace, console: Console) -> None:
-    from operator_input import Keyboard, TerminalError
+    try:
+        from operator_input import Keyboard, TerminalError
 
-    from .first_motion import check_joint
-
+        from .first_motion import check_joint
+    except ImportError as error:
+        raise CommandError(f"{error}; pip install './quad_hardware[first_motion]'") from error
     urdf = robot_urdf(options.preset, options.arm)
     servos = _calibrated(urdf, read_parameters(options.output))
     with limp_robot(_link(options), [servo.motor for servo in servos]) as robot:

@@ -175,9 +175,10 @@ def _noise(group: Mapping[str, Any], term: Mapping[str, Any]) -> float | None:
         return 0.0
     if not isinstance(noise, Mapping) or noise.get('operation') != 'add':
         return None
-    if 'n_min' in noise:
-        return float(noise['n_max'] - noise['n_min']) / math.sqrt(12.0)
-    return noise.get('std')
+    lower, upper, deviation = (noise.get(name) for name in ('n_min', 'n_max', 'std'))
+    if isinstance(lower, (int, float)) and isinstance(upper, (int, float)):
+        return abs(upper - lower) / math.sqrt(12.0)
+    return deviation if isinstance(deviation, (int, float)) else None
 
 
 def _one_action(actions: Mapping[str, Any], origin: str) -> list[str]:

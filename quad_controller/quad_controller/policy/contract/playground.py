@@ -56,9 +56,10 @@ def read_config(values: Mapping[str, Any], origin: str) -> ContractDocument:
         {'observation': {'terms': {k: dict(v) for k, v in TERMS.items()}}}, JOYSTICK
     )
     document = terms.over(document_of(contract, origin))
-    noise = values.get('noise_config', {})
-    if isinstance(each := noise.get('scales', {}).get('joint_vel'), (int, float)):
-        deviation = noise.get('level', 1.0) * each / math.sqrt(3.0)  # uniform, to either side
+    noise = values.get('noise_config') or {}
+    level, each = noise.get('level', 1.0), (noise.get('scales') or {}).get('joint_vel')
+    if isinstance(level, (int, float)) and isinstance(each, (int, float)):
+        deviation = level * each / math.sqrt(3.0)  # uniform, to either side
         known_noise = {'observation': {'terms': {'joint_vel': {'noise': deviation}}}}
         document = document_of(known_noise, origin).over(document)
     return ContractDocument(document.values, document.origins, HINTS, refusals)
