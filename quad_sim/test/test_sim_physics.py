@@ -315,6 +315,13 @@ def test_physics_that_blows_up_says_so(tmp_path: Path, monkeypatch: pytest.Monke
     assert not list(tmp_path.iterdir())
 
 
+def test_an_imu_has_one_of_two_names() -> None:
+    """A robot with links of both is measured where the documented one is."""
+    fixed = '<joint name="x" type="fixed"><parent link="base_link"/><child link="imu"/></joint>'
+    both = URDF.replace('</robot>', f'<link name="imu"/>{fixed}</robot>')
+    assert Robot(both).imu.specific_force == pytest.approx(Robot(URDF).imu.specific_force)
+
+
 @pytest.mark.parametrize(
     ('urdf', 'message'),
     [

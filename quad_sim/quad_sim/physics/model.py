@@ -141,7 +141,9 @@ def _load(urdf: str) -> mujoco.MjSpec:
             element.remove(visual)
     spec = mujoco.MjSpec.from_string(ET.tostring(root, encoding='unicode'))
     spec.compiler.fusestatic = False  # feet and IMU stay links of their own
-    names = {body_link(tree): BASE, 'imu': IMU}
+    names = {body_link(tree): BASE}
+    if spec.body(IMU) is None:
+        names['imu'] = IMU
     names |= {foot_link(tree, leg): foot for leg, foot in zip(LEGS, FEET, strict=True)}
     for link, name in names.items():
         if (body := spec.body(link)) is not None:
