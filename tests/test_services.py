@@ -162,6 +162,8 @@ def test_a_unit_is_ready_and_ends_in_order(
         if not line.startswith('#')
     )
     port = tmp_path / 'xgo'
+    calibration = tmp_path / 'calibration.yaml'
+    calibration.write_text('hardware_node: {ros__parameters: {joints_checked: true}}\n')
     bus_config = ROOT / 'arm_bringup' / 'robots' / settings['ROBOT'] / 'bus.yml'
     device = {
         'arm': ['canopen_sim', 'fake_slaves', '--ros-args', '-p', f'bus_config:={bus_config}'],
@@ -171,6 +173,7 @@ def test_a_unit_is_ready_and_ends_in_order(
         device += ['-p', f'can_interface_name:={isolation.bus}']
     line = parser['Service']['ExecStart'].replace('$$', '$')
     line = line.replace('/dev/xgo', str(port)).replace('can0', isolation.bus)
+    line = line.replace('$WORKSPACE/quad_calibration.yaml', str(calibration))
     env = isolation.env | settings | {'WORKSPACE': str(workspace)}
     with RunningProcess([executable(*device[:2]), *device[2:]], isolation.env) as simulated:
         simulated.wait_for('.')

@@ -27,11 +27,12 @@ EMERGENCY = CobId.EMCY + NODE_ID
 def test_of_process_data_the_newest_is_kept_and_of_services_all() -> None:
     """In the order of arrival."""
     sync, old, new = Frame(0x080), Frame(0x205, b'\1'), Frame(0x205, b'\2')
-    start, read, lss = Frame(0x000, b'\1\5'), Frame(0x605, bytes(8)), Frame(0x7E5, bytes(8))
-    batch = [sync, old, start, read, Frame(0x705, b'\5'), lss, Frame(0x080), new, read, lss, start]
+    start, read, other = Frame(0x000, b'\1\5'), Frame(0x605, bytes(8)), Frame(0x7E5, bytes(8))
+    batch = [sync, old, start, read, Frame(0x705, b'\5'), other]
+    batch += [Frame(0x080), new, read, other, start]
     assert newest_process_data(batch) == [
-        *(start, read, Frame(0x705, b'\5'), lss),
-        *(Frame(0x080), new, read, lss, start),
+        *(start, read, Frame(0x705, b'\5'), other),
+        *(Frame(0x080), new, read, other, start),
     ]
 
 

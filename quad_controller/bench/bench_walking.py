@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""How the gait and the shipped policies walk: on servos of any kind, and on several grounds.
+"""How the gait and the example walk: on servos of any kind, and on several grounds.
 
 Servos and grounds are tried in virtual time on all cores. None of the figures is judged here:
 `check_policy` does that, and it walks the course over a serial line in real time (`--chain`).

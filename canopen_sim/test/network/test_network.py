@@ -1119,7 +1119,7 @@ def test_a_master_that_runs_is_refused_by_name(frame: Frame, words: str) -> None
         Frame(0x7E5, bytes(8)),
         Frame(0x080, is_extended=True),
     ],
-    ids=['device', 'guarding', 'tpdo', 'sdo', 'lss', 'extended'],
+    ids=['device', 'guarding', 'tpdo', 'sdo', 'other', 'extended'],
 )
 def test_devices_and_tools_are_no_master(frame: Frame) -> None:
     """What a device or a tool that only reads may send does not hold up the start."""

@@ -127,4 +127,4 @@ AS_TUNED = GaitParameters()
 """The gait as it is when nothing is set."""
 
 LOW_AND_WIDE = GaitParameters(nominal_height=0.07, stance_widening=0.025)
-"""A stance of the XGO that pushes hardly tip, and that is slower; what is trained begins there."""
+"""A stance of the XGO that pushes hardly tip, and that is slower."""

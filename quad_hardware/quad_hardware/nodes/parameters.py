@@ -107,7 +107,7 @@ def declare_parameters(node: Node) -> NodeSettings:
         joints_checked=read.flag(
             JOINTS_CHECKED,
             default=False,
-            meaning='each joint has moved as its servo says (calibrate first-motion)',
+            meaning='each joint of the legs has moved as its servo says (calibrate first-motion)',
         ),
         serial_log=_serial_log(read),
     )
