@@ -129,7 +129,6 @@ def test_a_short_training_ends_with_a_policy_that_is_checked(tmp_path: Path) -> 
 def test_without_the_library_it_is_said_what_installs_it(tmp_path: Path) -> None:
     """Not a traceback."""
     (tmp_path / 'skrl.py').write_text("raise ImportError('no skrl')\n")
-    (tmp_path / 'optax.py').write_text("raise ImportError('no optax')\n")
     (tmp_path / 'jax.py').write_text("raise ImportError('no jax')\n")
     environment = dict(os.environ)
     environment['PYTHONPATH'] = f'{tmp_path}:{environment.get("PYTHONPATH", "")}'
