@@ -119,7 +119,7 @@ def test_the_world_of_the_srdf_is_a_frame(topics: Topics) -> None:
 
 
 def test_displacements_that_come_faster_than_they_begin_add_up(topics: Topics) -> None:
-    """None is refused or late: those that wait become one; a wrong one spoils no other."""
+    """Within limits none is refused or late: those that wait become one; a wrong one is alone."""
     joints = ['panda_joint1', 'panda_joint2']
     drives, begin = topics.drives, topics.drives.path[-1]
     for number in range(150):
@@ -130,6 +130,28 @@ def test_displacements_that_come_faster_than_they_begin_add_up(topics: Topics) -
         drives.run()
     drives.run(100)
     assert (drives.path[-1] - begin)[:2] == pytest.approx([0.075, 0.075], abs=1e-6)
+
+
+def test_a_displacement_that_does_not_fit_is_refused_alone(topics: Topics) -> None:
+    """Those before it are carried out to the limit, and one that leads back from there."""
+    drives = topics.drives
+    limit = float(drives.gateway.model.limits.upper[0])
+    near = limit - 0.055 - drives.path[-1][0]
+    for ways in ([near], [0.01] * 10 + [9.0, -0.02]):
+        for way in ways:
+            topics.send(JOG, JointJog(joint_names=['panda_joint1'], displacements=[way]))
+        drives.run(1000)
+    assert limit - drives.path[-1][0] == pytest.approx(0.025, abs=1e-6)
+
+
+def test_a_displacement_of_zero_keeps_those_that_wait(topics: Topics) -> None:
+    """Also that they get the drives."""
+    begin = topics.drives.path[-1][0]
+    for way in (0.01, 0.01, 0.0):
+        topics.send(JOG, JointJog(joint_names=['panda_joint1'], displacements=[way]))
+    topics.drives.run(200)
+    assert topics.drives.path[-1][0] - begin == pytest.approx(0.02, abs=1e-6)
+    assert topics.prepared == 2
 
 
 def test_displacements_before_a_stop_do_not_come_back_with_the_next(topics: Topics) -> None:

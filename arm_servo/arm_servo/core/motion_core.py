@@ -44,7 +44,10 @@ from ..report import Cause, Limiter, MotionReport
 from .moving_arms import Neighbours
 from .preparation import CommandBasis, CoreSettings, Motion, Preparation, PreparedScene
 from .requests import (
+    by_joint,
+    check_limits,
     check_request,
+    DisplacementRequest,
     ImmediateRequest,
     in_base,
     JogRequest,
@@ -88,7 +91,7 @@ class MotionCore:
 
     Times are steady times in [s] that the owner hands over; it reads no clock. All methods are for
     the thread of the cycle but :meth:`plan`, which is for any one other thread, and
-    :meth:`prepare_scene`, for any.
+    :meth:`prepare_scene` and :meth:`check_displacement`, for any.
 
     Attributes:
         model: The arm.
@@ -251,6 +254,26 @@ class MotionCore:
             CommandError: The request is refused.
         """
         return self._preparation.prepare(request, basis)
+
+    def check_displacement(self, request: DisplacementRequest, rest: RobotState | None) -> None:
+        """Check that a displacement stays within the limits of its joints; for any thread.
+
+        Args:
+            rest: Where the arm stands while others have its drives; None where it follows.
+
+        Raises:
+            CommandError: It leads beyond them.
+        """
+        values, moved = by_joint(self.model, request.displacements, 'displacements')
+        active, limits = self._active, self.model.limits
+        if rest is not None:
+            begin = rest.position
+        else:
+            begin = active.target if isinstance(active, SingleTarget) else self.state.position
+        # where the others are was not asked for, as when it is planned
+        check_limits(
+            limits, np.where(moved, begin + values, np.clip(begin, limits.lower, limits.upper))
+        )
 
     def begin(
         self,

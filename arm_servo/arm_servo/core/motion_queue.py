@@ -13,7 +13,7 @@ import math
 import threading
 from typing import Any
 
-from arm_model import RobotState
+from arm_model import ArmError, RobotState
 from arm_trajectory import GoalCode, StateMovedError, TrajectoryGoal
 
 from ..controllers.controller import Outcome, refused, Source
@@ -134,26 +134,34 @@ class MotionQueue:
     ) -> MotionCommand:
         """Prepare a motion, and begin it when its path is clear.
 
-        It replaces those of its stream that wait; displacements add up.
+        It replaces those of its stream that wait; displacements add up. One that would lead a sum
+        beyond limits is refused alone.
         """
+        error: ArmError | None = None
         with self._lock:
             number = self._mailbox.gate.number() if number is None else number
             replaced = [each for each in self._waiting if stream and each.stream == stream]
+            try:
+                for each in replaced:
+                    if isinstance(request, DisplacementRequest) and not self._is_void(each):
+                        get_ready = each.get_ready if request.is_zero else get_ready
+                        request = request.beyond(each.request)
+                if isinstance(request, DisplacementRequest) and stream:
+                    self._check_displacement(request)
+            except ArmError as refusal:
+                error, replaced = refusal, []
             for each in replaced:
                 self._waiting.remove(each)
-                is_void = each.is_canceled or self._mailbox.gate.refusal(each.source, each.number)
-                if isinstance(request, DisplacementRequest) and not is_void:
-                    request = request.beyond(each.request)
             command = MotionCommand(request, number, self._clock(), get_ready, stream)
-            is_full = len(self._waiting) >= MAX_QUEUED_MOTIONS
-            if not is_full:
+            if len(self._waiting) >= MAX_QUEUED_MOTIONS:
+                error = error or NotReadyError(
+                    f'{MAX_QUEUED_MOTIONS} motions wait already; send them more slowly'
+                )
+            if error is None:
                 self._waiting.append(command)
         for each in replaced:
             self._refuse(each, CancelledError())
-        if is_full:
-            error = NotReadyError(
-                f'{MAX_QUEUED_MOTIONS} motions wait already; send them more slowly'
-            )
+        if error is not None:
             self._refuse(command, error)
         self._prepare_next()
         return command
@@ -185,6 +193,26 @@ class MotionQueue:
             if command.motion is None or command.motion.outcome is not None:
                 self._begun.remove(command)
                 command.end((command.motion and command.motion.outcome) or NOTHING)
+
+    def _is_void(self, command: MotionCommand) -> bool:
+        """Return whether a motion was canceled or stopped before its begin."""
+        return command.is_canceled or bool(
+            self._mailbox.gate.refusal(command.source, command.number)
+        )
+
+    def _check_displacement(self, request: DisplacementRequest) -> None:
+        """Check that it stays within limits, behind the one that is being prepared.
+
+        Raises:
+            CommandError: It leads beyond them.
+        """
+        if request.is_zero:
+            return
+        now = self._preparing
+        if now is not None and now.motion is None and not self._is_void(now):
+            request = request.beyond(now.request)
+        with suppress(NotReadyError):  # where the arm is not known yet, that is refused later
+            self._core.check_displacement(request, self._rest())
 
     def _prepare_next(self) -> None:
         """Begin with the next motion, once the one before has begun or was refused."""

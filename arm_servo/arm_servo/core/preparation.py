@@ -32,7 +32,7 @@ from ..controllers.controller import Source
 from ..controllers.jog import ServoSettings
 from ..controllers.target import SingleTarget
 from ..controllers.trajectory import Execution, ExecutionSettings
-from .requests import by_joint, DisplacementRequest, MotionRequest
+from .requests import by_joint, check_limits, DisplacementRequest, MotionRequest
 
 Motion = Execution | SingleTarget  # what has a goal, and an outcome once it ended
 
@@ -158,14 +158,7 @@ class Preparation:
     def _single_target(self, target: Array, max_speed: float, basis: CommandBasis) -> SingleTarget:
         if not max_speed > 0.0:
             raise CommandError(f'greatest speed of a joint {max_speed} rad/s: it must be above 0')
-        limits = self._limits
-        beyond = (target < limits.lower) | (target > limits.upper)
-        if beyond.any():
-            joint = int(np.argmax(beyond))
-            raise CommandError(
-                f'{limits.names[joint]}: {target[joint]:.4f} is beyond its limits'
-                f' {limits.lower[joint]:.4f}..{limits.upper[joint]:.4f}'
-            )
+        check_limits(self._limits, target)
         motion = SingleTarget(target, max_speed, self._generator)
         self._check_single_target(motion.plan(basis.state, basis.speed_scaling), basis)
         return motion

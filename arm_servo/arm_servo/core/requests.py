@@ -14,7 +14,16 @@ import math
 
 import numpy as np
 
-from arm_model import Array, checked, combined, CommandError, Mask, Pose, RobotModel
+from arm_model import (
+    Array,
+    checked,
+    combined,
+    CommandError,
+    JointLimits,
+    Mask,
+    Pose,
+    RobotModel,
+)
 from arm_trajectory import TrajectoryGoal
 
 from ..controllers.controller import Controller, Source
@@ -66,6 +75,8 @@ class DisplacementRequest:
         """Return it beyond another displacement; anything else it takes the place of."""
         if not isinstance(before, DisplacementRequest):
             return self
+        if self.is_zero:
+            return before
         ways = {name: before.displacements.get(name, 0.0) for name in self.displacements}
         sums = {name: way + ways[name] for name, way in self.displacements.items()}
         return replace(self, displacements={**before.displacements, **sums})
@@ -110,6 +121,21 @@ MotionRequest = DisplacementRequest | TargetRequest | TrajectoryGoal
 
 ImmediateRequest = JogRequest | StopRequest | PauseRequest | SpeedRequest
 """Requests for which nothing is planned: they count from the next cycle on."""
+
+
+def check_limits(limits: JointLimits, target: Array) -> None:
+    """Check that joints may be at positions in [rad].
+
+    Raises:
+        CommandError: One is beyond its limits.
+    """
+    beyond = (target < limits.lower) | (target > limits.upper)
+    if beyond.any():
+        joint = int(np.argmax(beyond))
+        raise CommandError(
+            f'{limits.names[joint]}: {target[joint]:.4f} is beyond its limits'
+            f' {limits.lower[joint]:.4f}..{limits.upper[joint]:.4f}'
+        )
 
 
 def by_joint(model: RobotModel, values: Mapping[str, float], what: str) -> tuple[Array, Mask]:
