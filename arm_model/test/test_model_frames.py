@@ -105,3 +105,16 @@ def test_transforms_that_come_late_or_are_no_numbers_do_not_count() -> None:
     assert frames.pose('cup').position.tolist() == [0.2, 0.0, 0.0]
     node.publish(101, 0.3)  # of a clock a little ahead
     assert frames.pose('cup').position.tolist() == [0.3, 0.0, 0.0]
+
+
+def test_a_world_that_tf_has_placed_is_no_other_name_of_the_root() -> None:
+    """Also while its publisher pauses: the arm does not jump to another frame."""
+    node, model = TfNode(), robot('gp110')
+    frames = TfListener(
+        cast('Node', node), model.kinematics, base='base_link', world_frames=['cup']
+    )
+    assert frames.link('cup') == model.kinematics.root
+    node.publish(90, 0.1)
+    assert frames.link('cup') is None
+    with pytest.raises(CommandError, match=r'10\.0 s old'):
+        frames.pose('cup')

@@ -11,7 +11,7 @@ import time
 from typing import Any
 
 from control_msgs.msg import JointJog
-from geometry_msgs.msg import PoseStamped, TwistStamped
+from geometry_msgs.msg import PoseStamped, TransformStamped, TwistStamped
 from isolation import Isolation
 from model_robots import table, texts
 import pytest
@@ -21,6 +21,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from servo_drives import Drives
+from tf2_msgs.msg import TFMessage
 
 from arm_model import RobotModel
 from arm_servo import JogRequest, PoseCommand, TwistCommand
@@ -116,6 +117,22 @@ def test_the_world_of_the_srdf_is_a_frame(topics: Topics) -> None:
         topics.send(TWIST, message)
     twists = [each.command for each in topics.requests if isinstance(each.command, TwistCommand)]
     assert [(each.link, each.axes) for each in twists] == [(None, None)] * 2
+
+
+def test_tf_decides_where_the_world_is(topics: Topics) -> None:
+    """An arm may stand on a pedestal: static_transform_publisher says so."""
+    placed = TransformStamped(child_frame_id='panda_link0')
+    placed.header.frame_id = 'world'
+    placed.transform.rotation.x, placed.transform.rotation.w = 1.0, 0.0
+    (static,) = (each for each in topics.node.subscriptions if each.topic_name == '/tf_static')
+    static.callback(TFMessage(transforms=[placed]))
+    message = twist(0.5)
+    message.header.frame_id = 'world'
+    topics.send(TWIST, message)
+    (request,) = topics.requests
+    assert isinstance(request.command, TwistCommand)
+    assert request.command.axes is not None
+    assert request.command.axes.diagonal() == pytest.approx([1.0, -1.0, -1.0])
 
 
 def test_displacements_that_come_faster_than_they_begin_add_up(topics: Topics) -> None:

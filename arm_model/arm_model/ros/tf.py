@@ -91,24 +91,38 @@ class TfListener:
         Args:
             prefix: Before the names of the robot's links in TF.
             base: Link in which :meth:`pose` is.
-            world_frames: Other names of the root link: those of the SRDF's virtual joint.
+            world_frames: Names of the root link where TF does not place them: those of the SRDF's
+                virtual joint.
             on_demand: Whether messages are kept as they come and read when a frame is asked for:
                 robots publish the frames of their own links 100 times a second, and few requests
                 name others. Else it listens from the first frame on that is no link, and reads
                 each message as it comes, so that no control cycle reads many.
         """
         self._node, self._prefix, self._base = node, prefix, base
-        self._links = dict.fromkeys(world_frames, kinematics.root)
-        self._links |= {link: link for link in kinematics.frames}
+        self._links, self._root = frozenset(kinematics.frames), kinematics.root
+        self._world_frames = frozenset(world_frames) - self._links
         self._on_demand, self._is_listening = on_demand, False
+        self._has_static = False
         self._unread: deque[tuple[float, float, bytes]] = deque(maxlen=KEPT_MESSAGES)
         self._tree, self._lock = FrameTree(), threading.Lock()
         if on_demand:
             self._listen()
+        elif self._world_frames:  # the first command in one is to know where it is
+            self._listen_to_static()
 
     def link(self, frame: str) -> str | None:
         """Return the link of the robot that a frame is, with or without its prefix."""
-        return self._links.get(frame.removeprefix(self._prefix))
+        name = frame.removeprefix(self._prefix)
+        if name in self._world_frames and not self._is_placed(frame):
+            return self._root
+        return name if name in self._links else None
+
+    def _is_placed(self, frame: str) -> bool:
+        """Return whether TF has connected a frame with the root link, however long ago."""
+        self._listen()
+        with self._lock:
+            self._read()
+            return self._tree.pose(frame, self._prefix + self._root, -math.inf) is not None
 
     def pose(self, frame: str) -> Pose:
         """Return the pose of a frame of TF in the base.
@@ -156,11 +170,16 @@ class TfListener:
         if self._is_listening:
             return
         self._is_listening = True
-        self._node.create_subscription(TFMessage, '/tf_static', self._learn_static, STATIC_QOS)
+        self._listen_to_static()
         if self._on_demand:
             self._node.create_subscription(TFMessage, '/tf', self._keep, 100, raw=True)
         else:
             self._node.create_subscription(TFMessage, '/tf', self._learn_now, 100)
+
+    def _listen_to_static(self) -> None:
+        if not self._has_static:
+            self._has_static = True
+            self._node.create_subscription(TFMessage, '/tf_static', self._learn_static, STATIC_QOS)
 
     def _arrival(self) -> tuple[float, float]:
         """Return the steady time, and that of the clock of the stamps, in [s]."""
