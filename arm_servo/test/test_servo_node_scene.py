@@ -21,7 +21,7 @@ from servo_scenes import Listener
 from shape_msgs.msg import SolidPrimitive
 
 from arm_model import Clearances, RobotModel
-from arm_servo.ros.scene_listener import SceneListener
+from arm_servo.ros.scene_listener import ANSWER_TIMEOUT, SceneListener
 from node_runner import LATCHED
 
 
@@ -164,10 +164,11 @@ def test_a_diff_before_any_whole_scene_counts_with_a_warning() -> None:
     listener.take(diff)
     listener.run()
     assert objects(drives) == {'cup'}
+    listener.run(ANSWER_TIMEOUT)
     assert 'start this node before move_group' in listener.warnings[0]
 
 
-def test_the_scene_of_a_move_group_that_began_before_is_requested_once() -> None:
+def test_the_scene_of_a_move_group_that_began_before_is_requested() -> None:
     """Diffs that came meanwhile count beyond it; where ours publishes, nothing is requested."""
     drives = started(arm())
     listener = Listener(drives)
@@ -177,8 +178,8 @@ def test_the_scene_of_a_move_group_that_began_before_is_requested_once() -> None
     listener.publishers = 0
     diff = message('cup')
     diff.is_diff = True
-    listener.take(diff)
     listener.run()
+    listener.take(diff)
     (answer,) = listener.answers
     whole = message('box')
     whole.is_diff = True
@@ -186,8 +187,32 @@ def test_the_scene_of_a_move_group_that_began_before_is_requested_once() -> None
     for _ in range(5):
         listener.run()
     assert objects(drives) == {'box', 'cup'}
+    listener.run(2 * ANSWER_TIMEOUT)
     assert len(listener.answers) == 1
     assert not listener.warnings
+
+
+def test_a_scene_is_requested_until_it_comes() -> None:
+    """Where move_group died over the request, or the call failed; diffs before count no more."""
+    drives = started(arm())
+    listener = Listener(drives)
+    listener.answers = []
+    listener.run(2.0)
+    diff = message('cup')
+    diff.is_diff = True
+    listener.take(diff)
+    listener.run(ANSWER_TIMEOUT)
+    lost, failed = listener.answers
+    assert lost.cancelled()
+    failed.set_exception(RuntimeError('no connection'))
+    listener.run(ANSWER_TIMEOUT)
+    assert 'no whole scene came' in listener.warnings[0]
+    assert objects(drives) == {'cup'}
+    listener.answers[-1].set_result(GetPlanningScene.Response(scene=message('box')))
+    listener.run()
+    assert objects(drives) == {'box'}
+    listener.run(2 * ANSWER_TIMEOUT)
+    assert len(listener.answers) == 3
 
 
 @pytest.mark.scenario

@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from functools import partial
+import math
 import time
 from typing import Any
 
@@ -41,6 +42,9 @@ FOREIGN_DEPTH = 100  # messages of MoveIt's monitor that may wait, as it keeps a
 ASK_AFTER = 1.0  # time from the start in [s] in which a whole scene may come by itself
 
 LOOK_PERIOD = 0.1  # time between two looks where the joints are in [s]
+ANSWER_TIMEOUT = 5.0
+"""Time in [s] for which a whole scene is awaited before it is requested again, and missed."""
+
 PLACE_TIMEOUT = 1.0  # time for which a scene waits for a group's position without a warning in [s]
 OTHERS_TIMEOUT = 5.0  # time for which joints beside a group are awaited without a warning in [s]
 
@@ -95,8 +99,10 @@ class SceneListener:
         self._gateways = [*gateways, *unchecked]
         self._begin = self._received = clock()
         self._is_complete = False  # whether a whole scene came
-        self._early = deque[PlanningScene](maxlen=FOREIGN_DEPTH)  # diffs that came before
-        self._has_asked = False
+        self._early = deque[PlanningScene](maxlen=FOREIGN_DEPTH)  # diffs since it was requested
+        self._answer: Any = None  # the one that is awaited
+        self._due = self._begin + ASK_AFTER  # when it is requested next
+        self._missed = math.inf  # since when it is known to be missing
         self._client = node.create_client(GetPlanningScene, 'get_planning_scene')
         self._unplaced = list(self._updaters)  # those of which no warning has said so
         self._assuming = list(self._updaters)  # the same for joints beside them
@@ -132,36 +138,33 @@ class SceneListener:
             self._take(deserialize_message(data, PlanningScene))
 
     def _ask(self) -> None:
-        """Request the whole scene, once, of a move_group that began before this node."""
-        waited = self._clock() - self._begin
-        if self._is_complete or self._has_asked or waited < ASK_AFTER:
+        """Request the whole scene, until it comes, of a move_group that began before this node."""
+        now = self._clock()
+        if self._is_complete or now < self._due:
             return
         if self._client.service_is_ready() and not self._node.count_publishers(TOPIC):
-            self._has_asked = True
-            asked = self._client.call_async(GetPlanningScene.Request())
-            asked.add_done_callback(self._answered)
+            if self._answer is not None:  # nothing may answer it any more
+                self._answer.cancel()
+            self._early.clear()  # the answer has what was published before
+            self._due, self._missed = now + ANSWER_TIMEOUT, min(self._missed, now)
+            self._answer = self._client.call_async(GetPlanningScene.Request())
+            self._answer.add_done_callback(self._answered)
 
     def _answered(self, answer: Any) -> None:  # noqa: ANN401  # rclpy has no types here
-        response = answer.result()
-        if self._is_complete or response is None:
+        if self._is_complete or answer.cancelled() or answer.exception() is not None:
             return
+        response = answer.result()
         response.scene.is_diff = False
         for message in (response.scene, *self._early):  # it may be older than those
             self._take(message)
 
     def _take(self, message: PlanningScene) -> None:
-        if message.is_diff and not self._is_complete:
-            self._early.append(message)
-            if not self._client.service_is_ready():
-                self._node.get_logger().warning(
-                    f'{FOREIGN_TOPIC}: a diff (is_diff) came before a whole scene: only what it'
-                    ' names counts, and objects that were there before it do not; start this node'
-                    ' before move_group, or have move_group offer get_planning_scene or publish a'
-                    ' whole scene',
-                    once=True,
-                )
-        self._is_complete |= not message.is_diff
         self._received = self._clock()
+        if not message.is_diff:
+            self._is_complete, self._missed = True, math.inf
+        elif not self._is_complete:
+            self._early.append(message)
+            self._missed = min(self._missed, self._received)
         for updater in self._updaters:
             updater.change(partial(_changed, message), is_whole=not message.is_diff)
         self._submit()
@@ -183,6 +186,7 @@ class SceneListener:
         self._joints = self._joints.next(places, commanded)
         self._ask()
         self._submit()
+        self._warn_of_whole()
         self._warn_of_groups()
         self._warn_of_others()
 
@@ -203,6 +207,17 @@ class SceneListener:
             self._node.get_logger().error(
                 f'{TOPIC} refused for {updater.gateway.model.group}, the scene before counts:'
                 f' {reason}'
+            )
+
+    def _warn_of_whole(self) -> None:
+        """Say that objects may be missing."""
+        if not self._is_complete and self._clock() - self._missed > ANSWER_TIMEOUT:
+            self._node.get_logger().warning(
+                f'{FOREIGN_TOPIC}: no whole scene came in {ANSWER_TIMEOUT:g} s: only what diffs'
+                ' (is_diff) name counts, and objects that were there before them do not; start'
+                ' this node before move_group, or have move_group answer get_planning_scene or'
+                ' publish a whole scene',
+                once=True,
             )
 
     def _warn_of_groups(self) -> None:
