@@ -215,6 +215,36 @@ def test_a_scene_is_requested_until_it_comes() -> None:
     assert len(listener.answers) == 3
 
 
+def test_objects_in_the_world_of_the_srdf_count() -> None:
+    """MoveIt places all of them there, where there is a virtual joint."""
+    urdf, srdf = texts('panda')
+    world = '<virtual_joint name="v" type="fixed" parent_frame="world" child_link="panda_link0"/>'
+    held = RobotModel(urdf, srdf.replace('</robot>', f'{world}</robot>'), table('panda'))
+    drives = started(Drives(model=held))
+    listener = Listener(drives)
+    listener.take(message('box', 'world'))
+    listener.run()
+    assert drives.gateway.model.scene.objects['box'].pose.position.tolist() == [2.0, 0.0, 0.0]
+    assert not listener.errors
+
+
+def test_a_whole_scene_that_is_refused_is_requested_again() -> None:
+    """It says so, and diffs behind it do not make it whole."""
+    drives = started(arm())
+    listener = Listener(drives)
+    listener.answers = []
+    listener.run(2.0)
+    listener.answers[0].set_result(GetPlanningScene.Response(scene=message('cup', 'nowhere')))
+    listener.run()
+    assert "'cup': no frame 'nowhere'" in listener.errors[0]
+    listener.run(ANSWER_TIMEOUT)
+    listener.answers[1].set_result(GetPlanningScene.Response(scene=message('box')))
+    listener.run()
+    assert objects(drives) == {'box'}
+    listener.run(2 * ANSWER_TIMEOUT)
+    assert len(listener.answers) == 2
+
+
 @pytest.mark.scenario
 @pytest.mark.parametrize('qos', [LATCHED, 100], ids=['latched', 'volatile'])
 def test_a_scene_of_another_move_group_is_received(isolation: Isolation, qos: Any) -> None:

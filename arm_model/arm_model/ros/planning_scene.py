@@ -8,7 +8,7 @@ as in MoveIt: what a link takes up, a message may remove from the world besides.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -57,7 +57,12 @@ LENGTHS: dict[int, tuple[type[Box | Sphere | Cylinder | Cone], tuple[int, ...]]]
 
 
 def apply_planning_scene(
-    scene: PlanningScene, message: SceneMessage, positions: Array, frame_of: FrameOf | None = None
+    scene: PlanningScene,
+    message: SceneMessage,
+    positions: Array,
+    frame_of: FrameOf | None = None,
+    *,
+    world_frames: Collection[str] = (),
 ) -> PlanningScene:
     """Return a scene with what a message has in the place of what it replaces.
 
@@ -68,6 +73,8 @@ def apply_planning_scene(
     Args:
         positions: Joint positions in [rad], for frames that move with the arm.
         frame_of: Returns frames that are no links; without it there are none.
+        world_frames: Other names of the root link: those of the SRDF's virtual joint, in which
+            MoveIt places its objects.
 
     Raises:
         SceneError: The message does not fit the robot, or the scene before.
@@ -81,6 +88,7 @@ def apply_planning_scene(
         scene,
         positions,
         frame_of,
+        world_frames,
         {} if is_whole else dict(scene.objects),
         dict(scene.attached_bodies) if keeps and not is_whole else {},
     )
@@ -173,6 +181,7 @@ class _Draft:
     before: PlanningScene
     positions: Array
     frame_of: FrameOf | None
+    world_frames: Collection[str]
     objects: dict[str, CollisionObject]
     attached: dict[str, AttachedBody]
 
@@ -310,6 +319,8 @@ class _Draft:
             return ORIGIN
         if frame in kinematics.frames:
             return kinematics.link_pose(frame, self.positions)
+        if frame in self.world_frames:
+            return ORIGIN
         if self.frame_of is None:
             known = ', '.join(kinematics.frames)
             raise SceneError(f'object {name!r}: no frame {frame!r}; links: {known}')

@@ -19,7 +19,7 @@ from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
-from arm_model import ArmError, Array
+from arm_model import ArmError, Array, RobotModel
 from arm_model import PlanningScene as Scene
 from arm_model.ros import apply_planning_scene
 from node_runner import LATCHED
@@ -98,7 +98,7 @@ class SceneListener:
         ]
         self._gateways = [*gateways, *unchecked]
         self._begin = self._received = clock()
-        self._is_complete = False  # whether a whole scene came
+        self._is_complete = False  # whether a whole scene came, and none was refused
         self._early = deque[PlanningScene](maxlen=FOREIGN_DEPTH)  # diffs since it was requested
         self._answer: Any = None  # the one that is awaited
         self._due = self._begin + ASK_AFTER  # when it is requested next
@@ -166,8 +166,20 @@ class SceneListener:
             self._early.append(message)
             self._missed = min(self._missed, self._received)
         for updater in self._updaters:
-            updater.change(partial(_changed, message), is_whole=not message.is_diff)
+            model = updater.gateway.model
+            updater.change(partial(self._change, message, model), is_whole=not message.is_diff)
         self._submit()
+
+    def _change(
+        self, message: PlanningScene, model: RobotModel, scene: Scene, positions: Array
+    ) -> Scene:
+        """Apply a message; in the thread of the scenes."""
+        try:
+            return apply_planning_scene(scene, message, positions, world_frames=model.world_frames)
+        except Exception:
+            if not message.is_diff:
+                self._is_complete = False  # it is requested again
+            raise
 
     def _take_joints(self, message: JointState) -> None:
         self._states.receive(message.name, message.position, [], self._clock())
@@ -240,7 +252,3 @@ class SceneListener:
                 self._assuming.remove(updater)
                 if assumption := updater.gateway.model.assumption(self._joints.places):
                     self._node.get_logger().warning(assumption)
-
-
-def _changed(message: PlanningScene, scene: Scene, positions: Array) -> Scene:
-    return apply_planning_scene(scene, message, positions)
