@@ -12,7 +12,7 @@ import tempfile
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from model_robots import robot
+from model_robots import ready, robot
 import numpy as np
 import pytest
 
@@ -157,6 +157,19 @@ def test_a_free_edge_is_free_between_its_ends(name: str) -> None:
             assert reference.least(place, 1e-2).min() <= 1e-3 + ROUNDING
         answers.append(share is None)
     assert 0.1 < np.mean(answers) < 0.99
+
+
+@pytest.mark.parametrize(('link', 'moves'), [('panda_link8', True), ('panda_link0', False)])
+def test_an_attached_octree_is_solid(link: str, *, moves: bool) -> None:
+    """Also where it moves with its link: then coal measures, instead of the compiled core."""
+    model, at = robot('panda'), ready('panda')
+    elbow = model.scene.kinematics.link_pose('panda_link4', at)
+    scan = CollisionObject('scan', Cells(np.zeros((1, 3)), 0.1), pose=elbow)
+    scene = model.scene.with_object(scan).attached('scan', link, at)
+    found = compiled_scene(scene)
+    assert (found is None) is moves
+    measured = found or Clearances(scene)
+    assert measured.least(at, 1.0)[scene.pairs.index(('scan', 'panda_link4'))] <= 0.0
 
 
 @pytest.fixture

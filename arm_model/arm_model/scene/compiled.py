@@ -185,10 +185,16 @@ class CompiledSearch:
 
 
 def compiled_scene(scene: PlanningScene) -> CompiledScene | None:
-    """Return a scene for the compiled core; None without a core, or without pairs."""
+    """Return a scene for the compiled core, whose octrees stand still.
+
+    None without a core, without pairs, and where an octree moves with a joint.
+    """
     with LOADING:
         loaded = library()
     if loaded is None or not scene.pairs:
+        return None
+    things = scene.geometry.geometryObjects
+    if any(things[number].parentJoint for number in scene.octrees):
         return None
     return CompiledScene(loaded, scene)
 
