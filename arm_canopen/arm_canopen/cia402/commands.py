@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from dataclasses import replace
+import math
 from typing import Any, TypeAlias, TypeVar
 
 from canopen_core import DriveError, SdoTimeoutError
@@ -42,6 +43,7 @@ SELECT_MODE = '; select a mode before the first target'
 SETTLING_TIME = 0.5  # [s] from standstill to the place
 WAY_SHARE = 0.02  # of a way that may be left at its end, where the drive has no window (0x6067)
 WINDOW_INCREMENTS = 10  # the same of short ways [increments]
+SAG_TOLERANCES = 5.0  # of these, by which a load may keep an axis away from its set-point
 TAKEN_TIMEOUT = RESUME_TIMEOUT + 1.0  # [s] after which nothing leads the drive out of its halt
 
 
@@ -226,29 +228,39 @@ class AxisCommands:
                 raise await self._halted(f'has not arrived within {timeout:g} s') from None
         if lost():
             raise self._steps.refused(ended)
-        elsewhere = await self._elsewhere(start, replaced)
+        tolerance = self._tolerance(start)
+        elsewhere = await self._elsewhere(tolerance, replaced)
         if replaced():
             raise self._steps.refused(ended)
         if elsewhere and axis.halt.rests:
             raise self._steps.refused(elsewhere)
         if elsewhere:
-            axis.hold_here()
+            window = min(
+                axis.view.parameters.following_window or math.inf, SAG_TOLERANCES * tolerance
+            )
+            # a set-point on which a load hangs stays, else it would sag once more
+            sags = mode.cyclic and abs(axis.following_error) <= window
+            (axis.hold if sags else axis.hold_here)()
             raise await self._halted(elsewhere)
         return axis.describe()
 
-    async def _elsewhere(self, start: float, replaced: Callable[[], bool]) -> str:
-        """Return where an axis that came from ``start`` stands, empty where that is its target.
+    def _tolerance(self, start: float) -> float:
+        """Return how far from its set-point an axis that came from ``start`` has arrived."""
+        view = self.axis.view
+        return max(
+            view.parameters.position_window or 0.0,
+            WAY_SHARE * abs(self.axis.setpoint - start),
+            WINDOW_INCREMENTS / abs(view.units.position.to_dev),
+        )
+
+    async def _elsewhere(self, tolerance: float, replaced: Callable[[], bool]) -> str:
+        """Return where an axis stands, empty where that is its target.
 
         The drive may have shortened the way to its own limits, and in the cyclic modes no bit
         shows the arrival.
         """
         axis = self.axis
         target, view, is_placed = axis.setpoint, axis.view, axis.mode.setpoint is not None
-        tolerance = max(
-            view.parameters.position_window or 0.0,
-            WAY_SHARE * abs(target - start),
-            WINDOW_INCREMENTS / abs(view.units.position.to_dev),
-        )
 
         def in_place() -> bool:
             return not is_placed or abs(view.position - target) <= tolerance

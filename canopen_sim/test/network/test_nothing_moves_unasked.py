@@ -145,6 +145,19 @@ def test_a_loaded_axis_does_not_sag_when_the_mode_is_switched(mode: OperationMod
 
 
 @pytest.mark.parametrize('mode', STREAMED, ids=lambda mode: mode.name)
+def test_a_loaded_axis_does_not_sag_when_it_has_not_arrived(mode: OperationMode) -> None:
+    """The set-point on which it hangs is kept, as it stands a little below it only."""
+    loaded = Loaded()
+    loaded.enable(mode)
+    loaded.net.run(0.5)
+    target = loaded.net.drives[JOINT].setpoint + 0.02
+    with pytest.raises(DriveError, match=r'not at its target.*was halted'):
+        loaded.net.master.drive(JOINT).move_to(target)
+    loaded.net.run(0.5)
+    assert loaded.setpoints(loaded.net.now - 0.2)[-1] == round(target * SCALE)
+
+
+@pytest.mark.parametrize('mode', STREAMED, ids=lambda mode: mode.name)
 def test_a_mode_switch_that_the_drive_refuses_leaves_it_where_it_is(mode: OperationMode) -> None:
     """For all the seconds of the time-out the set-point that holds the load does not change."""
     loaded = Loaded()
