@@ -8,7 +8,13 @@ from collections.abc import Callable
 import contextlib
 
 from canopen_core import CodecError, DriveError, SdoError, SdoTimeoutError
-from canopen_core.standard import DriveState, Index, OperationMode, Statusword
+from canopen_core.standard import (
+    DriveState,
+    Index,
+    object_address,
+    OperationMode,
+    Statusword,
+)
 
 from ..master.events import Severity
 from ..master.scheduler import Scheduler
@@ -192,6 +198,24 @@ class AxisSteps:
                 f'{mode.number.title} ({error})'
             ) from error
 
+    async def _holding_torque(self, mode: Mode) -> int:
+        """Return 0x6077 where only an SDO brings it; a mode that begins without drops a load."""
+        place = object_address(self.axis.view.at(Index.TORQUE_ACTUAL))
+        try:
+            torque = await self.axis.view.read_torque()
+        except (SdoError, CodecError) as error:
+            raise self.refused(
+                'is not switched: it would drop its load, as the torque that holds it cannot be '
+                f'read ({error}); map {place} into a TPDO, or disable it, select mode '
+                f'{mode.number.title}, and enable it again'
+            ) from error
+        if torque is None:
+            self.axis.warn(
+                f'begins mode {mode.number.title} without torque, and drops what it holds: its '
+                f'EDS has no number at {place}'
+            )
+        return torque or 0
+
     async def come_to_rest(self) -> None:
         """Halt what moves before another mode ends it with a jerk; the drive stays halted.
 
@@ -252,9 +276,9 @@ class AxisSteps:
         leave = enabled and switching_state is not DriveState.OPERATION_ENABLED
         axis.released(Refusal(RefusalCause.MODE_SELECTED, mode.number.title))
         await self.come_to_rest()
-        if enabled and not leave and mode.number in TORQUE_MODES:
-            axis.view.held_torque = await axis.view.read_torque()  # else it would drop its load
         try:
+            if enabled and not leave and mode.number in TORQUE_MODES:
+                axis.view.held_torque = await self._holding_torque(mode)
             await self._preload(mode, 'is not switched')
             if leave:
                 await self.reach(switching_state)

@@ -41,7 +41,7 @@ from arm_canopen.cia402.homing import HomingProgress
 from arm_canopen.cia402.modes.profile_position import Move, QUEUE_MAX
 from arm_canopen.config import DriveConfig, RecoveryPolicy
 from canopen_core.can import Frame
-from canopen_core.standard import NmtCommand
+from canopen_core.standard import NmtCommand, ObjectDictionary
 from canopen_sim import Fault, FaultInjection, ServoModel
 
 pytestmark = pytest.mark.slow
@@ -80,6 +80,37 @@ def test_a_switch_to_torque_keeps_the_load(*, mapped: bool) -> None:
     assert abs(first) == pytest.approx(150, abs=30)
     net.run(0.2)
     assert net.motor() == pytest.approx(held, abs=0.05)
+
+
+@pytest.mark.parametrize('mode', TORQUE_MODES, ids=by_name)
+@pytest.mark.parametrize('fault', [Fault.SDO_ABORT, Fault.SDO_SILENCE])
+def test_a_torque_that_cannot_be_read_drops_no_load(mode: OperationMode, fault: Fault) -> None:
+    """The switch is refused with object and remedy; the mode of before goes on to hold."""
+    config = full_drive()
+    net = booted(replace(config, tpdos=config.tpdos[:2]))
+    net.enable(OperationMode.CYCLIC_POSITION)
+    net.simulated().set_load(150, net.now)
+    net.run(1.0)
+    held, faults = net.motor(), net.devices[JOINT].faults
+    faults.inject(FaultInjection(fault, object=(0x6077, 0)), net.now)
+    with pytest.raises(DriveError, match=r'drop its load.*0x6077.*map 0x6077 into a TPDO'):
+        net.select(JOINT, mode)
+    net.run(0.5)
+    assert net.drives[JOINT].view.mode == OperationMode.CYCLIC_POSITION
+    assert net.motor() == pytest.approx(held, abs=1e-3)
+    faults.end(net.now)
+    assert 'Operation enabled' in net.select(JOINT, mode)
+
+
+def test_a_drive_without_an_actual_torque_is_reported_to_begin_without() -> None:
+    """It has no other way into mode 10 than to drop its load."""
+    config = full_drive()
+    dictionary = ObjectDictionary(each for each in config.dictionary if each.index != 0x6077)
+    net = booted(replace(config, tpdos=config.tpdos[:2], dictionary=dictionary))
+    net.enable(OperationMode.CYCLIC_POSITION)
+    assert not net.reported(Severity.WARNING)
+    net.select(JOINT, OperationMode.CYCLIC_TORQUE)
+    assert any('without torque' in text for text in net.reported(Severity.WARNING))
 
 
 def test_moves_are_for_mode_1_and_within_the_limits() -> None:
