@@ -368,7 +368,7 @@ def test_each_message_between_two_pictures_counts(robot: Robot, opened: list[boo
 
 
 def test_a_robot_that_walks_is_shown_where_it_is(robot: Robot, opened: list[bool]) -> None:
-    """Its place comes among the transforms of its links, which are more."""
+    """Its place comes among those of its links, which are more, and behind that of its map."""
     assert opened
     robot.description.publish(String(data=TWO_SLIDERS))
     publisher = robot.node.create_publisher(TFMessage, '/tf', 10)
@@ -378,7 +378,8 @@ def test_a_robot_that_walks_is_shown_where_it_is(robot: Robot, opened: list[bool
         def is_shown(x: float = x) -> bool:
             frame = TransformStamped(child_frame_id=next(children))
             frame.transform.translation.x = x
-            publisher.publish(TFMessage(transforms=[frame]))
+            odom = TransformStamped(child_frame_id='odom')
+            publisher.publish(TFMessage(transforms=[odom, frame]))
             return robot.viewer._shown_base.translation[0] == x
 
         robot.spin_until(is_shown, f'{x} m')

@@ -42,21 +42,30 @@ class Topic:
 
 
 def joints_of(data: bytes) -> Hashable:
-    """Return the bytes of a JointState that name its joints."""
-    count = _behind(data, 12, 1)  # behind its stamp and frame
-    return data[12 : _behind(data, count + 4, _whole(data, count))]
+    """Return the frame of a JointState and the names of its joints."""
+    frame, at = _strings(data, 12, 1)  # behind its stamp
+    joints, _ = _strings(data, at + 4, _whole(data, at))
+    return frame + joints
 
 
 def frames_of(data: bytes) -> Hashable:
-    """Return the bytes of a TFMessage that name its first frames, and the length of all."""
-    return len(data), data[16 : _behind(data, 16, 2)]  # behind the first stamp
+    """Return the names of all frames of a TFMessage."""
+    frames, at = tuple[bytes, ...](), 8
+    while at < len(data):
+        pair, at = _strings(data, at + 8, 2)  # behind a stamp
+        frames += pair
+        at += (4 - at) % 8 + 56  # seven doubles; CDR aligns them from behind its head of 4 bytes
+    return frames
 
 
-def _behind(data: bytes, at: int, strings: int) -> int:
-    """Return the place behind some strings in CDR."""
-    for _ in range(strings):
-        at = (at + 4 + _whole(data, at) + 3) & ~3
-    return at
+def _strings(data: bytes, at: int, count: int) -> tuple[tuple[bytes, ...], int]:
+    """Return strings in CDR, without what is between them (any bytes), and the place behind."""
+    found = list[bytes]()
+    while len(found) < count and at < len(data):
+        end = at + 4 + _whole(data, at)
+        found.append(data[at + 4 : end])
+        at = (end + 3) & ~3
+    return tuple(found), at
 
 
 def _whole(data: bytes, at: int) -> int:
