@@ -19,7 +19,11 @@ LINGER = 5.0
 """How long it goes on after the last look in [s]: a page that is loaded anew needs it at once."""
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 BETWEEN_LOOKS = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Of topics with several publishers: it keeps what comes from one look to the next."""
+"""Of topics with several publishers: it keeps what comes from one look to the next.
+
+At rest, with ten looks a second, that holds up to 500 Hz of all publishers together; of more the
+oldest is lost.
+"""
 
 
 @dataclass(frozen=True, slots=True)
