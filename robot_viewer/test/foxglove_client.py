@@ -80,7 +80,7 @@ class FoxgloveClient:
         number = next(self._numbers)
         self._subscribed[number] = topic
         wanted = {'id': number, 'channelId': self.channels[topic]['id']}
-        self._send('subscribe', subscriptions=[wanted])
+        self.send('subscribe', subscriptions=[wanted])
 
     def next_message(self, topic: str) -> Any:
         """Return the next message of a topic, decoded by the definition that the server sent."""
@@ -93,7 +93,7 @@ class FoxgloveClient:
     def fetch(self, uri: str) -> bytes | str:
         """Fetch a file; return its bytes, or the text of the failure."""
         number = next(self._numbers)
-        self._send('fetchAsset', uri=uri, requestId=number)
+        self.send('fetchAsset', uri=uri, requestId=number)
         self.until(lambda: number in self._answers, f'file {uri}')
         return self._answers[number]
 
@@ -136,7 +136,8 @@ class FoxgloveClient:
             rest = data[10:]
             self._answers[request] = rest[:length].decode() if status else rest[length:]
 
-    def _send(self, operation: str, **values: object) -> None:
+    def send(self, operation: str, **values: object) -> None:
+        """Send an operation."""
         self._socket.send(json.dumps({'op': operation, **values}))
 
 

@@ -161,6 +161,27 @@ def test_clients_from_before_the_sdk_are_served(rig: Rig) -> None:
     robot.until(lambda: robot.states.get_subscription_count() == 0, 'its end')
 
 
+def test_a_number_that_no_message_carries_is_refused(rig: Rig, client: FoxgloveClient) -> None:
+    """Its client keeps its connection, and the others get their messages."""
+    robot, topic, other = rig.robot, '/joint_states', FoxgloveClient(rig.url)
+    other.until(lambda: topic in other.channels, 'channel')
+    wrong: list[object] = [-1, 2**32, 1.5, True, '7']
+    for number in wrong:
+        wanted = {'id': number, 'channelId': other.channels[topic]['id']}
+        other.send('subscribe', subscriptions=[wanted])
+    other.send('fetchAsset', uri='package://cube_description/meshes/cube.stl', requestId=-1)
+    other.subscribe(topic)
+    client.subscribe(topic)
+    client.until(lambda: robot.states.get_subscription_count() == 1, 'subscription')
+    other.until(lambda: len(other.statuses) > len(wrong), 'refusals')
+    for number, text in zip([*wrong, -1], other.statuses, strict=True):
+        assert f' {number!r}: give it a whole number from 0 to 4294967295' in text
+    for each in (client, other):
+        robot.states.publish(JointState(name=['a']))
+        assert list(each.next_message(topic).name) == ['a']
+    other.close()
+
+
 def test_files_of_packages_are_fetched(rig: Rig, client: FoxgloveClient) -> None:
     """Meshes, and nothing else."""
     assert rig.url

@@ -72,8 +72,10 @@ LOOK_PERIOD = 1.0
 UNKNOWN_DEPTH, MAX_DEPTH = 10, 25
 """Depth for a publisher whose depth is unknown, since DDS does not report it, and the greatest of
 a subscription."""
-WARNING = 1
-"""Level of a status of the protocol."""
+WARNING, ERROR = 1, 2
+"""Levels of a status of the protocol."""
+ID_END = 2**32
+"""Numbers that clients give are below; messages carry them as uint32."""
 
 
 class AssetError(ValueError):
@@ -284,7 +286,8 @@ class Server:
             case 'subscribe':
                 topics = {offer['id']: topic for topic, offer in self._offers.items()}
                 for each in message['subscriptions']:
-                    if topic := topics.get(each['channelId'], ''):
+                    topic = topics.get(each['channelId'], '')
+                    if topic and _accepts(client, 'subscription', each['id']):
                         client.topics[each['id']] = topic
                         self._wanted(topic)
             case 'unsubscribe':
@@ -292,8 +295,19 @@ class Server:
                     client.topics.pop(number, None)
                 self._wanted('')
             case 'fetchAsset':
-                answer = await asyncio.to_thread(_asset, message['requestId'], message['uri'])
-                await client.connection.send(answer)
+                request, uri = message['requestId'], message['uri']
+                if _accepts(client, 'request', request):
+                    await client.connection.send(await asyncio.to_thread(_asset, request, uri))
+
+
+def _accepts(client: _Client, what: str, number: object) -> bool:
+    """Return whether messages can carry a number; refuse one that they cannot."""
+    fits = type(number) is int and 0 <= number < ID_END
+    if not fits:
+        text = f'{what} {number!r}: give it a whole number from 0 to {ID_END - 1}'
+        status = {'op': 'status', 'level': ERROR, 'message': text}
+        broadcast([client.connection], json.dumps(status))
+    return fits
 
 
 def _asset(request: int, uri: str) -> bytes:
