@@ -1,12 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Who may connect to the bridge to Foxglove."""
+"""What the server of the bridge to Foxglove decides alone, as who may connect."""
 
 from __future__ import annotations
 
-import pytest
+import socket
+import threading
 
-from robot_viewer.nodes.foxglove_bridge import Admission, FOXGLOVE_ORIGINS
+import pytest
+from websockets.client import ClientProtocol
+from websockets.uri import parse_uri
+
+from robot_viewer.nodes.foxglove_bridge import Admission, FOXGLOVE_ORIGINS, PROTOCOLS, Server
 
 ANYWHERE = frozenset({'*'})
 FOXGLOVE = frozenset(FOXGLOVE_ORIGINS)
@@ -41,3 +46,17 @@ def test_from_elsewhere_the_token_counts() -> None:
     for path in ('/', '/?token=', '/?token=secretx', '/secret', '/?token=s\u00e9cret'):
         assert 'token' in admission.refusal(path, [])
     assert 'allowed_origins' in admission.refusal('/?token=secret', ['https://evil.example'])
+
+
+def test_a_client_that_does_not_answer_is_not_waited_for() -> None:
+    """As one on a computer that sleeps: it holds up no end of the bridge."""
+    server = Server(('127.0.0.1', 0), Admission(FOXGLOVE, ''), lambda _: None)
+    protocol = ClientProtocol(parse_uri(f'ws://127.0.0.1:{server.port}'), subprotocols=PROTOCOLS)
+    protocol.send_request(protocol.connect())
+    with socket.create_connection(('127.0.0.1', server.port), timeout=60.0) as silent:
+        silent.sendall(b''.join(protocol.data_to_send()))
+        assert silent.recv(1000).startswith(b'HTTP/1.1 101')
+        ending = threading.Thread(target=server.close, daemon=True)
+        ending.start()
+        ending.join(5.0)
+        assert not ending.is_alive()

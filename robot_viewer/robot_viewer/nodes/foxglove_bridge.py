@@ -76,6 +76,8 @@ WARNING, ERROR = 1, 2
 """Levels of a status of the protocol."""
 ID_END = 2**32
 """Numbers that clients give are below; messages carry them as uint32."""
+CLOSE_TIMEOUT = 1.0
+"""Time for a client to answer that the connection ends, in [s]."""
 
 
 class AssetError(ValueError):
@@ -194,6 +196,7 @@ class Server:
             subprotocols=PROTOCOLS,
             process_request=self._admit,
             compression=None,
+            close_timeout=CLOSE_TIMEOUT,
         )
 
     # -- in any thread
