@@ -4,10 +4,14 @@
 
 from __future__ import annotations
 
+import queue
 import socket
 import threading
 
+from foxglove_client import FoxgloveClient
 import pytest
+from rclpy.serialization import serialize_message
+from std_msgs.msg import String
 from websockets.client import ClientProtocol
 from websockets.uri import parse_uri
 
@@ -46,6 +50,29 @@ def test_from_elsewhere_the_token_counts() -> None:
     for path in ('/', '/?token=', '/?token=secretx', '/secret', '/?token=s\u00e9cret'):
         assert 'token' in admission.refusal(path, [])
     assert 'allowed_origins' in admission.refusal('/?token=secret', ['https://evil.example'])
+
+
+def test_a_topic_that_is_offered_anew_is_subscribed_to_anew() -> None:
+    """A subscription ends with its channel: each message comes once, and under a number of now."""
+    taken = queue.SimpleQueue[str]()
+    server = Server(('127.0.0.1', 0), Admission(FOXGLOVE, ''), taken.put)
+    client = FoxgloveClient(f'ws://127.0.0.1:{server.port}')
+    try:
+        for number in (1, 2):
+            string = {'schemaName': 'std_msgs/msg/String', 'schema': 'string data'}
+            form = {'encoding': 'cdr', 'schemaEncoding': 'ros2msg', **string}
+            server.offer('/a', {'id': number, 'topic': '/a', **form})
+            client.subscribe('/a')
+            assert taken.get(timeout=60.0) == '/a'
+            for text in ('first', 'second'):
+                server.send('/a', 0, serialize_message(String(data=text)))
+            assert [client.next_message('/a').data for _ in range(2)] == ['first', 'second']
+            server.withdraw('/a')
+            client.until(lambda: '/a' not in client.channels, 'its end')
+            assert not server.wanted
+    finally:
+        client.close()
+        server.close()
 
 
 def test_a_client_that_does_not_answer_is_not_waited_for() -> None:

@@ -251,6 +251,8 @@ class Server:
         self._publish('advertise', {'channels': [offer]})
 
     def _withdraw(self, topic: str) -> None:
+        for client in self._clients:
+            client.topics = {n: wanted for n, wanted in client.topics.items() if wanted != topic}
         self._publish('unadvertise', {'channelIds': [self._offers.pop(topic)['id']]})
 
     def _send(self, topic: str, stamp: int, data: bytes) -> None:
