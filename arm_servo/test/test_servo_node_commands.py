@@ -154,11 +154,13 @@ def test_a_displacement_that_does_not_fit_is_refused_alone(topics: Topics) -> No
     drives = topics.drives
     limit = float(drives.gateway.model.limits.upper[0])
     near = limit - 0.055 - drives.path[-1][0]
-    for ways in ([near], [0.01] * 10 + [9.0, -0.02]):
+    for ways in ([near], [0.01] * 10 + [9.0, -0.02], [0.02, 9.0]):
         for way in ways:
             topics.send(JOG, JointJog(joint_names=['panda_joint1'], displacements=[way]))
         drives.run(1000)
-    assert limit - drives.path[-1][0] == pytest.approx(0.025, abs=1e-6)
+    assert limit - drives.path[-1][0] == pytest.approx(0.005, abs=1e-6)
+    # also when the one before it begins afterwards
+    assert 'panda_joint1: ' in topics._servo._refusals.fresh(0.0)
 
 
 def test_a_displacement_of_zero_keeps_those_that_wait(topics: Topics) -> None:

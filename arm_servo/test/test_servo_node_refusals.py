@@ -38,5 +38,5 @@ def test_the_status_forgets_a_refusal() -> None:
     assert refusals.fresh(1.1 + STATUS_PERIOD) == ''
     assert refusals.to_log(1.1 + STATUS_PERIOD) == ''
     refusals.note('paused', 3.0)
-    refusals.clear()
+    refusals.clear(3.0)
     assert refusals.fresh(3.0) == ''

@@ -40,9 +40,10 @@ class Refusals:
         """Note why a command was refused."""
         self._last = (reason, now)
 
-    def clear(self) -> None:
-        """Note that a command was taken."""
-        self._last = ('', -math.inf)
+    def clear(self, sent: float) -> None:
+        """Note that a command of a time in [s] was taken: a refusal since then stands."""
+        if self._last[1] <= sent:
+            self._last = ('', -math.inf)
 
     def fresh(self, now: float) -> str:
         """Return the refusal for the status; empty when there is none."""

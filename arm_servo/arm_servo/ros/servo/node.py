@@ -173,15 +173,16 @@ class Servo:
     ) -> None:
         """Command a motion, which gets back drives that others have."""
         # the events executor hands out no publisher, so topic and frame stand for the client
+        note = partial(self._note, time.monotonic())
         get_ready = _do_nothing if request.is_zero else self._prepare
         if isinstance(request, JogRequest):
             request = replace(request, client=client)
-            self._gateway.command(request, get_ready).add_done_callback(self._note)
+            self._gateway.command(request, get_ready).add_done_callback(note)
             return
         # a stream of displacements is held like a jog
         self._gateway.stream(Source.JOG, client, is_zero=request.is_zero)
         command = self._gateway.request(request, get_ready, stream=client)
-        command.future.add_done_callback(self._note)
+        command.future.add_done_callback(note)
         command.ended.add_done_callback(self._note_end)
 
     def _checked_age(self, message: Any) -> float:  # noqa: ANN401
@@ -201,13 +202,13 @@ class Servo:
             raise NotReadyError(f'stamped {-age:.2f} s in the future: are the clocks in step?')
         return max(age, 0.0)
 
-    def _note(self, future: Future[Any]) -> None:
+    def _note(self, sent: float, future: Future[Any]) -> None:
         """Remember what became of a command; in the cycle, so nothing is logged here."""
         error = None if future.cancelled() else future.exception()
         if error is not None:
             self._refuse(str(error))
         else:
-            self._refusals.clear()
+            self._refusals.clear(sent)
 
     def _note_end(self, future: Future[Outcome]) -> None:
         """Remember why a displacement did not get to its end."""
