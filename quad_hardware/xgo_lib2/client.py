@@ -63,7 +63,7 @@ class XgoDog:
             XgoError: The port cannot be opened.
         """
         with _as_xgo_errors():
-            self._connection = connect(port, baud=baud)
+            self._connection = connect(port, (V2, V1), baud)
         self._parser = SendStateParser()
         self._states: list[DeviceState] = []
 

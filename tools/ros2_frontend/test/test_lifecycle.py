@@ -22,7 +22,7 @@ UNCONFIGURED = """\
 def test_nodes(ros2: Ros2) -> None:
     """Only nodes with a life cycle."""
     assert ros2('lifecycle', 'nodes').lines == ['/machine']
-    assert ros2('lifecycle', 'nodes', '-c').out == '1\n'
+    assert ros2('lifecycle', 'nodes', '-c', '--spin-time', '2').out == '1\n'
 
 
 def test_a_node_through_its_life(ros2: Ros2) -> None:
