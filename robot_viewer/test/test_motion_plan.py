@@ -72,7 +72,9 @@ class Drawn:
         """Return what adds a node of a kind."""
 
         def add(_path: str, *shape: object, **_options: object) -> Any:
-            self.nodes.append((name.removeprefix('add_'), SimpleNamespace(shape=shape, position=())))
+            self.nodes.append(
+                (name.removeprefix('add_'), SimpleNamespace(shape=shape, position=()))
+            )
             return self.nodes[-1][1]
 
         return add
