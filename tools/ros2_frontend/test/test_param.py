@@ -50,7 +50,7 @@ def test_list_of_one_node(ros2: Ros2) -> None:
 
 def test_list_of_all_nodes(ros2: Ros2) -> None:
     """Each below its node's name."""
-    lines = ros2('param', 'list').lines
+    lines = ros2('param', 'list', '--spin-time', '2').lines
     heads = [line for line in lines if not line.startswith(' ')]
     assert heads == ['/factory/worker:', '/machine:', '/talker:']
     assert lines[1 : 1 + len(NAMES)] == [f'  {name}' for name in NAMES]
