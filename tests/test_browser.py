@@ -560,6 +560,7 @@ def test_a_fault_has_two_presses_to_motion(seen: Seen) -> None:
     page.mouse.up()
     seen.wait_for_rest()
     page = seen.show('Diagnose')
+    page.set_default_timeout(chromium.PAGE_TIMEOUT)
     page.get_by_label('Drive', exact=True).click(force=True)
     page.get_by_role('option', name='/panda_joint3', exact=True).click(force=True)
     page.get_by_role('cell', name='Operation enabled', exact=True).wait_for()
