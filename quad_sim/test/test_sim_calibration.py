@@ -88,6 +88,7 @@ def test_a_poor_recording_is_refused(arguments: tuple[str, ...], reason: str) ->
         calibrate('nominal', V2, *arguments)
 
 
+@pytest.mark.scenario  # in real time: with the priority of robots
 def test_a_whole_calibration_over_a_port_ends_with_the_servos(tmp_path: Path) -> None:
     """Both programs as a person starts them: it asks first, and ends (after 40 s, if alone)."""
     hidden, port = parse_servo('nominal'), str(tmp_path / 'xgo')
