@@ -48,7 +48,9 @@ def run_examples(
     with ExitStack() as stack:
         if PORT in text:
             board = [sys.executable, '-m', 'quad_sim.fake_xgo', '--no-ros', '--link', str(port)]
-            process = stack.enter_context(subprocess.Popen(board, stdout=subprocess.PIPE))
+            process = stack.enter_context(
+                subprocess.Popen(board, stdout=subprocess.PIPE, start_new_session=True)
+            )
             stack.callback(process.terminate)
             assert process.stdout is not None
             assert process.stdout.readline()  # it is there
@@ -56,6 +58,7 @@ def run_examples(
             [python, Path(__file__).with_name('readme_examples.py'), readme],
             cwd=CHECKOUT,
             env=env,
+            start_new_session=True,  # its robots do not share the processor of all tests
             capture_output=True,
             text=True,
             timeout=TIMEOUT,

@@ -22,23 +22,27 @@ def test_first(request):
         os.kill(watch.pid, signal.SIGSTOP)
         time.sleep(0.3)
         os.kill(watch.pid, signal.SIGCONT)
+    {says}
     assert len(runs) == {passes}
 """
 
 
 @pytest.mark.parametrize(
-    ('stalls', 'passes', 'closing', 'named'),
+    ('stalls', 'says', 'passes', 'closing', 'named'),
     [
-        ('len(runs) == 1', 2, '1 passed, 1 rerun', False),
-        ('False', 2, '1 failed in', False),
-        ('True', 9, '1 failed, 2 rerun', True),
+        ('len(runs) == 1', '', 2, '1 passed, 1 rerun', False),
+        ('False', '', 2, '1 failed in', False),
+        ('False', "print('the drives got no processor for 1 s')", 2, '1 passed, 1 rerun', False),
+        ('True', '', 9, '1 failed, 2 rerun', True),
     ],
 )
 def test_only_a_test_in_a_stall_is_run_again(
-    tmp_path: Path, *, stalls: str, passes: int, closing: str, named: bool
+    tmp_path: Path, *, stalls: str, says: str, passes: int, closing: str, named: bool
 ) -> None:
     """A failure without one stays a failure, and so does one that comes back."""
-    (tmp_path / 'test_once.py').write_text(FAILS_ONCE.format(stalls=stalls, passes=passes))
+    (tmp_path / 'test_once.py').write_text(
+        FAILS_ONCE.format(stalls=stalls, says=says, passes=passes)
+    )
     output = subprocess.run(
         [sys.executable, '-m', 'pytest', '-q', '-p', 'stalls', str(tmp_path)],
         env=os.environ | {'PYTHONPATH': str(Path(__file__).parent)},

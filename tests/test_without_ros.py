@@ -130,6 +130,7 @@ class Environment:
             env=self.variables,
             cwd=self.folder,
             stdin=subprocess.DEVNULL,
+            start_new_session=True,
             capture_output=True,
             text=True,
             timeout=TIMEOUT,
@@ -141,7 +142,12 @@ class Environment:
         """Run one of its commands meanwhile."""
         command = [str(self.folder / 'bin' / argv[0]), *map(str, argv[1:])]
         with subprocess.Popen(
-            command, env=self.variables, cwd=self.folder, stdout=subprocess.PIPE, text=True
+            command,
+            env=self.variables,
+            cwd=self.folder,
+            start_new_session=True,
+            stdout=subprocess.PIPE,
+            text=True,
         ) as process:
             try:
                 yield process
@@ -251,6 +257,7 @@ with CanopenMaster.from_bus_yml(sys.argv[1], sys.argv[2]) as master:
 """
 
 
+@pytest.mark.scenario
 def test_drives_are_moved(environment: Environment, isolation: Isolation) -> None:
     """`CanopenMaster` leads the drives that `canopen-fake-slaves` simulates."""
     bus_config = CHECKOUT / 'arm_bringup' / 'robots' / 'panda' / 'bus.yml'
@@ -288,6 +295,7 @@ def test_a_model_is_printed(environment: Environment) -> None:
     assert '<robot' in done.stdout
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize('package', READMES)
 def test_examples_of_the_readmes_run(
     environment: Environment, package: str, tmp_path: Path, isolation: Isolation
