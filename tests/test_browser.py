@@ -215,7 +215,6 @@ def seen() -> Iterator[Seen]:
             client.spin_until(lambda: bool(states), REACTION, 'joint states')
             chromium.state_is(page, 'READY')
             page.locator('#rv-first').wait_for(state='hidden')
-            wait_for_all_ways(page)
             assert page.locator('[role=tab]').all_inner_texts()[: len(GROUPS)] == GROUPS
             yield Seen(bringup, viewer, browser, url, page, client, states)
 
@@ -229,22 +228,6 @@ def one_page(seen: Seen) -> Iterator[None]:
     for context in seen.browser.contexts:
         if context is not seen.page.context:
             context.close()
-
-
-def wait_for_all_ways(page: Page) -> None:
-    """Wait until joints, tool and target are offered: with each the page makes its tabs anew."""
-    missing = page.get_by_text(re.compile('^No (servo_node jogs|trajectory controller moves)'))
-    deadline = time.monotonic() + STARTING
-
-    def lacks(tab: str, button: str) -> bool:
-        chromium.show(page, 'Drive', tab)
-        missing.or_(page.get_by_role('button', name=button, exact=True)).first.wait_for()
-        return missing.count() > 0
-
-    while any(
-        lacks(*way) for way in (('Joints', '1 +'), ('Tool', 'Z +'), ('Target', HOLD_TARGET))
-    ):
-        assert time.monotonic() < deadline, missing.all_inner_texts()
 
 
 def words_of_stop(page: Page, pattern: str) -> Locator:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 import re
 import threading
@@ -102,12 +102,14 @@ class Shown:
         state: What it shows, again and again.
         stops: How often STOP was pressed.
         jogs: What was jogged.
+        offered: What can be driven.
     """
 
     page: RobotPage
     state: RobotState = READY
     stops: int = 0
     jogs: list[tuple[object, ...]] = field(default_factory=list)
+    offered: Offered = field(default_factory=Offered)
 
     def show(self, over: threading.Event) -> None:
         """Show it until the end."""
@@ -149,7 +151,8 @@ def shown() -> Iterator[Shown]:
         tree = read_urdf(example_files().urdf.read_text())
         page.show_robot(tree)
         arm = tuple(f'panda_joint{number}' for number in range(1, 8))
-        page.offer_drive(Offered(arm, True, (), arm))
+        made.offered = Offered(arm, tool=True, targets=arm)
+        page.offer_drive(made.offered)
         page.velocity = lambda share: 0.4 * share
         page.offer_drives({f'/{joint}': ('enable', 'recover', 'halt', 'disable') for joint in arm})
         thread = threading.Thread(target=made.show, args=[over])
@@ -325,6 +328,25 @@ def test_keys_move_the_robot_where_that_is_ticked(browser: Browser, shown: Shown
     page.keyboard.press('3', delay=400)
     assert not shown.jogs, 'a number is typed'
     assert page.locator('.rv-speed span').inner_text() == 'Tool: 80 mm/s'
+
+
+def test_what_is_offered_later_takes_no_open_tab_away(browser: Browser, shown: Shown) -> None:
+    """In the first seconds of a robot it comes piece by piece; a target that is set stays, too."""
+    shown.page.offer_drive(Offered(targets=shown.offered.targets))
+    see(page := opened(browser, shown, 'desk'), shown, READY)
+    chromium.show(page, 'Drive', 'Target')
+    chromium.drag(page, 1, 0.7)
+    target = chromium.slider_value(page, 1)
+    for tab, offered in (('Target', replace(shown.offered, tool=False)), ('Tool', shown.offered)):
+        chromium.show(page, 'Drive', tab)
+        shown.page.offer_drive(offered)
+        last = 'X +' if offered.tool else '7 +'
+        page.locator('.rv-keyed').get_by_text(last, exact=True).wait_for(state='attached')
+        selected = page.locator('[role=tab][aria-selected=true]').all_inner_texts()
+        assert selected == ['Drive', tab]
+    page.get_by_role('button', name='X +', exact=True).wait_for()
+    chromium.show(page, 'Drive', 'Target')
+    page.locator(f'[role=slider][aria-valuenow="{target}"]').wait_for()
 
 
 def test_the_log_is_copied_as_text(browser: Browser, shown: Shown) -> None:

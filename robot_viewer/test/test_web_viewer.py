@@ -488,10 +488,10 @@ def test_a_gripper_is_opened_closed_and_stopped(robot: Robot, said: list[str]) -
 
     def found() -> bool:
         states.publish(state)
-        return robot.viewer.page._offered.grippers == (('/hand', 'b'),)
+        return robot.viewer._offered().grippers == (('/hand', 'b'),)
 
     robot.spin_until(found, 'the gripper')
-    assert robot.viewer.page._offered.joints == ('a',)
+    assert robot.viewer._offered().joints == ('a',)
     client = robot.viewer._grippers._found['/hand'].client
     robot.spin_until(client.server_is_ready, 'its action')
     for end, word in ((2.0, 'open'), (-2.0, 'close'), (0.5, 'to 0.5000')):

@@ -7,13 +7,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from html import escape
-from typing import Protocol, TypeAlias
+from typing import Protocol, TypeAlias, TypeVar
 
 from urdf_reader import Joint, JointKind, KinematicTree
-from viser import GuiDropdownHandle, ViserServer
+from viser import GuiDropdownHandle, GuiFolderHandle, GuiTabHandle, ViserServer
 
 from ..robot_state import Stop
 from .live import Hold, Live
@@ -23,6 +23,7 @@ from .target_panel import TargetPanel
 
 Velocity: TypeAlias = tuple[float, float, float]
 Twist: TypeAlias = tuple[float, float, float, float, float, float]
+_Offer = TypeVar('_Offer')
 
 TWISTS: Mapping[str, tuple[str, Twist]] = {
     'X +': ('ArrowUp', (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)),
@@ -95,66 +96,98 @@ class Offered:
     targets: tuple[str, ...] = ()
 
 
+@dataclass(slots=True)
+class _Tab:
+    """A tab, what it offers, and the HTML of its buttons by their numbers."""
+
+    handle: GuiTabHandle
+    content: GuiFolderHandle | None = None
+    offered: object = None
+    holds: dict[int, str] = field(default_factory=dict)
+
+
 class JogPanel:
-    """The joints, the tool, the target and the grippers, a tab each."""
+    """The joints, the tool, the target and the grippers, a tab each, which stay while it is there.
+
+    What can be driven is found out piece by piece: only what offers something else than before is
+    made anew, so that a person stays in the tab that is open.
+    """
 
     def __init__(
         self,
         server: ViserServer,
         robot: RobotScene,
-        offered: Offered,
         ways: tuple[Actions, Live, Share],
         place: Callable[[JogPanel], AbstractContextManager[None]],
     ) -> None:
-        actions, live, self._speed = ways
-        self._gui, self._actions, self._live = server.gui, actions, live
-        self._numbers: list[int] = []
-        self._keyed: list[str] = []
+        """Offer nothing yet."""
+        self._actions, self._live, self._speed = ways
+        self._server, self._gui, self._robot = server, server.gui, robot
         self._joints = {joint.name: joint for joint in robot.tree.movable()}
         self.target: TargetPanel | None = None
         with place(self):
-            self._tabs = tabs = self._gui.add_tab_group()
-            with tabs.add_tab('Joints'):
-                self._gui.add_html(self._joint_rows(offered.joints))
-                if not offered.joints:
-                    self._gui.add_html(sentence('No servo_node jogs these joints.'))
-            with tabs.add_tab('Tool'):
-                if offered.tool:
-                    self._add_twists(tool_frames(robot.tree, offered.joints))
-                else:
-                    self._gui.add_html(sentence('No servo_node jogs this tool.'))
-            with tabs.add_tab('Target'):
-                if offered.targets:
-                    joints = [self._joints[name] for name in offered.targets]
-                    aiming = actions.aim, actions.let_go, self._speed, self._hold
-                    self.target = TargetPanel(server, robot, joints, aiming)
-                else:
-                    self._gui.add_html(sentence('No trajectory controller moves these joints.'))
-            with tabs.add_tab('Gripper'):
-                for gripper, joint in offered.grippers:
-                    self._add_gripper(gripper, self._joints[joint])
-                if not offered.grippers:
-                    self._gui.add_html(sentence('This robot has no gripper.'))
+            tabs = self._gui.add_tab_group()
+            self._tabs = {
+                name: _Tab(tabs.add_tab(name)) for name in ('Joints', 'Tool', 'Target', 'Gripper')
+            }
             # of tabs that are not shown there are no buttons; keys hold these
-            self._keys = self._gui.add_html(pad(self._keyed, 'rv-keyed'))
+            self._keys = self._gui.add_html('')
+        self._filled = self._tabs['Joints']
+        self.offer(Offered())
+
+    def offer(self, offered: Offered) -> None:
+        """Offer to drive what there is now."""
+        frames = tool_frames(self._robot.tree, offered.joints) if offered.tool else None
+        self._fill('Joints', offered.joints, self._add_joints)
+        self._fill('Tool', frames, self._add_twists)
+        self._fill('Target', offered.targets, self._add_target)
+        self._fill('Gripper', offered.grippers, self._add_grippers)
+        holds = [html for tab in self._tabs.values() for html in tab.holds.values() if html]
+        self._keys.content = pad(holds, 'rv-keyed')
+
+    def _fill(self, name: str, offered: _Offer, add: Callable[[_Offer], None]) -> None:
+        """Fill a tab anew where it offers something else than before."""
+        tab = self._tabs[name]
+        if tab.content is not None:
+            if tab.offered == offered:
+                return
+            tab.content.remove()
+        for number in tab.holds:
+            self._live.remove(number)
+        tab.offered, tab.holds, self._filled = offered, {}, tab
+        with tab.handle:
+            tab.content = self._gui.add_folder(None)
+        with tab.content:
+            add(offered)
 
     def remove(self) -> None:
-        """Remove all of it from the page."""
-        for number in self._numbers:
-            self._live.remove(number)
+        """Remove the target from the picture; the page removes its groups."""
         if self.target is not None:
             self.target.remove()
-        self._tabs.remove()
-        self._keys.remove()
 
     def _hold(self, hold: Hold) -> tuple[int, str]:
         number, html = self._live.button(hold)
-        self._numbers.append(number)
-        if hold.key:
-            self._keyed.append(html)
+        self._filled.holds[number] = html if hold.key else ''
         return number, html
 
-    def _joint_rows(self, jogged: Sequence[str]) -> str:
+    def _add_target(self, targets: Sequence[str]) -> None:
+        if self.target is not None:
+            self.target.remove()
+            self.target = None
+        if not targets:
+            self._gui.add_html(sentence('No trajectory controller moves these joints.'))
+            return
+        joints = [self._joints[name] for name in targets]
+        aiming = self._actions.aim, self._actions.let_go, self._speed, self._hold
+        self.target = TargetPanel(self._server, self._robot, joints, aiming)
+
+    def _add_grippers(self, grippers: Sequence[tuple[str, str]]) -> None:
+        for gripper, joint in grippers:
+            self._add_gripper(gripper, self._joints[joint])
+        if not grippers:
+            self._gui.add_html(sentence('This robot has no gripper.'))
+
+    def _add_joints(self, jogged: Sequence[str]) -> None:
         free = [joint for joint in self._joints.values() if joint.mimic is None]
         rows = []
         for joint in free:
@@ -178,9 +211,14 @@ class JogPanel:
                     for sign, way in (('−', -1.0), ('+', 1.0))
                 ]
             rows += [cell, *buttons]
-        return pad(rows, 'rv-rows')
+        self._gui.add_html(pad(rows, 'rv-rows'))
+        if not jogged:
+            self._gui.add_html(sentence('No servo_node jogs these joints.'))
 
-    def _add_twists(self, frames: Sequence[str]) -> None:
+    def _add_twists(self, frames: Sequence[str] | None) -> None:
+        if frames is None:
+            self._gui.add_html(sentence('No servo_node jogs this tool.'))
+            return
         axes = self._gui.add_dropdown('Along axes of', (BASE, *frames))
         buttons = [
             self._hold(

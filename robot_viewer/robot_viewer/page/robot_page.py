@@ -202,7 +202,6 @@ class RobotPage:
             with self._groups[group]:
                 self._notes[group] = gui.add_html(sentence(NOTHING[group]))
         self._drives: dict[str, tuple[str, ...]] = {}
-        self._offered = Offered()
         self._jog: JogPanel | None = None
         self._plots: PlotPanel | None = None
         self._modes: dict[str, GuiButtonHandle] = {}
@@ -266,7 +265,10 @@ class RobotPage:
         self.server.initial_camera.look_at = (0.0, 0.0, 0.3 * self.robot.size)
         for client in self.server.get_clients().values():
             self._place_camera(client, 'Fit')
-        self.offer_drive(Offered(), force=True)
+        if self.has('Plan'):
+            ways = self._actions, self.live, self.speed
+            place = partial(self.place, 'Drive')
+            self._jog = JogPanel(self.server, self.robot, ways, place)
         self.say(f'robot {tree.name}')
         return self.robot.notes
 
@@ -451,15 +453,10 @@ class RobotPage:
         self._disable, html = self.live.button(hold)
         self.server.gui.add_html(f'<div class="rv-one">{html}</div>')
 
-    def offer_drive(self, offered: Offered, *, force: bool = False) -> None:
+    def offer_drive(self, offered: Offered) -> None:
         """Offer to drive an arm: joints, tool, targets and grippers."""
-        if self.robot is None or not self.has('Plan'):
-            return
-        if offered == self._offered and not force:
-            return
-        self._offered = offered
-        ways = self._actions, self.live, self.speed
-        self._jog = JogPanel(self.server, self.robot, offered, ways, partial(self.place, 'Drive'))
+        if self._jog is not None:
+            self._jog.offer(offered)
 
     def has(self, group: str) -> bool:
         """Whether there is a group for the robot that is shown."""
