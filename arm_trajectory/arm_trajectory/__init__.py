@@ -15,16 +15,22 @@ that of the cycle. ``state`` is what was commanded last, ``measured`` what the d
 
 from __future__ import annotations
 
-from .exceptions import GoalCode, GoalError, StateMovedError
-from .execution.catch_up import CatchUpInterpolator
-from .execution.speed_scaling import TimerState, TrajectoryTimer
-from .execution.tolerances import merge_tolerances, Tolerances
-from .goal import GoalPoint, GoalRules, JointTolerance, TrajectoryGoal
+from .execution import CatchUpInterpolator, TimerState, TrajectoryTimer
+from .goal import (
+    GoalCode,
+    GoalError,
+    GoalPoint,
+    GoalRules,
+    JointTolerance,
+    merge_tolerances,
+    StateMovedError,
+    Tolerances,
+    TrajectoryGoal,
+)
+from .goal_path import build_path
 from .otg import brakeable, hard_brake, OnlineTrajectoryGenerator, Plan
-from .paths.goal_path import build_path
-from .paths.path import cubics, Excess, farthest_beyond, lines, Path, quintics
-from .paths.path_check import PathCheck, PathContact
-from .paths.time_scaling import Demand, Timing
+from .path import cubics, Excess, farthest_beyond, lines, Path, PathCheck, PathContact, quintics
+from .time_scaling import Demand, Timing
 
 __all__ = [
     'CatchUpInterpolator',

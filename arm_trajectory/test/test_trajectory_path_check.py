@@ -12,7 +12,7 @@ import pytest
 
 from arm_model import Array, AttachedBody, Box, CollisionObject, ORIGIN
 from arm_trajectory import PathCheck
-from arm_trajectory.paths.path_check import MAX_STEP
+from arm_trajectory.path import MAX_STEP
 
 pytestmark = pytest.mark.slow
 

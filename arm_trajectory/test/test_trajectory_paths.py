@@ -14,7 +14,7 @@ import pytest
 
 from arm_model import RobotState
 from arm_trajectory import cubics, JointTolerance, lines, merge_tolerances, Path, Timing
-from arm_trajectory.paths.rounding import rounded
+from arm_trajectory.rounding import rounded
 
 pytestmark = pytest.mark.slow
 

@@ -4,7 +4,7 @@
 
 It takes place before the path begins, once, as that of TOPP-RA does, but with limited jerk and
 never quicker than the points say. While the path runs, the speed scaling of
-:mod:`..execution.speed_scaling` takes over.
+:mod:`.execution` takes over.
 
 Planners know speeds and accelerations, seldom jerks, and only at their points; what lies between
 may ask more. The path q(s) is followed as q(s(t)) with ds/dt = 1/r. The scaling r(s) >= 1 is a
