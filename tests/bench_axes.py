@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 import time
 from typing import TYPE_CHECKING
 
-from bus_recorder import BusRecorder
+from bus_watch import BusRecorder
 from canopen_interfaces.srv import COTargetDouble
 from diagnostic_msgs.msg import DiagnosticArray
 from isolation import reserve

@@ -18,15 +18,14 @@ import time
 from typing import TYPE_CHECKING
 
 from bench_axes import cpu_time, FIRST_NODE_ID, milliseconds
-from bus_recorder import BusRecorder
+from bus_watch import BusRecorder
 from control_msgs.msg import JointJog
 from isolation import reserve
-from moving_arm import goal_to, MovingArm, READY, robot_parameters
 import numpy as np
 from processes import executable, RunningProcess
 from ros_client import RosClient
 from sensor_msgs.msg import JointState
-from simulated_arm import JOINTS
+from simulated_arm import goal_to, JOINTS, MovingArm, READY, robot_parameters
 from std_msgs.msg import Float64MultiArray
 
 from arm_bringup.description import expand_xacro

@@ -20,10 +20,9 @@ from quad_hardware.joints import JointMap, servo_of
 
 if TYPE_CHECKING:
     from pathlib import Path
-    from types import TracebackType
 
     from isolation import Isolation
-    from serial_tap import Target
+    from simulated_quad import Target
     from typing_extensions import Self
 
 WORST_NOISE = 0.02
@@ -84,12 +83,7 @@ class QuadVictim:
         """Use it in a with statement."""
         return self
 
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Stop all processes."""
         self._stack.close()
 

@@ -40,21 +40,13 @@ ON_PROCESSES = (Disturbance.KILL, Disturbance.STOP)
 
 @dataclass(frozen=True)
 class Event:
-    """One disturbance.
+    """One disturbance."""
 
-    Attributes:
-        kind: What happens.
-        process: Name of the process that it happens to; empty for the line and the computer.
-        delay: Time in [s] from the start of the motion.
-        duration: How long it lasts in [s].
-        severity: 0 to 1, for kinds that have degrees.
-    """
-
-    kind: Disturbance
-    process: str
-    delay: float
-    duration: float
-    severity: float
+    kind: Disturbance  # what happens
+    process: str  # name of the process that it happens to; empty for the line and the computer
+    delay: float  # time in [s] from the start of the motion
+    duration: float  # how long it lasts in [s]
+    severity: float  # 0 to 1, for kinds that have degrees
 
     def __str__(self) -> str:
         """Say it in words."""

@@ -26,13 +26,9 @@ _logs = TemporaryDirectory(prefix='ros_logs_')  # and what black boxes write
 
 @dataclass(frozen=True)
 class Isolation:
-    """What keeps a test's processes to themselves.
+    """What keeps a test's processes to themselves."""
 
-    Attributes:
-        domain_id: A ROS domain that no other test of this machine uses at the moment.
-    """
-
-    domain_id: int
+    domain_id: int  # a ROS domain that no other test of this machine uses at the moment
 
     @property
     def bus(self) -> str:

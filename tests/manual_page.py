@@ -51,21 +51,13 @@ class How(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A command of a page.
+    """A command of a page."""
 
-    Attributes:
-        text: As it is typed.
-        shown: Lines that the page shows of its output.
-        how: How it is run.
-        block: Where its block begins in the page.
-        detail: Its keys, the test that runs it, or why it is not run.
-    """
-
-    text: str
-    shown: tuple[str, ...]
-    how: How
-    block: int
-    detail: str
+    text: str  # as it is typed
+    shown: tuple[str, ...]  # lines that the page shows of its output
+    how: How  # how it is run
+    block: int  # where its block begins in the page
+    detail: str  # its keys, the test that runs it, or why it is not run
 
     def missing(self, printed: Iterable[str]) -> str:
         """Return the first shown line that was not printed, behind those before it; or nothing."""

@@ -1,23 +1,148 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Two hosts with a cable between them, as network namespaces of this machine."""
+"""Two hosts with a cable between them, as network namespaces of this machine.
+
+The cable may be a link with the faults of a radio: two tap devices, and a thread that carries
+Ethernet frames from one to the other. It does what ``tc netem`` does, for kernels without it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, ExitStack
 from dataclasses import dataclass
+import fcntl
+import heapq
 import ipaddress
 import os
 from pathlib import Path
+import random
+import select
 import shutil
+import struct
 import subprocess
+import threading
 import time
+from typing import TYPE_CHECKING
 import uuid
 
-from network_link import Link
 from processes import RunningProcess
 import pytest
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+
+_DEVICE = '/dev/net/tun'
+_TUNSETIFF = 0x400454CA  # linux/if_tun.h
+_IFF_TAP, _IFF_NO_PI = 0x0002, 0x1000
+_FRAME_SIZE = 65536  # [byte] longest frame, segmentation left to the kernel
+_ARP = b'\x08\x06'  # EtherType; a link without multicast still resolves addresses
+_SEED = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """What a link does to frames.
+
+    Attributes:
+        delay: Of each frame, one way, in [s].
+        jitter: Greatest further delay, evenly distributed, in [s]; frames keep their order.
+        loss: Share of the frames that are lost.
+        multicast: Whether multicast gets through.
+        cut: Whether nothing does.
+    """
+
+    delay: float = 0.0
+    jitter: float = 0.0
+    loss: float = 0.0
+    multicast: bool = True
+    cut: bool = False
+
+
+class Link:
+    """The link; it carries frames within a ``with`` statement.
+
+    Attributes:
+        names: Names of its two devices, to be moved to the hosts.
+        condition: What it does to frames from now on; may be replaced at any time.
+    """
+
+    def __init__(self, mark: str) -> None:
+        """Make the devices.
+
+        Args:
+            mark: Makes their names unique on this machine, up to 10 characters.
+
+        Raises:
+            OSError: This machine does not allow it.
+        """
+        self.condition = Condition()
+        self.names = (f'tap-{mark}a', f'tap-{mark}b')
+        self._random = random.Random(_SEED)  # no secrets
+        with ExitStack() as stack:
+            self._ends = tuple(_open_tap(stack, name) for name in self.names)
+            self._wake, self._stop = os.pipe()
+            stack.callback(os.close, self._wake)
+            self._stack = stack.pop_all()
+        self._thread = threading.Thread(target=self._carry, name='link')
+
+    def _carry(self) -> None:
+        """Take frames at either end, and give them to the other one when they are due."""
+        other = dict(zip(self._ends, reversed(self._ends), strict=True))
+        waiting: list[tuple[float, int, int, bytes]] = []  # [s], order, end, frame
+        last = dict.fromkeys(self._ends, 0.0)  # [s] when the last frame of an end is due
+        count = 0
+        while True:
+            timeout = max(0.0, waiting[0][0] - time.monotonic()) if waiting else None
+            ready, _, _ = select.select([*self._ends, self._wake], [], [], timeout)
+            if self._wake in ready:
+                return
+            now = time.monotonic()
+            for end in ready:
+                frame, condition = os.read(end, _FRAME_SIZE), self.condition
+                if self._is_lost(frame, condition):
+                    continue
+                due = now + condition.delay + condition.jitter * self._random.random()
+                last[end] = due = max(due, last[end])
+                count += 1
+                heapq.heappush(waiting, (due, count, other[end], frame))
+            while waiting and waiting[0][0] <= now:
+                _, _, end, frame = heapq.heappop(waiting)
+                if not self.condition.cut:
+                    _write(end, frame)
+
+    def _is_lost(self, frame: bytes, condition: Condition) -> bool:
+        if condition.cut or self._random.random() < condition.loss:
+            return True
+        return not condition.multicast and bool(frame[0] & 1) and frame[12:14] != _ARP
+
+    def __enter__(self) -> Self:
+        """Begin to carry frames."""
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End, and remove the devices."""
+        os.close(self._stop)
+        self._thread.join()
+        self._stack.close()
+
+
+def _open_tap(stack: ExitStack, name: str) -> int:
+    end = os.open(_DEVICE, os.O_RDWR | os.O_NONBLOCK)
+    stack.callback(os.close, end)
+    request = struct.pack('16sH22x', name.encode(), _IFF_TAP | _IFF_NO_PI)
+    fcntl.ioctl(end, _TUNSETIFF, request)
+    return end
+
+
+def _write(end: int, frame: bytes) -> None:
+    try:
+        os.write(end, frame)
+    except OSError:  # the device is down: the frame is lost, as on a cable
+        return
+
 
 # each host has its own shared memory, as machines have: programs with ROS alone use it
 _OWN_MEMORY = 'mount -t tmpfs tmpfs /dev/shm && exec "$@"'
@@ -27,17 +152,11 @@ _MARK = 8  # characters that make the names of a test its own
 
 @dataclass(frozen=True, slots=True)
 class Host:
-    """One of the two.
+    """One of the two."""
 
-    Attributes:
-        namespace: Its network namespace.
-        interface: Its end of the cable.
-        address: Its IPv4 address there.
-    """
-
-    namespace: str
-    interface: str
-    address: str
+    namespace: str  # its network namespace
+    interface: str  # its end of the cable
+    address: str  # its IPv4 address there
 
     def run(self, arguments: Sequence[str], env: Mapping[str, str]) -> RunningProcess:
         """Start a program on this host; it shares memory with what it starts."""

@@ -20,8 +20,6 @@ from std_srvs.srv import Trigger
 from node_runner import ServerMatch
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
     from typing_extensions import Self
 
 
@@ -94,12 +92,7 @@ class RosClient:
         """Use it in a with statement."""
         return self
 
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Leave the domain."""
         self._executor.shutdown()
         destroy_with_actions(self.node)

@@ -23,10 +23,9 @@ from control_msgs.action import FollowJointTrajectory
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist
 from isolation import reserve
-from moving_arm import goal_to, MovingArm, READY, trajectory_client
 import numpy as np
 import psutil
-from simulated_arm import JOINTS
+from simulated_arm import goal_to, JOINTS, MovingArm, READY, trajectory_client
 from simulated_quad import SimulatedQuad
 
 from canopen_core.can import open_bus
@@ -34,8 +33,6 @@ from canopen_core.standard import CobId
 from quad_msgs.srv import InjectFault
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
     from typing_extensions import Self
 
 DURATION = 3600.0
@@ -67,19 +64,12 @@ AT_THE_END = 1
 
 @dataclass(frozen=True)
 class Sample:
-    """What a process uses.
+    """What a process uses."""
 
-    Attributes:
-        time: On the steady clock in [s].
-        memory: That no other process shares, in [MB].
-        threads: Their number.
-        descriptors: Number of open files and sockets.
-    """
-
-    time: float
-    memory: float
-    threads: int
-    descriptors: int
+    time: float  # on the steady clock in [s]
+    memory: float  # that no other process shares, in [MB]
+    threads: int  # their number
+    descriptors: int  # number of open files and sockets
 
     @classmethod
     def of(cls, process: psutil.Process) -> Sample:
@@ -137,12 +127,7 @@ class FrameCount:
         """Use it in a with statement."""
         return self
 
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Stop counting."""
         self._closing.set()
         self._bus.wake()

@@ -13,11 +13,11 @@ from controller_manager_msgs.srv import ListControllers
 from isolation import Isolation, reserve
 from moveit_msgs.action import ExecuteTrajectory
 from moveit_msgs.msg import RobotTrajectory
-from moving_arm import goal_to, reach
 from processes import RunningProcess
 import pytest
 from ros_client import RosClient
 from sensor_msgs.msg import JointState
+from simulated_arm import goal_to, reach
 from tf2_msgs.msg import TFMessage
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from two_arms import ARMS, DRIVES, FOLLOWER, GRIPPER, write_two_arms
@@ -34,17 +34,12 @@ MIDDLE = {'left': [-1.57, 0.0, 0.0], 'right': [1.57, 0.0]}
 
 
 class Robot:
-    """The robot, brought up with its drives enabled.
-
-    Attributes:
-        client: The test's own node.
-        at: Newest position of each joint.
-    """
+    """The robot, brought up with its drives enabled."""
 
     def __init__(self, client: RosClient) -> None:
         """Listen to its joints."""
-        self.client = client
-        self.at: dict[str, float] = {}
+        self.client = client  # the test's own node
+        self.at: dict[str, float] = {}  # newest position of each joint
         client.node.create_subscription(JointState, '/joint_states', self._take, 10)
 
     def _take(self, message: JointState) -> None:

@@ -30,7 +30,6 @@ from moveit_msgs.srv import (
     GetPlanningScene,
     GetPositionFK,
 )
-from moving_arm import MovingArm, READY, robot_parameters
 from planning_messages import panda
 from planning_scenes import distances
 from processes import executable
@@ -38,7 +37,7 @@ import pytest
 from readme_folder import CHECKOUT
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
-from simulated_arm import JOINTS
+from simulated_arm import JOINTS, MovingArm, READY, robot_parameters
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 

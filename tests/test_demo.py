@@ -11,7 +11,7 @@ import shutil
 import signal
 from typing import TYPE_CHECKING
 
-from bus_recorder import BusRecorder
+from bus_watch import BusRecorder
 from canopen_interfaces.srv import COTargetDouble
 from manual_page import CHECKOUT, missing_in_run
 from processes import find_children, RunningProcess
@@ -31,21 +31,13 @@ pytestmark = pytest.mark.scenario
 
 @dataclass(frozen=True)
 class Demo:
-    """A demo that ends by itself.
+    """A demo that ends by itself."""
 
-    Attributes:
-        command: Package, program and arguments of `ros2 run`.
-        target: Target of `make` by which docs/index.md starts it.
-        begun: Line of its output by which all its processes run.
-        drives: Their node ids.
-        patterns: What its output has besides what the page shows.
-    """
-
-    command: tuple[str, ...]
-    target: str
-    begun: str
-    drives: range = range(0)
-    patterns: tuple[str, ...] = ()
+    command: tuple[str, ...]  # package, program and arguments of `ros2 run`
+    target: str  # target of `make` by which docs/index.md starts it
+    begun: str  # line of its output by which all its processes run
+    drives: range = range(0)  # their node ids
+    patterns: tuple[str, ...] = ()  # what its output has besides what the page shows
 
 
 DEMOS = (

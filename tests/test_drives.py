@@ -79,23 +79,18 @@ def _send_target(arm: SimulatedArm, target: float) -> COTargetDouble.Response:
 
 
 class HomingRun:
-    """A goal of the homing action.
-
-    Attributes:
-        phases: Phases of its feedback.
-        handle: Handle of the accepted goal.
-    """
+    """A goal of the homing action."""
 
     def __init__(self, arm: SimulatedArm, method: int) -> None:
         """Send the goal, and wait until it is accepted."""
-        self.phases: list[str] = []
+        self.phases: list[str] = []  # phases of its feedback
         self._client = arm.client
         client = arm.client.action(Home, f'{JOINT}/home')
         arm.client.spin_until(client.server_is_ready, 10.0, 'the action')
         goal = Home.Goal(method=method)
         sent = client.send_goal_async(goal, lambda each: self.phases.append(each.feedback.phase))
         arm.client.spin_until(sent.done, 10.0, 'acceptance')
-        self.handle: Any = sent.result()
+        self.handle: Any = sent.result()  # handle of the accepted goal
         assert self.handle.accepted
         self._result = self.handle.get_result_async()
 

@@ -95,21 +95,13 @@ REDS = """() => [...document.querySelectorAll('body *')].filter(e => {
 
 @dataclass
 class Shown:
-    """A page of an arm that is shown in any state.
+    """A page of an arm that is shown in any state."""
 
-    Attributes:
-        page: What is served.
-        state: What it shows, again and again.
-        stops: How often STOP was pressed.
-        jogs: What was jogged.
-        offered: What can be driven.
-    """
-
-    page: RobotPage
-    state: RobotState = READY
-    stops: int = 0
-    jogs: list[tuple[object, ...]] = field(default_factory=list)
-    offered: Offered = field(default_factory=Offered)
+    page: RobotPage  # what is served
+    state: RobotState = READY  # what it shows, again and again
+    stops: int = 0  # how often STOP was pressed
+    jogs: list[tuple[object, ...]] = field(default_factory=list)  # what was jogged
+    offered: Offered = field(default_factory=Offered)  # what can be driven
 
     def show(self, over: threading.Event) -> None:
         """Show it until the end."""

@@ -12,7 +12,7 @@ from urllib.request import urlopen
 
 import browser as chromium
 from browser import url_of, viewers_below
-from bus_recorder import BusRecorder
+from bus_watch import BusRecorder
 from processes import executable, find_children, RunningProcess
 import psutil
 import pytest

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Files of Foxglove, RViz, PlotJuggler name what is there: frames, topics, fields."""
+"""Files for viewers, and words of the page, name what robots have."""
 
 from __future__ import annotations
 
@@ -23,8 +23,25 @@ import yaml
 
 from arm_bringup.description import read_description, read_semantic
 from arm_bringup.robots import find_robot
+from arm_canopen.master.remote_node import BootPhase
+from arm_servo.teleop.keyboard_teleop import TOOL
+from canopen_core.standard import DriveState, OperationMode
 from node_runner import LATCHED
+from quad_controller import MODES as QUAD_MODES
+from quad_controller.states.modes import MOVING_STATES
 from quad_description import movable_joints, robot_urdf
+from quad_teleop.key_map import MOVES
+from robot_viewer.page.jog_panel import TWISTS
+from robot_viewer.page.robot_page import GAITS, MODES, WALKS
+from robot_viewer.robot_state import (
+    BOOTING,
+    ENABLED,
+    FAULTY,
+    FOLLOWS,
+    MODE_SERVICES,
+    NO_MODE,
+    POSTURES,
+)
 
 CHECKOUT = Path(__file__).parents[1]
 ROBOTS = CHECKOUT / 'arm_bringup' / 'robots'
@@ -60,17 +77,11 @@ CLASSES = {
 
 @dataclass(frozen=True)
 class Named:
-    """What a file names.
+    """What a file names."""
 
-    Attributes:
-        frames: Frames of TF.
-        topics: Topics.
-        fields: Fields of messages, each behind its topic.
-    """
-
-    frames: frozenset[str]
-    topics: frozenset[str]
-    fields: frozenset[tuple[str, str]]
+    frames: frozenset[str]  # frames of TF
+    topics: frozenset[str]  # topics
+    fields: frozenset[tuple[str, str]]  # fields of messages, each behind its topic
 
 
 def entries(value: Any) -> Iterator[tuple[str, Any]]:
@@ -328,3 +339,37 @@ def test_a_running_robot_has_all(isolation: Isolation, robot: str) -> None:
     ):
         bringup.wait_for('all is ready', STARTING)
         check(client, files)
+
+
+ENDS = {BootPhase.WAITING, BootPhase.OPERATIONAL, BootPhase.FAILED}
+"""Phases in which a device does not come by itself, or is there."""
+
+
+def test_words_of_drives() -> None:
+    """Each phase of a boot is one; a fault and a drive with torque are known by their titles."""
+    assert set(BOOTING) == {phase.value for phase in BootPhase if phase not in ENDS}
+    faults = DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE
+    assert {state.title for state in faults} == FAULTY
+    assert DriveState.OPERATION_ENABLED.title == ENABLED
+    assert {NO_MODE, *MODE_SERVICES} <= {mode.title for mode in OperationMode}
+
+
+def test_words_of_legs() -> None:
+    """Modes that the page requests are modes; those with velocities are all of them."""
+    assert {state.value for state in MOVING_STATES} == FOLLOWS
+    assert {*POSTURES, *MODES.values(), *(f'gait:{gait}' for gait in GAITS)} <= set(QUAD_MODES)
+
+
+def test_keys_are_those_of_the_terminals() -> None:
+    """They move the same way."""
+    for key, twist in TWISTS.values():
+        jog = TOOL[key.removeprefix('Arrow').lower()]
+        assert (*jog.linear, *jog.angular) == twist
+    for key, velocity in WALKS.values():
+        move = MOVES[key]
+        assert [*map(signum, velocity)] == [move.x, move.y, move.yaw]
+
+
+def signum(value: float) -> int:
+    """Return 1, 0 or -1."""
+    return (value > 0.0) - (value < 0.0)

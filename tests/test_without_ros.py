@@ -112,15 +112,10 @@ NOT_SOURCE = shutil.ignore_patterns('__pycache__', '*.egg-info', 'build', 'test'
 
 @dataclass(frozen=True)
 class Environment:
-    """A virtual environment without ROS.
+    """A virtual environment without ROS."""
 
-    Attributes:
-        folder: Where it is.
-        variables: Environment of its programs.
-    """
-
-    folder: Path
-    variables: Mapping[str, str]
+    folder: Path  # where it is
+    variables: Mapping[str, str]  # environment of its programs
 
     def run(self, *argv: str | Path) -> subprocess.CompletedProcess[str]:
         """Run one of its commands to its end, nothing on its standard input."""

@@ -9,11 +9,10 @@ from functools import partial
 import threading
 from typing import TYPE_CHECKING
 
-from moving_arm import CONTROLLER, READY, robot_parameters
 from processes import executable, RunningProcess
 from ros_client import RosClient
 from sensor_msgs.msg import JointState
-from simulated_arm import JOINTS
+from simulated_arm import CONTROLLER, JOINTS, READY, robot_parameters
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory
 
@@ -57,16 +56,7 @@ def standalone(folder: Path, program: str, *arguments: str, semantic: str = '') 
 
 
 class TopicArm:
-    """Drives that follow set-points and publish joint states, and the program that commands them.
-
-    Attributes:
-        joints: Names of its joints.
-        at: Where they are in [rad] or [m].
-        moves: Whether it goes to its set-points.
-        publishes: Whether it publishes where it is.
-        arrays: Set-points as arrays so far.
-        trajectories: Set-points as trajectories so far.
-    """
+    """Drives that follow set-points and publish joint states, and their program."""
 
     def __init__(
         self,
@@ -86,12 +76,12 @@ class TopicArm:
             topics: The joints of each topic of arrays.
             start: Where all of them are at first, in the order of topics, in [rad] or [m].
         """
-        self.moves = True
-        self.joints = [name for names in topics.values() for name in names]
-        self.at = list(start)
-        self.arrays: list[list[float]] = []
-        self.trajectories: list[JointTrajectory] = []
-        self.publishes = True
+        self.moves = True  # whether it goes to its set-points
+        self.joints = [name for names in topics.values() for name in names]  # names of its joints
+        self.at = list(start)  # where they are in [rad] or [m]
+        self.arrays: list[list[float]] = []  # set-points as arrays so far
+        self.trajectories: list[JointTrajectory] = []  # set-points as trajectories so far
+        self.publishes = True  # whether it publishes where it is
         self._received = 0
         self._stopped = threading.Event()
         with ExitStack() as stack:

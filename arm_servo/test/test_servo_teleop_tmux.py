@@ -14,7 +14,7 @@ from model_robots import texts
 import pytest
 from ros_client import RosClient
 from servo_listener import ServoListener, TIMEOUT
-from tmux_pane import Pane
+from terminals import Pane
 
 pytestmark = [
     pytest.mark.scenario,

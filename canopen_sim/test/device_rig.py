@@ -59,12 +59,7 @@ class RefusedError(Exception):
 
 
 class Rig:
-    """One device in virtual time; every frame that it sent is kept.
-
-    Attributes:
-        now: Virtual time in [s].
-        sent: Frames of the device with the time of each.
-    """
+    """One device in virtual time; every frame that it sent is kept."""
 
     def __init__(
         self,
@@ -76,9 +71,9 @@ class Rig:
         rate_units: tuple[float, float] = (1.0, 1.0),
     ) -> None:
         """Connect a device, and switch it on."""
-        self.now = 100.0
+        self.now = 100.0  # virtual time in [s]
         self.node_id = node_id
-        self.sent: list[tuple[float, Frame]] = []
+        self.sent: list[tuple[float, Frame]] = []  # frames of the device with the time of each
         self.device = Device(
             node_id,
             drive_dictionary() if dictionary is None else dictionary,

@@ -1,19 +1,25 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Several simulated devices in one process, and the thread that runs them."""
+"""Several simulated devices in one process, and the thread that runs them.
+
+It may have stood still, and gives no power where others have the node ids.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 import logging
+import math
+from pathlib import Path
 import threading
 import time
 
 from can_addresses import free_multicast, free_virtual
-from device_rig import drive_dictionary
+from device_rig import drive_dictionary, NODE_ID, with_defaults
 import pytest
 
-from arm_canopen import BusError
+from arm_canopen import BusError, CanopenError
 from canopen_core.can import (
     Bus,
     Frame,
@@ -21,8 +27,10 @@ from canopen_core.can import (
     VirtualBus,
     VirtualWire,
 )
-from canopen_core.standard import NmtState, sdo
-from canopen_sim import DeviceHost, DeviceRunner
+from canopen_core.standard import CobId, nmt_frame, NmtCommand, NmtState, sdo, tpdo_default
+from canopen_sim import DeviceHost, DeviceRunner, runner, simulated_devices
+from canopen_sim.node_id_check import NodeIdCheck
+from canopen_sim.runner import newest_process_data
 
 ARRIVAL = 10.0  # [s] a deadline, no measure
 IDS = range(2, 9)
@@ -230,3 +238,173 @@ def test_defect_that_stays_due_does_not_stop_time(monkeypatch: pytest.MonkeyPatc
         host.advance(host.deadline)
     assert len(sent) in (19, 20, 21)
     assert 5 < len(defects) < 15
+
+
+TIMEOUT = 10.0  # [s]
+MASTER_ID = 1
+WATCHED = 0.3  # [s]
+EMERGENCY = CobId.EMCY + NODE_ID
+
+
+def test_of_process_data_the_newest_is_kept_and_of_services_all() -> None:
+    """In the order of arrival."""
+    sync, old, new = Frame(0x080), Frame(0x205, b'\1'), Frame(0x205, b'\2')
+    start, read, other = Frame(0x000, b'\1\5'), Frame(0x605, bytes(8)), Frame(0x7E5, bytes(8))
+    batch = [sync, old, start, read, Frame(0x705, b'\5'), other]
+    batch += [Frame(0x080), new, read, other, start]
+    assert newest_process_data(batch) == [
+        *(start, read, Frame(0x705, b'\5'), other),
+        *(Frame(0x080), new, read, other, start),
+    ]
+
+
+def test_a_device_that_stood_still_does_not_live_through_what_it_missed(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """It answers one SYNC and not all of the past, and its log says how many it passed over."""
+    monkeypatch.setattr(runner, 'STALL', 0.0)
+    name = free_virtual()
+    with open_bus(name) as bus, open_bus(name) as master:
+        devices = DeviceRunner(bus)
+        dictionary = with_defaults(drive_dictionary(), {(0x1800, 2): 1})  # on each SYNC
+        devices.host.add(NODE_ID, dictionary)
+        devices.start()
+        gate = threading.Event()
+        try:
+            devices.call(lambda: None).result(TIMEOUT)
+            devices.call(lambda: gate.wait(TIMEOUT))
+            master.send(Frame(CobId.NMT, nmt_frame(NmtCommand.START, NODE_ID)))
+            for _ in range(20):
+                master.send(Frame(CobId.SYNC))
+            gate.set()
+            devices.call(lambda: None).result(TIMEOUT)
+            devices.call(lambda: None).result(TIMEOUT)
+        finally:
+            gate.set()
+            devices.stop()
+        answers = [f for f in master.receive(0.0) if f.can_id == tpdo_default(1, NODE_ID)]
+    assert len(answers) == 1
+    assert any(isinstance(record.args, tuple) and 19 in record.args for record in caplog.records)
+
+
+@pytest.mark.parametrize(
+    ('stalls', 'heartbeat'),
+    [
+        ([WATCHED + 0.2], math.inf),
+        ([WATCHED + 0.2], 0.05),
+        ([WATCHED + 0.15] * 3, math.inf),
+    ],
+    ids=['longer', 'with a heartbeat', 'several'],
+)
+def test_a_device_that_stood_still_reports_no_silence(
+    stalls: list[float], heartbeat: float
+) -> None:
+    """It received nothing meanwhile; a master that is silent while it runs is noticed in time."""
+    name = free_virtual()
+    with open_bus(name) as bus, open_bus(name) as master:
+        devices = DeviceRunner(bus)
+        watch = {(0x1016, 1): MASTER_ID << 16 | round(WATCHED * 1000)}
+        devices.host.add(NODE_ID, with_defaults(drive_dictionary(), watch))
+        devices.start()
+
+        def stand_still(seconds: float) -> None:
+            rest = max(0.0, seconds - heartbeat)
+            threading.Event().wait(seconds - rest)
+            if rest:
+                master.send(Frame(CobId.HEARTBEAT + MASTER_ID, b'\5'))
+            threading.Event().wait(rest)
+
+        try:
+            devices.call(lambda: None).result(TIMEOUT)
+            master.send(Frame(CobId.HEARTBEAT + MASTER_ID, b'\5'))
+            devices.call(lambda: None).result(TIMEOUT)
+            begun = time.monotonic()
+            for stall in stalls:
+                devices.call(partial(stand_still, stall)).result(TIMEOUT)
+                devices.call(lambda: None).result(TIMEOUT)
+            while not (lost := [f for f in master.receive(TIMEOUT) if f.can_id == EMERGENCY]):
+                assert time.monotonic() - begun < TIMEOUT
+            running = lost[0].timestamp - begun - sum(stalls)
+            assert WATCHED * 0.9 < running < TIMEOUT / 2.0
+        finally:
+            devices.stop()
+
+
+PANDA = Path(__file__).parents[2] / 'arm_bringup' / 'robots' / 'panda' / 'bus.yml'
+
+
+class StoppedClock:
+    """A clock that goes on when it is read, so that nothing waits long."""
+
+    def __init__(self, step: float) -> None:
+        self.now, self.step = 100.0, step
+
+    def __call__(self) -> float:
+        """Return the time in [s]."""
+        self.now += self.step
+        return self.now
+
+
+def test_a_device_that_answers_is_found() -> None:
+    """It says nothing by itself: it waits for a master."""
+    name = free_virtual()
+    with open_bus(name) as first, open_bus(name) as second:
+        devices = DeviceRunner(first)
+        devices.host.add(NODE_ID, drive_dictionary())
+        devices.start()
+        try:
+            devices.call(lambda: None).result(TIMEOUT)
+            second.receive(0.0)  # its boot-up, which was before
+            check = NodeIdCheck(second, [4, NODE_ID], StoppedClock(0.0))
+            with pytest.raises(
+                CanopenError, match=r'SDO response \(0x585\) of node id 5.* End th'
+            ):
+                check.finish()
+        finally:
+            devices.stop()
+
+
+def test_an_answer_counts_after_other_work_that_took_long() -> None:
+    """It has been received meanwhile."""
+    name = free_virtual()
+    with open_bus(name) as bus, open_bus(name) as other:
+        check = NodeIdCheck(bus, [NODE_ID], StoppedClock(10.0))
+        other.send(Frame(0x585, bytes(8)))
+        with pytest.raises(CanopenError, match='0x585'):
+            check.finish()
+
+
+@pytest.mark.parametrize(
+    ('frame', 'found'),
+    [
+        (Frame(0x705, b'\0'), True),
+        (Frame(0x705, b'\5'), True),
+        (Frame(0x585, bytes(8)), True),
+        (Frame(0x706, b'\0'), False),
+        (Frame(0x605, bytes(8)), False),
+        (Frame(0x705, is_remote=True), False),
+        (Frame(0x080), False),
+    ],
+)
+def test_only_what_the_device_itself_sends_counts(frame: Frame, found: bool) -> None:
+    """The requests of a master, its node guarding and other devices do not."""
+    name = free_virtual()
+    with open_bus(name) as bus, open_bus(name) as other:
+        other.send(frame)
+        check = NodeIdCheck(bus, [NODE_ID], StoppedClock(0.05))
+        assert bool(check.found) is found
+        requests = [each.can_id for each in other.receive(0.0)]
+        assert requests == ([] if found else [0x605])  # devices that are there are not disturbed
+        if not found:
+            check.finish()
+
+
+def test_a_second_simulation_of_a_bus_is_refused() -> None:
+    """The first goes on; when it has ended, there is room."""
+    name = free_virtual()
+    with simulated_devices(PANDA, name) as first:
+        with pytest.raises(CanopenError, match='already'), simulated_devices(PANDA, name):
+            pass
+        assert len(first.call(lambda: first.host.devices).result(TIMEOUT)) == 7
+    with simulated_devices(PANDA, name) as again:
+        assert again.bus_name == name

@@ -1,14 +1,25 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""NMT state machine of a simulated device, and which services each state offers."""
+"""NMT states of a simulated device, their services, heartbeats both ways, guarding."""
 
 from __future__ import annotations
 
-from device_rig import NODE_ID, Rig
+from itertools import pairwise
+
+from device_rig import drive_dictionary, NODE_ID, Rig
 import pytest
 
+from arm_canopen import DriveState
 from canopen_core.can import Frame
-from canopen_core.standard import NmtCommand, NmtState, ObjectDictionary
+from canopen_core.standard import (
+    AbortCode,
+    DataType,
+    NmtCommand,
+    NmtState,
+    ObjectDictionary,
+    ObjectEntry,
+)
+from canopen_sim import Fault
 
 PRE, OP, STOP = NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL, NmtState.STOPPED
 START = NmtCommand.START
@@ -162,3 +173,285 @@ def test_device_without_any_object_lives() -> None:
     rig.run(1.0)
     assert rig.nmt_state is OP
     assert rig.device.drive is None
+
+
+OWN = 0x700 + NODE_ID
+EMCY = 0x080 + NODE_ID
+MASTER = 1
+LOST = bytes.fromhex('30 81 11 01 00 00 00 00')
+GONE = bytes(8)
+
+
+def beat(rig: Rig, node_id: int = MASTER, state: int = 5) -> None:
+    """Send a heartbeat of another device."""
+    rig.send(0x700 + node_id, bytes((state,)))
+
+
+def watch(rig: Rig, milliseconds: int, node_id: int = MASTER, subindex: int = 1) -> None:
+    """Configure the device to watch another one."""
+    rig.put(0x1016, node_id << 16 | milliseconds, subindex)
+
+
+@pytest.fixture
+def rig() -> Rig:
+    """A device in Pre-operational."""
+    rig = Rig()
+    rig.take()
+    return rig
+
+
+def test_period_is_kept(rig: Rig) -> None:
+    """Heartbeats come at exactly the period of 0x1017, the first within one; 0 ends them."""
+    start = rig.now
+    rig.put(0x1017, 200)
+    rig.run(10.0)
+    times = rig.times(OWN)
+    assert 0.0 < times[0] - start <= 0.2
+    steps = [later - earlier for earlier, later in pairwise(times)]
+    assert steps == pytest.approx([0.2] * len(steps))
+    assert len(times) in (49, 50)
+    rig.put(0x1017, 0)
+    rig.take()
+    rig.run(10.0)
+    assert rig.take() == []
+
+
+def test_heartbeats_of_devices_are_spread() -> None:
+    """Seven devices that are configured at once do not beat at once."""
+    rigs = [Rig(node_id=node_id) for node_id in range(2, 9)]
+    for rig in rigs:
+        rig.put(0x1017, 1000)
+        rig.run(1.0)
+    firsts = sorted(rig.times(0x700 + rig.node_id)[-1] for rig in rigs)
+    gaps = [later - earlier for earlier, later in pairwise(firsts)]
+    assert min(gaps) > 0.05
+
+
+def test_heartbeat_carries_the_nmt_state(rig: Rig) -> None:
+    """Each heartbeat has the state at its time, in every state."""
+    rig.put(0x1017, 100)
+    for command, state in (
+        (NmtCommand.START, NmtState.OPERATIONAL),
+        (NmtCommand.STOP, NmtState.STOPPED),
+        (NmtCommand.ENTER_PRE_OPERATIONAL, NmtState.PRE_OPERATIONAL),
+    ):
+        rig.nmt(command)
+        rig.run(0.1)
+        assert rig.take(OWN)[-1] == bytes((state,))
+
+
+def test_no_burst_after_a_standstill(rig: Rig) -> None:
+    """A process that could not run for a while sends one heartbeat, not all that it missed."""
+    rig.put(0x1017, 100)
+    rig.now += 10.0
+    rig.device.advance(rig.now)
+    assert len(rig.take(OWN)) == 1
+
+
+def test_loss_is_reported_once(rig: Rig) -> None:
+    """One EMCY 0x8130, on time, of a device that has sent one; its return is an error reset."""
+    watch(rig, 300)
+    rig.run(10.0)
+    assert rig.take() == []
+    for _ in range(5):
+        beat(rig)
+        rig.run(0.29)
+    assert rig.take() == []
+    start = rig.now - 0.29
+    rig.run(5.0)
+    assert rig.times(EMCY) == pytest.approx([start + 0.3])
+    assert rig.take(EMCY) == [LOST]
+    assert rig.get(0x1001) == 0x11
+    assert rig.get(0x1003, 1) == 0x8130
+    beat(rig)
+    assert rig.take(EMCY) == [GONE]
+    assert rig.get(0x1001) == 0
+
+
+@pytest.mark.parametrize(
+    ('option', 'state', 'code'),
+    [
+        (0, DriveState.OPERATION_ENABLED, 0),
+        (1, DriveState.FAULT, 0x8130),
+        (2, DriveState.SWITCH_ON_DISABLED, 0),
+        (3, DriveState.SWITCH_ON_DISABLED, 0),
+    ],
+)
+def test_drive_stops_without_its_master(
+    rig: Rig, option: int, state: DriveState, code: int
+) -> None:
+    """A moving drive whose master is lost does what 0x6007 says; by default it is a fault."""
+    if option != 1:
+        rig.put(0x6007, option)
+    watch(rig, 300)
+    rig.put(0x60FF, 500)
+    rig.enable(3)
+    beat(rig)
+    rig.run(1.0)
+    assert rig.state is state
+    assert rig.get(0x603F) == code
+    assert (rig.get(0x606C) == 0) is (option != 0)
+
+
+def test_fault_of_a_lost_master_is_latched(rig: Rig) -> None:
+    """The master's return does not clear the fault; a fault reset does."""
+    watch(rig, 300)
+    rig.enable(8)
+    beat(rig)
+    rig.run(1.0)
+    beat(rig)
+    states = [rig.state]
+    rig.take()
+    rig.command(0x80)
+    assert rig.take(EMCY) == [GONE]
+    states.append(rig.state)
+    assert states == [DriveState.FAULT, DriveState.SWITCH_ON_DISABLED]
+    beat(rig)
+    rig.run(1.0)  # without torque there is nothing to stop
+    assert rig.state is DriveState.SWITCH_ON_DISABLED
+
+
+def test_an_error_lasts_until_the_heartbeat_is_back(rig: Rig) -> None:
+    """A fault reset of the drive before does not end it."""
+    watch(rig, 300)
+    rig.enable(8)
+    beat(rig)
+    rig.run(1.0)
+    rig.take()
+    rig.command(0x80)
+    assert rig.state is DriveState.SWITCH_ON_DISABLED
+    assert rig.take(EMCY) == []
+    beat(rig)
+    assert rig.take(EMCY) == [GONE]
+
+
+def test_two_watches_of_one_device_are_refused(rig: Rig) -> None:
+    """One device cannot have two consumer times (CiA 301, 7.5.2.17)."""
+    watch(rig, 300)
+    assert rig.refused(0x1016, MASTER << 16 | 500, 2) == AbortCode.PARAMETER_INCOMPATIBLE
+    watch(rig, 500, subindex=1)
+    watch(rig, 500, node_id=2, subindex=2)
+
+
+def test_several_devices_are_watched(rig: Rig) -> None:
+    """The error lasts until the last lost device is back."""
+    watch(rig, 300, node_id=1, subindex=1)
+    watch(rig, 600, node_id=2, subindex=2)
+    beat(rig, 1)
+    beat(rig, 2)
+    rig.run(2.0)
+    assert len(rig.take(EMCY)) == 1
+    beat(rig, 1)
+    assert rig.take(EMCY) == []
+    beat(rig, 2)
+    assert rig.take(EMCY) == [GONE]
+
+
+@pytest.mark.parametrize('entry', [0x0000_012C, 0x0080_012C, 0x0001_0000])
+def test_entries_without_a_device(rig: Rig, entry: int) -> None:
+    """Node id 0, one beyond 127 or time 0 switch an entry off."""
+    rig.put(0x1016, entry, 1)
+    beat(rig, entry >> 16 & 0x7F)
+    rig.run(5.0)
+    assert rig.take() == []
+
+
+@pytest.mark.parametrize('data', [b'', b'\x05\x05', b'\x01'])
+def test_other_frames_are_no_heartbeats(rig: Rig, data: bytes) -> None:
+    """Frames of the wrong length or with an unknown state do not count."""
+    watch(rig, 300)
+    beat(rig)
+    for _ in range(5):
+        rig.run(0.1)
+        rig.send(0x700 + MASTER, data)
+    assert rig.take(EMCY) == [LOST]
+
+
+def guarded(behaviour: int = 0) -> Rig:
+    """Return a drive in Pre-operational with a life time of 0.3 s."""
+    added = (
+        (0x100C, 0, DataType.UNSIGNED16, 100),
+        (0x100D, 0, DataType.UNSIGNED8, 3),
+        (0x1029, 1, DataType.UNSIGNED8, behaviour),
+    )
+    places = [(index, subindex) for index, subindex, *_ in added]
+    entries = [entry for entry in drive_dictionary() if entry.address not in places]
+    entries += [
+        ObjectEntry(index, subindex, 'added', kind, default=value)
+        for index, subindex, kind, value in added
+    ]
+    return Rig(ObjectDictionary(entries))
+
+
+def guard(rig: Rig) -> list[int]:
+    """Request the state and return the answers."""
+    rig.take()
+    rig.device.receive(Frame(OWN, is_remote=True), rig.now)
+    return [data[0] for data in rig.take(OWN)]
+
+
+def test_guarding() -> None:
+    """Answers have the state and the other toggle bit; a device with heartbeats is not guarded."""
+    rig = guarded()
+    assert [guard(rig) for _ in range(3)] == [[0x7F], [0xFF], [0x7F]]
+    rig.nmt(NmtCommand.START)
+    assert guard(rig) == [0x85]
+    rig.nmt(NmtCommand.STOP)
+    assert guard(rig) == [0x04]
+    rig.nmt(NmtCommand.RESET_COMMUNICATION)
+    assert guard(rig) == [0x7F]
+    rig.put(0x1017, 100)
+    assert guard(rig) == []
+    rig.put(0x1017, 0)
+    assert guard(rig) == [0xFF]
+    rig.inject(Fault.HEARTBEAT_STOP, duration=1.0)
+    assert guard(rig) == []
+    rig.run(1.1)
+    assert len(guard(rig)) == 1
+    entries = [entry for entry in drive_dictionary() if entry.index not in (0x100C, 0x100D)]
+    assert guard(Rig(ObjectDictionary(entries))) == []
+
+
+@pytest.mark.parametrize('kind', ['heartbeat', 'guarding'])
+@pytest.mark.parametrize(
+    ('before', 'behaviour', 'state'),
+    [
+        (NmtState.OPERATIONAL, 0, NmtState.PRE_OPERATIONAL),
+        (NmtState.OPERATIONAL, 1, NmtState.OPERATIONAL),
+        (NmtState.OPERATIONAL, 2, NmtState.STOPPED),
+        (NmtState.PRE_OPERATIONAL, 2, NmtState.PRE_OPERATIONAL),  # concerns Operational only
+    ],
+)
+def test_a_loss_is_handled_as_0x1029_says(
+    kind: str, before: NmtState, behaviour: int, state: NmtState
+) -> None:
+    """A heartbeat, or the requests of a guard, that stay away for their time."""
+    rig = guarded(behaviour)
+    if kind == 'heartbeat':
+        watch(rig, 300)
+    if before is NmtState.OPERATIONAL:
+        rig.nmt(NmtCommand.START)
+    rig.run(5.0)
+    assert rig.times(EMCY) == []  # no master yet
+    for _ in range(5):
+        beat(rig) if kind == 'heartbeat' else guard(rig)
+        rig.run(0.29)
+    assert rig.times(EMCY) == []
+    start = rig.now - 0.29
+    rig.run(1.0)
+    assert rig.nmt_state is state
+    if state is not NmtState.STOPPED:
+        assert rig.times(EMCY) == pytest.approx([start + 0.3])
+        beat(rig) if kind == 'heartbeat' else guard(rig)
+        assert rig.get(0x1001) == 0
+
+
+def test_enabled_drive_stops_when_its_guard_is_gone() -> None:
+    """The drive faults (0x6007 = 1), as when a heartbeat is lost."""
+    rig = guarded()
+    rig.nmt(NmtCommand.START)
+    rig.enable(3)
+    guard(rig)
+    rig.run(1.0)
+    assert rig.state is DriveState.FAULT
+    assert rig.get(0x603F) == 0x8130

@@ -10,7 +10,7 @@ from isolation import Isolation
 import pytest
 from ros_client import RosClient
 from teleop_robot import Robot, STILL, TEST_TIMEOUT
-from tmux_pane import Pane
+from terminals import Pane
 
 pytestmark = [
     pytest.mark.scenario,

@@ -89,17 +89,11 @@ class Station(Protocol):
 
 @dataclass(frozen=True)
 class Sent:
-    """A frame that was on the bus.
+    """A frame that was on the bus."""
 
-    Attributes:
-        time: When it was handed to the bus in [s].
-        sender: Name of the station; ``master`` for the master.
-        frame: The frame.
-    """
-
-    time: float
-    sender: str
-    frame: Frame
+    time: float  # when it was handed to the bus in [s]
+    sender: str  # name of the station; ``master`` for the master
+    frame: Frame  # the frame
 
 
 @dataclass
@@ -482,13 +476,7 @@ class VirtualNetwork:
 
 
 class Leader:
-    """A motion source that leads its axes while they follow, or does what a test wants.
-
-    Attributes:
-        axes: Names of its axes.
-        losses: The first refusal of each axis that it has lost.
-        pauses: It answers nothing.
-    """
+    """A motion source that leads its axes while they follow, or does what a test wants."""
 
     def __init__(
         self,
@@ -505,9 +493,9 @@ class Leader:
             feed_forward: Velocity and effort that it announces.
             heeds: It leads an axis only while that is followable.
         """
-        self.axes = axes or (JOINT,)
-        self.losses: dict[str, Refusal] = {}
-        self.pauses = False
+        self.axes = axes or (JOINT,)  # names of its axes
+        self.losses: dict[str, Refusal] = {}  # the first refusal of each axis that it has lost
+        self.pauses = False  # it answers nothing
         self._speed = speed
         self._feed_forward = feed_forward
         self._heeds = heeds

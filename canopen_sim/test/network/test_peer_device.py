@@ -26,17 +26,11 @@ NEVER = float('inf')
 
 @dataclass
 class Heartbeat:
-    """A message that python-canopen wants to be sent again and again.
+    """A message that python-canopen wants to be sent again and again."""
 
-    Attributes:
-        frame: The message.
-        period: Time between two in [s].
-        due: When the next one is due in [s].
-    """
-
-    frame: Frame
-    period: float
-    due: float
+    frame: Frame  # the message
+    period: float  # time between two in [s]
+    due: float  # when the next one is due in [s]
 
     def stop(self) -> None:
         """Send no more."""

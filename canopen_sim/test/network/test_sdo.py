@@ -14,7 +14,7 @@ from typing import Any
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 import pytest
-from sdo_byte_server import SdoByteServer
+from scripted_device import SdoByteServer
 
 from arm_canopen import (
     BusError,
@@ -40,20 +40,15 @@ ABORTED = '80 {place} 00 00 04 05'  # SDO protocol timed out
 
 
 class Line:
-    """A client whose device is the test.
-
-    Attributes:
-        sent: Requests that nobody has answered yet.
-        refusal: Why the bus takes no frames; None while it does.
-    """
+    """A client whose device is the test."""
 
     def __init__(self) -> None:
         """Connect the client."""
         self.scheduler = Scheduler()
         self.defects: list[BaseException] = []
         self.scheduler.on_defect = self.defects.append
-        self.sent: list[bytes] = []
-        self.refusal: BusError | None = None
+        self.sent: list[bytes] = []  # requests that nobody has answered yet
+        self.refusal: BusError | None = None  # why the bus takes no frames; None while it does
         self.client = SdoClient(NODE, 'joint1', self.scheduler, self._take)
 
     def _take(self, frame: Frame) -> BusError | None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""An arm and a host beside it: closed unless opened, and stopped when the link is cut."""
+"""Hosts with a cable: who may enter, clients of another host, links that are cut or slow."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager, ExitStack
 import ipaddress
 import json
+import os
 from pathlib import Path
 import sys
 from typing import Any
 
 import browser as chromium
-from held_key import held_key
 from isolation import Isolation
-from network_hosts import Host, two_hosts, two_linked_hosts
-from network_link import Condition
+from network_hosts import Condition, Host, two_hosts, two_linked_hosts
 from processes import executable, RunningProcess
 import pytest
+from terminals import held_key
 
 from dds_network import NETWORK_VARIABLE, PROFILE_VARIABLE
 
@@ -191,3 +191,27 @@ def test_a_page_of_the_other_side_jogs_and_stops_with_the_link(isolation: Isolat
                 chromium.state_is(page, 'MOVING')
                 page.mouse.up()
                 watch.wait_until_last('^still')
+
+
+PROGRAM = [sys.executable, str(Path(__file__).with_name('bus_host.py'))]
+
+
+def test_nothing_enters_or_leaves_by_the_cable(isolation: Isolation) -> None:
+    """Although the group is joined on the cable, too, as a tool of python-can would do."""
+    env = os.environ | {'PYTHONPATH': os.pathsep.join(sys.path)}
+    _, group, port = isolation.bus.split(':')
+    with two_hosts() as (robot, desk):
+        listen = ['listen', isolation.bus, robot.address]
+        attack = ['attack', group, port, desk.address, robot.address]
+        with robot.run([*PROGRAM, *listen], env) as bus:
+            bus.wait_for('open')
+            sent = robot.packets()[1]
+            with desk.run([*PROGRAM, *attack], env) as attacker:
+                attacker.wait_for('sent')
+                # beside it a second member of the bus, which is received
+                with robot.run([*PROGRAM, *listen], env):
+                    bus.wait_for('080', count=20)
+            assert robot.packets()[0] > 20
+            assert '666' not in bus.lines
+            # it has sent dozens of frames: what left is ARP, ICMP and IGMP
+            assert robot.packets()[1] - sent < 20

@@ -1,26 +1,35 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""motion_node, by its names, for drives that listen to topics."""
+"""Motion for drives that listen to topics: programs of arm_servo, and --controller-only."""
 
 from __future__ import annotations
 
 from itertools import pairwise
+import math
+from pathlib import Path
+import shutil
 import signal
 import time
 from typing import TYPE_CHECKING
+from xml.etree import ElementTree as ET
 
 from control_msgs.action import FollowJointTrajectory
 from control_msgs.msg import JointJog, JointTrajectoryControllerState
 from controller_manager_msgs.srv import ListControllers, SwitchController
-from moving_arm import CONTROLLER, goal_to, GoalRun, reach, READY
-from processes import RunningProcess
+from processes import executable, RunningProcess
 import pytest
-from topic_arm import standalone, TopicArm
+from simulated_arm import CONTROLLER, goal_to, GoalRun, reach, READY
+from topic_arm import PATIENT, standalone, TopicArm
+from two_arms import ARMS, GRIPPER, write_two_arms
+
+from arm_bringup.description import expand_xacro
+from arm_bringup.robots import installed_robots_folder
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Sequence
 
     from isolation import Isolation
+
 
 pytestmark = pytest.mark.scenario
 
@@ -221,3 +230,129 @@ def test_a_program_that_cannot_begin_says_why(
     with RunningProcess(command, isolation.env) as process:
         assert process.wait() == 1
         assert words in process.output
+
+
+def test_a_goal_and_a_jog_move_drives_elsewhere(isolation: Isolation) -> None:
+    """A goal is reached; a jog takes over from the next one, without a jump; it ends at rest."""
+    command = [executable('arm_bringup', 'bringup'), 'panda', '--controller-only']
+    with TopicArm(isolation, command, 'all is ready') as arm:
+        reach(arm.client, goal_to([0.3, *READY[1:]], 2.0))
+        assert arm.at[0] == pytest.approx(0.3, abs=1e-6)
+        run = GoalRun(arm.client, goal_to([1.0, *READY[1:]], 6.0))
+        arm.client.spin_until(lambda: arm.at[0] > 0.35, 10.0, 'motion')
+        publisher = arm.client.node.create_publisher(JointJog, '/servo_node/delta_joint_cmds', 10)
+        jog = JointJog(joint_names=['panda_joint1'], velocities=[-1.0])
+        arm.client.node.create_timer(0.02, lambda: publisher.publish(jog))
+        arm.client.spin_until(lambda: arm.at[0] < 0.2, 10.0, 'motion the other way')
+        result = run.wait()[1]
+        assert result.error_code == FollowJointTrajectory.Result.INVALID_GOAL
+        assert 'jogging took over' in result.error_string
+        assert max(abs(b[0] - a[0]) for a, b in pairwise(arm.arrays)) < 0.01
+        assert not arm.trajectories  # they would go to the trajectory controller
+        names = arm.client.node.get_node_names()
+        assert 'robot_state_publisher' not in names
+        arm.process.signal(signal.SIGINT)
+        arm.client.spin_until(lambda: not arm.process.is_running(), 15.0, 'end of the bring-up')
+        assert arm.process.wait() == 0
+        steps = [abs(b[0] - a[0]) for a, b in pairwise(arm.arrays)]
+        assert steps[-1] < 1e-4
+
+
+def test_each_group_has_a_topic_of_its_own(isolation: Isolation, tmp_path: Path) -> None:
+    """Two arms and a gripper move at the same time; one is canceled, and the others go on."""
+    groups = {**ARMS, 'hand': (GRIPPER,)}
+    commands = 'forward_position_controller/commands'
+    topics = {
+        f'/{"" if group == "left" else group + "_"}{commands}': joints
+        for group, joints in groups.items()
+    }
+    command = [executable('arm_bringup', 'bringup'), f'{write_two_arms(tmp_path / "two_arms")}/']
+    command += ['--controller-only', '--ros-args']
+    for group in groups:
+        for name, value in PATIENT.items():
+            command += ['-p', f'{group}_controller:{name}:={value}']
+    start = [0.0] * sum(map(len, groups.values()))
+    with TopicArm(isolation, command, 'all is ready', topics=topics, start=start) as robot:
+
+        def follow(group: str, positions: Sequence[float], time: float) -> GoalRun:
+            goal = goal_to(positions, time, groups[group])
+            return GoalRun(robot.client, goal, f'/{group}_controller')
+
+        runs = {
+            'left': follow('left', [0.4, -0.3, 0.5], 4.0),
+            'right': follow('right', [-1.5, 0.2], 20.0),
+            'hand': follow('hand', [0.03], 4.0),
+        }
+        for name in ('left', 'hand'):
+            result = runs[name].wait()[1]
+            assert result.error_code == 0, (name, result.error_string)
+        places = dict(zip(robot.joints, robot.at, strict=True))
+        assert [places[name] for name in ARMS['left']] == pytest.approx([0.4, -0.3, 0.5], abs=1e-6)
+        assert places[GRIPPER] == pytest.approx(0.03, abs=1e-6)
+        assert -1.4 < places['right_turn'] < -0.05
+        runs['right'].cancel()
+        runs['right'].wait()
+        jogs = robot.client.node.create_publisher(
+            JointJog, '/right_servo_node/delta_joint_cmds', 10
+        )
+        jog = JointJog(joint_names=['right_turn'], velocities=[1.0])
+        robot.client.node.create_timer(0.02, lambda: jogs.publish(jog))
+        turn, before = robot.joints.index('right_turn'), places['right_turn']
+        robot.client.spin_until(lambda: robot.at[turn] > before + 0.1, 20.0, 'a jog')
+        robot.process.signal(signal.SIGINT)
+        robot.client.spin_until(lambda: not robot.process.is_running(), 15.0, 'end')
+        assert robot.process.wait() == 0
+
+
+FOLDED = [0.0, 1.7, 0.0, -3.0, 0.0, 1.5, 0.7]
+"""A pose of the Panda within its limits, with the forearm in its base."""
+
+FREE = [0.3, *READY[1:]]
+
+
+def prism(radius: float, length: float) -> str:
+    """Return a prism of eight sides along z as Wavefront OBJ."""
+    turns = [math.pi * number / 4 for number in range(8)]
+    lines = [
+        f'v {radius * math.cos(turn)} {radius * math.sin(turn)} {side * length / 2}'
+        for side in (-1, 1)
+        for turn in turns
+    ]
+    return '\n'.join([*lines, *(f'f {n} {n + 1} {n + 8}' for n in range(1, 8))])
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Make the Panda's folder with a mesh in the place of each capsule, beside a plain URDF."""
+    panda, folder = installed_robots_folder() / 'panda', tmp_path / 'panda'
+    shutil.copytree(panda, folder, ignore=shutil.ignore_patterns('*.xacro'))
+    (folder / 'meshes').mkdir()
+    robot = ET.fromstring(expand_xacro(panda / 'panda.urdf.xacro'))  # noqa: S314  our own
+    for link in robot.iter('link'):
+        for number, collision in enumerate(link.findall('collision')):
+            geometry = collision.find('geometry')
+            assert geometry is not None
+            cylinder = geometry.find('cylinder')
+            if cylinder is None:
+                link.remove(collision)
+                continue
+            name = f'meshes/{link.get("name")}_{number}.obj'
+            text = prism(*(float(cylinder.get(key, 0)) for key in ('radius', 'length')))
+            (folder / name).write_text(text, encoding='utf-8')
+            geometry.remove(cylinder)
+            ET.SubElement(geometry, 'mesh', filename=name)
+    ET.ElementTree(robot).write(folder / 'panda.urdf')
+    return folder
+
+
+def test_a_goal_in_which_meshes_meet_is_refused(isolation: Isolation, folder: Path) -> None:
+    """With the links and the time; another one is reached."""
+    command = [executable('arm_bringup', 'bringup'), str(folder), '--controller-only']
+    with TopicArm(isolation, command, 'all is ready') as arm:
+        refused = GoalRun(arm.client, goal_to(FOLDED, 6.0)).wait()[1]
+        assert refused.error_code == FollowJointTrajectory.Result.INVALID_GOAL
+        assert 'would collide at' in refused.error_string
+        assert 'panda_link' in refused.error_string
+        assert arm.at == READY
+        reach(arm.client, goal_to(FREE, 2.0))
+        assert arm.at[0] == pytest.approx(FREE[0], abs=1e-6)
