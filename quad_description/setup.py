@@ -9,9 +9,9 @@ SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
     programs=[
         'display = quad_description.display:main',
-        'urdf = quad_description.urdf_command:main',
+        'urdf = quad_description.presets:main',
     ],
-    commands=['quad-urdf = quad_description.urdf_command:main'],
+    commands=['quad-urdf = quad_description.presets:main'],
     package_data=['model/*'],
     folders=['quad_description/model'],
 )

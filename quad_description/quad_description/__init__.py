@@ -18,30 +18,38 @@ Public, besides the names below: the module :mod:`.rotations`.
 
 from urdf_reader import DescriptionError
 
-from .backend import Backend
-from .command_line import run_command
-from .kinematics.leg import (
+from .kinematics import (
     body_link,
     FEET,
+    Feet,
     foot_link,
     foot_position,
+    FootPose,
     jacobian,
     LegGeometry,
-    LEGS,
     LegSolution,
+    Quadruped,
+    quadruped,
+    raised_feet,
     solve,
+    Targets,
 )
-from .kinematics.quadruped import Feet, FootPose, Quadruped, quadruped, raised_feet, Targets
 from .presets import (
+    Joint,
+    JointLimits,
+    LEGS,
+    movable_joints,
     Pose,
     pose_positions,
     preset_of,
     PresetError,
     PRESETS,
     robot_urdf,
+    run_command,
     STREAM_TIMEOUT,
 )
 from .state import (
+    Backend,
     ContactSource,
     EMPTY_BATTERY,
     ImuSample,
@@ -51,7 +59,6 @@ from .state import (
     OdometryState,
     RobotState,
 )
-from .urdf import Joint, JointLimits, movable_joints
 
 __all__ = [
     'EMPTY_BATTERY',

@@ -18,9 +18,8 @@ from urdf_reader import DescriptionError
 
 from node_runner import destroyed_when_refused, LATCHED, ParameterReader, refuse_misspelt, run_node
 
-from .kinematics.quadruped import quadruped
-from .presets import Pose, pose_positions, PRESETS, robot_urdf
-from .urdf import Joint, movable_joints
+from .kinematics import quadruped
+from .presets import Joint, movable_joints, Pose, pose_positions, PRESETS, robot_urdf
 
 SWEEP_DURATION: Final = 2.5  # [s] for one joint, there and back
 

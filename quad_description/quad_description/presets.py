@@ -1,20 +1,30 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The URDF and the poses of a preset, and the numbers for both: model/robot.yaml."""
+"""The URDF and the poses of a preset by the numbers of model/robot.yaml; the joints of a URDF.
+
+``ros2 run quad_description urdf`` prints the URDF for other tools.
+"""
 
 from __future__ import annotations
 
+import argparse
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
 import math
 from pathlib import Path
 import re
-from typing import Any, Final
+import signal
+import sys
+from typing import Any, Final, NoReturn
 
-from urdf_reader import DescriptionError
+from urdf_reader import DescriptionError, JointKind, KinematicTree, read_urdf
+from urdf_reader import Joint as UrdfJoint
 import yaml
 
-from .kinematics.leg import LEGS
+LEGS: Final = ('fl', 'fr', 'bl', 'br')
+"""Front left, front right, back left, back right: the order of the legs everywhere."""
 
 
 class PresetError(DescriptionError):
@@ -106,7 +116,6 @@ STREAM_TIMEOUT: Final = 0.5
 """A pause [s] that ends a stream of joint commands: a robot that it leaves with a foot in the air
 is laid down by the hardware node, so the next stream has to begin where the joints are then."""
 
-
 _LEG_JOINTS = ('hip', 'thigh', 'calf')
 _ARM_JOINTS = ('yaw', 'thigh', 'calf')
 _GRIPPER = 'hand_right_joint'
@@ -136,3 +145,110 @@ def pose_positions(pose: Pose, arm: bool = False) -> dict[str, float]:
             positions[f'arm_{joint}_joint'] = float(value)
         positions[_GRIPPER] = 0.0
     return positions
+
+
+@dataclass(frozen=True, slots=True)
+class JointLimits:
+    """Range of a joint."""
+
+    lower: float = -math.inf  # smallest position in [rad] or [m]
+    upper: float = math.inf  # largest position in [rad] or [m]
+    velocity: float = math.inf  # largest speed in [rad/s] or [m/s]
+    effort: float = math.inf  # largest torque in [N m] or force in [N]
+
+    def clamp(self, position: float) -> float:
+        """Return the nearest position within the range."""
+        return min(max(position, self.lower), self.upper)
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """A joint that takes commands of its own."""
+
+    name: str  # name in the URDF
+    limits: JointLimits  # its range
+
+
+def movable_joints(urdf: str | KinematicTree) -> tuple[Joint, ...]:
+    """Return the joints that have a motor, in the order of the URDF; those that mimic do not.
+
+    Raises:
+        DescriptionError: It is no URDF, or a joint has no usable limits.
+    """
+    tree = read_urdf(urdf) if isinstance(urdf, str) else urdf
+    return tuple(Joint(joint.name, limits_of(joint)) for joint in tree.joints if joint.independent)
+
+
+def limits_of(joint: UrdfJoint) -> JointLimits:
+    """Return the range of a movable joint.
+
+    Raises:
+        DescriptionError: It has no limits, or these have no finite numbers.
+    """
+    given = joint.limit or {}
+    if missing := [key for key in ('velocity', 'effort') if key not in given]:
+        raise DescriptionError(
+            f'joint {joint.name}: a {joint.kind.value} joint needs <limit .../> with '
+            f'{" and ".join(missing)}'
+        )
+    span = joint.range
+    try:
+        effort = float(given['effort'])
+    except ValueError as error:
+        raise DescriptionError(f'joint {joint.name}: <limit> is not usable: {error}') from error
+    ends = () if joint.kind is JointKind.CONTINUOUS else (span.lower, span.upper)
+    if not all(map(math.isfinite, (*ends, span.velocity, effort))):
+        raise DescriptionError(f'joint {joint.name}: <limit> has a number that is not finite')
+    return JointLimits(span.lower, span.upper, span.velocity, effort)
+
+
+INTERRUPTED = 130  # exit code of a program that Ctrl-C ended
+
+
+def run_command(run: Callable[[Sequence[str]], int]) -> NoReturn:
+    """Run a program with the arguments of its command line, and end with its exit code."""
+    # a script's shell starts background jobs with SIGINT ignored
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        sys.exit(run(sys.argv[1:]))
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
+
+
+def run(argv: Sequence[str] | None = None) -> int:
+    """Print the URDF that the arguments request; return the exit code."""
+    parser = argparse.ArgumentParser(
+        description='Print the URDF of the quadruped.', allow_abbrev=False
+    )
+    parser.add_argument('--preset', default='lite', choices=PRESETS, help='the robot')
+    parser.add_argument('--arm', action='store_true', help='with the arm on its back')
+    parser.add_argument(
+        '--trunk-mass', type=float, metavar='KG', help="mass of the trunk instead of the preset's"
+    )
+    parser.add_argument(
+        '--base-footprint',
+        action='store_true',
+        help='with that frame on a floating joint, as /robot_description has it',
+    )
+    options = parser.parse_args(argv)
+    try:
+        urdf = robot_urdf(
+            options.preset,
+            options.arm,
+            options.trunk_mass,
+            base_footprint=options.base_footprint,
+        )
+    except DescriptionError as error:
+        sys.stderr.write(f'urdf: {error}\n')
+        return 2
+    sys.stdout.write(urdf + '\n')
+    return 0
+
+
+def main() -> None:
+    """Entry point."""
+    sys.exit(run())
+
+
+if __name__ == '__main__':
+    main()

@@ -1,13 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""State of a quadruped as its sensors measure it: SI units, frames of REP 103 and 145."""
+"""State of a quadruped as its sensors measure it, and the back end that it comes from.
+
+SI units, frames of REP 103 and 145.
+"""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 import math
+from typing import TYPE_CHECKING
 
 from .rotations import (
     about_z,
@@ -22,6 +27,9 @@ from .rotations import (
     Vector,
     yaw_of,
 )
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 MAX_TILT = 0.9  # [rad] beyond which the legs find no ground
 LOW_BATTERY, EMPTY_BATTERY = 0.2, 0.1  # charge below which it is to be charged, and useless
@@ -160,3 +168,34 @@ class RobotState:
     servo_problem: str | None = None
     # of the servos in [°C], by motor id; empty where they are not reported
     temperatures: Mapping[int, float] = field(default_factory=dict)
+
+
+class Backend(ABC):
+    """What gets joint targets and gives states, one period after the other."""
+
+    names: tuple[str, ...]  # joints in the order of states and targets
+    period: float  # time that a step takes in [s]
+
+    @abstractmethod
+    def reset(self) -> RobotState:
+        """Begin anew and return the first state."""
+
+    @abstractmethod
+    def step(self, targets: Sequence[float] | None) -> RobotState:
+        """Send targets in [rad], or nothing; return the state a period later."""
+
+    @abstractmethod
+    def observe(self) -> RobotState:
+        """Return the state of now; no time passes."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Release what the back end holds; nothing else may be called afterwards."""
+
+    def __enter__(self) -> Self:
+        """Use it in a with statement."""
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        """Close it."""
+        self.close()

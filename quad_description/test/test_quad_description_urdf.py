@@ -26,7 +26,7 @@ from quad_description import (
     robot_urdf,
     run_command,
 )
-from quad_description.urdf_command import run
+from quad_description.presets import run
 from quad_kinematics import centre_of_mass, inertia, link_pose, mass, parse, rotation
 
 pytestmark = pytest.mark.slow

@@ -24,7 +24,7 @@ from quad_description import (
     robot_urdf,
     solve,
 )
-from quad_description.kinematics.leg import calf_rotation
+from quad_description.kinematics import calf_rotation
 from quad_description.rotations import conjugate, multiply, rotation_vector
 
 pytestmark = pytest.mark.slow

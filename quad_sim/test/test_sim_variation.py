@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from quad_description import robot_urdf
-from quad_description.urdf_command import run as print_urdf
+from quad_description.presets import run as print_urdf
 from quad_sim import ServoModel, ServoParameters, Terrain
 from quad_sim.export_mjcf import run
 from quad_sim.physics import Robot, Variation

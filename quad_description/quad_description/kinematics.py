@@ -1,0 +1,461 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A quadruped: its legs and where their feet are, the order of its joints, limits and weight.
+
+The family of legs is roll - pitch - pitch: the hip turns about the body's x axis, thigh and calf
+about its y axis, at the zero pose. Link shapes may be bent and zeros may be anywhere; what matters
+are two lengths, two angles and an offset to the side, all measured in the zero pose.
+
+The kinematics of a leg are in closed form. With the foot at (x, y, z) from the hip point and d
+its offset to the side, the leg's plane is rolled by ``atan2(z, y) - atan2(depth, d)``,
+``depth = -sqrt(y^2 + z^2 - d^2)``; inside it the law of cosines gives the knee and the angle to
+the target gives the thigh. Plain floats, no arrays: this runs for four legs in every step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+from typing import Final, NamedTuple
+
+from urdf_reader import (
+    centre_of_mass,
+    DescriptionError,
+    JointKind,
+    KinematicTree,
+    link_poses,
+    Quaternion,
+    read_urdf,
+    rotate,
+    Vector,
+)
+
+from .presets import JointLimits, LEGS, limits_of, movable_joints
+
+FEET: Final = tuple(f'{leg}_foot' for leg in LEGS)
+"""Links of the feet, in the order of the legs."""
+
+BASE: Final = 'base_link'  # link of the body; else the root of the URDF is
+SPELLINGS: Final = {
+    'fl': ('fl', 'lf'),
+    'fr': ('fr', 'rf'),
+    'bl': ('bl', 'rl', 'hl', 'lh'),
+    'br': ('br', 'rr', 'hr', 'rh'),
+}
+"""How the legs are called in other URDFs, in small or large letters."""
+AXIS_TOLERANCE = 1e-6
+_TURNING = (JointKind.REVOLUTE, JointKind.CONTINUOUS)
+_EXPECTED: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.0, 0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class LegGeometry:
+    """Lengths in [m], angles in [rad]; "pitch" is the angle of a link from straight down.
+
+    A positive pitch turns the link's lower end backward (right-hand rule about y).
+    """
+
+    joints: tuple[str, str, str]  # names of the hip, thigh and calf joints
+    # point on the hip axis that is beside the thigh joint's origin, in the body's frame
+    hip: Vector
+    thigh_x: float  # thigh axis ahead of the hip point
+    thigh_z: float  # thigh axis above the hip axis
+    offset_y: float  # plane of the foot beside the hip axis, positive to the left
+    thigh_length: float  # thigh axis to calf axis
+    calf_length: float  # calf axis to the foot's centre
+    thigh_pitch: float  # pitch of the thigh at zero
+    calf_pitch: float  # pitch of the line from calf axis to foot at zero
+    signs: Vector  # sense of the three joints: 1 when positive is right-handed about +x, +y, +y
+    knee_sign: float  # 1 when the knee bends so that the calf pitches backward, else -1
+    limits: tuple[JointLimits, JointLimits, JointLimits]  # ranges of the three joints
+
+
+def body_link(tree: KinematicTree) -> str:
+    """Return the link of the body."""
+    return BASE if BASE in tree.links else tree.root
+
+
+def foot_link(tree: KinematicTree, leg: str) -> str:
+    """Return the link of a foot: ``fl_foot``, or as others call it, ``FL_foot``, ``LF_FOOT``.
+
+    Raises:
+        DescriptionError: There is none, or several.
+    """
+    names = [f'{each}_foot' for each in SPELLINGS[leg]]
+    found = [link for link in tree.links if link.lower() in names]
+    if len(found) != 1:
+        raise DescriptionError(
+            f'the foot of leg {leg} is one link named {" or ".join(names)}, in small or large '
+            f'letters; the URDF has {" and ".join(found) or "none"}: rename its links'
+        )
+    return found[0]
+
+
+def leg_geometry(tree: KinematicTree, leg: str) -> LegGeometry:
+    """Derive the geometry of a leg from the joints between the body and its foot.
+
+    Args:
+        leg: One of :data:`LEGS`.
+
+    Raises:
+        DescriptionError: Other than three turning joints move the foot, an axis points
+            elsewhere, or a length is zero.
+    """
+    body, end = body_link(tree), foot_link(tree, leg)
+    joints = [each for each in tree.chain(body, end) if each.kind is not JointKind.FIXED]
+    names = tuple(joint.name for joint in joints)
+    for joint in joints:
+        if joint.kind not in _TURNING or joint.mimic is not None:
+            raise DescriptionError(
+                f'{joint.name} is in a leg and is not a turning joint of its own'
+            )
+    if len(joints) != len(_EXPECTED):
+        raise DescriptionError(
+            f'{len(joints)} joints move {end} ({", ".join(names)}); a leg has hip, thigh and calf'
+        )
+    poses = link_poses(tree, {}, body)
+    signs = [
+        _sign(rotate(poses[joint.child].rotation, joint.axis), unit, joint.name)
+        for joint, unit in zip(joints, _EXPECTED, strict=True)
+    ]
+    hip, thigh, calf = (poses[joint.child].translation for joint in joints)
+    foot = poses[end].translation
+    thigh_length, thigh_pitch = _in_plane(thigh, calf)
+    calf_length, calf_pitch = _in_plane(calf, foot)
+    if min(thigh_length, calf_length) < AXIS_TOLERANCE:
+        raise DescriptionError(f'leg {leg}: thigh or calf has no length')
+    limits = [limits_of(joint) for joint in joints]
+    knee = limits[2].lower + limits[2].upper  # of a joint without ends, not a number
+    middle = calf_pitch - thigh_pitch + signs[2] * (knee / 2 if math.isfinite(knee) else 0.0)
+    return LegGeometry(
+        joints=(names[0], names[1], names[2]),
+        hip=hip,
+        thigh_x=thigh[0] - hip[0],
+        thigh_z=thigh[2] - hip[2],
+        offset_y=foot[1] - hip[1],
+        thigh_length=thigh_length,
+        calf_length=calf_length,
+        thigh_pitch=thigh_pitch,
+        calf_pitch=calf_pitch,
+        signs=(signs[0], signs[1], signs[2]),
+        knee_sign=math.copysign(1.0, middle),
+        limits=(limits[0], limits[1], limits[2]),
+    )
+
+
+def _sign(axis: Vector, unit: Vector, name: str) -> float:
+    along = sum(a * b for a, b in zip(axis, unit, strict=True))
+    if abs(abs(along) - 1.0) > AXIS_TOLERANCE:
+        raise DescriptionError(
+            f'{name} turns about {[round(part, 3) for part in axis]} of the body; hips must turn '
+            'about x, thighs and calves about y'
+        )
+    return math.copysign(1.0, along)
+
+
+def _in_plane(upper: Vector, lower: Vector) -> tuple[float, float]:
+    """Return length and pitch of a link, seen from the side."""
+    x, z = lower[0] - upper[0], lower[2] - upper[2]
+    return math.hypot(x, z), math.atan2(-x, -z)
+
+
+@dataclass(frozen=True, slots=True)
+class LegSolution:
+    """Joint positions for a foot."""
+
+    angles: Vector  # hip, thigh, calf in [rad], always within the limits
+    reachable: bool  # whether they bring the foot to where it was requested
+    # distance of the foot from the edge of the reach in [m], negative outside; joint limits are
+    # not counted
+    margin: float
+
+
+def solve(leg: LegGeometry, foot: Vector) -> LegSolution:
+    """Return the joint positions for a foot, the nearest ones when it is out of reach.
+
+    Args:
+        foot: Centre of the foot in the body's frame in [m].
+    """
+    hip, one, two = leg.hip, leg.thigh_length, leg.calf_length
+    x = foot[0] - hip[0] - leg.thigh_x
+    y, z = foot[1] - hip[1], foot[2] - hip[2]
+    side = math.hypot(y, z)
+    depth = -math.sqrt(max(side * side - leg.offset_y * leg.offset_y, 0.0))
+    roll = wrapped(math.atan2(z, y) - math.atan2(depth, leg.offset_y))
+    z = depth - leg.thigh_z
+    reach = math.hypot(x, z)
+    margin = min(one + two - reach, reach - abs(one - two), side - abs(leg.offset_y))
+    cosine = (reach * reach - one * one - two * two) / (2.0 * one * two)
+    knee = leg.knee_sign * math.acos(min(max(cosine, -1.0), 1.0))
+    thigh = math.atan2(-x, -z) - math.atan2(two * math.sin(knee), one + two * math.cos(knee))
+    wanted = (
+        leg.signs[0] * roll,
+        leg.signs[1] * wrapped(thigh - leg.thigh_pitch),
+        leg.signs[2] * wrapped(knee + leg.thigh_pitch - leg.calf_pitch),
+    )
+    limits = leg.limits
+    angles = (
+        limits[0].clamp(wanted[0]),
+        limits[1].clamp(wanted[1]),
+        limits[2].clamp(wanted[2]),
+    )
+    return LegSolution(angles, margin >= 0.0 and angles == wanted, margin)
+
+
+def foot_position(leg: LegGeometry, angles: Vector) -> Vector:
+    """Return the centre of the foot in the body's frame in [m].
+
+    Args:
+        angles: Hip, thigh, calf in [rad].
+    """
+    roll, upper, lower = _pitches(leg, angles)
+    x = leg.thigh_x - leg.thigh_length * math.sin(upper) - leg.calf_length * math.sin(lower)
+    z = leg.thigh_z - leg.thigh_length * math.cos(upper) - leg.calf_length * math.cos(lower)
+    y, sine, cosine = leg.offset_y, math.sin(roll), math.cos(roll)
+    return (leg.hip[0] + x, leg.hip[1] + y * cosine - z * sine, leg.hip[2] + y * sine + z * cosine)
+
+
+def calf_rotation(leg: LegGeometry, angles: Vector) -> Quaternion:
+    """Return how calf and foot are turned against the zero pose, in the body's frame.
+
+    Args:
+        angles: Hip, thigh, calf in [rad].
+    """
+    roll = leg.signs[0] * angles[0] / 2
+    pitch = (leg.signs[1] * angles[1] + leg.signs[2] * angles[2]) / 2
+    sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
+    return sr * cp, cr * sp, sr * sp, cr * cp
+
+
+def jacobian(leg: LegGeometry, angles: Vector) -> tuple[Vector, Vector, Vector]:
+    """Return the derivative of the foot's position by each joint, one column after another.
+
+    Args:
+        angles: Hip, thigh, calf in [rad].
+    """
+    roll, upper, lower = _pitches(leg, angles)
+    sine, cosine = math.sin(roll), math.cos(roll)
+    lower_x = -leg.calf_length * math.cos(lower)
+    lower_z = leg.calf_length * math.sin(lower)
+    both_x = lower_x - leg.thigh_length * math.cos(upper)
+    both_z = lower_z + leg.thigh_length * math.sin(upper)
+    _, y, z = foot_position(leg, angles)
+    hip, pitch, knee = leg.signs
+    return (
+        (0.0, -hip * (z - leg.hip[2]), hip * (y - leg.hip[1])),
+        (pitch * both_x, -pitch * both_z * sine, pitch * both_z * cosine),
+        (knee * lower_x, -knee * lower_z * sine, knee * lower_z * cosine),
+    )
+
+
+def _pitches(leg: LegGeometry, angles: Vector) -> Vector:
+    """Return the roll of the leg's plane, and the pitches of thigh and calf in it."""
+    hip, thigh, calf = (sign * angle for sign, angle in zip(leg.signs, angles, strict=True))
+    return hip, thigh + leg.thigh_pitch, thigh + calf + leg.calf_pitch
+
+
+def wrapped(angle: float) -> float:
+    """Return the same direction within -pi to pi [rad]."""
+    return math.remainder(angle, math.tau)
+
+
+MAX_GAP = 0.005  # [m] above the plane of the other three, of a foot that stands
+
+
+def raised_feet(feet: Sequence[Vector]) -> tuple[str, ...]:
+    """Return the feet that are in the air while the other three stand, whatever their plane.
+
+    With one foot or a diagonal pair lifted, the robot rocks: both feet of the diagonal are raised.
+
+    Args:
+        feet: Their centres in the body, in the order of FEET [m].
+    """
+    raised = []
+    for index, link in enumerate(FEET):
+        a, b, c = (foot for other, foot in enumerate(feet) if other != index)
+        normal = _cross(_difference(b, a), _difference(c, a))
+        length = math.copysign(math.hypot(*normal), normal[2])  # up, in the body
+        way = _difference(feet[index], a)
+        height = sum(n * w for n, w in zip(normal, way, strict=True))
+        if length and height / length > MAX_GAP:
+            raised.append(link)
+    return tuple(raised)
+
+
+def _difference(one: Vector, other: Vector) -> Vector:
+    return one[0] - other[0], one[1] - other[1], one[2] - other[2]
+
+
+def _cross(one: Vector, other: Vector) -> Vector:
+    return (
+        one[1] * other[2] - one[2] * other[1],
+        one[2] * other[0] - one[0] * other[2],
+        one[0] * other[1] - one[1] * other[0],
+    )
+
+
+Targets = tuple[float, ...]
+"""One position in [rad] or [m] for each commanded joint, in the order of the URDF."""
+
+Feet = tuple[Vector, Vector, Vector, Vector]
+"""Centres of the feet in the body's frame in [m], in the order of :data:`LEGS`."""
+
+BALANCE_PASSES = 3  # the centre of mass moves with the legs; this many passes settle to 0.1 mm
+
+
+class FootPose(NamedTuple):
+    """Where a foot is."""
+
+    position: Vector  # of its centre in [m]
+    # how it is turned against the zero pose, in what the position is given in
+    rotation: Quaternion
+
+
+@dataclass(frozen=True, slots=True)
+class Quadruped:
+    """A robot."""
+
+    tree: KinematicTree  # what the URDF says
+    names: tuple[str, ...]  # commanded joints in the order of the URDF
+    limits: tuple[JointLimits, ...]  # their ranges, in the same order
+    legs: tuple[LegGeometry, ...]  # the four legs in the order of :data:`LEGS`
+    # for each leg the places of hip, thigh and calf in ``names``
+    leg_indices: tuple[tuple[int, int, int], ...]
+    mass: float  # weight of all links in [kg]
+    foot_radius: float  # of the ball that a foot is in [m]; 0 where the URDF has none
+
+    @property
+    def hip_centre(self) -> Vector:
+        """Mean of the hip points in the body's frame in [m]."""
+        hips = [leg.hip for leg in self.legs]
+        x, y, z = (sum(axis) / len(hips) for axis in zip(*hips, strict=True))
+        return x, y, z
+
+    @property
+    def leg_length(self) -> float:
+        """Thigh and calf of the first leg in [m]."""
+        return self.legs[0].thigh_length + self.legs[0].calf_length
+
+    @property
+    def others(self) -> tuple[int, ...]:
+        """Places of the joints that belong to no leg (those of an arm)."""
+        taken = {index for indices in self.leg_indices for index in indices}
+        return tuple(index for index in range(len(self.names)) if index not in taken)
+
+    def leg_angles(self, positions: Sequence[float]) -> list[Vector]:
+        """Return the joint positions of each leg from those of all joints [rad]."""
+        return [(positions[a], positions[b], positions[c]) for a, b, c in self.leg_indices]
+
+    def feet(self, positions: Sequence[float]) -> Feet:
+        """Return where the feet are for the positions of the joints [rad].
+
+        Args:
+            positions: In the order of ``names``; what comes behind the legs may be left out.
+        """
+        one, two, three, four = (
+            foot_position(leg, angles)
+            for leg, angles in zip(self.legs, self.leg_angles(positions), strict=True)
+        )
+        return one, two, three, four
+
+    def foot_poses(self, positions: Sequence[float]) -> list[FootPose]:
+        """Return where the feet are and how they are turned, as :meth:`feet`."""
+        pairs = zip(self.legs, self.leg_angles(positions), strict=True)
+        return [FootPose(foot_position(*pair), calf_rotation(*pair)) for pair in pairs]
+
+    def standing_height(self, positions: Sequence[float]) -> float:
+        """Return how high a level base_link is above ground that its lowest foot touches [m]."""
+        return self.foot_radius - min(z for _, _, z in self.feet(positions))
+
+    def solve(self, feet: Sequence[Vector]) -> list[LegSolution]:
+        """Return the joint positions of each leg for where the feet shall be."""
+        return [solve(leg, foot) for leg, foot in zip(self.legs, feet, strict=True)]
+
+    def place(self, solutions: Sequence[LegSolution], others: Sequence[float]) -> Targets:
+        """Put the legs' joint positions among those of all joints.
+
+        Args:
+            others: Positions of all joints; those of the legs in it are replaced.
+        """
+        return self.with_legs([solution.angles for solution in solutions], others)
+
+    def with_legs(self, angles: Sequence[Vector], others: Sequence[float]) -> Targets:
+        """Do as :meth:`place` with positions of hip, thigh and calf of each leg [rad]."""
+        targets = list(others)
+        for (hip, thigh, calf), leg in zip(self.leg_indices, angles, strict=True):
+            targets[hip], targets[thigh], targets[calf] = leg
+        return tuple(targets)
+
+    def clamp(self, positions: Sequence[float]) -> Targets:
+        """Return the nearest positions within the limits."""
+        return tuple(
+            limits.clamp(position) for limits, position in zip(self.limits, positions, strict=True)
+        )
+
+    def footprint(self, height: float, positions: Sequence[float]) -> Feet:
+        """Return where the feet stand with the centre of mass over their middle.
+
+        Args:
+            height: Hip axes above the centres of the feet in [m].
+            positions: Positions of all joints in [rad]; of interest for an arm, whose weight
+                moves the centre of mass.
+
+        Raises:
+            DescriptionError: The legs do not reach so far.
+        """
+        placed: Sequence[float] = positions
+        shift = 0.0
+        for _ in range(BALANCE_PASSES):
+            feet = self._feet_below(shift, height)
+            solutions = self.solve(feet)
+            if not all(solution.reachable for solution in solutions):
+                raise DescriptionError(
+                    f'the legs do not reach a height of {height:.3f} m; set nominal_height and '
+                    f'lie_height between folded and straight legs ({self.leg_length:.3f} m)'
+                )
+            placed = self.place(solutions, placed)
+            named = dict(zip(self.names, placed, strict=True))
+            centre = centre_of_mass(
+                self.tree.masses(), link_poses(self.tree, named, body_link(self.tree))
+            )
+            if centre is None:
+                raise DescriptionError('the robot description has no masses (inertial/mass)')
+            shift = centre[0] - self.hip_centre[0]
+        return self._feet_below(shift, height)
+
+    def _feet_below(self, shift: float, height: float) -> Feet:
+        one, two, three, four = (
+            (leg.hip[0] + shift, leg.hip[1] + leg.offset_y, leg.hip[2] - height)
+            for leg in self.legs
+        )
+        return one, two, three, four
+
+
+def quadruped(urdf: str) -> Quadruped:
+    """Make the model of a robot from its URDF.
+
+    Raises:
+        DescriptionError: It is no URDF of a quadruped whose legs turn about x, y and y.
+    """
+    tree = read_urdf(urdf)
+    joints = movable_joints(tree)
+    names = tuple(joint.name for joint in joints)
+    legs = tuple(leg_geometry(tree, leg) for leg in LEGS)
+    shapes = (*tree.collisions(), *tree.visuals())
+    foot = foot_link(tree, LEGS[0])
+    feet = (each for each in shapes if each.link == foot and each.shape == 'sphere')
+    return Quadruped(
+        tree=tree,
+        names=names,
+        limits=tuple(joint.limits for joint in joints),
+        legs=legs,
+        leg_indices=tuple(_indices(names, leg) for leg in legs),
+        mass=sum(point.mass for point in tree.masses()),
+        foot_radius=next((foot.lengths('radius')[0] for foot in feet), 0.0),
+    )
+
+
+def _indices(names: Sequence[str], leg: LegGeometry) -> tuple[int, int, int]:
+    hip, thigh, calf = (names.index(name) for name in leg.joints)
+    return hip, thigh, calf
