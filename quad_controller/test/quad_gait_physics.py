@@ -21,7 +21,7 @@ from quad_description import quadruped, robot_urdf, RobotState, Targets
 from quad_sim import ServoModel as Servos
 from quad_sim import Terrain
 from quad_sim.physics import Meter, PhysicsBackend, Robot
-from quad_sim.plant.terrain import FLAT
+from quad_sim.state import FLAT
 
 PERIOD = 0.02  # [s]
 URDF = robot_urdf()

@@ -34,7 +34,7 @@ from quad_hardware.estimation.odometry import LegOdometry
 from quad_sim import ServoModel as ServoModels
 from quad_sim import Terrain
 from quad_sim.physics import PhysicsBackend, Robot
-from quad_sim.plant.servo import parse_servo
+from quad_sim.plant import parse_servo
 
 pytestmark = pytest.mark.slow
 

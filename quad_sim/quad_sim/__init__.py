@@ -18,10 +18,10 @@ damage.
 """
 
 from .exceptions import SetupError, SimulationError, TargetError
-from .line.command_times import CommandTiming
-from .plant.servo import parse_servo, ServoModel, ServoParameters
-from .plant.terrain import Terrain
+from .plant import parse_servo, ServoModel, ServoParameters
+from .robot_line import CommandTiming
 from .served import ServedRobot, Watched
+from .state import Terrain
 
 __all__ = [
     'CommandTiming',

@@ -12,7 +12,7 @@ import sys
 from quad_description import DescriptionError, PRESETS, robot_urdf
 
 from .exceptions import SetupError
-from .plant.servo import parse_servo
+from .plant import parse_servo
 
 
 def run(arguments: Sequence[str]) -> int:

@@ -16,9 +16,8 @@ from types import FrameType
 from process_supervisor import ServiceManager, split_ros_arguments
 
 from .exceptions import SimulationError
-from .line.pseudo_terminal import PseudoTerminal
-from .line.server import Server
 from .options import build, parse_arguments
+from .server import PseudoTerminal, Server
 
 
 def run(argv: Sequence[str] | None = None) -> int:

@@ -23,11 +23,11 @@ from quad_description.rotations import Vector
 from quad_msgs.msg import FootContacts
 from quad_msgs.srv import InjectFault, Push
 
-from .board.board import POSE_TIME
+from .board import POSE_TIME
 from .exceptions import SetupError
-from .line.faults import FOREVER, make_fault
-from .line.server import Server
+from .faults import FOREVER, make_fault
 from .options import Simulation
+from .server import Server
 
 TRUTH_PERIOD = 0.05  # [s]
 ANSWER_TIMEOUT = 1.0  # [s] the loop answers within milliseconds

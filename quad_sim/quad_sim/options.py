@@ -13,15 +13,13 @@ from pathlib import Path
 from quad_description import Pose, pose_positions, PRESETS, robot_urdf
 from quad_hardware.protocol import Model, Protocol, V1, V2
 
-from .board.board import Board
-from .board.servos import Mount, Plant
+from .board import Board
 from .exceptions import SetupError, SimulationError
-from .line.faults import FaultKind, FaultPlan, parse_fault, SETTINGS
-from .line.robot_line import RobotLine
-from .plant.plant import KinematicRobot
-from .plant.servo import parse_servo
-from .plant.state import BOARD, NONE
-from .plant.terrain import Terrain
+from .faults import FaultKind, FaultPlan, parse_fault, SETTINGS
+from .plant import KinematicRobot, parse_servo
+from .robot_line import RobotLine
+from .servos import Mount, Plant
+from .state import BOARD, NONE, Terrain
 
 DEFAULT_LINK = Path('/tmp/xgo')  # noqa: S108  the path that the documentation names
 SETTLE_TIME = 1.0  # [s] until a robot that was put down is at rest

@@ -24,15 +24,14 @@ from typing import Any, cast, TYPE_CHECKING
 from quad_description import Pose, pose_positions, robot_urdf
 
 from .exceptions import SetupError, SimulationError
-from .line.command_times import CommandTiming
-from .line.pseudo_terminal import PseudoTerminal
-from .line.server import Server
 from .options import build, parse_arguments, Simulation
+from .robot_line import CommandTiming
+from .server import PseudoTerminal, Server
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-    from .physics.meter import Metered
+    from .physics.backend import Metered
 
 START_TIME = 120.0  # [s] in which the process has to be there, on a machine that has much to do
 ANSWER_TIME = 40.0  # [s]

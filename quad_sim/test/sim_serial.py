@@ -13,9 +13,8 @@ import time
 import serial
 
 from quad_hardware.protocol import Frame, Protocol, ROBOT_KINDS, StreamParser, V2
-from quad_sim.line.pseudo_terminal import PseudoTerminal
-from quad_sim.line.server import Server
 from quad_sim.options import build, parse_arguments, Simulation
+from quad_sim.server import PseudoTerminal, Server
 
 TEST_TIMEOUT = 10.0  # [s] until a test gives up
 

@@ -19,7 +19,7 @@ from quad_hardware.calibration.servos import calibrate_servos
 from quad_hardware.calibration.wizard import Console
 from quad_hardware.joints import servo_of
 from quad_hardware.protocol import Protocol, V1, V2
-from quad_sim.plant.servo import parse_servo
+from quad_sim.plant import parse_servo
 
 pytestmark = pytest.mark.slow
 

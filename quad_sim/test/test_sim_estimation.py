@@ -25,7 +25,7 @@ from quad_hardware.estimation import OdometrySettings
 from quad_hardware.estimation.odometry import LegOdometry
 from quad_sim import ServoModel, Terrain
 from quad_sim.physics import Robot
-from quad_sim.plant.terrain import FLAT
+from quad_sim.state import FLAT
 
 pytestmark = pytest.mark.slow
 

@@ -17,9 +17,9 @@ from sim_virtual import VirtualRobot
 
 from quad_hardware.protocol import Code, Fault, Frame, Kind, V2
 from quad_sim import SetupError
-from quad_sim.line.faults import Fault as LineFault
-from quad_sim.line.faults import FaultKind, FaultPlan, make_fault, parse_fault
-from quad_sim.line.wire import Wire
+from quad_sim.faults import Fault as LineFault
+from quad_sim.faults import FaultKind, FaultPlan, make_fault, parse_fault
+from quad_sim.robot_line import Wire
 from quad_state_frames import read_state
 
 KINEMATIC = ('--physics', 'none', '--noise', 'none')

@@ -16,7 +16,7 @@ from quad_description import movable_joints, Pose, pose_positions, robot_urdf
 from quad_description.rotations import rotate, yaw_of
 from quad_sim import ServoModel, ServoParameters, SetupError, SimulationError, TargetError, Terrain
 from quad_sim.physics import Robot
-from quad_sim.plant.state import BOARD, ENCODER_STEP
+from quad_sim.state import BOARD, ENCODER_STEP
 
 URDF = robot_urdf('mini')
 GRAVITY = 9.81  # [m/s2]

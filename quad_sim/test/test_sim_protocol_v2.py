@@ -26,7 +26,7 @@ from quad_hardware.protocol import (
     V1,
     V2,
 )
-from quad_sim.board.power import Overload, OVERLOAD_TIME
+from quad_sim.board import Overload, OVERLOAD_TIME
 from quad_state_frames import read_state
 
 KINEMATIC = ('--physics', 'none', '--noise', 'none')

@@ -23,7 +23,7 @@ from quad_hardware.protocol import (
     V1,
     V2,
 )
-from quad_sim.board.board import MAX_LAG
+from quad_sim.board import MAX_LAG
 
 pytestmark = pytest.mark.slow
 

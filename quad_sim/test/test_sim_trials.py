@@ -18,9 +18,9 @@ from quad_description import robot_urdf
 from quad_hardware.protocol import Code, Frame, Kind
 from quad_sim import CommandTiming, ServedRobot, ServoModel, SimulationError, Terrain
 from quad_sim.env import WalkingEnv
-from quad_sim.line.command_times import CommandTimes
 from quad_sim.options import build, parse_arguments
 from quad_sim.physics import Meter, PhysicsBackend, Robot, Variation
+from quad_sim.robot_line import CommandTimes
 
 URDF = robot_urdf()
 DEADLINE = 60.0  # [s]

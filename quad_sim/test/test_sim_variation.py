@@ -19,7 +19,7 @@ from quad_sim.export_mjcf import run
 from quad_sim.physics import Robot, Variation
 from quad_sim.physics.model import build_model
 from quad_sim.physics.robot import TIMESTEP
-from quad_sim.plant.servo import parse_servo
+from quad_sim.plant import parse_servo
 
 FIRM = ServoModel.FIRM.parameters
 

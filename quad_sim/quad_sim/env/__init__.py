@@ -17,9 +17,14 @@ Many at once, spread over the cores::
 from gymnasium.envs.registration import register
 
 from .processes import ProcessVectorEnv
-from .randomization import NO_RANDOMIZATION, Randomization
-from .rewards import RewardWeights
-from .walking import CommandRanges, Observation, WalkingEnv
+from .walking import (
+    CommandRanges,
+    NO_RANDOMIZATION,
+    Observation,
+    Randomization,
+    RewardWeights,
+    WalkingEnv,
+)
 
 ID = 'quad_sim/Walk-v0'
 

@@ -1,11 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Walking as commanded: the environment, another robot in each episode."""
+"""Walking as commanded: the environment, another robot in each episode, and what a step is worth.
+
+The terms of the reward are as in legged_gym (Rudin et al., 2022).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from enum import Enum
 import math
 from typing import Any
@@ -28,11 +31,184 @@ from quad_description.rotations import down_in_body, Vector
 
 from ..exceptions import SetupError, TargetError
 from ..physics import ImuBias, Robot
+from ..physics.model import Variation
 from ..physics.robot import TIMESTEP
-from ..plant.servo import ServoModel, ServoParameters
-from ..plant.terrain import FLAT, Terrain
-from .randomization import check_range, NO_RANDOMIZATION, Randomization, Range
-from .rewards import Motion, RewardWeights
+from ..plant import ServoModel, ServoParameters
+from ..state import Array, BaseVelocity, BOARD, FLAT, Noise, NONE, Terrain
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """What a step brought about."""
+
+    velocity: BaseVelocity  # how base_link moves
+    tilt: float  # angle between its z axis and up in [rad]
+    down: Vector  # direction of gravity in base_link
+    torques: Array  # of the joints in [N m]
+    velocities: Array  # of the joints in [rad/s]
+    target_speed: Array  # of the targets since the step before in [rad/s]
+
+    @property
+    def power(self) -> float:
+        """Of the servos' torques, before the damping of their motors, in [W]."""
+        return float(abs(self.torques * self.velocities).sum())
+
+    @property
+    def action_rate(self) -> float:
+        """Square of the speed of the targets in [rad2/s2]."""
+        return float((self.target_speed * self.target_speed).sum())
+
+
+@dataclass(frozen=True, slots=True)
+class RewardWeights:
+    """Weights of the terms of a second, of which a step has its part; a fall counts once."""
+
+    tracking: float = 2.0  # exp(-(error / tracking_width)^2) of the linear velocity
+    turning: float = 1.0  # exp(-(error / turning_width)^2) of the turning
+    vertical: float = -2.0  # square of the velocity up and down in [m2/s2]
+    rolling: float = -0.05  # square of the turning about x and y in [rad2/s2]
+    level: float = -2.0  # square of the sine of the tilt
+    power: float = -0.02  # of the servos' torques, before the damping of their motors, in [W]
+    action_rate: float = -0.002  # square of the speed of the targets in [rad2/s2]
+    fall: float = -5.0  # of a fall
+    tracking_width: float = 0.1  # [m/s]
+    turning_width: float = 0.4  # [rad/s]
+
+    def __post_init__(self) -> None:
+        """Refuse numbers of which no reward can be made."""
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not math.isfinite(value) or (field.name.endswith('_width') and value <= 0.0):
+                raise SetupError(f'{field.name} {value}: give a finite number, a width above 0')
+
+    def terms(
+        self, motion: Motion, commanded: Vector, period: float, *, fallen: bool
+    ) -> dict[str, float]:
+        """Return what each term is worth in one step.
+
+        Args:
+            commanded: Velocity ahead and to the left in [m/s], turning in [rad/s].
+        """
+        (x, y, up), (roll, pitch, yaw) = motion.velocity.linear, motion.velocity.angular
+        wanted_x, wanted_y, wanted_yaw = commanded
+        off = math.hypot(x - wanted_x, y - wanted_y)
+        tilt = motion.down[0] ** 2 + motion.down[1] ** 2
+        rates = {
+            'tracking': self.tracking * _nearness(off, self.tracking_width),
+            'turning': self.turning * _nearness(yaw - wanted_yaw, self.turning_width),
+            'vertical': self.vertical * up * up,
+            'rolling': self.rolling * (roll * roll + pitch * pitch),
+            'level': self.level * tilt,
+            'power': self.power * motion.power,
+            'action_rate': self.action_rate * motion.action_rate,
+        }
+        worth = {name: period * rate for name, rate in rates.items()}
+        return worth | {'fall': self.fall if fallen else 0.0}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the terms."""
+        return tuple(field.name for field in fields(self) if not field.name.endswith('_width'))
+
+
+def _nearness(error: float, width: float) -> float:
+    return math.exp(-((error / width) ** 2))
+
+
+Range = tuple[float, float]
+# as in Variation
+_VARIED = (
+    *('friction', 'trunk_mass', 'stiffness', 'damping'),
+    *('delay', 'backlash', 'refresh', 'bumps'),
+)
+_FIXED = {'kick_interval', 'noise'}  # no ranges
+
+
+def check_range(name: str, span: Range) -> None:
+    """Refuse what is not two finite numbers, the lower one first.
+
+    Raises:
+        SetupError: With the name.
+    """
+    if len(span) != 2 or not -math.inf < span[0] <= span[1] < math.inf:
+        raise SetupError(f'{name} {span}: give two finite numbers, the lower one first')
+
+
+@dataclass(frozen=True, slots=True)
+class Randomization:
+    """Ranges from which each episode draws, all alike likely."""
+
+    friction: Range = (0.4, 1.3)  # under the feet
+    trunk_mass: Range = (0.9, 1.25)  # factor of the mass of the trunk
+    stiffness: Range = (0.8, 1.2)  # factor of the servos' stiffness; alike likely in ratio
+    damping: Range = (0.8, 1.2)  # factor of their damping
+    delay: Range = (0.0, 0.04)  # of targets, beside that of the servos, in [s]
+    backlash: Range = (0.0, 0.01)  # free play, beside that of the servos, in [rad]
+    refresh: Range = (0.0, 0.04)  # time between two targets, beside that of the servos, in [s]
+    bumps: Range = (0.0, 1.0)  # factor of the height of the terrain's
+    gyro_bias: Range = (-0.05, 0.05)  # of each axis of the gyro in [rad/s]
+    level_bias: Range = (-0.02, 0.02)  # of measured roll and pitch in [rad]
+    kick: Range = (-0.4, 0.4)  # change of the velocity at once, ahead and to the side, in [m/s]
+    kick_interval: float = 4.0  # mean time between two kicks in [s]; 0 for none
+    noise: Noise = BOARD  # of the sensors
+
+    def __post_init__(self) -> None:
+        """Refuse what nothing can be drawn from."""
+        for field in fields(self):
+            if field.name not in _FIXED:
+                check_range(field.name, getattr(self, field.name))
+        for end in (0, 1):  # refuses what no robot has
+            Variation(*(getattr(self, name)[end] for name in _VARIED))
+        if not 0.0 <= self.kick_interval < math.inf:
+            raise SetupError(f'kick_interval {self.kick_interval} s: give 0 or a finite time')
+
+    def variation(self, random: np.random.Generator) -> Variation:
+        """Draw a robot and its ground."""
+        drawn = {name: float(random.uniform(*getattr(self, name))) for name in _VARIED}
+        softest, stiffest = map(math.log, self.stiffness)
+        return Variation(**drawn | {'stiffness': math.exp(random.uniform(softest, stiffest))})
+
+    def scaled(self, share: float) -> Randomization:
+        """Return ranges that are nearer to the robot as it is; kicks are weaker. Noise stays.
+
+        Args:
+            share: 0 for the robot as it is, 1 for these ranges.
+
+        Raises:
+            SetupError: The share is not from 0 to 1.
+        """
+        if not 0.0 <= share <= 1.0:
+            raise SetupError(f'share {share}: give 0 to 1')
+        spans: dict[str, Any] = {
+            field.name: tuple(
+                (1.0 - share) * none + share * end
+                for none, end in zip(
+                    getattr(NO_RANDOMIZATION, field.name), getattr(self, field.name), strict=True
+                )
+            )
+            for field in fields(self)
+            if field.name not in _FIXED
+        }
+        return replace(self, **spans)
+
+
+NO_RANDOMIZATION = Randomization(
+    friction=(0.8, 0.8),
+    trunk_mass=(1.0, 1.0),
+    stiffness=(1.0, 1.0),
+    damping=(1.0, 1.0),
+    delay=(0.0, 0.0),
+    backlash=(0.0, 0.0),
+    refresh=(0.0, 0.0),
+    bumps=(1.0, 1.0),
+    gyro_bias=(0.0, 0.0),
+    level_bias=(0.0, 0.0),
+    kick=(0.0, 0.0),
+    kick_interval=0.0,
+    noise=NONE,
+)
+"""The robot as it is, on level ground, with ideal sensors."""
+
 
 PERIOD = 0.02  # [s]
 MAX_TILT = math.radians(70.0)  # as in the vendor's training (luwu_mjlab)

@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The robot in MuJoCo; the only part of the simulation that needs it."""
 
-from .backend import ImuBias, PhysicsBackend
-from .meter import Meter, Metered
+from .backend import ImuBias, Meter, Metered, PhysicsBackend
+from .model import Variation
 from .robot import Robot
-from .variation import Variation
 
 __all__ = ['ImuBias', 'Meter', 'Metered', 'PhysicsBackend', 'Robot', 'Variation']

@@ -6,11 +6,89 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import math
 
-from quad_description import Backend, ImuSample, JointSample, RobotState
+import numpy as np
+
+from quad_description import Backend, ImuSample, JointSample, movable_joints, RobotState
 from quad_description.rotations import from_rpy, Quaternion, Vector
 
+from ..state import BasePose
 from .robot import Robot
+
+SATURATED = 0.98  # share of a limit from which on a servo is at it
+
+
+@dataclass(frozen=True, slots=True)
+class Metered:
+    """What a robot did in some time."""
+
+    time: float  # how long in [s]
+    x: float  # way ahead, in the robot's own frame, in [m]
+    y: float  # way to the left in [m]
+    yaw: float  # turning in [rad]
+    path: float  # length of the way over the ground in [m]
+    tilt: float  # largest tilt in [rad]
+    energy: float  # mechanical work of the servos in [J]: the sum of all joints' absolute power
+    weight: float  # of the robot in [N]
+    # share of the time that a servo is at its largest torque, mean of all
+    torque_saturation: float
+    speed_saturation: float  # share of the time that a joint is at its largest speed, mean of all
+
+
+class Meter:
+    """Adds up what a robot does between two calls of :meth:`sample`, 20 ms apart or less."""
+
+    def __init__(self, robot: Robot, urdf: str) -> None:
+        """Begin now."""
+        limits = [joint.limits for joint in movable_joints(urdf)]
+        self._efforts = np.array([each.effort for each in limits])
+        self._speeds = np.array([each.velocity for each in limits])
+        self._robot = robot
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin anew; also after a reset of the robot."""
+        self._start = self._time = self._robot.time
+        self._pose: BasePose = self._robot.base_pose
+        self._way = np.zeros(3)
+        self._path = self._tilt = self._energy = 0.0
+        self._torque_time = self._speed_time = 0.0
+
+    def sample(self) -> None:
+        """Sample the robot."""
+        robot, before = self._robot, self._pose
+        passed, self._time = robot.time - self._time, robot.time
+        self._pose = after = robot.base_pose
+        dx, dy = (b - a for a, b in zip(before.position[:2], after.position[:2], strict=True))
+        heading, turned = before.roll_pitch_yaw[2], after.roll_pitch_yaw[2]
+        cos, sin = math.cos(heading), math.sin(heading)
+        yaw = math.remainder(turned - heading, math.tau)
+        self._way += (dx * cos + dy * sin, dy * cos - dx * sin, yaw)
+        self._path += math.hypot(dx, dy)
+        self._tilt = max(self._tilt, after.tilt)
+        torques, speeds = np.abs(robot.joint_torques), np.abs(robot.joint_velocities)
+        self._energy += passed * float(torques @ speeds)
+        self._torque_time += passed * float(np.mean(torques >= SATURATED * self._efforts))
+        self._speed_time += passed * float(np.mean(speeds >= SATURATED * self._speeds))
+
+    def read(self) -> Metered:
+        """Return what came together since :meth:`begin`."""
+        time = self._time - self._start
+        x, y, yaw = self._way.tolist()
+        return Metered(
+            time=time,
+            x=x,
+            y=y,
+            yaw=yaw,
+            path=self._path,
+            tilt=self._tilt,
+            energy=self._energy,
+            weight=9.81 * self._robot.mass,
+            torque_saturation=self._torque_time / time if time > 0.0 else 0.0,
+            speed_saturation=self._speed_time / time if time > 0.0 else 0.0,
+        )
+
 
 PERIOD = 0.02  # [s]
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A MuJoCo model from the robot's URDF: free base, floor, servos and sensors.
+"""A MuJoCo model from the robot's URDF: free base, floor, servos, sensors; its IMU and variations.
 
 All parts of the robot touch the floor. Its legs touch each other and the trunk; the parts of one
 leg, which its joint limits keep apart, and an arm touch nothing of the robot.
@@ -9,7 +9,9 @@ leg, which its joint limits keep apart, and an arm touch nothing of the robot.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import combinations
+import math
 from typing import Final
 from xml.etree import ElementTree as ET
 
@@ -18,11 +20,11 @@ import numpy as np
 from urdf_reader import JointKind, read_urdf
 
 from quad_description import body_link, FEET, foot_link, Joint, LEGS, movable_joints
+from quad_description.rotations import roll_pitch_yaw, Vector
 
 from ..exceptions import SetupError
-from ..plant.servo import JAW, ServoParameters
-from ..plant.state import Array
-from ..plant.terrain import Terrain
+from ..plant import JAW, ServoParameters
+from ..state import Array, Imu, Terrain
 
 BASE: Final = 'base_link'
 IMU: Final = 'imu_link'
@@ -283,3 +285,150 @@ def _add_sensors(spec: mujoco.MjSpec) -> None:
             objtype=mujoco.mjtObj.mjOBJ_SITE,
             objname=foot,
         )
+
+
+BANDWIDTH: Final = 20.0  # [Hz] of the accelerometer's low-pass, as IMU chips have one
+
+
+def base_rotation(data: mujoco.MjData) -> Array:
+    """Return the rotation of base_link to the world, of the positions as they are now."""
+    return _matrix(data.qpos[3:7])
+
+
+def vector(array: Array) -> Vector:
+    """Return three numbers of an array."""
+    x, y, z = array.tolist()
+    return x, y, z
+
+
+class InertialUnit:
+    """What imu_link feels. :meth:`sample` goes with every step of the physics."""
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Fix the unit to the robot.
+
+        Args:
+            model: With the sensors of :func:`~.model.build_model`.
+            data: What it feels; its arrays stay where they are.
+        """
+        self._data = data
+        self._accelerometer = _readings(model, data, ACCELEROMETER)
+        self._gyro = _readings(model, data, GYRO)
+        self._imu_to_base = _matrix(model.body(IMU).quat)
+        self._gravity = np.array([0.0, 0.0, -model.opt.gravity[2]])
+        self._share = 1.0 - math.exp(-2.0 * math.pi * BANDWIDTH * model.opt.timestep)
+        self._force: Array = np.zeros(3)
+        self._change: Array = np.zeros(3)
+        self.rest()
+
+    def rest(self) -> None:
+        """Be at rest: a low-pass that begins at zero would report a fall."""
+        self._force = self._rotation().T @ self._gravity
+
+    def sample(self) -> None:
+        """Filter what the accelerometer measures now."""
+        # in place: this is done 500 times a second of the simulation
+        change = self._change
+        np.subtract(self._accelerometer, self._force, out=change)
+        change *= self._share
+        self._force += change
+
+    def read(self) -> Imu:
+        """Return what the unit measures; its attitude is that of imu_link in the world."""
+        quaternion = np.empty(4)
+        mujoco.mju_mat2Quat(quaternion, self._rotation().ravel())
+        w, x, y, z = quaternion.tolist()
+        return Imu(vector(self._force), vector(self._gyro), roll_pitch_yaw((x, y, z, w)))
+
+    def _rotation(self) -> Array:
+        rotation: Array = base_rotation(self._data) @ self._imu_to_base
+        return rotation
+
+
+def _readings(model: mujoco.MjModel, data: mujoco.MjData, name: str) -> Array:
+    """Return a view of what a sensor measures."""
+    sensor = model.sensor(name)
+    start = int(sensor.adr[0])
+    view: Array = data.sensordata[start : start + int(sensor.dim[0])]
+    return view
+
+
+def _matrix(quaternion: Array) -> Array:
+    """Return the rotation matrix of a quaternion (w, x, y, z)."""
+    matrix = np.empty(9)
+    mujoco.mju_quat2Mat(matrix, quaternion)
+    return matrix.reshape(3, 3)
+
+
+FLATTEST = 1e-4  # [m] height of bumps without any; they lie below the plane
+
+
+@dataclass(frozen=True, slots=True)
+class Variation:
+    """How a robot and its ground differ from what they were made as."""
+
+    friction: float | None = None  # of the ground; None leaves that of the terrain
+    trunk_mass: float = 1.0  # factor of mass and inertia of the trunk
+    stiffness: float = 1.0  # factor of the servos' stiffness, and of their gain against speed
+    damping: float = 1.0  # factor of the joints' damping, and of the servos' gain against speed
+    delay: float = 0.0  # of targets, beside that of the servos [s]
+    backlash: float = 0.0  # free play, beside that of the servos [rad]
+    refresh: float = 0.0  # time between two targets, beside that of the servos [s]
+    bumps: float = 1.0  # factor of the height of bumps on the ground, at most 1
+
+    def __post_init__(self) -> None:
+        """Refuse what no robot has."""
+        friction = 1.0 if self.friction is None else self.friction
+        positive = (friction, self.trunk_mass, self.stiffness)
+        others = (self.damping, self.delay, self.backlash, self.refresh)
+        if not (
+            all(0.0 < n < math.inf for n in positive)
+            and all(0.0 <= n < math.inf for n in others)
+            and 0.0 <= self.bumps <= 1.0
+        ):
+            raise SetupError(
+                f'{self}: friction, mass and stiffness must be finite and above 0, bumps 0 to 1, '
+                'and the others finite and 0 or more'
+            )
+
+
+AS_MADE = Variation()
+"""The robot as it was made."""
+
+
+class VariedModel:
+    """A model that can be varied again and again; each variation counts from the original."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        """Keep what may change."""
+        self._model = model
+        self._base = int(model.body(BASE).id)
+        self._ground = [
+            geom for geom in range(model.ngeom) if model.geom(geom).name in {FLOOR, BUMPS}
+        ]
+        self._friction = float(model.geom_friction[self._ground[0], 0])
+        self._mass = float(model.body_mass[self._base])
+        self._inertia = model.body_inertia[self._base].copy()
+        self._damping = model.dof_damping.copy()
+        self._bumps = model.hfield_size[:, 2].copy()
+        self._gains = model.actuator_gainprm.copy()
+        self._biases = model.actuator_biasprm.copy()
+        self._present = AS_MADE
+
+    def vary(self, data: mujoco.MjData, variation: Variation) -> None:
+        """Apply a variation; the servos hold."""
+        model = self._model
+        model.actuator_gainprm[:] = self._gains * variation.stiffness
+        model.actuator_biasprm[:] = self._biases
+        model.actuator_biasprm[:, 1] *= variation.stiffness
+        model.actuator_biasprm[:, 2] *= variation.stiffness * variation.damping
+        if variation == self._present:
+            return
+        self._present = variation
+        friction = self._friction if variation.friction is None else variation.friction
+        model.geom_friction[self._ground, 0] = friction
+        model.body_mass[self._base] = self._mass * variation.trunk_mass
+        model.body_inertia[self._base] = self._inertia * variation.trunk_mass
+        model.dof_damping[:] = self._damping * variation.damping
+        model.hfield_size[:, 2] = np.maximum(self._bumps * variation.bumps, FLATTEST)
+        mujoco.mj_setConst(model, data)

@@ -18,12 +18,12 @@ import numpy as np
 from quad_description import Joint
 from quad_hardware.protocol import ANGLE_SPANS, Model, MOTOR_OF_JOINT, MOTOR_ORDER, slot_of
 
-from ..exceptions import SetupError
-from ..plant.plant import KinematicRobot
-from ..plant.state import Array, Measurement
+from .exceptions import SetupError
+from .plant import KinematicRobot
+from .state import Array, Measurement
 
 if TYPE_CHECKING:
-    from ..physics import Robot
+    from .physics import Robot
 
 Plant: TypeAlias = 'KinematicRobot | Robot'
 """What has servos: a robot in physics, which needs MuJoCo, or one that is held in the air."""

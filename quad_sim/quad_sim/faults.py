@@ -14,7 +14,7 @@ import math
 from types import MappingProxyType
 from typing import NamedTuple
 
-from ..exceptions import SetupError
+from .exceptions import SetupError
 
 
 class FaultKind(Enum):

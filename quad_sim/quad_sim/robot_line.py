@@ -1,21 +1,174 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The robot at the end of its serial line: bytes in, bytes out, in a time that is handed in."""
+"""The robot at the end of its serial line: bytes in, bytes out, in a time that is handed in.
+
+A pseudo-terminal moves everything at once; here bytes take as long as the baud rate says, and may
+be damaged on the way.
+"""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 import math
+import random
 
 from quad_hardware.protocol import Code, Frame, HOST_KINDS, Protocol, StreamParser, V1, V2
 
-from ..board.board import Board
-from ..board.functions import Functions
-from ..board.registers import Registers
-from .command_times import CommandTimes
+from .board import Board
+from .board_protocols import Functions, Registers
 from .faults import Fault, FaultKind, FaultPlan
-from .wire import Arrival, Wire
+
+BITS_PER_BYTE = 10  # 8N1: start, eight data bits, stop
+
+
+@dataclass(slots=True)
+class LineCounters:
+    """What went over one direction of a line."""
+
+    bytes: int = 0  # bytes put in
+    dropped: int = 0  # bytes that a fault swallowed
+    flipped: int = 0  # bytes that a fault damaged
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """Bytes at the end of a line."""
+
+    end: float  # when the last of them is there [s]
+    data: bytes  # what is left of them
+    seconds_per_byte: float  # how long each took on the line [s]
+
+
+class Wire:
+    """One direction of a serial line."""
+
+    def __init__(self, faults: FaultPlan, muted_by: FaultKind, seed: int, *, slow: bool) -> None:
+        """Lay the wire.
+
+        Args:
+            muted_by: The fault in which nothing gets through.
+        """
+        self.counters = LineCounters()
+        self._faults = faults
+        self._muted_by = muted_by
+        self._random = random.Random(seed)  # noqa: S311  for tests, not for secrets
+        self._slow = slow
+        self._free_at = -math.inf
+        self._queue: deque[Arrival] = deque()
+
+    def put(self, data: bytes, now: float, baud: int) -> None:
+        """Put bytes on the wire; they follow those that are still on it."""
+        seconds = BITS_PER_BYTE / baud
+        end = max(now, self._free_at) + len(data) * seconds
+        self._free_at = end
+        self.counters.bytes += len(data)
+        if self._faults.active(self._muted_by, now) is not None:
+            return
+        slow = self._faults.active(FaultKind.SLOW, now) if self._slow else None
+        self._queue.append(
+            Arrival(end + (slow['delay'] if slow else 0.0), self._damage(data, now), seconds)
+        )
+
+    def take(self, now: float) -> list[Arrival]:
+        """Return what has arrived, in order."""
+        arrived = []
+        while self._queue and self._queue[0].end <= now:
+            arrived.append(self._queue.popleft())
+        return arrived
+
+    def clear(self) -> None:
+        """Forget what is on the way."""
+        self._queue.clear()
+
+    @property
+    def next_arrival(self) -> float:
+        """When the next bytes are there [s]; infinity for none."""
+        return self._queue[0].end if self._queue else math.inf
+
+    def _damage(self, data: bytes, now: float) -> bytes:
+        flip = self._faults.active(FaultKind.FLIP, now)
+        if flip is not None:
+            data = bytes(map(self._flip, data, [flip['rate']] * len(data)))
+        drop = self._faults.active(FaultKind.DROP, now)
+        if drop is not None:
+            whole = len(data)
+            data = bytes(byte for byte in data if self._random.random() >= drop['rate'])
+            self.counters.dropped += whole - len(data)
+        return data
+
+    def _flip(self, byte: int, rate: float) -> int:
+        if self._random.random() >= rate:
+            return byte
+        self.counters.flipped += 1
+        return byte ^ (1 << self._random.randrange(8))
+
+
+WINDOW = 20_000  # commands that are looked back
+
+
+@dataclass(frozen=True, slots=True)
+class CommandTiming:
+    """Of joint commands on the wire; percentiles of nothing are NaN."""
+
+    # times from the last byte of a state to the first byte of the next command in [s]
+    latencies: tuple[float, ...] = ()
+    # of the times between two commands from their median in [s]
+    deviations: tuple[float, ...] = ()
+
+    def __add__(self, other: CommandTiming) -> CommandTiming:
+        """Return both together."""
+        return CommandTiming(self.latencies + other.latencies, self.deviations + other.deviations)
+
+    def latency(self, share: float) -> float:
+        """Return a percentile of the latencies, 0.5 for the median, in [s]."""
+        return _percentile(sorted(self.latencies), share)
+
+    def jitter(self, share: float) -> float:
+        """Return a percentile of the deviations in [s]."""
+        return _percentile(sorted(self.deviations), share)
+
+
+class CommandTimes:
+    """Collects them; times are those of the robot [s]."""
+
+    def __init__(self) -> None:
+        """Begin without any."""
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._state_at: float | None = None
+        self._command_at: float | None = None
+        self._latencies: deque[float] = deque(maxlen=WINDOW)
+        self._intervals: deque[float] = deque(maxlen=WINDOW)
+
+    def sent(self, now: float) -> None:
+        """Note that bytes have arrived at the host."""
+        self._state_at = now
+
+    def commanded(self, begin: float) -> None:
+        """Note the first byte of a command."""
+        # a second command after a state is no answer to it, nor is one that was there before it
+        if self._state_at is not None and begin > self._state_at:
+            self._latencies.append(begin - self._state_at)
+            self._state_at = None
+        if self._command_at is not None:
+            self._intervals.append(begin - self._command_at)
+        self._command_at = begin
+
+    def timing(self) -> CommandTiming:
+        """Return what came together."""
+        middle = _percentile(sorted(self._intervals), 0.5)
+        return CommandTiming(
+            tuple(self._latencies), tuple(abs(each - middle) for each in self._intervals)
+        )
+
+
+def _percentile(ordered: list[float], share: float) -> float:
+    return ordered[int((len(ordered) - 1) * share)] if ordered else math.nan
+
 
 LATE = 0.05  # [s] after which a state that was due is one of now
 JOINT_COMMANDS = {Code.SERVO, Code.SERVOS}

@@ -1,0 +1,380 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+r"""How the servos follow their targets, and a robot that is nothing but servos.
+
+The torque on a joint is
+
+.. math:: \tau = \mathrm{clamp}(k_p\,\mathrm{dead}(q^* - q) - k_v \dot q, \pm\tau_{max}) - d \dot q
+
+with the largest torque from the URDF. ``dead`` is zero within the free width: the dead band, and
+half the backlash to either side. Of the passive damping :math:`d`, a stall torque of 0.46 N m
+and a no-load speed of 9.2 rad/s give 0.05 N m s/rad: it is the torque-speed line of the motor, and
+therefore outside the clamp. A target arrives after the delay, with the next refresh; it is
+approached along a straight line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from enum import Enum
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_description import Joint, movable_joints
+from quad_description.rotations import Vector
+
+from .exceptions import SetupError, TargetError
+from .state import Array, BasePose, BaseVelocity, disturb, Imu, Measurement, Noise, NONE
+
+MAX_DELAY = 1.0  # [s]
+
+
+@dataclass(frozen=True, slots=True)
+class ServoParameters:
+    """What a servo does with its target."""
+
+    stiffness: float  # torque per position error, k_p [N m/rad]
+    velocity_gain: float = 0.0  # torque against speed inside the clamp, k_v [N m s/rad]
+    damping: float = 0.05  # torque-speed line of the motor, d [N m s/rad]
+    armature: float = 0.001  # inertia of rotor and gear at the joint [kg m2]
+    friction: float = 0.0  # dry friction [N m]
+    # time over which the servo goes from one target to the next [s]; 0: a step
+    interpolation: float = 0.0
+    deadband: float = 0.0  # error to either side that the servo ignores [rad]
+    backlash: float = 0.0  # free play of the gear, from one end to the other [rad]
+    delay: float = 0.0  # from a target to the servo that has it [s]
+    refresh: float = 0.0  # time between two targets that the servo takes over [s]; 0: all
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that are no servo."""
+        for name in self.__slots__:
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise SetupError(f'servo: {name} {value} must be zero or a positive number')
+        if self.stiffness == 0.0:
+            raise SetupError('servo: stiffness 0 never moves; give it in [N m/rad], e.g. 2.45')
+        if max(self.delay, self.refresh) > MAX_DELAY:
+            raise SetupError(
+                f'servo: delay {self.delay} s, refresh {self.refresh} s: give 0 to {MAX_DELAY:g}'
+            )
+
+    @property
+    def free_width(self) -> float:
+        """Error to either side that moves nothing [rad]."""
+        return self.deadband + 0.5 * self.backlash
+
+
+class ServoModel(Enum):
+    """Servos by name; anything else is a ServoParameters.
+
+    NOMINAL is the default: published figures of the vendor's servos and of the serial bus servos
+    that they are made of (sources in the README). VENDOR_RL is the actuator in the vendor's newer
+    training environment (luwu_mjlab): policies trained there expect it. FIRM is no real servo, but
+    stiff enough to show what a gait or policy does when the servos follow; trot_ppo was trained
+    with it.
+    """
+
+    NOMINAL = 'nominal'
+    FIRM = 'firm'
+    VENDOR_RL = 'vendor_rl'
+
+    @property
+    def parameters(self) -> ServoParameters:
+        """The numbers of the model."""
+        return _PARAMETERS[self]
+
+
+_PARAMETERS = {
+    ServoModel.NOMINAL: ServoParameters(
+        stiffness=2.45,
+        velocity_gain=0.042,
+        interpolation=0.02,
+        deadband=0.0015,
+        backlash=0.015,
+        delay=0.02,
+    ),
+    ServoModel.FIRM: ServoParameters(stiffness=10.0, velocity_gain=0.25, interpolation=0.02),
+    ServoModel.VENDOR_RL: ServoParameters(stiffness=1.1, armature=0.002, friction=0.001),
+}
+
+JAW = ServoParameters(stiffness=400.0, velocity_gain=4.0, damping=1.0, armature=0.01)
+"""A jaw on its rack: [N/m], [N s/m], [kg]; chosen by us, closes in a tenth of a second."""
+
+
+def parse_servo(text: str) -> ServoParameters:
+    """Return a servo from its name, or from ``name=value,...``.
+
+    Raises:
+        SetupError: The text has no sense; the message names what has.
+    """
+    known = [model.value for model in ServoModel]
+    if text in known:
+        return ServoModel(text).parameters
+    names = {'kp': 'stiffness', 'kv': 'velocity_gain'}
+    names |= {each.name: each.name for each in fields(ServoParameters)[2:]}
+    values: dict[str, float] = {}
+    for word in text.split(','):
+        name, _, value = word.partition('=')
+        try:
+            values[names[name.strip()]] = float(value)
+        except (KeyError, ValueError):
+            raise SetupError(
+                f'--servo {text!r}: give {" or ".join(known)}, or {",".join(names)} as name=value'
+            ) from None
+    if 'stiffness' not in values:
+        raise SetupError(f'--servo {text!r} needs kp, in [N m/rad]')
+    return ServoParameters(**values)
+
+
+Targets = Mapping[str, float] | Sequence[float] | Array
+"""Positions by name, or of all joints in the order of the URDF; [rad], of a gripper [m]."""
+
+
+class TargetRamp:
+    """The set-points of all servos, one value for each time step."""
+
+    def __init__(self, joints: Sequence[Joint], timestep: float, values: Array) -> None:
+        """Stand still.
+
+        Args:
+            joints: Names and limits, in the order of the values.
+            timestep: Time between two calls of :meth:`advance` [s].
+        """
+        self._index = {joint.name: index for index, joint in enumerate(joints)}
+        self._lower = np.array([joint.limits.lower for joint in joints])
+        self._upper = np.array([joint.limits.upper for joint in joints])
+        self._timestep = timestep
+        self.values: Array = values  # the set-points now [rad]; changes in place with every step
+        self._goal: Array = values.copy()
+        self._slope: Array = np.zeros(len(joints))  # [rad] a step; 0 for those that stand still
+        self._arrival = np.zeros(len(joints), dtype=np.int64)  # step in which each arrives
+        self._step = self._next_arrival = self._last_arrival = 0
+        self._all = np.arange(len(joints))
+
+    @property
+    def goal(self) -> Array:
+        """Where the set-points go [rad], a copy."""
+        return np.array(self._goal)
+
+    def jump(self, values: Array) -> None:
+        """Be at other set-points at once."""
+        self.values[:] = values
+        self._goal[:] = values
+        self._slope[:] = 0.0
+        self._next_arrival = self._last_arrival = self._step
+
+    def approach(self, targets: Targets, duration: float) -> None:
+        """Begin to approach targets; joints that are not named go on with what they do.
+
+        Args:
+            targets: Where to; what lies beyond a limit is taken to the limit, as servos do.
+            duration: How long it takes [s]; 0 for a step.
+
+        Raises:
+            TargetError: A name is unknown, a value is not finite, or there are too many or few.
+        """
+        indices, values = self._checked(targets)
+        goal = np.minimum(np.maximum(values, self._lower[indices]), self._upper[indices])
+        steps = max(round(duration / self._timestep), 1)
+        self._goal[indices] = goal
+        self._slope[indices] = (goal - self.values[indices]) / steps
+        self._arrival[indices] = self._step + steps
+        if indices is self._all:
+            self._next_arrival = self._last_arrival = self._step + steps
+        else:
+            self._plan()
+
+    def check(self, targets: Targets) -> None:
+        """Refuse what :meth:`approach` would refuse, and change nothing.
+
+        Raises:
+            TargetError: A name is unknown, a value is not finite, or there are too many or few.
+        """
+        self._checked(targets)
+
+    def advance(self) -> None:
+        """Go one time step on."""
+        if self._step == self._last_arrival:
+            return
+        self._step += 1
+        self.values += self._slope
+        if self._step == self._next_arrival:
+            arrived = self._arrival == self._step
+            self.values[arrived] = self._goal[arrived]
+            self._slope[arrived] = 0.0
+            self._plan()
+
+    def _plan(self) -> None:
+        coming = self._arrival[self._arrival > self._step]
+        self._next_arrival = int(coming.min()) if len(coming) else self._step
+        self._last_arrival = int(coming.max()) if len(coming) else self._step
+
+    def _checked(self, targets: Targets) -> tuple[NDArray[np.intp], Array]:
+        if isinstance(targets, Mapping):
+            unknown = sorted(targets.keys() - self._index.keys())
+            if unknown:
+                known = ', '.join(self._index)
+                raise TargetError(f'no joint is named {", ".join(unknown)}; there are {known}')
+            indices = np.array([self._index[name] for name in targets], np.intp)
+            values = np.array(list(targets.values()), dtype=np.float64)
+        else:
+            indices = self._all
+            values = np.asarray(targets, dtype=np.float64)
+            if values.shape != (len(indices),):
+                raise TargetError(
+                    f'{values.shape} targets for {len(indices)} joints; give one for each'
+                )
+        if not np.isfinite(values).all():
+            names = list(self._index)
+            bad = [names[indices[k]] for k in np.flatnonzero(~np.isfinite(values))]
+            raise TargetError(f'targets of {", ".join(bad)} are not finite; nothing moves')
+        return indices, values
+
+
+TIMESTEP = 0.002  # [s]
+SET_POINT_TIME = 0.02  # [s] of a servo from one target to the next
+GRAVITY = 9.81  # [m/s2]
+_FEET = 4
+
+
+class KinematicRobot:
+    """A robot held up in the air: servos follow at once, and nothing else moves.
+
+    Costs next to nothing and needs no MuJoCo; good for the serial side, not for gaits.
+    """
+
+    def __init__(
+        self,
+        urdf: str,
+        *,
+        pose: Mapping[str, float] | None = None,
+        noise: Noise = NONE,
+        seed: int = 0,
+    ) -> None:
+        """Hold the robot.
+
+        Args:
+            pose: Joint positions at the start [rad]; zero for those left out.
+            noise: What :meth:`measure` adds.
+
+        Raises:
+            SetupError: The pose names joints that the robot lacks.
+        """
+        joints = movable_joints(urdf)
+        self.joint_names = tuple(joint.name for joint in joints)
+        self._noise = noise
+        self._ramp = TargetRamp(joints, TIMESTEP, np.zeros(len(joints)))
+        self.reset(pose=pose, seed=seed)
+
+    def reset(self, *, pose: Mapping[str, float] | None = None, seed: int = 0) -> None:
+        """Begin anew.
+
+        Raises:
+            SetupError: The pose names joints that the robot lacks.
+        """
+        self._random = np.random.default_rng(seed)
+        self._on = dict.fromkeys(self.joint_names, True)
+        self._missed: dict[str, float] = {}  # targets that came without torque
+        self._steps, self._remaining_steps = 0, 0.0
+        self._ramp.jump(np.zeros(len(self.joint_names)))
+        try:
+            self._ramp.approach(pose or {}, 0.0)
+        except TargetError as error:
+            raise SetupError(f'start pose: {error}') from error
+        self._ramp.advance()
+        self._before: Array = self._ramp.values.copy()
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        return self._steps * TIMESTEP
+
+    @property
+    def base_pose(self) -> BasePose:
+        """Level, and where it was."""
+        return BasePose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+
+    @property
+    def base_velocity(self) -> BaseVelocity:
+        """None."""
+        return BaseVelocity((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+    @property
+    def foot_contacts(self) -> tuple[bool, ...]:
+        """None: it is held up in the air."""
+        return (False,) * _FEET
+
+    @property
+    def joint_targets(self) -> Array:
+        """Set-points now [rad]."""
+        return np.array(self._ramp.values)
+
+    def set_targets(self, targets: Targets, duration: float | None = None) -> None:
+        """Set new targets [rad]; servos without torque stay where they are.
+
+        Raises:
+            TargetError: As :meth:`quad_sim.physics.Robot.set_targets`.
+        """
+        self._ramp.check(targets)
+        if not isinstance(targets, Mapping):
+            targets = dict(zip(self.joint_names, targets, strict=True))
+        held = {name: value for name, value in targets.items() if self._on[name]}
+        self._missed |= {name: value for name, value in targets.items() if not self._on[name]}
+        self._ramp.approach(held, SET_POINT_TIME if duration is None else duration)
+
+    def set_torque(
+        self, on: bool, joints: Iterable[str] | None = None, *, hold: bool = True
+    ) -> None:
+        """Switch servos on or off, as the robot in physics does; they do not fall."""
+        names = self.joint_names if joints is None else tuple(joints)
+        self._on |= dict.fromkeys(names, on)
+        missed = {name: self._missed.pop(name) for name in names if on and name in self._missed}
+        if not hold:
+            self._ramp.approach(missed, 0.0)
+
+    def torque_on(self, joint: str) -> bool:
+        """Return whether a servo holds."""
+        return self._on[joint]
+
+    def push(self, force: Vector, duration: float = 0.1) -> None:
+        """Refuse: what is held does not move.
+
+        Raises:
+            SetupError: Always.
+        """
+        raise SetupError('a robot without physics cannot be pushed; leave out --physics none')
+
+    def kick(self, velocity: Vector) -> None:
+        """Refuse, as :meth:`push` does.
+
+        Raises:
+            SetupError: Always.
+        """
+        raise SetupError('a robot without physics cannot be kicked; leave out --physics none')
+
+    def step(self, duration: float) -> None:
+        """Advance the time [s]."""
+        self._remaining_steps += duration / TIMESTEP
+        count = int(self._remaining_steps + 1e-6)
+        self._remaining_steps -= count
+        self._steps += count
+        for _ in range(count):
+            self._before[:] = self._ramp.values
+            self._ramp.advance()
+
+    def measure(self) -> Measurement:
+        """Return what the sensors measure."""
+        values = self.joint_targets
+        level = (0.0, 0.0, 0.0)
+        truth = Measurement(
+            time=self.time,
+            imu=Imu((0.0, 0.0, GRAVITY), level, level),
+            positions=values,
+            velocities=(values - self._before) / TIMESTEP,
+            torques=np.zeros(len(values)),
+            foot_forces=np.zeros(_FEET),
+        )
+        return disturb(truth, self._noise, self._random)
