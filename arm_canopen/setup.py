@@ -17,6 +17,6 @@ runpy.run_path(str(SHARED))['setup_package'](
         'fake_slave = arm_canopen.aliases:fake_slave',
         'fake_slaves = arm_canopen.aliases:fake_slaves',
     ],
-    package_data=['config/resolve/default_drive.eds'],
+    package_data=['config/read/default_drive.eds'],
     folders=['eds'],
 )

@@ -34,8 +34,8 @@ from .config import load_bus
 from .config.model import BusConfig, NodeConfig
 
 if TYPE_CHECKING:
-    from .library.canopen_master import CanopenMaster
-    from .library.device import CanopenDevice, CanopenDrive
+    from .canopen_master import CanopenMaster
+    from .device import CanopenDevice, CanopenDrive
     from .master.events import Event, EventKind, Severity
     from .master.other_master import MasterFrames
     from .master.scheduler import Promise, Scheduler
@@ -84,9 +84,9 @@ __all__ = [
 
 
 _LATE = {
-    'CanopenDevice': '.library.device',
-    'CanopenDrive': '.library.device',
-    'CanopenMaster': '.library.canopen_master',
+    'CanopenDevice': '.device',
+    'CanopenDrive': '.device',
+    'CanopenMaster': '.canopen_master',
     'Event': '.master.events',
     'EventKind': '.master.events',
     'MasterFrames': '.master.other_master',

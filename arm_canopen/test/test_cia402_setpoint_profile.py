@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.cia402.modes.setpoint_profile import SetpointProfile
+from arm_canopen.cia402.modes.cyclic_position import SetpointProfile
 from arm_canopen.cia402.parameters import ProfileLimits
 
 CYCLE = 0.01  # [s]

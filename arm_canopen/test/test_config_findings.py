@@ -16,7 +16,7 @@ import pytest
 
 from arm_canopen import load_bus
 from arm_canopen.config import check_bus, check_file, Report
-from arm_canopen.config.model.checks.drives import period_setting
+from arm_canopen.config.model.device_checks import period_setting
 from canopen_core import Problem
 
 HERE = '# <-'

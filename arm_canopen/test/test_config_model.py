@@ -18,7 +18,7 @@ import pytest
 from arm_canopen import BusConfig, DriveState, load_bus, NodeConfig
 from arm_canopen.config import DEFAULT_DRIVE, Identity, PdoConfig, RecoveryPolicy, SdoWrite
 from arm_canopen.config.read.document import Item, Scalar, ScalarKind, YamlMap
-from arm_canopen.config.resolve.layout import merge_device
+from arm_canopen.config.resolve.bus import merge_device
 from canopen_core import Place
 from canopen_core.eds import load_eds
 from canopen_core.standard import CAN_ID_MASK, DataType
@@ -227,7 +227,7 @@ def test_an_eds_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         reads.append(path)
         return load_eds(path)
 
-    monkeypatch.setattr('arm_canopen.config.resolve.eds_files.load_eds', counted)
+    monkeypatch.setattr('arm_canopen.config.read.document.load_eds', counted)
     text = BUS + ''.join(f'  joint{n}: {{node_id: {n + 1}}}\n' for n in range(2, 8))
     assert len(load_text(tmp_path, text).nodes) == 7
     assert len(reads) == 1

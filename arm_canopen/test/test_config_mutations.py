@@ -45,7 +45,7 @@ def test_damaged_buses_are_checked(
 ) -> None:
     """Each problem has a message, a remedy, and a line within its file."""
     # the EDS files are whole, and reading them takes longer than all the rest
-    monkeypatch.setattr('arm_canopen.config.resolve.eds_files.load_eds', cache(load_eds))
+    monkeypatch.setattr('arm_canopen.config.read.document.load_eds', cache(load_eds))
     generator = random.Random(seed)
     path = write_bus(tmp_path)
     (tmp_path / 'cia402_slave.eds').write_text(eds_text(), encoding='utf-8')

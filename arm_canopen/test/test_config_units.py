@@ -16,8 +16,8 @@ import pytest
 
 from arm_canopen import DriveError, OperationMode
 from arm_canopen.cia402.modes import Mode
+from arm_canopen.cia402.modes.mode import check_target
 from arm_canopen.cia402.parameters import DriveParameters
-from arm_canopen.cia402.targets import check_target
 from arm_canopen.cia402.units import Units
 from arm_canopen.config import AxisUnits, check_bus, check_file, DriveConfig, rate_units, UnitRule
 from canopen_core.standard import Index

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen import load_bus
-from arm_canopen.library.bus_recording import BusRecording
+from arm_canopen.recording import BusRecording
 from black_box import BlackBox, BlackBoxSettings
 from canopen_core.can import Frame, FrameRing, read_log
 

@@ -13,7 +13,7 @@ from config_samples import BUS, load_text
 import pytest
 
 from arm_canopen import DriveState, Event, EventKind, Severity
-from arm_canopen.library.bus_replay import BusReplay, unknown_scales
+from arm_canopen.recording import BusReplay, unknown_scales
 from black_box import LogPlayer
 from canopen_core.can import Frame
 from canopen_core.standard import NmtState

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen import CodecError
-from arm_canopen.master.object_access import (
+from arm_canopen.nodes.device_node import (
     bytes_from_raw,
     number_from_raw,
     raw_from_bytes,

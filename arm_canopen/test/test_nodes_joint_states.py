@@ -22,7 +22,7 @@ from std_msgs.msg import String
 
 from arm_canopen import CanopenError
 from arm_canopen.cia402.state import AxisState
-from arm_canopen.nodes.joint_states import BusJointStates, DriveJointStates
+from arm_canopen.nodes.joint_state_publisher import BusJointStates, DriveJointStates
 from arm_canopen.nodes.output_thread import OutputThread
 
 pytestmark = pytest.mark.slow

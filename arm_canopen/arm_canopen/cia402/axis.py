@@ -17,9 +17,6 @@ from ..master.events import EventKind, Severity
 from ..master.process_image import SentRpdo
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Promise, Scheduler, Task
-from .controlword import ControlwordOutput
-from .following_watch import Following, FollowingWatch, MARGIN_TIME
-from .halt import Halt
 from .modes import (
     build_modes,
     CyclicPosition,
@@ -29,12 +26,12 @@ from .modes import (
     NEW_SET_POINT,
     NO_BITS,
 )
+from .modes.mode import check_setpoint, check_target, TORQUE_MODES
 from .motion import AxisFeedback, Refusal, RefusalCause, Setpoint
-from .quirks import quirks_of
+from .parameters import quirks_of
 from .state import AxisState, DriveStatus, FAULTY, LOOK_PERIOD, POWERED
-from .state_machine import Command, fault_reset, next_command
-from .stop import BrakingWatch, StopSequence
-from .targets import check_setpoint, check_target, TORQUE_MODES
+from .state_machine import Command, ControlwordOutput, fault_reset, next_command
+from .stop import BrakingWatch, Following, FollowingWatch, Halt, MARGIN_TIME, StopSequence
 
 FOLLOWS_COMMAND = int(Statusword.FOLLOWS_COMMAND)
 FOLLOWING_ERROR = int(Statusword.FOLLOWING_ERROR)

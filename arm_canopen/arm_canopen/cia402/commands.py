@@ -27,14 +27,12 @@ from ..config.model.drive import RecoveryPolicy
 from ..master.events import Severity
 from ..master.scheduler import completed, Promise, Scheduler, Task
 from .axis import Axis, NOT_TAKEN
-from .halt import HaltState, RESUME_TIMEOUT
-from .homing import home, HomingProgress
 from .modes import Mode, Move, NoMode, ProfilePosition
 from .motion import Refusal, RefusalCause
+from .sequences import home, HomingProgress, StopCommands, TargetStream
 from .state import FAULTY
 from .steps import AxisSteps
-from .stop_commands import StopCommands
-from .streaming import TargetStream
+from .stop import HaltState, RESUME_TIMEOUT
 
 T = TypeVar('T')
 Sequence: TypeAlias = Callable[[], Coroutine[Promise[Any], None, str]]

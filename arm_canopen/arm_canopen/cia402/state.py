@@ -27,9 +27,8 @@ from canopen_core.standard import (
 
 from ..config.model.drive import DriveConfig
 from ..master.process_image import InputReader, ReceivedTpdo
-from ..master.remote_node import RemoteNode
+from ..master.remote_node import node_status, NodeStatus, RemoteNode
 from ..master.scheduler import Scheduler
-from ..master.status import node_status, NodeStatus
 from .parameters import DriveParameters, OFFSET_OBJECTS, ParameterCache
 from .units import clamp, INT16_MAX, INT32_MAX, Units
 

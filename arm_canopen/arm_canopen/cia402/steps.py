@@ -19,13 +19,12 @@ from canopen_core.standard import (
 from ..master.events import Severity
 from ..master.scheduler import Scheduler
 from .axis import Axis, NOT_TAKEN
-from .halt import RESUME_TIMEOUT
 from .modes import Mode, ProfilePosition
+from .modes.mode import TORQUE_MODES
 from .motion import Refusal, RefusalCause
-from .quirks import quirks_of
+from .parameters import quirks_of
 from .state import FAULTY
-from .stop import STOP_TIMEOUT
-from .targets import TORQUE_MODES
+from .stop import RESUME_TIMEOUT, STOP_TIMEOUT
 
 BUFFER_CLEAR = 6  # sub-index of 0x60C4 (CiA 402-2, clause 12)
 BUFFER_EMPTY, BUFFER_OPEN = 0, 1

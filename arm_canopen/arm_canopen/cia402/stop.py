@@ -3,22 +3,266 @@
 """The stop of an axis: halt, then quick stop, then no power, until it was seen to rest.
 
 What still reaches the drive commands it: its RPDO, else an SDO. A drive that one step does not
-slow down gets the next. "Unknown" is never "stopped".
+slow down gets the next. "Unknown" is never "stopped". First :class:`Halt` (bit 8, and when it may
+be taken back), then what its positions show (:class:`FollowingWatch`, :class:`BrakingWatch`), then
+:class:`StopSequence`.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
+from enum import Enum
 import math
 
 from canopen_core import CodecError, SdoError
-from canopen_core.standard import DriveState, Index, NmtCommand, NmtState
+from canopen_core.standard import (
+    Controlword,
+    DriveState,
+    Index,
+    NmtCommand,
+    NmtState,
+    OperationMode,
+)
 
 from ..master.events import Severity
-from ..master.scheduler import Scheduler, Task
-from .controlword import ControlwordOutput
+from ..master.scheduler import completed, Promise, Scheduler, Task
+from .modes import Mode, NO_BITS, ProfilePosition
 from .state import AxisState
-from .state_machine import Command
+from .state_machine import Command, ControlwordOutput
+
+HALT_BIT = int(Controlword.HALT)
+RESUME_TIMEOUT = 2.5  # [s] for which a halted drive may take to acknowledge a set-point
+UNDER_HALT_TIME = 0.5  # [s] for the acknowledge of a set-point while bit 8 is set
+RELEASED_TIME = 0.05  # [s] for it where bit 8 went with bit 4: an old move might go on meanwhile
+ANSWER_CYCLES = 5  # in which a drive answers what it sees, if that takes longer
+
+
+class HaltState(Enum):
+    """Whether an axis is halted, and what will end that."""
+
+    ENDED = 'it is not halted'
+    HELD = 'bit 8 is set, or the set-points were braked; no target is on its way'
+    UNANSWERED = 'as held: the drive has not taken the target that was to end the halt'
+    LEAVING = 'a target is on its way that will end it'
+    LIFTED = 'so it is, and bit 8 went with its bit 4: the acknowledge is awaited'
+
+
+class Halt:
+    """Holds a drive until a target that came later has been handed over.
+
+    A set-point of mode 1 is offered while bit 8 is set, so that a move of before cannot go on. A
+    drive that does not acknowledge there gets it once more in the controlword that takes bit 8
+    back, and from then on always so; at the end of its halt it has no other target to go to.
+    Where that one is not acknowledged either, it is halted again.
+    """
+
+    def __init__(self) -> None:
+        self.state = HaltState.ENDED
+        self._leaving_since = 0.0
+        self._delivery = completed()
+        self._offered_since: float | None = None
+        self._ends_in: OperationMode | None = None
+        self._ends_with_offer = False  # the drive sees no set-point under halt
+
+    @property
+    def held(self) -> bool:
+        """Whether the drive is halted; the next target ends it."""
+        return self.state is not HaltState.ENDED
+
+    @property
+    def leaving(self) -> bool:
+        """Whether a target is on its way that will end it."""
+        return self.state in (HaltState.LEAVING, HaltState.LIFTED)
+
+    @property
+    def rests(self) -> bool:
+        """Whether the drive is halted, and no target is on its way that will end it."""
+        return self.state in (HaltState.HELD, HaltState.UNANSWERED)
+
+    def hold(self) -> None:
+        """Halt; whatever would have ended an earlier halt does not end this one."""
+        self._enter(HaltState.HELD)
+
+    def release(self) -> None:
+        """End it at once: there is nothing old that could go on."""
+        self._enter(HaltState.ENDED)
+
+    def leave(self, now: float, delivery: Promise[None]) -> None:
+        """End it when the drive has taken the target that was commanded at ``now`` in [s].
+
+        Where the drive refuses its delivery, the halt goes on.
+        """
+        if self.rests:
+            self.state = HaltState.LEAVING
+        if self.held:
+            self._leaving_since, self._delivery = now, delivery
+
+    def end_in(self, mode: OperationMode) -> None:
+        """End it when the drive shows another mode, in which it has no target yet."""
+        if self.held:
+            self._ends_in = mode
+
+    def bits(self, mode: Mode) -> int:
+        """Return bit 8 for a drive that is moved, or was moved last, by a mode."""
+        sets = self.held and self.state is not HaltState.LIFTED and mode.halts_by_bit
+        return HALT_BIT if sets else NO_BITS
+
+    def advance(self, now: float, period: float, mode: Mode) -> bool:
+        """End it where that is due, for a drive that acts on a mode.
+
+        Returns:
+            False when the drive has not taken its new target in time, and stays halted.
+        """
+        if self._ends_in is mode.number:
+            self.release()
+        if not self.leaving:
+            return True
+        if self._delivery.error is not None:
+            self.hold()
+        elif mode.taken:
+            self.release()
+        elif isinstance(mode, ProfilePosition) and not self._advance_offer(now, period, mode):
+            if not mode.goes_on_unanswered():  # else it is not known to acknowledge anything
+                return self._hold_unanswered()
+            self._ends_with_offer = False
+            self.release()
+        elif now - self._leaving_since > RESUME_TIMEOUT:
+            return self._hold_unanswered()
+        return True
+
+    def _advance_offer(self, now: float, period: float, mode: ProfilePosition) -> bool:
+        """Offer a set-point under halt, then without; False when neither is acknowledged."""
+        if self._offered_since is None:
+            if mode.offered:
+                self._offered_since = now
+                self.state = HaltState.LIFTED if self._ends_with_offer else HaltState.LEAVING
+            return True
+        waited, answers = now - self._offered_since, ANSWER_CYCLES * period
+        if self.state is HaltState.LIFTED:
+            return waited <= max(RELEASED_TIME, answers)
+        if waited > max(UNDER_HALT_TIME, answers):
+            self._offered_since = None
+            self._ends_with_offer = True
+            mode.offer_again()
+        return True
+
+    def _hold_unanswered(self) -> bool:
+        self._enter(HaltState.UNANSWERED)
+        self._ends_with_offer = False
+        return False
+
+    def _enter(self, state: HaltState) -> None:
+        self.state = state
+        self._offered_since = self._ends_in = None
+
+
+FOLLOWING_WINDOW = 0.5  # [s] of set-points among which the position has to be
+MARGIN_TIME = 0.1  # [s] of the profile velocity by which it may be beside them
+LASTING_ERROR_TIME = 1.0  # [s] of a following error after which the axis is taken out of operation
+MOVED_SHARE = 0.1  # share of the margin by which set-points have to move to count as a motion
+FOLLOWED_SHARE = 0.5  # share of the motion of the set-points that an axis makes at least
+
+
+class Following(Enum):
+    """What the positions of the last half second show."""
+
+    FOLLOWS = 'it follows'
+    UNDECIDED = 'it is seen again, where it was before'
+    LEFT_BEHIND = 'the set-points moved, and it did not'
+    LASTING_ERROR = 'it has been beside its set-points for too long'
+
+
+class FollowingWatch:
+    """Compares the position of an axis with the set-points of the last half second.
+
+    A drive that has lost its RPDOs goes on to report that it follows: it compares itself with the
+    last set-point that reached it. Its position is then left behind by the set-points, and would
+    jump to them when the RPDOs arrive again. An axis that a load pulls away from set-points that
+    stand is another matter: a new set-point where it is would let the load pull it further.
+    """
+
+    def __init__(self) -> None:
+        self._samples: deque[tuple[float, float, float]] = deque()
+        self._beside_since: float | None = None
+        self._unseen_from: float | None = None  # set-point when the axis was seen last
+        self._received = 0  # positions, in the cycle in which it was seen again
+
+    def clear(self) -> None:
+        """Forget the set-points: the axis is not led by them any more."""
+        self._samples.clear()
+        self._beside_since = self._unseen_from = None
+
+    def lose_sight(self) -> None:
+        """The axis is led on, but its positions are too old to be judged.
+
+        The first that comes again may be old, too. Where frames were lost, the axis stands there,
+        and the set-point that is due would make it jump. Where they were late, several positions
+        come in a cycle: the axis is led on, and a set-point at the first would make it jump back.
+        Thus none leaves in the first cycle.
+        """
+        if self._samples:
+            unseen_from = self._unseen_from  # of a sight that was too short to judge
+            if unseen_from is None:
+                unseen_from = self._samples[0][1]  # positions are too old after some time only
+            self.clear()
+            self._unseen_from = unseen_from
+
+    def judge(
+        self,
+        now: float,
+        setpoint: float,
+        position: float,
+        *,
+        margin: float,
+        window: float,
+        error: bool,
+        received: int,
+    ) -> Following:
+        """Judge by set-point and position of this cycle whether the axis follows.
+
+        Args:
+            now: Steady time in [s].
+            setpoint: Position commanded last in user units.
+            position: Actual position in user units.
+            margin: How far an axis that has stopped to move may be beside its set-points in user
+                units.
+            window: How far one that moves, or is pulled by a load, may lastingly be beside them
+                in user units; not below the margin.
+            error: The drive itself shows a following error.
+            received: Number of positions received from the axis so far.
+        """
+        samples = self._samples
+        samples.append((now, setpoint, position))
+        while samples[0][0] < now - FOLLOWING_WINDOW:
+            samples.popleft()
+        if not error and abs(position - setpoint) <= margin:
+            self._beside_since = self._unseen_from = None
+            return Following.FOLLOWS
+        unseen_from, cycles = self._unseen_from, len(samples) - 1
+        if unseen_from is not None and abs(setpoint - unseen_from) > MOVED_SHARE * margin:
+            if not cycles:
+                self._received = received
+                return Following.UNDECIDED
+            if received - self._received <= cycles:
+                return Following.LEFT_BEHIND
+        self._unseen_from = None
+        setpoints = [sample[1] for sample in samples]
+        low, high = min(setpoints), max(setpoints)
+        beside = max(low - position, position - high)
+        positions = [sample[2] for sample in samples]
+        way = max(positions) - min(positions)
+        left = high - low > MOVED_SHARE * margin and way < FOLLOWED_SHARE * (high - low)
+        if left and (error or beside > margin):
+            return Following.LEFT_BEHIND
+        if not error and beside <= window:
+            self._beside_since = None
+            return Following.FOLLOWS
+        if self._beside_since is None:
+            self._beside_since = now
+        lasting = now - self._beside_since > LASTING_ERROR_TIME
+        return Following.LASTING_ERROR if lasting else Following.FOLLOWS
+
 
 REACTION_TIME = 0.5  # [s] in which a drive shows that it has got a command
 UNSEEN_TIMEOUT = 1.0  # [s] for it to show anything, beside the time of the ramp

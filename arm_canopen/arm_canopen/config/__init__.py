@@ -15,6 +15,7 @@ remedy; ``check_file`` reports them, and what works and was probably meant other
 
 from canopen_core.eds import load_eds
 
+from .keys import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS
 from .model import (
     BusConfig,
     DriveConfig,
@@ -32,9 +33,10 @@ from .model.boot_plan import (
     held_after_boot,
     HeldConsumers,
 )
-from .model.bus import IDENTITY_OBJECTS, U16_MAX
-from .model.checks import check_bus, Report
-from .model.checks.drive_units import (
+from .model.bus import Direction, IDENTITY_OBJECTS, RPDO, TPDO, U16_MAX
+from .model.checks import check_bus, LoadEstimate, Report, Traffic
+from .model.drive import FACTOR_ADDRESSES, FACTOR_OBJECTS, FactorGroup, NamedUnit, RPM, UNSET
+from .model.drive_units import (
     ACCELERATION_KEY,
     AxisUnits,
     is_coarse,
@@ -43,14 +45,9 @@ from .model.checks.drive_units import (
     reported_increments,
     UnitRule,
 )
-from .model.checks.traffic import LoadEstimate, Traffic
-from .model.factor_group import FACTOR_ADDRESSES, FACTOR_OBJECTS, FactorGroup, UNSET
-from .model.pdo import Direction, RPDO, TPDO
-from .model.si_unit import NamedUnit, RPM
+from .read.document import DEFAULT_DRIVE
 from .resolve.bus import check_file, load_bus
-from .resolve.eds_files import DEFAULT_DRIVE
-from .resolve.pdo_mapping import eds_mapping, is_fixed, mapping_slots
-from .units import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS
+from .resolve.pdos import eds_mapping, is_fixed, mapping_slots
 
 __all__ = [
     'ACCELERATION_KEY',

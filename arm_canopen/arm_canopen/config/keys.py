@@ -9,6 +9,11 @@ from dataclasses import dataclass, field, fields, replace
 from enum import auto, Enum
 from typing import Any
 
+MILLISECONDS = 1e3  # per second
+MICROSECONDS = 1e6
+HUNDRED_MICROSECONDS = 1e4
+KILOBIT = 1e-3  # kbit/s per bit/s
+
 
 class Kind(Enum):
     """What stands behind a key."""

@@ -22,10 +22,9 @@ from typing import Any
 
 from canopen_core.standard import NODE_ID_MAX, NODE_ID_MIN
 
-from .keys import Key, key, keys_of, Kind, Use
+from .keys import HUNDRED_MICROSECONDS, Key, key, keys_of, Kind, MILLISECONDS, Use
 from .model.bus import MasterConfig, NodeConfig, RETRY_FACTOR, U16_MAX, U32_MAX
 from .model.drive import DriveConfig
-from .units import HUNDRED_MICROSECONDS, MILLISECONDS
 
 U8_MAX = 0xFF
 NO_DICTIONARY = 'the master has no object dictionary of its own'

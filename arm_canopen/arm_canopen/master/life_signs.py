@@ -1,16 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a device lives: its heartbeat, or its answers to node guarding (CiA 301, 7.2.8.3)."""
+"""What shows that a device is alive and well: heartbeat or node guarding, EMCYs, its TPDOs."""
 
 from __future__ import annotations
 
+from collections import Counter, deque
+from collections.abc import Callable, Sequence
 import math
 
+from canopen_core import CodecError
 from canopen_core.can import Frame
-from canopen_core.standard import CobId, NmtState
+from canopen_core.standard import CobId, Emergency, error_code_text, NmtState
 
 from ..config.model import NodeConfig
+from .events import EventKind, Severity
 from .frame_sender import Send
+from .process_image import ReceivedTpdo
 
 TOGGLE = 0x80  # bit of an answer that changes with each
 
@@ -141,3 +146,179 @@ class LifeSigns:
         self._awaited_from = now
         if self._guarding is not None:
             self._guarding.start(now)
+
+
+HISTORY = 16  # EMCYs that are remembered
+REPEAT_PERIOD = 10.0  # [s] in which one that comes again is counted, and not reported
+REPORTS_MAX = 8  # that are reported in that time, whatever they are
+NAMED_MAX = 3  # codes that a count names
+
+
+class EmergencyLog:
+    """Reports each EMCY in words, and remembers the last ones.
+
+    One that comes again and again, or many that alternate, are a flood: it is reported once in
+    :data:`REPEAT_PERIOD`, with the number of its messages, until none has come for that long.
+    """
+
+    def __init__(self, report: Callable[[EventKind, Severity, str], None]) -> None:
+        # the last EMCYs, the newest at the end, with the steady time of each in [s]; of a flood
+        # each one once
+        self.history: deque[tuple[float, Emergency]] = deque(maxlen=HISTORY)
+        # last one that was no reset, None when the device reported its end
+        self.last: Emergency | None = None
+        self._report = report
+        self._came: dict[str, float] = {}
+        self._newest = ''
+        self._reported: deque[float] = deque(maxlen=REPORTS_MAX)
+        self._repeats: Counter[str] = Counter()
+        self._counted_since = 0.0
+        self._counted_at = -REPEAT_PERIOD
+
+    def since(self, begin: float) -> Emergency | None:
+        """Return the last EMCY, when it came after a steady time in [s] and was no reset."""
+        if self.last is None or not self.history or self.history[-1][0] < begin:
+            return None
+        return self.last
+
+    def restarted(self) -> None:
+        """The device restarted: whatever it was, it ended with that."""
+        self.last = None
+        self._came.clear()
+        self._newest = ''
+
+    def receive(self, frame: Frame) -> None:
+        """Store an EMCY message."""
+        try:
+            emergency = Emergency.decode(frame.data)
+        except CodecError as error:
+            text = f'odd EMCY: {error}'
+            self._report_or_count(Severity.WARNING, text, 'odd', frame.timestamp)
+            return
+        now = frame.timestamp
+        for entry in list(self.history):
+            if entry[1] == emergency and now - entry[0] < REPEAT_PERIOD:
+                self.history.remove(entry)
+        self.history.append((now, emergency))
+        self.last = None if emergency.is_reset else emergency
+        severity = Severity.INFO if emergency.is_reset else Severity.ERROR
+        code = error_code_text(emergency.code)
+        self._report_or_count(severity, f'EMCY: {emergency}', code, now)
+
+    def look(self, now: float) -> None:
+        """Report the number of those that were only counted, where that is due."""
+        counted = now - self._counted_since
+        if not self._repeats or counted < REPEAT_PERIOD:
+            return
+        repeats, self._repeats = self._repeats, Counter()
+        named = ', '.join(f'{count} x {name}' for name, count in repeats.most_common(NAMED_MAX))
+        others = ', and others' if len(repeats) > NAMED_MAX else ''
+        text = f'EMCY: {repeats.total()} more in {counted:.0f} s ({named}{others})'
+        self._report(EventKind.EMERGENCY, Severity.WARNING, text)
+
+    def _report_or_count(self, severity: Severity, text: str, name: str, now: float) -> None:
+        newest, self._newest = self._newest, text
+        came_before = now - self._came.get(name, -math.inf) < REPEAT_PERIOD
+        self._came[name] = now
+        flooded = now - self._counted_at < REPEAT_PERIOD
+        full = len(self._reported) == REPORTS_MAX and now - self._reported[0] < REPEAT_PERIOD
+        if not full and not (came_before and (flooded or text == newest)):
+            self._reported.append(now)
+            self._report(EventKind.EMERGENCY, severity, text)
+            return
+        if not self._repeats:
+            self._counted_since = now
+        self._repeats[name] += 1
+        self._counted_at = now
+
+
+class PdoWatch:
+    """Counts the TPDOs that do not come, and reports once when they have stopped."""
+
+    def __init__(
+        self,
+        inputs: Sequence[ReceivedTpdo],
+        report: Callable[[EventKind, Severity, str], None],
+    ) -> None:
+        self.missed = 0  # TPDOs that did not answer a SYNC
+        self._report = report
+        self._inputs = inputs
+        self._every_sync = [entry for entry in inputs if entry.every_sync]
+        self._synchronous = {entry.config.number for entry in inputs if entry.synchronous}
+        self._stopped: set[int] = set()
+        self._may_get_lost = ''  # numbers of TPDOs, as at the last boot
+        for entry in inputs:
+            entry.on_short = self._report_short
+
+    @property
+    def last(self) -> float:
+        """Steady time of the last TPDO in [s]; 0 before the first."""
+        return max((entry.timestamp for entry in self._inputs), default=0.0)
+
+    def stop(self) -> None:
+        """The device went away."""
+        self._stopped.clear()
+
+    def warn_of_losses(self) -> None:
+        """Report which TPDOs of a drive may get lost unnoticed, unless the last boot did."""
+        numbers = ', '.join(
+            str(entry.config.number) for entry in self._inputs if entry.loss_unnoticed
+        )
+        before, self._may_get_lost = self._may_get_lost, numbers
+        if numbers and numbers != before:
+            self._warn(
+                f'TPDO {numbers}: its loss goes unnoticed, and the drive is led by what '
+                'it sent before. Write transmission: 1 (with SYNC), or 255 and event_timer: 100 '
+                'where the device has it'
+            )
+
+    def expect(self) -> None:
+        """A SYNC is about to be sent: await those that answer each one."""
+        for entry in self._every_sync:
+            entry.expect()
+
+    def excuse(self, late: float) -> None:
+        """Await those that answer SYNC so many [s] longer, as it was not sent meanwhile."""
+        for entry in self._inputs:
+            if entry.synchronous:
+                entry.excused += late
+
+    def count_missed(self) -> None:
+        """Count those that did not answer the last SYNC."""
+        self.missed += sum(entry.awaited for entry in self._every_sync)
+
+    def look(self, now: float) -> None:
+        """Report those that have come and then stopped, at a steady time in [s]."""
+        stopped = [
+            entry for entry in self._inputs if entry.values is not None and entry.stale(now)
+        ]
+        if not stopped and not self._stopped:
+            return
+        numbers = {entry.config.number for entry in stopped}
+        before, self._stopped = self._stopped, numbers
+        if self._synchronous and self._synchronous <= numbers:
+            if not self._synchronous <= before:
+                longest = max(entry.stale_after for entry in stopped if entry.synchronous)
+                self._warn(
+                    f'has not answered SYNC for {longest * 1000:g} ms; targets are refused until '
+                    'it does. Check its power and its cable'
+                )
+            numbers = numbers - self._synchronous
+        for entry in stopped:
+            if entry.config.number in numbers - before:
+                self._warn(
+                    f'TPDO {entry.config.number} (0x{entry.config.cob_id:03X}) has stopped: none '
+                    f'for {entry.stale_after * 1000:g} ms; targets are refused until it comes '
+                    'again'
+                )
+
+    def _report_short(self, entry: ReceivedTpdo, length: int) -> None:
+        if entry.length_errors == 1:
+            self._warn(
+                f'TPDO {entry.config.number} (0x{entry.config.cob_id:03X}) has {length} bytes, '
+                f'its mapping {entry.codec.size}; it is not used. Does the device have another '
+                'mapping than bus.yml, or does somebody else send with this identifier?'
+            )
+
+    def _warn(self, text: str) -> None:
+        self._report(EventKind.PDO, Severity.WARNING, text)

@@ -31,16 +31,14 @@ from canopen_core.standard import (
 )
 
 from ..config.model import BusConfig
-from .boot import BootManager
-from .controller_watch import ControllerWatch
+from .boot import BootManager, Startup
 from .events import Event, EventKind, Report, Severity
-from .frame_sender import BusSender, NmtSender, PeriodicFrame
+from .frame_sender import BusSender, ControllerWatch, NmtSender, PeriodicFrame
 from .other_master import OtherMasterWatch
 from .process_image import SentRpdo, SyncRound
 from .remote_node import RemoteNode
 from .scheduler import completed, Promise, Scheduler
 from .sdo_client import SdoClient
-from .startup import Startup
 
 DEFECT_PERIOD = 10.0  # [s] between two reports of the same defect
 NEVER = float('inf')

@@ -26,7 +26,7 @@ from canopen_core.standard import (
 )
 
 from ..config.model import PdoConfig
-from ..config.model.pdo import longest_silence, loss_unnoticed
+from ..config.model.bus import longest_silence, loss_unnoticed
 from .scheduler import completed, Promise
 
 REPEAT_SHARE = 0.5  # of the deadline of an RPDO, after which it is repeated

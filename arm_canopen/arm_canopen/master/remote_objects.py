@@ -27,7 +27,7 @@ from canopen_core.standard import (
 )
 
 from ..config.model import NodeConfig
-from ..config.model.pdo import PERIODS_MISSED, STALE_AFTER
+from ..config.model.bus import PERIODS_MISSED, STALE_AFTER
 from .events import EventKind, Severity
 from .frame_sender import Send
 from .process_image import InputReader, Limits, limits_of, ProcessImage, SyncRound, Writer

@@ -1,28 +1,42 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Services, topic and action by which one axis of a drive is commanded."""
+"""Services and action of an axis: commands, modes, homing with feedback, and how it counts."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
+from dataclasses import dataclass, field
 from functools import partial
-from typing import TypeVar
+import math
+from pathlib import Path
+import time
+from typing import Any, TYPE_CHECKING, TypeVar
 
 from canopen_interfaces.srv import COTargetDouble
 from std_msgs.msg import Float64
 
+from arm_msgs.action import Home
 from arm_msgs.srv import Move as MoveService
+from arm_msgs.srv import ReadUnits
+from canopen_core import DriveError
 from canopen_core.standard import OperationMode
+from node_runner.action_goals import Ending, GoalServer, ServedGoal
 
+from ..cia402.axis import Axis
 from ..cia402.commands import AxisCommands
 from ..cia402.modes import Move
+from ..cia402.sequences import HomingProgress
+from ..config.model.drive import FactorGroup
 from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
 from .device_node import DeviceNode
-from .home_action import HomeAction
-from .joint_states import DriveJointStates
-from .units_service import BusFile, UnitsService
+from .joint_state_publisher import DriveJointStates
+from .output_thread import OutputThread
+
+if TYPE_CHECKING:
+    pass
+
 
 T = TypeVar('T')
 
@@ -126,6 +140,176 @@ class AxisServices:
 
     def _deliver(self, command: Callable[[], str]) -> Future[str]:
         return self._thread.run(self._admitted(lambda: self._commands.deliver(command)))
+
+
+FEEDBACK_PERIOD = 0.1  # [s]
+
+
+@dataclass(slots=True, eq=False)
+class _Homing(ServedGoal):
+    """A goal from its request to its end."""
+
+    stop_count: Future[int]  # at its request
+    phase: str = HomingProgress.ENABLING.value
+    begin: float = field(default_factory=time.monotonic)
+    timer: Any = None
+    task: Promise[str] | None = None
+    result: Any = None
+
+
+class HomeAction:
+    """The action ``~/home`` of one axis: a goal ends when the network's thread has homed it."""
+
+    def __init__(
+        self,
+        node: DeviceNode,
+        commands: AxisCommands,
+        name: str,
+        thread: NetworkThread,
+        output: OutputThread,
+    ) -> None:
+        """Offer the action; arguments as of :class:`.axis_services.AxisServices`."""
+        self._node = node
+        self._commands = commands
+        self._thread = thread
+        self._output = output
+        self._server = GoalServer(
+            node,
+            Home,
+            name,
+            accept=lambda: _Homing(thread.call(lambda: commands.stop_count)),
+            start=self._start,
+            conclude=self._conclude,
+            cancel=self._cancel,
+            fail=self._fail,
+        )
+
+    def _start(self, homing: _Homing) -> None:
+        # made and destroyed in the executor only: it may be about to run the timer
+        homing.timer = self._node.create_timer(
+            FEEDBACK_PERIOD, partial(self._publish_feedback, homing)
+        )
+
+        def notify(progress: HomingProgress) -> None:
+            homing.phase = progress.value
+
+        def run() -> Promise[str]:
+            self._node.admit()
+            if homing.stop_count.result() != self._commands.stop_count:
+                raise DriveError(f'{self._commands.axis.name} was stopped before it was homed')
+            method = homing.handle.request.method or None
+            homing.task = self._commands.run('home', self._commands.home(method, notify))
+            return homing.task
+
+        def finished(future: Future[str]) -> None:
+            self._output.post(partial(self._finish, homing, future))
+
+        self._thread.run(run).add_done_callback(finished)
+
+    def _cancel(self, homing: _Homing) -> None:
+        def cancel() -> None:
+            # only its own command; another one may run by now
+            if homing.task is not None and not homing.task.done:
+                self._commands.cancel('homing was cancelled')
+
+        self._thread.call(cancel)
+
+    def _publish_feedback(self, homing: _Homing) -> None:
+        if not homing.has_ended:
+            elapsed = time.monotonic() - homing.begin
+            homing.handle.publish_feedback(
+                Home.Feedback(phase=homing.phase, position=self._position(), elapsed=elapsed)
+            )
+
+    def _position(self) -> float:
+        view = self._commands.axis.view
+        return view.position if view.fresh else math.nan
+
+    def _finish(self, homing: _Homing, future: Future[str]) -> None:
+        error = future.exception()
+        homing.result = Home.Result(
+            success=error is None,
+            message=future.result() if error is None else str(error),
+            position=self._position(),
+        )
+        self._server.end(homing)
+
+    def _conclude(self, homing: _Homing) -> tuple[Ending, Home.Result]:
+        self._node.destroy_timer(homing.timer)
+        ending = Ending.SUCCEEDED if homing.result.success else Ending.CANCELED
+        return ending, homing.result
+
+    def _fail(self, homing: _Homing, error: Exception) -> Home.Result:
+        if homing.timer is not None:
+            self._node.destroy_timer(homing.timer)
+        message = f'{type(error).__name__}: {error}'
+        return Home.Result(success=False, message=message, position=math.nan)
+
+
+KEYS = (
+    'scale_from_factor_group',
+    'scale_pos_to_dev',
+    'scale_pos_from_dev',
+    'scale_vel_to_dev',
+    'scale_vel_from_dev',
+    'scale_eff_to_dev',
+    'scale_eff_from_dev',
+    'offset_pos_from_dev',
+)
+"""Keys of bus.yml, which are the names of the fields of the answer, too."""
+
+
+@dataclass(frozen=True, slots=True)
+class BusFile:
+    """A bus.yml as the master has read it, so that a client recognizes the very file."""
+
+    path: Path  # where it is on this computer
+    inode: int = 0  # its inode; 0 when it is gone
+    changed: int = 0  # when it was changed last in [ns]; 0 when it is gone
+
+    @classmethod
+    def at(cls, path: Path) -> BusFile:
+        """Remember a file that was just read."""
+        try:
+            stat = path.stat()
+        except OSError:
+            return cls(path.absolute())
+        return cls(path.absolute(), stat.st_ino, stat.st_mtime_ns)
+
+
+class UnitsService:
+    """``~/read_units`` of one axis."""
+
+    def __init__(
+        self, node: DeviceNode, drive: Axis, place: str, thread: NetworkThread, file: BusFile
+    ) -> None:
+        self._node, self._drive = node, drive
+        self._thread, self._file = thread, file
+        node.offer(ReadUnits, f'{place}/read_units', self._read, self._answer)
+
+    def _read(self, _request: ReadUnits.Request) -> Future[FactorGroup]:
+        return self._thread.run_coroutine(self._drive.view.cache.factor_group)
+
+    def _answer(
+        self, response: ReadUnits.Response, future: Future[FactorGroup]
+    ) -> ReadUnits.Response:
+        error = future.exception()
+        if error is not None:
+            response.message = str(error)
+            return response
+        factors, drive = future.result(), self._drive
+        response.gear = factors.gear or 0.0
+        response.factor_scale = factors.position_scale
+        for key in KEYS:
+            setattr(response, key, getattr(drive.view.units.config, key))
+        response.bus_config = str(self._file.path)
+        response.bus_config_inode = self._file.inode
+        response.bus_config_changed = self._file.changed
+        config = drive.node.config
+        response.device = config.name
+        response.channel = drive.config.channel if len(config.axes) > 1 else -1
+        response.success = True  # last: an answer of which one part fails is sent, too
+        return response
 
 
 def offer_drive(

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ROS node of one device: NMT, SDO and raw PDO access, as ros2_canopen's proxy has them.
 
-And services that read and write objects of any type by name or number.
+And services that read and write objects of any type by name or number. The messages of
+ros2_canopen carry objects as raw 32 bits.
 """
 
 from __future__ import annotations
@@ -10,26 +11,108 @@ from __future__ import annotations
 from collections.abc import Callable, Coroutine, Mapping
 from concurrent.futures import Future
 from functools import partial
+import struct
 from typing import Any
 
 from canopen_interfaces.msg import COData
 from canopen_interfaces.srv import CORead, COWrite
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from arm_msgs.srv import ReadObject, WriteObject
-from canopen_core import CanopenError, ObjectError, SdoError
+from canopen_core import CanopenError, CodecError, ObjectError, SdoError
 from canopen_core.eds import bytes_from_text, text_from_bytes
-from canopen_core.standard import NmtCommand, Number, object_address, object_path, ObjectEntry
-from node_runner import create_deferred_service, destroyed_when_refused
+from canopen_core.standard import (
+    byte_length,
+    DataType,
+    MappedObject,
+    NmtCommand,
+    NmtState,
+    Number,
+    object_address,
+    object_path,
+    ObjectEntry,
+    PdoCodec,
+    SIGNED_BITS,
+)
+from node_runner import create_deferred_service, destroyed_when_refused, LATCHED
 
-from ..master.object_access import bytes_from_raw, number_from_raw, raw_from_bytes
+from ..config.model import NodeConfig
+from ..master.events import Event, EventKind, Severity
+from ..master.process_image import ReceivedTpdo
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
-from .device_topics import DeviceTopics, node_options
 from .output_thread import OutputThread
+
+NMT_STATE_WORDS: dict[NmtState, str] = {
+    NmtState.BOOT_UP: 'BOOTUP',
+    NmtState.PRE_OPERATIONAL: 'PREOP',
+    NmtState.OPERATIONAL: 'START',
+    NmtState.STOPPED: 'STOP',
+}
+"""The states of ~/nmt_state, in ros2_canopen's words; ERROR stands for a device that was lost."""
+
+
+def node_options(config: NodeConfig) -> dict[str, Any]:
+    """Return the options of the node of a device, by the namespace and remappings of bus.yml."""
+    remappings = [f'{old}:={new}' for old, new in config.remappings.items()]
+    arguments = [word for rule in remappings for word in ('-r', rule)]
+    return {
+        'namespace': config.namespace or None,
+        'cli_args': ['--ros-args', *arguments] if arguments else None,
+    }
+
+
+class DeviceTopics:
+    """``~/nmt_state`` and ``~/rpdo`` of a device."""
+
+    def __init__(self, node: Node, device: RemoteNode, output: OutputThread) -> None:
+        self._device = device
+        self._output = output
+        self._nmt_state = node.create_publisher(String, '~/nmt_state', LATCHED)
+        self._rpdo = node.create_publisher(COData, '~/rpdo', 10)
+        self._listened = False
+
+    def take_event(self, event: Event) -> None:
+        """Publish the NMT state where an event changes it."""
+        if event.kind in (EventKind.NMT_STATE, EventKind.HEARTBEAT_LOST):
+            state = self._device.nmt_state
+            words = 'ERROR' if state is None else NMT_STATE_WORDS[state]
+            self._nmt_state.publish(String(data=words))
+
+    def update_listeners(self) -> None:
+        """Publish each received object on ~/rpdo while somebody listens, and only then."""
+        listened = self._rpdo.get_subscription_count() > 0
+        if listened != self._listened:
+            self._listened = listened
+            for entry in self._device.image.tpdos:
+                (entry.listen if listened else entry.ignore)(self._received)
+
+    def _received(self, entry: ReceivedTpdo) -> None:
+        values = entry.values or ()
+        self._output.post_stream(entry, partial(self._publish_objects, entry, values))
+
+    def _publish_objects(self, entry: ReceivedTpdo, values: tuple[float, ...]) -> None:
+        for mapped, value in zip(entry.config.mapping, values, strict=True):
+            data = raw_from_number(mapped, value)
+            self._rpdo.publish(COData(index=mapped.index, subindex=mapped.subindex, data=data))
+
+
+def log_bus_event(node: Node, event: Event) -> None:
+    """Log an event of a bus."""
+    logger = node.get_logger()
+    if event.severity is Severity.INFO and event.kind is EventKind.NMT_STATE:
+        logger.debug(str(event))  # ~/nmt_state has it
+    elif event.severity is Severity.INFO:
+        logger.info(str(event))
+    elif event.severity is Severity.WARNING:
+        logger.warning(str(event))
+    else:
+        logger.error(str(event))
+
 
 Transfer = tuple[ObjectEntry, bytes]
 
@@ -235,3 +318,60 @@ def _require_clear(path: str) -> None:
             f'object {path!r} is 0x{digits}, or {number}, of which YAML makes {digits} without '
             f"quotes; write the one that is meant, in quotes: object: '{number}'"
         )
+
+
+RAW_BYTES = 4  # [byte] in COData, CORead and COWrite
+
+
+def raw_from_bytes(data: bytes) -> int:
+    """Return up to four bytes as they are, zero-extended.
+
+    Raises:
+        CodecError: There are more; the message has no room for them.
+    """
+    if len(data) > RAW_BYTES:
+        raise CodecError(f'the object has {len(data)} bytes, more than the 4 of this message')
+    return int.from_bytes(data, 'little')
+
+
+def bytes_from_raw(data_type: DataType, raw: int) -> bytes:
+    """Return the bytes of an object from the 32 bits of a message.
+
+    A negative number may come zero-extended to its type or sign-extended to 32 bits.
+
+    Raises:
+        CodecError: The type does not fit into 32 bits, or the value does not fit the type.
+    """
+    size = byte_length(data_type)
+    if size is None or size > RAW_BYTES:
+        raise CodecError(f'{data_type.name} does not fit into the 32 bits of this message')
+    bits = size * 8
+    raw = _narrowed(data_type, bits, raw)
+    if raw >> (1 if data_type is DataType.BOOLEAN else bits):
+        raise CodecError(f'0x{raw:X} does not fit {data_type.name}')
+    return raw.to_bytes(size, 'little')
+
+
+def _narrowed(data_type: DataType, bits: int, raw: int) -> int:
+    """Cut a negative number that was sign-extended to 32 bits down to those of its type."""
+    negative = raw >> (bits - 1) == (1 << (33 - bits)) - 1 if bits <= 32 else False
+    return raw & ((1 << bits) - 1) if negative and data_type in SIGNED_BITS else raw
+
+
+def raw_from_number(mapped: MappedObject, value: Number) -> int:
+    """Return a value of a PDO as the 32 bits of a message, cut off if it has more."""
+    return int.from_bytes(PdoCodec([mapped]).pack([value])[:RAW_BYTES], 'little')
+
+
+def number_from_raw(mapped: MappedObject, raw: int) -> Number:
+    """Return the value of a mapped object from the 32 bits of a message.
+
+    A negative number may come zero-extended to its type or sign-extended to 32 bits.
+
+    Raises:
+        CodecError: The value does not fit the object.
+    """
+    raw = _narrowed(mapped.data_type, mapped.bits, raw)
+    if raw >> min(mapped.bits, 32):
+        raise CodecError(f'0x{raw:X} does not fit the {mapped.bits} bits of the object')
+    return PdoCodec([mapped]).unpack(struct.pack('<Q', raw))[0]

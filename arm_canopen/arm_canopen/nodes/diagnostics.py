@@ -15,10 +15,10 @@ from canopen_core.can import BusCounters, ControllerState, LoadFigures
 from canopen_core.standard import DriveState
 
 from ..cia402.state import DriveStatus
-from ..master.controller_watch import ControllerWatch
+from ..master.frame_sender import ControllerWatch
 from ..master.network import Network
+from ..master.remote_node import node_status, NodeStatus
 from ..master.runner import CycleFigures
-from ..master.status import node_status, NodeStatus
 from .output_thread import OutputThread
 
 HIGH_LOAD = 0.7  # share of the bus time above which low-priority frames begin to wait long

@@ -39,7 +39,7 @@ from ..master.process_image import InputReader, ReceivedTpdo
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
 from .device_node import answer_write, DeviceNode
-from .joint_states import DriveJointStates
+from .joint_state_publisher import DriveJointStates
 
 
 class Channels:

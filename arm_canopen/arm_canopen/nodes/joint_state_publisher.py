@@ -1,28 +1,251 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run arm_canopen canopen_joint_state_publisher``: the drives' states as /joint_states."""
+"""Joint states of drives and of the robot that they move, stamped with their SYNC.
+
+``ros2 run arm_canopen canopen_joint_state_publisher`` puts those of several masters together.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import partial
 import sys
 import time
+from typing import Protocol
 
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.time import Time
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 
 from canopen_core import CanopenError
 from node_runner import (
     destroyed_when_refused,
+    LATCHED,
     notify_ready,
     ParameterReader,
     refuse_misspelt,
     run_node,
 )
 
-from ..joints import Joints, JointSample, SilenceWatch
-from .joint_states import on_description, RobotJointStates
+from ..joints import JointAggregator, Joints, JointSample, JointSet, movable_joints, SilenceWatch
+from .output_thread import OutputThread
+
+
+class Measured(Protocol):
+    """An axis of a drive or an encoder, as of the last cycle, in user units."""
+
+    @property
+    def name(self) -> str:
+        """Name of the joint."""
+
+    @property
+    def fresh(self) -> bool:
+        """Whether the values are young enough to be published."""
+
+    @property
+    def position(self) -> float:
+        """Actual position."""
+
+    @property
+    def velocity(self) -> float:
+        """Actual velocity."""
+
+    @property
+    def effort(self) -> float:
+        """Actual effort."""
+
+
+class DriveJointStates:
+    """``~/joint_states`` of a drive, and of each of its channels where it has several."""
+
+    def __init__(self, node: Node, axes: Sequence[Measured]) -> None:
+        self.axes = list(axes)  # the state of each axis
+        self.listened = False  # somebody listens to one of the topics
+        names = [axis.name for axis in axes]
+        topics = {'~': slice(None)}
+        if len(names) > 1:  # and each channel as a drive of its own
+            topics |= {name: slice(number, number + 1) for number, name in enumerate(names)}
+        self._topics = [
+            (_publisher(node, f'{place}/joint_states'), _message(names[axes]), axes)
+            for place, axes in topics.items()
+        ]
+
+    def update_listeners(self) -> None:
+        """Check for subscribers."""
+        self.listened = any(publisher.get_subscription_count() for publisher, _, _ in self._topics)
+
+    def sample(self) -> list[JointSample] | None:
+        """Return the state of each axis; None while one is not fresh."""
+        if not all(axis.fresh for axis in self.axes):
+            return None
+        return [JointSample(axis.position, axis.velocity, axis.effort) for axis in self.axes]
+
+    def publish(self, stamp: Time, samples: Sequence[JointSample]) -> None:
+        """Publish the state of the axes at the time of a SYNC."""
+        for publisher, message, axes in self._topics:
+            message.header.stamp = stamp.to_msg()
+            for number, sample in enumerate(samples[axes]):
+                message.position[number], message.velocity[number], message.effort[number] = sample
+            publisher.publish(message)
+
+
+class RobotJointStates:
+    """``joint_states`` of a robot, put together from those of its drives."""
+
+    def __init__(self, node: Node, joints: Joints) -> None:
+        self.aggregator = JointAggregator(joints)  # the joints
+        self.listened = False  # somebody listens to the topic
+        self._clock = node.get_clock()
+        self._publisher = _publisher(node, 'joint_states')
+
+    def set_joints(self, joints: Joints) -> None:
+        """Begin anew with other joints, or the same in another order."""
+        self.aggregator = JointAggregator(joints)
+
+    def update_listeners(self) -> None:
+        """Check for subscribers."""
+        self.listened = self._publisher.get_subscription_count() > 0
+
+    def update(self, joint: str, stamp: int, sample: JointSample) -> None:
+        """Store the state of a joint at a time in [ns], and publish what is complete."""
+        for ready in self.aggregator.update(joint, stamp, sample, time.monotonic()):
+            if ready.samples:
+                self._publish(ready)
+
+    def _publish(self, ready: JointSet) -> None:
+        positions, velocities, efforts = zip(*ready.samples.values(), strict=True)
+        names = [*ready.samples]
+        message = JointState(name=names, position=positions, velocity=velocities, effort=efforts)
+        # drivers that leave the stamp empty, as ros2_canopen does, get the time of arrival
+        stamp = Time(nanoseconds=ready.stamp) if ready.stamp else self._clock.now()
+        message.header.stamp = stamp.to_msg()
+        self._publisher.publish(message)
+
+
+class BusJointStates:
+    """The joint states of a bus: sampled in the cycle, published by the output thread."""
+
+    def __init__(
+        self, node: Node, drives: Sequence[DriveJointStates], output: OutputThread
+    ) -> None:
+        self._node = node
+        self._drives = list(drives)
+        self._output = output
+        self._robot: RobotJointStates | None = None
+        self._posted = False
+
+    def publish_robot(self, description: str) -> None:
+        """Publish ``joint_states``, too: all axes of the bus, and the joints that mimic them.
+
+        By a URDF in XML, or by the topic ``robot_description``. Until it comes, the joints are
+        those of bus.yml in its order; so they stay where it has none of them.
+        """
+        own = [axis.name for drive in self._drives for axis in drive.axes]
+        robot = RobotJointStates(self._node, dict.fromkeys(own))
+
+        def begin(joints: Joints) -> None:
+            here = {
+                name: mimic
+                for name, mimic in joints.items()
+                if name in own or (mimic is not None and mimic.source in own)
+            }
+            absent = [name for name in own if name not in joints]
+            if not here:
+                self._node.get_logger().error(
+                    f'joint_states: no drive of bus.yml is a joint of the URDF; bus.yml has '
+                    f'{", ".join(own)}, the URDF has {", ".join(joints)}; those of bus.yml are '
+                    'published'
+                )
+                return
+            if absent:
+                self._node.get_logger().warning(
+                    f'joint_states: {", ".join(absent)} of bus.yml are no joints of the URDF, and '
+                    'are left out'
+                )
+            self._output.post(lambda: robot.set_joints(here))
+
+        on_description(self._node, description, begin)
+        self._robot = robot
+
+    def update_listeners(self) -> None:
+        """Check for subscribers, so that only what is received is published."""
+        for drive in self._drives:
+            drive.update_listeners()
+        if self._robot is not None:
+            self._robot.update_listeners()
+
+    def feedback(self, sync_time: float) -> None:
+        """Sample the axes at the steady time of a SYNC in [s]."""
+        if self._posted:
+            return  # the output thread is behind; it gets the newest when it is there again
+        all_of_them = self._robot is not None and self._robot.listened
+        samples = [
+            (drive, sample)
+            for drive in self._drives
+            if (all_of_them or drive.listened) and (sample := drive.sample()) is not None
+        ]
+        if samples:
+            self._posted = True
+            self._output.post(partial(self._publish, sync_time, samples))
+
+    def _publish(
+        self, sync_time: float, samples: list[tuple[DriveJointStates, list[JointSample]]]
+    ) -> None:
+        self._posted = False
+        age = int((time.monotonic() - sync_time) * 1e9)  # [ns]
+        stamp = Time(nanoseconds=self._node.get_clock().now().nanoseconds - age)
+        for drive, sample in samples:
+            if drive.listened:
+                drive.publish(stamp, sample)
+        if self._robot is not None:
+            for drive, sample in samples:
+                for axis, joint in zip(drive.axes, sample, strict=True):
+                    self._robot.update(axis.name, stamp.nanoseconds, joint)
+
+
+def on_description(node: Node, text: str, begin: Callable[[Joints], None]) -> None:
+    """Call ``begin`` once with the movable joints of the robot.
+
+    Of a URDF in XML, or of the topic ``robot_description``.
+
+    Raises:
+        CanopenError: The text is no URDF.
+    """
+    if text:
+        try:
+            joints = movable_joints(text)
+        except CanopenError as error:
+            raise CanopenError(f'robot_description: {error}') from error
+        begin(joints)
+        return
+    begun = False
+
+    def receive(message: String) -> None:
+        nonlocal begun
+        if begun:
+            return  # a robot that changes its joints is another robot, for another process
+        try:
+            joints = movable_joints(message.data)
+        except CanopenError as error:
+            node.get_logger().error(f'robot_description: {error}')
+        else:
+            begun = True
+            begin(joints)
+
+    node.create_subscription(String, 'robot_description', receive, LATCHED)
+
+
+def _publisher(node: Node, topic: str) -> Publisher:
+    return node.create_publisher(JointState, topic, 10)
+
+
+def _message(joints: list[str]) -> JointState:
+    zeros = [0.0] * len(joints)
+    return JointState(name=joints, position=zeros, velocity=zeros, effort=zeros)
+
 
 WATCH_PERIOD = 2.0  # [s] between two looks for joints without states
 

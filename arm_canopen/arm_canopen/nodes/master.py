@@ -29,10 +29,10 @@ from node_runner import (
     spin,
 )
 
+from ..canopen_master import THREAD_PRIORITY
 from ..config import load_bus
 from ..config.model import BusConfig
 from ..config.model.checks import check_bus
-from ..library.canopen_master import THREAD_PRIORITY
 from ..master.lifecycle import MANAGER
 from .master_process import MasterProcess
 

@@ -1,37 +1,188 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""One bus in one process: network, drives and all their ROS nodes."""
+"""One bus in one process: network, drives and all their ROS nodes.
+
+The node of the master has SDO and NMT to any node id, and ``stop``: one service that stops the
+robot, whatever moves it.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, wait
 from functools import partial
 import threading
 import time
+from typing import Any
 
+from canopen_interfaces.srv import CONmtID, COReadID, COWriteID
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
 from black_box import BlackBoxSettings
 from canopen_core import CanopenError
 from canopen_core.can import Bus
-from node_runner import notify_ready, raise_thread_priority
+from canopen_core.standard import (
+    ALL_NODES,
+    byte_length,
+    DataType,
+    NmtCommand,
+    NODE_ID_MAX,
+    NODE_ID_MIN,
+    object_address,
+)
+from node_runner import create_deferred_service, notify_ready, raise_thread_priority
 
+from ..canopen_master import CanopenMaster
+from ..cia402.commands import AxisCommands
 from ..cia402.motion import MotionSource
+from ..cia402.motion_group import stop_all, StopReport
 from ..config.model import BusConfig
-from ..library.canopen_master import CanopenMaster
 from ..master.events import Event
-from .axis_services import offer_drive
-from .device_node import DeviceNode
-from .device_topics import log_bus_event
+from ..master.runner import NetworkThread
+from ..master.scheduler import Promise
+from .axis_services import BusFile, offer_drive
+from .device_node import (
+    answer_read,
+    answer_write,
+    bytes_from_raw,
+    DeviceNode,
+    log_bus_event,
+    raw_from_bytes,
+)
 from .diagnostics import bus_diagnostics, DiagnosticsPublisher
 from .io_topics import EncoderTopics, offer_io
-from .joint_states import BusJointStates
-from .managed_bus import ManagedBus
-from .master_node import MasterServices
+from .joint_state_publisher import BusJointStates
+from .lifecycle import ManagedBus
 from .output_thread import OutputThread
-from .stop_service import StopService
-from .units_service import BusFile
+
+SERVICE_TYPES = (
+    DataType.INTEGER8,
+    DataType.INTEGER16,
+    DataType.INTEGER32,
+    DataType.UNSIGNED8,
+    DataType.UNSIGNED16,
+    DataType.UNSIGNED32,
+)
+"""Data types that COReadID and COWriteID name."""
+
+SDO_TIMEOUT = 0.5  # [s] a stranger's bus.yml entry, which would say, does not exist
+
+
+class MasterServices:
+    """Services of the master node."""
+
+    def __init__(self, node: Node, thread: NetworkThread, output: OutputThread) -> None:
+        # called for every request; raises CanopenError when none is taken at the moment
+        self.admit: Callable[[], None] = lambda: None
+        self._thread = thread
+        for kind, name, begin, respond in (
+            (COReadID, '~/sdo_read', self._read, answer_read),
+            (COWriteID, '~/sdo_write', self._write, answer_write),
+            (CONmtID, '~/set_nmt', self._set_nmt, answer_write),
+        ):
+            fill = partial(respond, node)
+            create_deferred_service(node, kind, name, begin, fill, post=output.post)
+
+    def _read(self, request: COReadID.Request) -> Future[int]:
+        async def read() -> int:
+            self.admit()
+            data_type = _data_type(request.canopen_datatype)
+            client = self._thread.network.sdo_client(_node_id(request.nodeid))
+            data = await client.read(request.index, request.subindex, SDO_TIMEOUT)
+            if len(data) != byte_length(data_type):
+                raise CanopenError(
+                    f'{object_address(request.index, request.subindex)} of node {request.nodeid} '
+                    f'has {len(data)} bytes, {data_type.name} has {byte_length(data_type)}'
+                )
+            return raw_from_bytes(data)
+
+        return self._thread.run_coroutine(read)
+
+    def _write(self, request: COWriteID.Request) -> Future[None]:
+        def write() -> Promise[None]:
+            self.admit()
+            for device in self._thread.network.nodes.values():
+                if device.config.node_id == request.nodeid:
+                    device.objects.check_owner(request.index)
+            data = bytes_from_raw(_data_type(request.canopen_datatype), request.data)
+            client = self._thread.network.sdo_client(_node_id(request.nodeid))
+            return client.write(request.index, request.subindex, data, SDO_TIMEOUT)
+
+        return self._thread.run(write)
+
+    def _set_nmt(self, request: CONmtID.Request) -> Future[None]:
+        async def send() -> None:
+            self.admit()
+            node_id = request.nodeid if request.nodeid == ALL_NODES else _node_id(request.nodeid)
+            await self._thread.network.command_nmt(_nmt_command(request.nmtcommand), node_id)
+
+        return self._thread.run_coroutine(send)
+
+
+def _data_type(number: int) -> DataType:
+    for data_type in SERVICE_TYPES:
+        if data_type == number:
+            return data_type
+    names = ', '.join(f'{data_type.name} {data_type:#04x}' for data_type in SERVICE_TYPES)
+    raise CanopenError(f'canopen_datatype {number:#04x} is none of {names}')
+
+
+def _nmt_command(number: int) -> NmtCommand:
+    try:
+        return NmtCommand(number)
+    except ValueError:
+        names = ', '.join(f'{command.value} {command.name}' for command in NmtCommand)
+        raise CanopenError(f'nmtcommand {number} is none of {names}') from None
+
+
+def _node_id(number: int) -> int:
+    if not NODE_ID_MIN <= number <= NODE_ID_MAX:
+        raise CanopenError(f'node id {number} is not {NODE_ID_MIN} to {NODE_ID_MAX}')
+    return number
+
+
+SERVICE = 'stop'
+EVENT_TOPIC, STOP_EVENT = 'trajectory_execution_event', 'stop'
+"""By which MoveIt's move_group, or ours, gives up what it executes, and what it was to execute."""
+
+
+class StopService:
+    """Halts all drives of a bus; it is there at any time, also while devices boot."""
+
+    def __init__(
+        self,
+        node: Node,
+        commands: Sequence[AxisCommands],
+        thread: NetworkThread,
+        output: OutputThread,
+    ) -> None:
+        self._node, self._commands, self._thread = node, commands, thread
+        self._events = node.create_publisher(String, EVENT_TOPIC, 10)
+        create_deferred_service(node, Trigger, SERVICE, self._stop, self._answer, post=output.post)
+
+    def _stop(self, _: Trigger.Request) -> Future[StopReport]:
+        self._events.publish(String(data=STOP_EVENT))  # or a plan would begin after the halt
+        scheduler = self._thread.network.scheduler
+        return self._thread.run_coroutine(lambda: stop_all(self._commands, scheduler))
+
+    def _answer(self, response: Any, future: Future[StopReport]) -> Any:  # noqa: ANN401
+        error = future.exception()
+        if error is None:
+            report = future.result()
+            response.success, response.message = not report.failed, str(report)
+        else:
+            response.success, response.message = False, str(error)
+        words = f'{SERVICE}: {response.message}'
+        # a line of its own for each severity: rclpy refuses another one from the same line
+        if response.success:
+            self._node.get_logger().info(words)
+        else:
+            self._node.get_logger().error(words)
+        return response
+
 
 LISTENER_PERIOD = 0.1  # [s] in which a new subscriber gets its first message
 LAST_DIAGNOSTICS_TIMEOUT = 0.5  # [s] for the last /diagnostics

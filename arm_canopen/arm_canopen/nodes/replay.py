@@ -32,11 +32,11 @@ from node_runner import (
 
 from ..config import load_bus
 from ..config.model import BusConfig
-from ..library.bus_replay import BusReplay, unknown_scales
 from ..master.events import Event
-from .device_topics import DeviceTopics, log_bus_event, node_options
+from ..recording import BusReplay, unknown_scales
+from .device_node import DeviceTopics, log_bus_event, node_options
 from .diagnostics import bus_diagnostics, DiagnosticsPublisher
-from .joint_states import BusJointStates, DriveJointStates
+from .joint_state_publisher import BusJointStates, DriveJointStates
 from .output_thread import OutputThread
 
 MASTER = 'master'

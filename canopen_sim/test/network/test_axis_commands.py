@@ -37,8 +37,8 @@ from arm_canopen import (
     Promise,
     Severity,
 )
-from arm_canopen.cia402.homing import HomingProgress
 from arm_canopen.cia402.modes.profile_position import Move, QUEUE_MAX
+from arm_canopen.cia402.sequences import HomingProgress
 from arm_canopen.config import DriveConfig, RecoveryPolicy
 from canopen_core.can import Frame
 from canopen_core.standard import NmtCommand, ObjectDictionary

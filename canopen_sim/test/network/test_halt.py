@@ -32,9 +32,9 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen import DriveError, DriveState, NodeConfig, OperationMode, Severity
-from arm_canopen.cia402.halt import UNDER_HALT_TIME
 from arm_canopen.cia402.modes import Move
 from arm_canopen.cia402.state import VelocityEstimate, WINDOW
+from arm_canopen.cia402.stop import UNDER_HALT_TIME
 from arm_canopen.config import RecoveryPolicy
 from canopen_core.can import Frame
 from canopen_core.standard import ObjectDictionary, Statusword

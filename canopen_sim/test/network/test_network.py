@@ -29,8 +29,7 @@ from arm_canopen import (
     SdoTimeoutError,
     Severity,
 )
-from arm_canopen.master.emergency_log import EmergencyLog
-from arm_canopen.master.life_signs import Guarding
+from arm_canopen.master.life_signs import EmergencyLog, Guarding
 from arm_canopen.master.network import Network, NEVER, UPDATE_SHARE
 from arm_canopen.master.other_master import (
     CATCH_UP_MAX,
@@ -39,9 +38,8 @@ from arm_canopen.master.other_master import (
     LISTENING_TIME,
     refuse_other_master,
 )
-from arm_canopen.master.remote_node import RESET_TIME
+from arm_canopen.master.remote_node import node_status, RESET_TIME
 from arm_canopen.master.runner import Clock
-from arm_canopen.master.status import node_status
 from canopen_core.can import Frame, VirtualBus, VirtualWire
 from canopen_core.standard import (
     CobId,

@@ -56,7 +56,7 @@ import pytest
 
 from arm_canopen import CanopenError, DriveError, DriveState, NodeConfig, OperationMode, Promise
 from arm_canopen.cia402.modes import Move
-from arm_canopen.cia402.stop_all import stop_all, StopReport
+from arm_canopen.cia402.motion_group import stop_all, StopReport
 from arm_canopen.config import RecoveryPolicy
 from canopen_core.can import Frame
 from canopen_core.standard import Controlword, drive_state, NmtCommand, TARGET_OBJECTS

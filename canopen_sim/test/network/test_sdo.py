@@ -25,8 +25,7 @@ from arm_canopen import (
     SdoError,
     SdoTimeoutError,
 )
-from arm_canopen.master.sdo_block_client import BURST
-from arm_canopen.master.sdo_client import BLOCK_MIN
+from arm_canopen.master.sdo_client import BLOCK_MIN, BURST
 from canopen_core.can import Frame
 from canopen_core.standard import DataType, ObjectDictionary, ObjectEntry
 from canopen_sim.objects.object_store import ObjectStore

@@ -22,10 +22,10 @@ from drive_samples import (
 import pytest
 
 from arm_canopen import DriveError, DriveState, EventKind, OperationMode, Severity
+from arm_canopen.canopen_master import leave_device
+from arm_canopen.cia402.motion_group import stop_all, StopReport
 from arm_canopen.cia402.stop import SHUTDOWN_MAX
-from arm_canopen.cia402.stop_all import stop_all, StopReport
 from arm_canopen.config import RecoveryPolicy
-from arm_canopen.library.canopen_master import leave_device
 from arm_canopen.master.remote_node import BootPhase
 from arm_canopen.nodes.diagnostics import drive_diagnostic
 from canopen_core.can import ControllerState, Frame

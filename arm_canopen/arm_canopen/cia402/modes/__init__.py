@@ -12,8 +12,7 @@ from ...master.process_image import Writer
 from ..parameters import OFFSET_OBJECTS
 from ..state import AxisState
 from .cyclic_position import CyclicPosition, FeedForward, InterpolatedPosition
-from .homing import Homing
-from .mode import Mode, NO_BITS, NoMode, OffsetTarget
+from .mode import Homing, Mode, NO_BITS, NoMode, OffsetTarget
 from .profile_position import Move, NEW_SET_POINT, ProfilePosition
 from .rates import CyclicTorque, CyclicVelocity, ProfileTorque, ProfileVelocity, Velocity
 

@@ -7,9 +7,8 @@ It is made of plain values, and imports nothing that reads files.
 
 from canopen_core import Place
 
-from .bus import BusConfig, Identity, MasterConfig, NodeConfig, SdoWrite
+from .bus import BusConfig, Identity, MasterConfig, NodeConfig, PdoConfig, SdoWrite
 from .drive import DriveConfig, RecoveryPolicy
-from .pdo import PdoConfig
 
 __all__ = [
     'BusConfig',

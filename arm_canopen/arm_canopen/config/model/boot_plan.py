@@ -28,9 +28,8 @@ from canopen_core.standard import (
     TIME_PRODUCER,
 )
 
-from ..units import HUNDRED_MICROSECONDS, MILLISECONDS
-from .bus import BusConfig, NodeConfig, SdoWrite
-from .pdo import Direction, EVENT_TIMER_SUBINDEX, PdoConfig, TPDO
+from ..keys import HUNDRED_MICROSECONDS, MILLISECONDS
+from .bus import BusConfig, Direction, EVENT_TIMER_SUBINDEX, NodeConfig, PdoConfig, SdoWrite, TPDO
 
 COB_ID_BITS = COB_ID_INVALID | COB_ID_EXTENDED | CAN_ID_MASK
 """Bits that bus.yml decides of a COB-ID; the device has bit 30 as it can."""

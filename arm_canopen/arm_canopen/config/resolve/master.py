@@ -11,13 +11,11 @@ import re
 from canopen_core import Findings, RefusedError
 from canopen_core.standard import TIME_PRODUCER
 
-from ..keys import keys_of
+from ..keys import keys_of, MILLISECONDS
 from ..model.bus import CYCLE_PERIOD, Identity, MasterConfig, U16_MAX
 from ..read.document import YamlMap
-from ..read.scalars import integer
-from ..read.section import read_section, texts
+from ..read.section import integer, read_section, texts
 from ..sections import MASTER_KEYS, MasterSettings, Options, U8_MAX
-from ..units import MILLISECONDS
 from .sdo_list import error_behaviours
 
 MASTER_PACKAGE = 'canopen_master_driver'

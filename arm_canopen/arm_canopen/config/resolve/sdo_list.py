@@ -38,9 +38,18 @@ from canopen_core.standard import (
 from ..keys import Key
 from ..model.boot_plan import ERROR_CONTROL
 from ..model.bus import SdoWrite
-from ..read import scalars
 from ..read.document import Item, Scalar, ScalarKind, YamlMap
-from ..read.section import block, listing, read_section
+from ..read.section import (
+    block,
+    boolean,
+    describe,
+    integer,
+    key_number,
+    listing,
+    number,
+    read_section,
+    text,
+)
 from ..sections import SDO_KEYS, U8_MAX
 
 OWN_KEYS: dict[tuple[int, int], str] = {
@@ -93,7 +102,7 @@ def error_behaviours(section: YamlMap, findings: Findings) -> Iterator[tuple[int
     """Yield what ``error_behavior`` has for 0x1029, by sub-index (CiA 301, 7.5.2.28)."""
     given = block(section, 'error_behavior', findings)
     for name, item in given.entries.items() if given else ():
-        subindex = scalars.key_number(name, U8_MAX)
+        subindex = key_number(name, U8_MAX)
         if subindex is None:
             findings.error(item.place, f'{name!r} is no sub-index', "write '1: 0' and the like")
         else:
@@ -108,9 +117,7 @@ def read_object(item: Item, keys: tuple[Key, ...], findings: Findings) -> dict[s
     """
     example = '{index: 0x6081, sub_index: 0}'
     if not isinstance(item, YamlMap):
-        findings.error(
-            item.place, f'expected an object, got {scalars.describe(item)}', f'write {example}'
-        )
+        findings.error(item.place, f'expected an object, got {describe(item)}', f'write {example}')
         return None
     values = {'subindex': 0} | read_section(item, keys, findings)
     if 'index' not in item.entries:
@@ -194,14 +201,14 @@ def encode_value(entry: ObjectEntry, item: Item) -> bytes:
 
 def _value(data_type: DataType, item: Item) -> Value:
     if data_type is DataType.BOOLEAN:
-        return scalars.boolean(item)
+        return boolean(item)
     if data_type in REAL_FORMATS:
-        return scalars.number(item)
+        return number(item)
     if integer_range(data_type) is not None:
-        return scalars.integer(item)
+        return integer(item)
     if data_type in (DataType.VISIBLE_STRING, DataType.UNICODE_STRING):
-        return scalars.text(item)
-    digits = scalars.text(item)
+        return text(item)
+    digits = text(item)
     try:
         return bytes.fromhex(digits)
     except ValueError:

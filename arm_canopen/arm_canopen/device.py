@@ -22,14 +22,13 @@ from canopen_core.standard import (
     Value,
 )
 
-from ..cia402.commands import AxisCommands, Sequence
-from ..cia402.modes import Move
-from ..cia402.state import DriveStatus
-from ..config.model import NodeConfig
-from ..master.process_image import ReceivedTpdo
-from ..master.remote_node import RemoteNode
-from ..master.runner import NetworkThread
-from ..master.status import node_status, NodeStatus
+from .cia402.commands import AxisCommands, Sequence
+from .cia402.modes import Move
+from .cia402.state import DriveStatus
+from .config.model import NodeConfig
+from .master.process_image import ReceivedTpdo
+from .master.remote_node import node_status, NodeStatus, RemoteNode
+from .master.runner import NetworkThread
 
 logger = logging.getLogger('arm_canopen')
 

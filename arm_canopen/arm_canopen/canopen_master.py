@@ -23,23 +23,23 @@ from canopen_core.can import Bus, BusLoad, Frame, open_bus
 from canopen_core.standard import CobId, Index, sdo
 from realtime_loop import raise_priority
 
-from ..cia402.axis import Axis
-from ..cia402.commands import AxisCommands
-from ..cia402.motion import MotionSource
-from ..cia402.motion_group import MotionGroup
-from ..cia402.state_machine import Command
-from ..cia402.stop import SHUTDOWN_MAX
-from ..config import load_bus
-from ..config.model import BusConfig
-from ..config.model.checks import check_bus
-from ..master.events import Event, EventKind, Report, Severity
-from ..master.network import Network
-from ..master.other_master import describe, listen, refuse_other_master
-from ..master.remote_node import RemoteNode
-from ..master.runner import Clock, NetworkThread, OWNER
-from ..master.scheduler import Scheduler
-from .bus_recording import BusRecording
+from .cia402.axis import Axis
+from .cia402.commands import AxisCommands
+from .cia402.motion import MotionSource
+from .cia402.motion_group import MotionGroup
+from .cia402.state_machine import Command
+from .cia402.stop import SHUTDOWN_MAX
+from .config import load_bus
+from .config.model import BusConfig
+from .config.model.checks import check_bus
 from .device import CanopenDevice, CanopenDrive, DeviceSdo
+from .master.events import Event, EventKind, Report, Severity
+from .master.network import Network
+from .master.other_master import describe, listen, refuse_other_master
+from .master.remote_node import RemoteNode
+from .master.runner import Clock, NetworkThread, OWNER
+from .master.scheduler import Scheduler
+from .recording import BusRecording
 
 if TYPE_CHECKING:
     from typing_extensions import Self

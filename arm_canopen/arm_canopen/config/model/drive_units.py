@@ -12,11 +12,10 @@ import math
 from canopen_core import Findings
 from canopen_core.standard import AXIS_OFFSET, Index, object_address, OperationMode
 
-from ..boot_plan import is_requested
-from ..bus import BusConfig, NodeConfig
-from ..drive import DriveConfig
-from ..factor_group import FactorGroup, REVOLUTION
-from .subject import Subject
+from .boot_plan import is_requested
+from .bus import BusConfig, NodeConfig
+from .device_checks import Subject
+from .drive import DriveConfig, FactorGroup, REVOLUTION
 
 POSITION_KEY, VELOCITY_KEY = 'scale_pos_to_dev', 'scale_vel_to_dev'
 ACCELERATION_KEY = 'scale_acc_to_dev'
