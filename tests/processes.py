@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 from ament_index_python.packages import get_package_prefix
 import psutil
 
-from process_supervisor.readiness import ReadinessSocket, VARIABLE
+from process_supervisor.spec import ReadinessSocket, VARIABLE
 
 ENDING_TIMEOUT = 45.0
 """Time in [s] for its end; a bring-up gives its master 24 s, and its own threads 10 s."""

@@ -21,7 +21,7 @@ from process_supervisor import (
     USAGE_ERROR,
     write_parameters,
 )
-from process_supervisor.arguments import apply_network
+from process_supervisor.ros_options import apply_network
 
 from .bus import in_namespace_of_bus, read_bus
 from .description import read_description

@@ -23,7 +23,7 @@ from process_supervisor import (
     StartError,
     write_parameters,
 )
-from process_supervisor.arguments import add_network, add_timeout, apply_network
+from process_supervisor.ros_options import add_network, add_timeout, apply_network
 
 from .bus import in_namespace_of_bus, read_bus, stream_mode_service
 from .description import read_description

@@ -29,7 +29,7 @@ from process_supervisor import (
     view_process,
     write_parameters,
 )
-from process_supervisor.arguments import add_network, add_timeout, apply_network
+from process_supervisor.ros_options import add_network, add_timeout, apply_network
 from quad_description import movable_joints, PRESETS, robot_urdf
 from quad_hardware.protocol import V1, V2
 

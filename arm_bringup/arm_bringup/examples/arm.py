@@ -30,8 +30,8 @@ from process_supervisor import (
     SupervisorError,
     USAGE_ERROR,
 )
-from process_supervisor.arguments import seconds_from
 from process_supervisor.demo import Demo, make_table, REFRESH_PERIOD, run_demo, signed
+from process_supervisor.ros_options import seconds_from
 
 from ..description import joint_limits
 from ..enabling import enabling_services

@@ -2,8 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Keeps the latest data in memory and writes it to a folder when a fault occurs."""
 
-from .box import BlackBox, BlackBoxSettings, Contents, default_folder, Pause, WINDOW, WINDOW_MAX
-from .player import LogPlayer, PlaybackError, Replay
+from .box import (
+    BlackBox,
+    BlackBoxSettings,
+    Contents,
+    default_folder,
+    LogPlayer,
+    Pause,
+    PlaybackError,
+    Replay,
+    WINDOW,
+    WINDOW_MAX,
+)
 
 __all__ = [
     'WINDOW',

@@ -5,10 +5,10 @@
 from .installed import (
     concatenated,
     DefinitionError,
+    load_type_support,
     message_definition,
     nested_type,
 )
-from .type_support import load_type_support
 
 __all__ = [
     'DefinitionError',

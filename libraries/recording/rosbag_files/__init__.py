@@ -5,12 +5,20 @@
 Messages are bytes here (CDR), and times nanoseconds since 1970. ROS is not needed.
 """
 
-from .exceptions import BagError
-from .metadata import BagFile, BagMetadata, load_metadata, METADATA_FILE, Topic, TopicCount
-from .qos import OfferedQos, read_qos, UNLIMITED
+from .metadata import (
+    BagError,
+    BagFile,
+    BagMetadata,
+    load_metadata,
+    METADATA_FILE,
+    OfferedQos,
+    read_qos,
+    Topic,
+    TopicCount,
+    UNLIMITED,
+)
 from .reader import BagMessage, BagReader
-from .recovery import repair
-from .writer import BagWriter, Preset, WriterOptions
+from .writer import BagWriter, Preset, repair, WriterOptions
 
 __all__ = [
     'METADATA_FILE',

@@ -29,8 +29,8 @@ from mcap.stream_reader import MAGIC_SIZE, StreamReader
 from mcap.summary import Summary
 import zstandard
 
-from .exceptions import BagError
 from .metadata import (
+    BagError,
     BagFile,
     BagMetadata,
     load_metadata,

@@ -4,7 +4,7 @@
 
 What `BagWriter.flush` has written is readable whatever becomes of the process: a chunk of MCAP
 carries its schemas, channels and messages. Only the index at the end of the file and metadata.yaml
-are missing then; `BagReader` does without, and `repair` adds them.
+are missing after a kill or a power failure; `BagReader` does without, and `repair` adds them.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from pathlib import Path
 from mcap.writer import CompressionType, Writer
 import yaml
 
-from .exceptions import BagError
-from .metadata import BagFile, BagMetadata, Topic, TopicCount
+from .metadata import BagError, BagFile, BagMetadata, Topic, TopicCount
+from .reader import has_index, opened, recording_files, records, scan
 
 _MESSAGE_OVERHEAD = 31  # [byte] of a message record of MCAP besides its data
 _CHUNK = 768 * 1024  # [byte], as rosbag2 has it
@@ -261,3 +261,46 @@ class McapFile:
         with self._stream:
             self._mcap.add_metadata('rosbag2', {'serialized_metadata': metadata})
             self._mcap.finish()
+
+
+def repair(folder: Path) -> BagMetadata:
+    """Write metadata.yaml of a folder, and the index of files that have none.
+
+    A file without an index is written anew up to where it is damaged, and then takes the place of
+    the old one.
+
+    Raises:
+        BagError: The folder holds no recording.
+    """
+    paths = recording_files(folder)
+    for path in paths:
+        if path.suffix == '.mcap':
+            _add_index(folder, path)
+    metadata = scan(folder, paths)
+    metadata.save(folder)
+    return metadata
+
+
+def _add_index(folder: Path, path: Path) -> None:
+    with opened(path) as stream:
+        if has_index(stream):
+            return
+        stream.seek(0)
+        whole = path.with_name(f'.{path.name}.part')
+        whole.unlink(missing_ok=True)
+        file = McapFile(whole, Preset.NONE)
+        for record in records(stream):
+            if isinstance(record, Topic):
+                file.add_topic(record)
+                continue
+            channel, message = record
+            file.write(
+                channel.topic,
+                message.data,
+                message.log_time,
+                message.publish_time,
+                message.sequence,
+            )
+    found = scan(folder, [path])
+    file.close(found.to_yaml())
+    whole.replace(path)

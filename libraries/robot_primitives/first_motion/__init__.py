@@ -7,17 +7,26 @@ clock or bus.
 """
 
 from .bus_edit import BusEditError, edited, replace_file, yaml_text
-from .correction import AxisScales, corrected, Correction, propose
 from .guard import FOLLOWING, MotionGuard, MotionPlan, Order, Outcome, Sample
-from .joint_units import (
+from .judgement import (
+    AxisScales,
+    Cause,
+    CAUSES,
+    corrected,
+    Correction,
+    DriveFacts,
     FASTEST,
     FURTHEST,
     JointKind,
+    judge,
+    Judgement,
+    propose,
+    Seen,
     too_far,
     too_fast,
     too_few_increments,
+    Verdict,
 )
-from .judgement import Cause, CAUSES, DriveFacts, judge, Judgement, Seen, Verdict
 
 __all__ = [
     'CAUSES',

@@ -7,7 +7,6 @@ description here: the model of an arm, publishers of joint states and of /tf, br
 """
 
 from .exceptions import DescriptionError, MeshFileError, XacroError
-from .groups import find_group, JointGroup
 from .kinematics import (
     centre_of_mass,
     joint_position,
@@ -15,8 +14,7 @@ from .kinematics import (
     link_poses,
     parents_first,
 )
-from .mesh_files import find_mesh, find_package, mesh_unit
-from .srdf import EndEffector, Group, Pair, parse_srdf, SemanticDescription
+from .srdf import EndEffector, find_group, Group, JointGroup, Pair, parse_srdf, SemanticDescription
 from .transforms import (
     about,
     compose,
@@ -39,7 +37,7 @@ from .urdf import (
     read_urdf,
     UrdfShape,
 )
-from .xacro_files import expand_xacro
+from .xacro_files import expand_xacro, find_mesh, find_package, mesh_unit
 
 __all__ = [
     'MOVABLE',

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the programs of all nodes share: start, end, and refusal of parameters in words."""
 
-from .construction import destroyed_if_refused, destroyed_when_refused
 from .deferred_service import create_deferred_service
 from .discovery import discover_other_nodes, other_nodes, ServerMatch
 from .log_bridge import log_as, RosLogBridge
@@ -15,15 +14,25 @@ from .parameter_reader import (
     refuse_misspelt,
     refuse_similar,
 )
-from .program import init_ros, notify_ready, run_node, run_program, stop_on_signals
-from .qos import LATCHED
-from .shared_parameters import (
+from .program import (
     declare_black_box,
     declare_thread_priority,
+    destroyed_if_refused,
+    destroyed_when_refused,
+    init_ros,
+    LINGER,
+    log_defects,
+    make_executor,
+    notify_ready,
     raise_thread_priority,
+    run_node,
+    run_program,
     settle_process_memory,
+    spin,
+    spin_beside,
+    stop_on_signals,
 )
-from .spinning import LINGER, log_defects, make_executor, spin, spin_beside
+from .qos import LATCHED
 
 __all__ = [
     'LATCHED',

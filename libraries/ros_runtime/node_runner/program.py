@@ -4,31 +4,255 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from functools import wraps
 import math
 import os
+from pathlib import Path
 import signal
 import socket
 import sys
 import threading
+import time
 from time import monotonic
+import traceback
+from typing import Concatenate, ParamSpec, TypeVar
 
 import rclpy
 from rclpy.context import Context
 from rclpy.exceptions import NameValidationException, ParameterException
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import try_shutdown
+from rclpy.utilities import ok, try_shutdown
 
+from black_box import BlackBoxSettings, default_folder, WINDOW, WINDOW_MAX
 from dds_network import NETWORK_VARIABLE, NetworkChoiceError, restrict_dds
 from message_definitions import load_type_support
-from realtime_loop import unsettle_memory
+from realtime_loop import PRIORITY_MAX, raise_priority, settle_memory, unsettle_memory
 
 from .log_bridge import log_as, RosLogBridge
-from .parameter_reader import ParameterError
-from .spinning import spin
+from .parameter_reader import ParameterError, ParameterReader
+
+AnyNode = TypeVar('AnyNode', bound=Node)
+Arguments = ParamSpec('Arguments')
+Constructor = Callable[Concatenate[AnyNode, Arguments], None]
+
+
+def destroyed_when_refused(
+    construct: Constructor[AnyNode, Arguments],
+) -> Constructor[AnyNode, Arguments]:
+    """Decorate the ``__init__`` of a node: when it raises, the node is destroyed first.
+
+    rclpy enters a node into the graph at the beginning of its constructor, and its participant
+    answers as long as the process lives, whatever became of the object.
+    """
+
+    @wraps(construct)
+    def guarded(node: AnyNode, /, *args: Arguments.args, **options: Arguments.kwargs) -> None:
+        with destroyed_if_refused(node):
+            construct(node, *args, **options)
+
+    return guarded
+
+
+@contextmanager
+def destroyed_if_refused(node: AnyNode) -> Iterator[AnyNode]:
+    """Destroy a node when what follows raises; else it stays.
+
+    For functions that make nodes of the class ``Node`` and then read their parameters; in an
+    ``ExitStack`` where there are several.
+    """
+    try:
+        yield node
+    except BaseException:
+        _destroy(node)
+        raise
+
+
+def _destroy(node: Node) -> None:
+    try:
+        node.destroy_node()
+    except AttributeError:  # not even the constructor of Node came to its end
+        with suppress(AttributeError):
+            node.handle.destroy_when_not_in_use()
+
+
+def declare_black_box(read: ParameterReader) -> BlackBoxSettings | None:
+    """Declare ``black_box_window`` and ``black_box_folder``; return None where it is off."""
+    window = read.number(
+        'black_box_window',
+        WINDOW,
+        (0.0, WINDOW_MAX),
+        'how much is written when a fault happens [s]; 0 for nothing',
+    )
+    folder = read.text(
+        'black_box_folder',
+        '',
+        'where that goes; by default black_box beside the logs of ROS (~/.ros/log/black_box)',
+    )
+    if window == 0.0:
+        return None
+    return BlackBoxSettings(Path(folder).expanduser() if folder else default_folder(), window)
+
+
+def declare_thread_priority(read: ParameterReader, default: int) -> int:
+    """Declare ``thread_priority`` as ros2_control has it; return its value."""
+    return read.whole(
+        'thread_priority',
+        default,
+        (0, PRIORITY_MAX),
+        'SCHED_FIFO priority of the thread of the cycle; 0 for none',
+    )
+
+
+def raise_thread_priority(node: Node, priority: int, what: str) -> None:
+    """Raise the priority of the calling thread; a refusal is a warning with the remedy."""
+    outcome = raise_priority(priority, what)
+    if outcome.granted:
+        node.get_logger().info(outcome.text)
+    elif outcome.text:
+        node.get_logger().warning(outcome.text)
+
+
+def settle_process_memory(node: Node) -> None:
+    """Freeze the garbage collector and lock the memory, before the cycle starts."""
+    node.get_logger().info(settle_memory().text)
+
+
+WAKE_PERIOD = 0.1  # how late the end may be noticed, in [s]
+
+LINGER = 0.3
+"""Time in [s] for an action to see the end of its goal, and for the result to reach the client."""
+
+
+SIMULATED_TIME = (
+    'use_sim_time is true: stamps follow /clock, and what is done periodically stands still until '
+    'that is published; control cycles, time-outs and ages keep the time of this computer. Leave '
+    'use_sim_time out where nothing publishes /clock'
+)
+
+REPEAT_PERIOD = 10.0  # time in [s] in which the same defect of callbacks is logged once
+
+
+def make_executor() -> Executor:
+    """Return an events executor where rclpy has one, else a single-threaded one.
+
+    A MultiThreadedExecutor is no choice: in Jazzy it hands queued tasks out again and again
+    while its workers wait for the interpreter lock (rclpy issue 1452).
+    """
+    try:
+        from rclpy.experimental.events_executor import EventsExecutor
+    except ImportError:  # rclpy before 7.1.4
+        return SingleThreadedExecutor()
+    return EventsExecutor()
+
+
+def spin(
+    nodes: Iterable[Node],
+    stop: threading.Event,
+    executor: Executor | None = None,
+    *,
+    linger: float = 0.0,
+    survive: Callable[[Exception], None] | None = None,
+) -> None:
+    """Serve nodes until an event is set, or until ``rclpy.shutdown``.
+
+    The nodes are still there afterwards; destroying them is up to the caller. Those that were set
+    to simulated time are named once, with what that does not cover.
+
+    Args:
+        nodes: The nodes to serve.
+        stop: Ends it within :data:`WAKE_PERIOD`.
+        executor: What serves them; :func:`make_executor` chooses when it is None.
+        linger: Time for which they are served after that in [s], see :data:`LINGER`.
+        survive: Reports what a callback raised, and the others go on; None raises it here.
+    """
+    executor = executor or make_executor()
+    simulated: list[Node] = []
+    for node in nodes:
+        executor.add_node(node)
+        log_as(node)
+        if node.get_parameter('use_sim_time').value:
+            simulated.append(node)
+    if simulated:  # once for all nodes of a process
+        simulated[0].get_logger().warning(SIMULATED_TIME)
+    try:
+        # the unbounded spin() of some EventsExecutors burns a core and runs nothing
+        while ok() and not stop.is_set():
+            _spin_once(executor, WAKE_PERIOD, survive)
+        end = time.monotonic() + linger
+        while ok() and (left := end - time.monotonic()) > 0.0:
+            _spin_once(executor, min(left, WAKE_PERIOD), survive)
+    except ExternalShutdownException:
+        pass
+    finally:
+        executor.shutdown()
+
+
+def log_defects(node: Node) -> Callable[[Exception], None]:
+    """Return a ``survive`` of :func:`spin` that logs what callbacks raise, with its place.
+
+    For programs whose nodes serve several clients or robots while other threads move these: a
+    defect in the answer to one ends neither the others nor the motion.
+    """
+    logged: dict[str, float] = {}
+
+    def log(error: Exception) -> None:
+        text, now = ''.join(traceback.format_exception(error)), time.monotonic()
+        if now - logged.get(text, -REPEAT_PERIOD) >= REPEAT_PERIOD:
+            logged.clear()
+            logged[text] = now
+            node.get_logger().error(f'a callback failed, the others go on: {text}')
+
+    return log
+
+
+def _spin_once(
+    executor: Executor, timeout: float, survive: Callable[[Exception], None] | None
+) -> None:
+    try:
+        executor.spin_once(timeout_sec=timeout)
+    except ExternalShutdownException:
+        raise
+    except Exception as error:
+        if survive is None:
+            raise
+        survive(error)
+
+
+def spin_beside(
+    work: Callable[[], None], nodes: Iterable[Node], stop: threading.Event, name: str
+) -> None:
+    """Serve nodes while a thread works; what it raises is raised here when both have ended.
+
+    Args:
+        work: Done in the thread; it has to end soon after the event is set.
+        nodes: The nodes to serve.
+        stop: Ends both; set when the work is done.
+        name: Of the thread.
+    """
+    failures: list[Exception] = []
+
+    def run() -> None:
+        try:
+            work()
+        except Exception as error:  # noqa: BLE001  # it is raised in the thread that waits
+            failures.append(error)
+        stop.set()
+
+    thread = threading.Thread(target=run, name=name, daemon=True)
+    thread.start()
+    try:
+        spin(nodes, stop)
+    finally:
+        stop.set()
+        thread.join()
+    if failures:
+        raise failures[0]
+
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """Ctrl-C, what stops services, and the closing of the terminal."""

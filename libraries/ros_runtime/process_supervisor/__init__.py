@@ -11,33 +11,45 @@ packages, :mod:`.exclusive` keeps a second bring-up away, :mod:`.terminal` and :
 what the processes write.
 """
 
-from .bring_up import (
+from .nodes import (
     add_view,
     bring_up_place,
-    exclusive,
-    node_process,
-    state_publisher,
-    view_process,
-)
-from .console import join_in_time, Shutdown, supervise, USAGE_ERROR
-from .exceptions import CallError, GivenUpError, StartError, SupervisorError
-from .nodes import (
     EVERY_NODE,
+    exclusive,
     Executable,
     find_executable,
     FindExecutable,
     namespaced_parameters,
     node_argv,
+    node_process,
     parameters_by_node,
     ros_domain,
+    state_publisher,
+    view_process,
     write_parameters,
 )
-from .readiness import ServiceManager
 from .ros_options import add_namespace, parse_with_ros, RosOptions, split_ros_arguments
 from .runner import Runner
-from .spec import ProcessSpec, StopStep
+from .spec import (
+    CallError,
+    GivenUpError,
+    ProcessSpec,
+    ServiceManager,
+    StartError,
+    StopStep,
+    SupervisorError,
+)
 from .supervision import Notice, Outcome, Phase, Severity, Supervision
-from .terminal import LineWriter, Painter, severity_of, wants_colour
+from .terminal import (
+    join_in_time,
+    LineWriter,
+    Painter,
+    severity_of,
+    Shutdown,
+    supervise,
+    USAGE_ERROR,
+    wants_colour,
+)
 
 __version__ = '0.1.0'
 

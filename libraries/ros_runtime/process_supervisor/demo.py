@@ -23,12 +23,10 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from .console import explain, join_in_time
-from .exceptions import CallError, GivenUpError
 from .runner import Runner
-from .spec import ProcessSpec
+from .spec import CallError, GivenUpError, ProcessSpec
 from .supervision import Notice, Outcome, Phase, Severity
-from .terminal import LineWriter, Painter, severity_of, wants_colour
+from .terminal import explain, join_in_time, LineWriter, Painter, severity_of, wants_colour
 
 if TYPE_CHECKING:
     from .graph_client import GraphClient

@@ -16,7 +16,7 @@ from rclpy.node import Node
 
 from node_runner import init_ros, ServerMatch
 
-from .exceptions import GivenUpError, no_answer
+from .spec import GivenUpError, no_answer
 
 SPIN = 0.05  # longest time in [s] after which a wait looks whether it shall be given up
 

@@ -18,10 +18,8 @@ import time
 from types import TracebackType
 from typing import final
 
-from .exceptions import StartError
 from .guardian import GuardianLink
-from .readiness import ReadinessSocket, VARIABLE
-from .spec import ProcessSpec
+from .spec import ProcessSpec, ReadinessSocket, StartError, VARIABLE
 from .supervision import Notice, Outcome, Phase, Supervision
 
 LONGEST_LINE = 16384

@@ -11,9 +11,8 @@ from enum import Enum
 import math
 from signal import Signals
 
-from .exceptions import StartError
-from .spec import ProcessSpec
-from .stopping import StopSequence
+from .guardian import StopSequence
+from .spec import ProcessSpec, StartError
 
 LAST_LINES = 12  # how many lines of a process are kept to explain its end
 

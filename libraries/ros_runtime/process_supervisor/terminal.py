@@ -1,16 +1,137 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Capabilities of a terminal, and output lines prefixed with the name of their process."""
+"""Runs the processes of a bring-up in a terminal, each line prefixed with its process."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import atexit
+from collections.abc import Callable, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass
+import faulthandler
+import os
 import re
+import sys
+from tempfile import TemporaryFile
+import threading
 from typing import TextIO
 
-from .supervision import Notice, Severity
+from .runner import Runner
+from .spec import ProcessSpec, ServiceManager
+from .supervision import Notice, Outcome, Phase, Severity
+
+ENDING_TIMEOUT = 10.0  # time in [s] in which a thread that was asked to has to end
+
+USAGE_ERROR = 2  # exit code of a bring-up when nothing was started
+REPORTED_STATES = {Phase.RUNNING: 'READY=1', Phase.STOPPING: 'STOPPING=1'}
+"""What is reported to the service manager of a bring-up, as in sd_notify(3)."""
+Shutdown = Callable[[Callable[[str], None], Callable[[], bool]], None]
+"""Done at the first Ctrl-C, while all processes still run; everything is stopped when it returns.
+
+It gets a function that shows the user a message, and one that returns True when it is no longer
+wanted: Ctrl-C again, or a process has ended.
+"""
+
+
+def join_in_time(thread: threading.Thread) -> str:
+    """Wait for a thread that was asked to end; when it does not, the program ends without it.
+
+    Args:
+        thread: One that does not keep the interpreter alive (``daemon``).
+
+    Returns:
+        Why it is given up, with what all threads are doing; empty when it has ended.
+    """
+    thread.join(ENDING_TIMEOUT)
+    if not thread.is_alive():
+        return ''
+    atexit.register(leave)
+    with TemporaryFile() as file:
+        faulthandler.dump_traceback(file)
+        file.seek(0)
+        doing = file.read().decode(errors='replace').rstrip()
+    return f'the thread {thread.name!r} did not end within {ENDING_TIMEOUT:g} s:\n{doing}'
+
+
+def leave() -> None:
+    """End the program with exit code 1, without finalising the interpreter.
+
+    A thread that comes back from C++ into an interpreter that is being taken down aborts it.
+    """
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(1)
+
+
+def supervise(
+    processes: Sequence[ProcessSpec], name: str = 'bringup', shutdown: Shutdown | None = None
+) -> Outcome:
+    """Run processes with their output on standard output, until Ctrl-C or one ends.
+
+    That all are ready, and that all are stopped, is reported to systemd, or what else
+    ``NOTIFY_SOCKET`` names, as in sd_notify(3).
+
+    Args:
+        processes: What to run.
+        name: Name before the supervisor's own lines.
+        shutdown: Done in a thread before they are stopped, if all had got ready.
+    """
+    names = [spec.name for spec in processes]
+    painter = Painter(name, names, wants_colour(sys.stdout, os.environ))
+    write = LineWriter(sys.stdout)
+
+    def notify(notice: Notice) -> None:
+        write(painter.notice(notice))
+
+    manager = ServiceManager()
+
+    def report(phase: Phase) -> None:
+        if phase in REPORTED_STATES:
+            manager.report(REPORTED_STATES[phase])
+
+    def interrupted() -> bool:
+        report(Phase.STOPPING)
+        if shutdown is None or runner.phase is not Phase.RUNNING:
+            return False
+        thread.start()
+        return True
+
+    def shut_down(do: Shutdown) -> None:
+        outcome = Outcome(0, 'stopped by the user')
+        try:
+            do(
+                lambda text: notify(Notice(Severity.INFO, text)),
+                lambda: runner.phase is not Phase.RUNNING,
+            )
+        except Exception as error:  # noqa: BLE001  whatever it is, the processes are stopped
+            outcome = Outcome(1, f'{type(error).__name__}: {error}')
+        runner.stop(outcome)
+
+    thread = threading.Thread(target=shut_down, args=[shutdown], name='shutdown', daemon=True)
+    with Runner(
+        processes,
+        lambda name, line: write(painter.line(name, line)),
+        notify,
+        on_interrupt=interrupted,
+        on_phase=report,
+    ) as runner:
+        outcome = runner.run()
+        late = join_in_time(thread) if thread.ident is not None else ''
+    if outcome.exit_code:
+        notify(Notice(Severity.ERROR, explain(outcome)))
+    if late:
+        notify(Notice(Severity.ERROR, late))
+        outcome = Outcome(1, late) if not outcome.exit_code else outcome
+    return outcome
+
+
+def explain(outcome: Outcome) -> str:
+    """Return why a bring-up failed, with what the process wrote last."""
+    if not outcome.last_lines:
+        return outcome.reason
+    quoted = '\n'.join(f'    {line}' for line in outcome.last_lines)
+    return f'{outcome.reason}; it wrote last:\n{quoted}'
+
 
 RESET = '\x1b[0m'
 BOLD = '\x1b[1m'

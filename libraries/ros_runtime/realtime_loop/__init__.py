@@ -2,8 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Deadlines without bursts, priority and locked memory for threads that own a cycle."""
 
-from .cycle_timer import Cycle, CycleTimer
-from .privileges import Outcome, PRIORITY_MAX, raise_priority, settle_memory, unsettle_memory
+from .privileges import (
+    Cycle,
+    CycleTimer,
+    Outcome,
+    PRIORITY_MAX,
+    raise_priority,
+    settle_memory,
+    unsettle_memory,
+)
 
 __all__ = [
     'PRIORITY_MAX',

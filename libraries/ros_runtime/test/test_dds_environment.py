@@ -21,7 +21,7 @@ from dds_network import (
     restrict_dds,
     selected_reach,
 )
-from dds_network.profile import profile_file, profile_text
+from dds_network.environment import profile_file, profile_text
 from dds_network.reach import has_link, LOCALHOST_PROFILE, read_interfaces, resolve_reach
 from dds_network.shell import main
 

@@ -12,7 +12,7 @@ import pytest
 from rclpy.context import Context
 from rclpy.node import Node
 
-from node_runner import raise_thread_priority, settle_process_memory, shared_parameters
+from node_runner import program, raise_thread_priority, settle_process_memory
 from realtime_loop import Outcome
 
 
@@ -27,11 +27,9 @@ def test_each_combination_is_logged(
 ) -> None:
     """In one node and one after the other; rclpy refuses a line that changes its severity."""
     monkeypatch.setattr(
-        shared_parameters, 'raise_priority', lambda *_: Outcome(priority, f'priority {priority}')
+        program, 'raise_priority', lambda *_: Outcome(priority, f'priority {priority}')
     )
-    monkeypatch.setattr(
-        shared_parameters, 'settle_memory', lambda: Outcome(memory, f'memory {memory}')
-    )
+    monkeypatch.setattr(program, 'settle_memory', lambda: Outcome(memory, f'memory {memory}'))
     context = Context()
     context.init(domain_id=isolation.domain_id)
     node = Node('cycle', context=context)

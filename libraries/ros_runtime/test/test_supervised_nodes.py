@@ -22,8 +22,8 @@ from process_supervisor import (
     view_process,
     write_parameters,
 )
-from process_supervisor.arguments import seconds_from
-from process_supervisor.exceptions import no_answer
+from process_supervisor.ros_options import seconds_from
+from process_supervisor.spec import no_answer
 
 NODE = Executable('some_package', 'some_node')
 

@@ -21,7 +21,7 @@ from process_supervisor import (
     StartError,
     Supervision,
 )
-from process_supervisor.stopping import StopSequence
+from process_supervisor.guardian import StopSequence
 
 
 class Bench:

@@ -15,7 +15,7 @@ import threading
 import pytest
 from small_processes import program, service_manager, TIMEOUT
 
-from process_supervisor import console, join_in_time, LineWriter, Outcome, Shutdown, supervise
+from process_supervisor import join_in_time, LineWriter, Outcome, Shutdown, supervise, terminal
 
 Say = Callable[[str], None]
 GivenUp = Callable[[], bool]
@@ -137,7 +137,7 @@ def test_a_shutdown_that_hangs_keeps_nobody_from_the_end(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It says what all threads are doing; the processes were stopped before."""
-    monkeypatch.setattr(console, 'ENDING_TIMEOUT', 0.1)
+    monkeypatch.setattr(terminal, 'ENDING_TIMEOUT', 0.1)
     test_over = threading.Event()
     threads: list[threading.Thread] = []
 
@@ -152,7 +152,7 @@ def test_a_shutdown_that_hangs_keeps_nobody_from_the_end(
     outcome = supervise([program('good', notifies_ready=True)], shutdown=shutdown)
     test_over.set()
     threads[0].join(TIMEOUT)
-    atexit.unregister(console.leave)  # this process goes on
+    atexit.unregister(terminal.leave)  # this process goes on
     assert outcome.exit_code == 1
     assert outcome.reason.startswith("the thread 'shutdown' did not end within 0.1 s")
     captured = capsys.readouterr()
@@ -177,13 +177,13 @@ def test_without_readiness_there_is_no_shutdown(
 
 PROGRAM = """
 import sys, threading
-from process_supervisor import console
-console.ENDING_TIMEOUT = 0.1
+from process_supervisor import terminal
+terminal.ENDING_TIMEOUT = 0.1
 def hang():
     threading.Event().wait()
 thread = threading.Thread(target=hang, name='enabling', daemon=True)
 thread.start()
-print(console.join_in_time(thread))
+print(terminal.join_in_time(thread))
 sys.exit(0)
 """
 

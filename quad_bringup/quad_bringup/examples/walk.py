@@ -26,8 +26,8 @@ from rich.text import Text
 from sensor_msgs.msg import BatteryState, Imu, JointState
 
 from process_supervisor import CallError, parse_with_ros, RosOptions, SupervisorError, USAGE_ERROR
-from process_supervisor.arguments import seconds_from
 from process_supervisor.demo import Demo, make_table, run_demo, signed
+from process_supervisor.ros_options import seconds_from
 from quad_controller import Gait, GaitParameters, Velocity
 from quad_description import LEGS
 from quad_description.rotations import tilt_of, yaw_of
