@@ -9,6 +9,6 @@ SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
     programs=[
         'move_group = arm_planning.nodes.move_group:main',
-        'srdf = arm_planning.aliases:srdf',  # a program of arm_bringup
+        'srdf = arm_planning.srdf:srdf',  # a program of arm_bringup
     ],
 )

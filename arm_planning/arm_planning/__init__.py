@@ -14,7 +14,7 @@ and acceleration above 0 and at most 1.
 from __future__ import annotations
 
 from .exceptions import ConfigError, PlanningCode, PlanningError
-from .industrial.sequence import SequenceItem
+from .pilz_planner import SequenceItem
 from .planner import Planner
 from .requests import (
     CircPoint,

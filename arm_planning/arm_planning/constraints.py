@@ -33,7 +33,7 @@ from arm_model import (
 from arm_trajectory import Path
 
 from .exceptions import PlanningCode, PlanningError
-from .ik.link_kinematics import LinkKinematics
+from .link_kinematics import LinkKinematics
 from .requests import OrientationConstraint, Parameterization, PathConstraints, PositionConstraint
 from .validity import Violation
 

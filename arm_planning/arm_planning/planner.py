@@ -16,12 +16,10 @@ from arm_model import Array, checked, PlanningScene, Pose, RobotModel
 
 from .constraints import ConstraintCheck
 from .exceptions import coded, PlanningCode, PlanningError
-from .free.free_motion import FreeMotion
-from .goal_states import GoalStates
-from .ik.solver import DEFAULT_TIMEOUT, IkSolver
-from .industrial.limits import CartesianLimits
-from .industrial.planner import IndustrialPlanner, PLANNER_IDS
-from .industrial.sequence import SequenceItem
+from .free_motion import FreeMotion, GoalStates
+from .ik import DEFAULT_TIMEOUT, IkSolver
+from .pilz_motions import CartesianLimits
+from .pilz_planner import PilzPlanner, PLANNER_IDS, SequenceItem
 from .requests import check_scaling, MotionPlan, MotionRequest
 from .retime import speed_limited
 from .validity import ValidityCheck, Violation
@@ -52,7 +50,7 @@ class Planner:
         self._model, self._clock = model, clock
         self._draw = np.random.default_rng(seed)
         self._solver = cache(lambda link: IkSolver(model, link or model.tip, clock, self._draw))
-        self._industrial = IndustrialPlanner(model, cartesian_limits, self._solver)
+        self._industrial = PilzPlanner(model, cartesian_limits, self._solver)
         self._check: ValidityCheck | None = None
 
     def plan(

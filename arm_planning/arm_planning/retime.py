@@ -14,8 +14,8 @@ from arm_model import Array, frozen, JointLimits, RobotState
 from arm_trajectory import Demand, OnlineTrajectoryGenerator, Path, quintics, Timing
 
 from .exceptions import PlanningCode, PlanningError
-from .ik.link_kinematics import LinkKinematics
-from .ik.solver import IkSolver
+from .ik import IkSolver
+from .link_kinematics import LinkKinematics
 
 MAX_SPACING = 0.05  # greatest length of a segment of a path that is not straight in [s]
 

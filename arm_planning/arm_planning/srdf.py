@@ -13,9 +13,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from importlib import import_module
 import math
 from pathlib import Path
 import re
+import sys
 from typing import Any
 from xml.etree import ElementTree as ET
 
@@ -277,3 +279,12 @@ def _named(pairs: Mapping[Pair, str] | frozenset[Pair] | set[Pair]) -> str:
 def _quoted(value: str) -> str:
     """Return the value of an attribute in XML."""
     return f'"{escape(value)}"'
+
+
+def srdf() -> None:
+    """Run the program of arm_bringup, which knows robot folders, by the name it has here."""
+    try:
+        program = import_module('arm_bringup.srdf')
+    except ModuleNotFoundError as error:
+        sys.exit(f'{error.name} is missing: build arm_bringup, which knows robot folders')
+    sys.exit(program.main())

@@ -42,8 +42,7 @@ from arm_bringup.description import expand_xacro
 from arm_bringup.robots import installed_robots_folder
 from arm_model import Array, Box, PlanningScene, RobotModel
 from arm_planning import JointGoal, MotionRequest, Planner, PlanningError, ValidityCheck
-from arm_planning.free.motion_check import MotionCheck
-from arm_planning.free.search import rrt_connect, shortened
+from arm_planning.rrt_connect import MotionCheck, rrt_connect, shortened
 
 try:
     from ompl import base, geometric, util

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from arm_model import Pose, RobotModel
-from arm_planning.cartesian_path import cartesian_path, JumpThresholds
-from arm_planning.ik.link_kinematics import LinkKinematics
+from arm_planning.cartesian import cartesian_path, JumpThresholds
+from arm_planning.link_kinematics import LinkKinematics
 
 
 @cache

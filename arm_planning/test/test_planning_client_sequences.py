@@ -57,7 +57,7 @@ from std_srvs.srv import Empty
 from arm_model import combined, frozen, inverse, Pose
 from arm_model.ros import pose_of
 from arm_planning import Planner
-from arm_planning.ros.scene_messages import pose_message
+from arm_planning.ros.scene import pose_message
 from node_runner import LATCHED
 
 BASE = 'panda_link0'

@@ -24,9 +24,9 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_planning import PlanningCode, PlanningError
-from arm_planning.ros import controllers, execution, scene_monitor
-from arm_planning.ros.controllers import FOLLOW, KINDS
-from arm_planning.ros.execution import ExecutionLimits, TrajectoryExecution
+from arm_planning.ros import execution, parameters, scene_monitor
+from arm_planning.ros.execution import TrajectoryExecution
+from arm_planning.ros.parameters import ExecutionLimits, FOLLOW, KINDS
 from arm_planning.ros.scene_monitor import SceneMonitor, STATE_TIMEOUT
 from node_runner.action_goals import GoalClient
 
@@ -82,14 +82,14 @@ def answered(value: Any) -> Future[Any]:
     return future
 
 
-ARM = {'arm': controllers.Controller(JOINTS, FOLLOW, FOLLOW.namespace)}
+ARM = {'arm': parameters.Controller(JOINTS, FOLLOW, FOLLOW.namespace)}
 
 
 class Bench:
     """An execution with controllers of two joints, which stand at 0."""
 
     def __init__(
-        self, monkeypatch: pytest.MonkeyPatch, known: Mapping[str, controllers.Controller] = ARM
+        self, monkeypatch: pytest.MonkeyPatch, known: Mapping[str, parameters.Controller] = ARM
     ) -> None:
         self.clients = {each.action(name): Controller() for name, each in known.items()}
         self.controller = next(iter(self.clients.values()))
@@ -210,8 +210,8 @@ def test_a_gripper_gets_where_the_trajectory_ends(
     monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
     """Beside the arm, which follows the rest; one that stalls has not arrived."""
-    hand = controllers.Controller(['right'], KINDS[kind], 'grip')
-    arm = controllers.Controller(['left'], FOLLOW, FOLLOW.namespace)
+    hand = parameters.Controller(['right'], KINDS[kind], 'grip')
+    arm = parameters.Controller(['left'], FOLLOW, FOLLOW.namespace)
     bench = Bench(monkeypatch, {'arm': arm, 'hand': hand})
     follower, gripper = bench.clients['arm/follow_joint_trajectory'], bench.clients['hand/grip']
     for status, code, words in (
@@ -232,8 +232,8 @@ def test_a_gripper_that_holds_something_begins_where_it_is(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A part of a sequence was planned from where its fingers would meet; arms must be there."""
-    hand = controllers.Controller(('right',), KINDS['GripperCommand'], 'gripper_cmd')
-    arm = controllers.Controller(('left',), FOLLOW, FOLLOW.namespace)
+    hand = parameters.Controller(('right',), KINDS['GripperCommand'], 'gripper_cmd')
+    arm = parameters.Controller(('left',), FOLLOW, FOLLOW.namespace)
     bench = Bench(monkeypatch, {'arm': arm, 'hand': hand})
     bench.turns['right'] = 1
     bench.start()
@@ -275,7 +275,7 @@ def test_a_controller_that_is_gone_while_it_moves_ends_the_motion(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Also a gripper, whose time is not watched."""
-    hand = controllers.Controller(['left', 'right'], KINDS['ParallelGripperCommand'], 'grip')
+    hand = parameters.Controller(['left', 'right'], KINDS['ParallelGripperCommand'], 'grip')
     for known in (ARM, {'hand': hand}):
         bench = Bench(monkeypatch, known)
         running = bench.start()

@@ -26,7 +26,7 @@ from arm_planning import (
     PoseGoal,
     ValidityCheck,
 )
-from arm_planning.free.free_motion import FreeMotion
+from arm_planning.free_motion import FreeMotion
 from arm_trajectory import Path
 
 pytestmark = pytest.mark.slow

@@ -20,10 +20,9 @@ from arm_model import Array, AttachedBody, Box, Clearances, CollisionObject, Pla
 from arm_planning import JointGoal, MotionRequest
 from arm_planning.ros.planning import GroupPlanners
 from arm_planning.ros.robot_groups import RobotGroups
-from arm_planning.ros.robot_services import RobotServices
+from arm_planning.ros.scene import pose_message, SceneSnapshot
 from arm_planning.ros.scene_changes import scene_for
-from arm_planning.ros.scene_messages import pose_message
-from arm_planning.ros.scene_snapshot import SceneSnapshot
+from arm_planning.ros.services import RobotServices
 
 ACROSS = np.pi / 2  # where right_2 holds its bar across the left arm in [rad]
 

@@ -25,9 +25,8 @@ from arm_model import (
     Sphere,
 )
 from arm_planning import PlanningCode, PlanningError
-from arm_planning.ik.link_kinematics import pose_error
-from arm_planning.ik.numeric import random_start
-from arm_planning.ik.solver import IkSolver
+from arm_planning.ik import IkSolver, random_start
+from arm_planning.link_kinematics import pose_error
 
 pytestmark = pytest.mark.slow
 

@@ -30,10 +30,10 @@ from arm_planning import (
     PoseGoal,
     SequenceItem,
 )
-from arm_planning.curves import arc_around, arc_through, Curve, Line
-from arm_planning.ik.link_kinematics import LinkKinematics
-from arm_planning.ik.solver import IkSolver
-from arm_planning.industrial.limits import CartesianLimits
+from arm_planning.cartesian import arc_around, arc_through, Curve, Line
+from arm_planning.ik import IkSolver
+from arm_planning.link_kinematics import LinkKinematics
+from arm_planning.pilz_motions import CartesianLimits
 from arm_trajectory import Path
 
 pytestmark = pytest.mark.slow

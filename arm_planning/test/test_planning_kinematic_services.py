@@ -22,7 +22,7 @@ from shape_msgs.msg import SolidPrimitive
 
 from arm_model import Array, frozen, ORIGIN, Pose
 from arm_planning import PlanningCode
-from arm_planning.ros.scene_messages import pose_message
+from arm_planning.ros.scene import pose_message
 
 BASE = 'panda_link0'
 MODEL = panda().model('panda_arm')

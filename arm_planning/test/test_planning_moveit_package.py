@@ -40,9 +40,8 @@ from shape_msgs.msg import SolidPrimitive
 from arm_model import ArmError
 from arm_model.ros import seconds
 from arm_planning import ConfigError
-from arm_planning.moveit_config.known import MANAGER, misspelt
-from arm_planning.moveit_config.package import MoveItPackage, read_package
-from arm_planning.moveit_config.settings import of_nothing, read_settings
+from arm_planning.moveit_package import MoveItPackage, read_package
+from arm_planning.moveit_settings import MANAGER, misspelt, of_nothing, read_settings
 from arm_planning.nodes import move_group
 
 FIXED = 'panda_joint8'

@@ -17,10 +17,10 @@ from trajectory_msgs.msg import JointTrajectory
 from arm_model import Array, frozen, RobotState
 from arm_model.ros import scene_change
 from arm_planning import PlanningCode
+from arm_planning.nodes.move_group import contact_ahead, passed_time, PathWatch
 from arm_planning.ros.execution import Execution, INVALIDATED
-from arm_planning.ros.path_watch import contact_ahead, passed_time, PathWatch
+from arm_planning.ros.scene import SceneSnapshot
 from arm_planning.ros.scene_changes import apply_scene
-from arm_planning.ros.scene_snapshot import SceneSnapshot
 from arm_planning.ros.trajectories import from_start, path_of, trajectory_message
 from arm_trajectory import build_path, GoalPoint, GoalRules, TrajectoryGoal
 

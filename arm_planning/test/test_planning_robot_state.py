@@ -16,7 +16,7 @@ from arm_model.ros import seconds
 from arm_planning import JointGoal
 from arm_planning.ros.motion_request import RequestReader
 from arm_planning.ros.robot_groups import RobotGroups
-from arm_planning.ros.scene_snapshot import SceneSnapshot
+from arm_planning.ros.scene import SceneSnapshot
 from arm_planning.ros.trajectories import check_trajectory, path_of, trajectory_message
 from arm_trajectory import lines, Path
 

@@ -34,14 +34,14 @@ from shape_msgs.msg import SolidPrimitive
 
 from arm_model import AllowedCollisionMatrix, Clearances
 from arm_model.ros import allowed_collisions, apply_planning_scene, scene_change
-from arm_planning.ros.scene_changes import apply_scene
-from arm_planning.ros.scene_messages import (
+from arm_planning.ros.scene import (
     collision_message,
     matrix_message,
     object_message,
     scene_message,
+    SceneSnapshot,
 )
-from arm_planning.ros.scene_snapshot import SceneSnapshot
+from arm_planning.ros.scene_changes import apply_scene
 
 READY = panda().positions(
     dict(zip(panda().joints, [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785], strict=False))

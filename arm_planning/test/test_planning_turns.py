@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from arm_model import frozen, RobotModel
-from arm_planning.ik.solver import IkSolver
+from arm_planning.ik import IkSolver
 
 pytestmark = pytest.mark.xdist_group('turns')
 

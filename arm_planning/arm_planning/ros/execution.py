@@ -28,7 +28,7 @@ from node_runner import ServerMatch
 from node_runner.action_goals import GoalClient
 
 from ..exceptions import PlanningCode, PlanningError
-from .controllers import Controller, FOLLOW
+from .parameters import Controller, ExecutionLimits, FOLLOW
 from .trajectories import check_trajectory, from_start, part_of
 
 WATCH_PERIOD = 0.05  # how often executions are looked at in [s]
@@ -46,18 +46,6 @@ FORGOTTEN = (CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID, CancelGoal.Response.ERRO
 INVALIDATED = PlanningCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
 
 Done = Callable[[PlanningCode, str], None]
-
-
-@dataclass(frozen=True, slots=True)
-class ExecutionLimits:
-    """When an execution is refused or ended; MoveIt's parameters ``trajectory_execution.*``."""
-
-    # how far the robot may be from the start in [rad]; 0 for anywhere
-    start_tolerance: float = 0.01
-    duration_scaling: float = 1.1  # how many times as long as planned it may take
-    duration_margin: float = 0.5  # how much longer than that in [s]
-    is_monitored: bool = True  # whether one that takes longer is stopped
-    is_allowed: bool = True  # whether anything is executed
 
 
 @dataclass(slots=True, eq=False)

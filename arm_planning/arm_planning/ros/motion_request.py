@@ -24,8 +24,8 @@ from arm_model import (
 from arm_model.ros import pose_of, primitive_shape, xyzw
 
 from ..exceptions import coded, PlanningCode, PlanningError
-from ..industrial.planner import PLANNER_IDS
-from ..moveit_config.settings import MoveItSettings, PIPELINES
+from ..moveit_settings import MoveItSettings, PIPELINES
+from ..pilz_planner import PLANNER_IDS
 from ..planner import DEFAULT_PLANNER, FREE_MOTION, unknown_planner
 from ..requests import (
     CircPoint,
@@ -40,7 +40,7 @@ from ..requests import (
     PoseGoal,
     PositionConstraint,
 )
-from .scene_snapshot import SceneSnapshot
+from .scene import SceneSnapshot
 
 OMPL, PILZ = PIPELINES
 

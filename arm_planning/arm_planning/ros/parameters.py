@@ -1,14 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of move_group: of the node itself, and of a package of MoveIt's Setup Assistant."""
+"""Parameters of move_group, of its node and of a package; the controllers that they name."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import re
+from typing import Any
 
+from control_msgs.action import FollowJointTrajectory, GripperCommand, ParallelGripperCommand
 from rclpy.node import Node
+from trajectory_msgs.msg import JointTrajectory
 from urdf_reader import read_urdf
 
 from arm_model import LimitsError, merge_limits
@@ -23,14 +26,101 @@ from node_runner import (
 )
 
 from ..exceptions import ConfigError
-from ..industrial.limits import CartesianLimits
-from ..moveit_config.known import at, known_of, LIMITS, MANAGER, WITHOUT_EFFECT
-from ..moveit_config.package import MoveItPackage
-from ..moveit_config.settings import MoveItSettings, read_settings
-from ..moveit_config.yaml_file import Place
-from .controllers import Controller, FOLLOW, KINDS
-from .execution import ExecutionLimits
+from ..moveit_package import MoveItPackage, Place
+from ..moveit_settings import (
+    at,
+    known_of,
+    LIMITS,
+    MANAGER,
+    MoveItSettings,
+    read_settings,
+    WITHOUT_EFFECT,
+)
+from ..pilz_motions import CartesianLimits
 from .robot_groups import RobotGroups
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerKind:
+    """What a controller takes."""
+
+    name: str  # MoveIt's name of it
+    action: Any  # class of its action
+    namespace: str  # name of its action below that of the controller, by default
+    # makes a goal of the part of a trajectory that is for its joints
+    goal: Callable[[JointTrajectory], Any]
+    single: bool = False  # whether it moves one joint only
+
+
+@dataclass(frozen=True, slots=True)
+class Controller:
+    """A controller."""
+
+    joints: Sequence[str]  # joints that it moves
+    kind: ControllerKind  # what it takes
+    namespace: str  # name of its action below that of the controller
+    max_effort: float = 0.0  # greatest effort of a GripperCommand in [N]; 0 for its own
+
+    def goal(self, part: JointTrajectory) -> Any:  # noqa: ANN401  # messages have no type
+        """Return the goal of its action for the part of a trajectory that is for its joints."""
+        goal = self.kind.goal(part)
+        if self.kind.single and self.max_effort:
+            goal.command.max_effort = self.max_effort
+        return goal
+
+    def action(self, name: str) -> str:
+        """Return the name of its action, by its own."""
+        return f'{name}/{self.namespace}'
+
+
+def _follow(part: JointTrajectory) -> Any:  # noqa: ANN401  # messages have no type
+    return FollowJointTrajectory.Goal(trajectory=part)
+
+
+def _grip(part: JointTrajectory) -> Any:  # noqa: ANN401
+    """Return where the trajectory ends: how a gripper gets there is its own affair."""
+    goal = GripperCommand.Goal()
+    (goal.command.position,) = part.points[-1].positions
+    return goal
+
+
+def _grip_in_parallel(part: JointTrajectory) -> Any:  # noqa: ANN401
+    goal = ParallelGripperCommand.Goal()
+    goal.command.name = list(part.joint_names)
+    goal.command.position = list(part.points[-1].positions)
+    return goal
+
+
+FOLLOW = ControllerKind(
+    'FollowJointTrajectory', FollowJointTrajectory, 'follow_joint_trajectory', _follow
+)
+KINDS = {
+    each.name: each
+    for each in (
+        FOLLOW,
+        ControllerKind('GripperCommand', GripperCommand, 'gripper_cmd', _grip, single=True),
+        ControllerKind(
+            'ParallelGripperCommand',
+            ParallelGripperCommand,
+            'parallel_gripper_cmd',
+            _grip_in_parallel,
+        ),
+    )
+}
+"""Kinds of controllers by MoveIt's names."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExecutionLimits:
+    """When an execution is refused or ended; MoveIt's parameters ``trajectory_execution.*``."""
+
+    # how far the robot may be from the start in [rad]; 0 for anywhere
+    start_tolerance: float = 0.01
+    duration_scaling: float = 1.1  # how many times as long as planned it may take
+    duration_margin: float = 0.5  # how much longer than that in [s]
+    is_monitored: bool = True  # whether one that takes longer is stopped
+    is_allowed: bool = True  # whether anything is executed
+
 
 OMPL_CONFIG = r'^(ompl\.planner_configs\.)[^.]+\.'  # before a key of a planner configuration
 

@@ -25,17 +25,17 @@ from arm_model import Array, frozen, RobotModel
 from node_runner import LATCHED
 
 from ..exceptions import coded, PlanningCode, PlanningError
-from ..industrial.limits import CartesianLimits
-from ..industrial.sequence import check_radii, SequenceItem
-from ..moveit_config.settings import MoveItSettings
+from ..moveit_settings import MoveItSettings
+from ..pilz_motions import CartesianLimits
+from ..pilz_planner import check_radii, SequenceItem
 from ..planner import CANCELED, Planner
 from ..requests import MotionRequest
 from .background import Background, error_code
 from .motion_request import RequestReader
 from .robot_groups import RobotGroups
+from .scene import SceneSnapshot
 from .scene_changes import apply_scene, scene_for
 from .scene_monitor import SceneMonitor
-from .scene_snapshot import SceneSnapshot
 from .trajectories import state_message, trajectory_message
 
 

@@ -32,8 +32,7 @@ from arm_model import (
 from arm_model.ros import apply_planning_scene, hull_of, pose_of
 
 from ..exceptions import coded, PlanningCode, PlanningError
-from .scene_messages import pose_message
-from .scene_snapshot import AttachedDetails, ObjectDetails, SceneSnapshot
+from .scene import AttachedDetails, ObjectDetails, pose_message, SceneSnapshot
 
 NO_CODE = PlanningCode.FAILURE
 CODES = (

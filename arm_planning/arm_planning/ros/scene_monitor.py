@@ -30,9 +30,14 @@ from robot_primitives import JointStateStore
 from ..exceptions import coded, PlanningCode, PlanningError
 from .background import as_refusal
 from .robot_groups import RobotGroups
+from .scene import (
+    ALL_COMPONENTS,
+    attached_messages,
+    collision_message,
+    scene_message,
+    SceneSnapshot,
+)
 from .scene_changes import apply_scene
-from .scene_messages import ALL_COMPONENTS, attached_messages, collision_message, scene_message
-from .scene_snapshot import SceneSnapshot
 from .trajectories import joints_of, state_message
 
 DEPTH = 100  # messages of changes that may wait: each of them counts

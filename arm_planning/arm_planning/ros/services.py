@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""compute_fk, check_state_validity, compute_ik and compute_cartesian_path."""
+"""Services: states, inverse kinematics, Cartesian paths, and which planners there are."""
 
 from __future__ import annotations
 
@@ -9,12 +9,20 @@ from functools import lru_cache, partial
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped, Vector3
-from moveit_msgs.msg import ConstraintEvalResult, ContactInformation
+from moveit_msgs.msg import (
+    ConstraintEvalResult,
+    ContactInformation,
+    PlannerInterfaceDescription,
+    PlannerParams,
+)
 from moveit_msgs.srv import (
     GetCartesianPath,
+    GetPlannerParams,
     GetPositionFK,
     GetPositionIK,
     GetStateValidity,
+    QueryPlannerInterfaces,
+    SetPlannerParams,
 )
 import numpy as np
 from rclpy.node import Node
@@ -24,19 +32,20 @@ from arm_model import Array, Clearances, combined, Contact, inverse, PlanningSce
 from arm_model.ros import seconds
 from arm_trajectory import Path
 
-from ..cartesian_path import cartesian_path, JumpThresholds
+from ..cartesian import cartesian_path, JumpThresholds
 from ..constraints import ConstraintCheck, ConstraintResult
 from ..exceptions import coded, PlanningCode, PlanningError
-from ..ik.solver import DEFAULT_TIMEOUT, IkSolver
-from ..moveit_config.settings import MoveItSettings
+from ..ik import DEFAULT_TIMEOUT, IkSolver
+from ..moveit_settings import MoveItSettings, PlannerConfigs
+from ..pilz_planner import PLANNER_IDS
+from ..planner import FREE_MOTION
 from ..retime import speed_limited, timed_rows
 from ..validity import ValidityCheck
 from .background import Background, error_code
-from .motion_request import RequestReader, scaling_factor
+from .motion_request import OMPL, PILZ, RequestReader, scaling_factor
+from .scene import point_message, pose_message, SceneSnapshot
 from .scene_changes import scene_for
-from .scene_messages import point_message, pose_message
 from .scene_monitor import SceneMonitor
-from .scene_snapshot import SceneSnapshot
 from .trajectories import state_message, trajectory_message
 
 CANDIDATES = 8
@@ -338,3 +347,51 @@ def _refuse(response: Any, error: PlanningError) -> None:  # noqa: ANN401
 def _refuse_path(response: Any, error: PlanningError) -> None:  # noqa: ANN401
     _refuse(response, error)
     response.fraction = -1.0
+
+
+SEARCH = 'geometric::RRTConnect'
+
+
+class PlannerQueries:
+    """Answers about planners; none has anything to set."""
+
+    def __init__(self, node: Node, planners: PlannerConfigs) -> None:
+        self._log, self._planners = node.get_logger(), planners
+        node.create_service(QueryPlannerInterfaces, 'query_planner_interface', self._interfaces)
+        node.create_service(GetPlannerParams, 'get_planner_params', self._get)
+        node.create_service(SetPlannerParams, 'set_planner_params', self._set)
+
+    def _set(self, request: Any, response: Any) -> Any:  # noqa: ANN401  # rclpy has no types here
+        """Log that it has no effect: the response has no field for that."""
+        self._log.warning(
+            f'set_planner_params: {request.planner_config or "the planners"} of group'
+            f' {request.group!r} cannot be set; {", ".join(request.params.keys) or "nothing"}'
+            ' was refused'
+        )
+        return response
+
+    def _interfaces(self, _request: Any, response: Any) -> Any:  # noqa: ANN401
+        response.planner_interfaces = [
+            PlannerInterfaceDescription(
+                name='RRT-Connect',
+                pipeline_id=OMPL,
+                planner_ids=list(self._planners.ids or FREE_MOTION),
+            ),
+            PlannerInterfaceDescription(
+                name='PTP, LIN, CIRC', pipeline_id=PILZ, planner_ids=list(PLANNER_IDS)
+            ),
+        ]
+        return response
+
+    def _get(self, request: Any, response: Any) -> Any:  # noqa: ANN401
+        name = self._planners.name(request.planner_config, request.group)
+        entries = dict(self._planners.configs.get(name, {}))
+        if not entries and name in FREE_MOTION:
+            entries = {'type': SEARCH}
+        words = 'RRT-Connect searches; nothing of it can be set'
+        response.params = PlannerParams(
+            keys=list(entries),
+            values=[str(value) for value in entries.values()],
+            descriptions=[words] * len(entries),
+        )
+        return response

@@ -1,6 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-r"""Joint positions along a curve of a link.
+r"""PTP, LIN and CIRC at full speed, as in Pilz' planner.
+
+PTP: all joints go straight to the goal, in phase. Each keeps its own limits: the profile is that
+of the joint that needs longest, and the others have shares of it. Pilz' planner gives every joint
+the strictest limits of all, which is never quicker, and keeps no limit better.
+
+LIN and CIRC: a link goes along a line or an arc, and turns about one axis. One profile leads along
+the curve; translation and rotation begin and end together, and neither is faster than its limit.
+Where a joint would be too fast, it gets slower there, which Pilz' planner refuses.
 
 Joints follow the curve with :math:`q' = J^+ \nu`, where :math:`\nu` is the derivative of the
 curve. The parameter of the result is time at the full speed along the curve, scaled where a
@@ -13,19 +21,134 @@ is the polynomial of the result, and the places are so dense that the link stays
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 import math
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
 from arm_model import Array, frozen, JointLimits
-from arm_trajectory import Path, quintics
+from arm_trajectory import brakeable, Path, quintics
 
-from ..curves import Curve
-from ..exceptions import PlanningCode, PlanningError
-from ..ik.link_kinematics import LinkKinematics, pose_error
+from .cartesian import Curve
+from .exceptions import PlanningCode, PlanningError
+from .link_kinematics import LinkKinematics, pose_error
+from .retime import FullSpeedPath, NEGLIGIBLE_SLOWDOWN, standstill
+
+MIN_SCALING = 1e-4  # least factor of velocity and acceleration, as in Pilz' planner
+
+JERK_RATIO = 10.0
+"""Jerk over acceleration along a path in [1/s]: Pilz' planner has no limit of jerk."""
+
+
+@dataclass(frozen=True, slots=True)
+class CartesianLimits:
+    """Limits of a link's motion; the defaults are those of the Panda and the PRBT in MoveIt.
+
+    The names are those of pilz_cartesian_limits.yaml. One profile leads along a path, with
+    ``max_trans_acc`` at both ends; ``max_trans_dec`` is read and checked, and not used. Rotations
+    have the acceleration that takes as long to their full speed.
+    """
+
+    max_trans_vel: float = 1.0  # greatest speed in [m/s]
+    max_trans_acc: float = 2.25  # greatest acceleration in [m/s2]
+    max_trans_dec: float = -5.0  # greatest deceleration in [m/s2], negative
+    max_rot_vel: float = 1.57  # greatest speed of rotation in [rad/s]
+
+    def __post_init__(self) -> None:
+        """Refuse limits that are none."""
+        for field in fields(self):
+            value = getattr(self, field.name)
+            sign, word = (-1.0, 'negative') if field.name == 'max_trans_dec' else (1.0, 'positive')
+            if not math.isfinite(value) or value * sign <= 0.0:
+                raise PlanningError(
+                    PlanningCode.FAILURE,
+                    f'cartesian_limits: {field.name} is {value}, a {word} number is needed',
+                )
+
+    @classmethod
+    def of_table(cls, table: Mapping[str, Any]) -> CartesianLimits:
+        """Return the limits of a table ``cartesian_limits``; other keys are left to others.
+
+        Raises:
+            PlanningError: A value is no number of the right sign.
+        """
+        try:
+            values = {
+                each.name: float(table[each.name]) for each in fields(cls) if each.name in table
+            }
+        except (TypeError, ValueError) as error:
+            raise PlanningError(PlanningCode.FAILURE, f'cartesian_limits: {error}') from error
+        return cls(**values)
+
+    @property
+    def radius(self) -> float:
+        """Way in [m] that takes as long as a rotation of 1 rad."""
+        return self.max_trans_vel / self.max_rot_vel
+
+
+MIN_LENGTH = 1e-9  # way in [m] below which a curve is none
+NEGLIGIBLE = 1e-12  # share of the longest way that a joint counts to have at least
+NO_WAY = 1e-9  # greatest way of a joint that counts as none in [rad]
+
+
+def ptp_path(start: Array, goal: Array, limits: JointLimits) -> FullSpeedPath:
+    """Return the path at full speed."""
+    way = goal - start
+    size = np.abs(way)
+    if size.max() < NO_WAY:
+        return standstill(goal)
+    sizes = np.maximum(size, NEGLIGIBLE * size.max())
+    speed, acceleration, jerk = (  # of the share of the way
+        float((limit / sizes).min())
+        for limit in (limits.velocity, limits.acceleration, limits.jerk)
+    )
+    # a short way ends before the full speed
+    peak = brakeable(0.5, acceleration, jerk)
+    speed = min(speed, peak)
+    coefficients = np.zeros((6, len(way)))
+    coefficients[0], coefficients[1] = start, way * speed
+    path = Path(np.array([1.0 / speed]), coefficients[None])
+    return FullSpeedPath(path, acceleration / speed, jerk / speed, straight=True)
+
+
+def curve_path(
+    link: LinkKinematics,
+    curve: Curve,
+    start: Array,
+    joints: JointLimits,
+    limits: CartesianLimits,
+    *,
+    factors: tuple[float, float],
+    name: str,
+) -> FullSpeedPath:
+    """Return the path of the joints at full speed along a curve.
+
+    Args:
+        curve: The curve; it begins where the link is.
+
+    Raises:
+        PlanningError: The curve cannot be followed; the message says where.
+    """
+    length = max(curve.length, curve.angle * limits.radius)
+    if length < MIN_LENGTH:
+        return standstill(start)
+    velocity, acceleration = factors
+    most = acceleration * limits.max_trans_acc
+    # a short way ends before the full speed
+    peak = brakeable(0.5 * length, most, JERK_RATIO * most)
+    speed = min(velocity * limits.max_trans_vel, peak)
+    tracer = _Tracer(link, curve, joints, duration=length / speed, name=name)
+    traced = tracer.timed(tracer.places(start))
+    rate = most / speed
+    notes = []
+    if traced.slowdown > NEGLIGIBLE_SLOWDOWN:
+        joint = joints.names[traced.joint]
+        share = 1.0 / traced.slowdown
+        notes.append(f'{name}: slowed to {share:.0%} where {joint} meets its limit of speed')
+    return FullSpeedPath(traced.path, rate, rate * JERK_RATIO, notes=tuple(notes))
+
 
 POSITION_TOLERANCE = 2e-5
 """Greatest way off the curve between two places in [m]; a fifth of what is promised."""
@@ -65,7 +188,7 @@ its sign changes in the middle.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trace:
+class _Trace:
     """Joint positions along a curve."""
 
     path: Path  # the joints by time at the full speed
@@ -83,29 +206,9 @@ class _Place:
     second: Array
 
 
-def trace(
-    link: LinkKinematics,
-    curve: Curve,
-    start: Array,
-    limits: JointLimits,
-    *,
-    duration: float,
-    name: str,
-) -> Trace:
-    """Follow a curve from a start.
-
-    Args:
-        curve: The curve; it begins where the link is.
-
-    Raises:
-        PlanningError: A joint would leave its range, the arm would become singular, or the curve
-            leads out of reach.
-    """
-    tracer = _Tracer(link, curve, limits, duration=duration, name=name)
-    return tracer.timed(tracer.places(start))
-
-
 class _Tracer:
+    """Follows a curve that begins where the link is."""
+
     def __init__(
         self,
         link: LinkKinematics,
@@ -140,12 +243,12 @@ class _Tracer:
             step = min(2.0 * step, MAX_STEP) if error < EASY else step
         return places
 
-    def timed(self, places: Sequence[_Place]) -> Trace:
+    def timed(self, places: Sequence[_Place]) -> _Trace:
         """Return the path through places, its time scaled where joints would be too fast."""
         durations, pieces = self._pieces(places)
         ratio = np.abs([each.first for each in places]) / self._speed
         joint = int(ratio.max(axis=0).argmax())
-        return Trace(Path(durations, pieces[:, :, :-1]), float(ratio.max()), joint)
+        return _Trace(Path(durations, pieces[:, :, :-1]), float(ratio.max()), joint)
 
     def _pieces(self, places: Sequence[_Place]) -> tuple[Array, Array]:
         """Return the polynomials from place to place: of the joints and, last, of the share.

@@ -1,10 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Joint positions for a pose: all of them in closed form, or those that starts lead to."""
+r"""Joint positions for a pose: all of them in closed form, or those that starts lead to.
+
+A numeric step solves :math:`\Delta q = J^T (J J^T + \lambda I)^{-1} e` with the pose error
+:math:`e` and a damping :math:`\lambda` that vanishes with it (Sugihara, "Solvability-unconcerned
+inverse kinematics by the Levenberg-Marquardt method", 2011). A joint that a step would take beyond
+its range stays at the end of it, and the others make up for it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 import math
 import time
 
@@ -22,15 +29,14 @@ from arm_model import (
     RobotModel,
 )
 
-from ..exceptions import coded, PlanningCode, PlanningError
-from .closed_form import ClosedForm, WristMiss
-from .link_kinematics import LinkKinematics, pose_error
-from .numeric import descend, Descent, random_start
+from .exceptions import coded, PlanningCode, PlanningError
+from .link_kinematics import ClosedForm, LinkKinematics, pose_error, WristMiss
 
 DEFAULT_TIMEOUT = 0.1
 """Time for numeric inverse kinematics in [s]; several starts of a seven-joint arm."""
 
 MAX_STARTS = 200  # starts of numeric inverse kinematics at most, however much time there is
+
 SAME_TOLERANCE = 1e-3  # solutions of which no joint differs by more count as one in [rad]
 
 RANGE_TOLERANCE = 1e-9
@@ -289,3 +295,82 @@ def _known(solution: Array, among: Sequence[Array]) -> bool:
 def _nearest_first(solutions: Sequence[Array], seed: Array) -> list[Array]:
     ordered = sorted(solutions, key=lambda each: float(np.linalg.norm(each - seed)))
     return [frozen(each) for each in ordered]
+
+
+CONVERGED = 1e-10  # greatest part of the pose error that counts as none in [m] and [rad]
+
+MAX_ITERATIONS = 60  # steps from one start at most
+
+MAX_STEP = 0.5  # greatest motion of a joint in a step in [rad] or [m]
+
+DAMPING = 1e-2  # damping over the square of the pose error
+
+MIN_DAMPING = 1e-13  # least damping, so that a singular arm has a step as well
+
+MIN_PROGRESS = 0.999
+"""A start is given up when so many parts of the error are left after :data:`STALL` steps."""
+
+STALL = 8  # steps without progress after which a start is given up
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Descent:
+    """Where steps led."""
+
+    positions: Array  # joint positions in [rad] (n)
+    error: Array  # way in [m] and rotation vector in [rad] that are left (6)
+
+    @property
+    def converged(self) -> bool:
+        """Whether the pose is met."""
+        return bool(np.abs(self.error).max() < CONVERGED)
+
+
+def descend(link: LinkKinematics, pose: Pose, start: Array, lower: Array, upper: Array) -> Descent:
+    """Approach a pose in the root link from a start."""
+    positions = np.clip(start, lower, upper)
+    best, stalled = np.inf, 0
+    for _ in range(MAX_ITERATIONS):
+        actual, jacobian = link.pose_and_jacobian(positions)
+        error = pose_error(pose, actual)
+        size = float(error @ error)
+        if np.abs(error).max() < CONVERGED:
+            return Descent(positions, error)
+        stalled = 0 if size < MIN_PROGRESS * best else stalled + 1
+        if stalled > STALL:
+            break
+        best = min(best, size)
+        step = _step(jacobian, error, positions, lower, upper)
+        largest = float(np.abs(step).max())
+        if largest > MAX_STEP:
+            step *= MAX_STEP / largest
+        positions = np.clip(positions + step, lower, upper)
+    return Descent(positions, pose_error(pose, link.pose(positions)))
+
+
+def _step(jacobian: Array, error: Array, positions: Array, lower: Array, upper: Array) -> Array:
+    """Return a damped step, in which joints at the end of their range stay there."""
+    damping = DAMPING * float(error @ error) + MIN_DAMPING
+    free = np.ones(len(positions), dtype=bool)
+    step = np.zeros(len(positions))
+    for _ in range(len(positions)):
+        part = jacobian[:, free]
+        step[:] = 0.0
+        step[free] = part.T @ np.linalg.solve(part @ part.T + damping * np.eye(6), error)
+        held = ((positions <= lower) & (step < 0.0)) | ((positions >= upper) & (step > 0.0))
+        if not held.any():
+            break
+        free &= ~held
+    return step
+
+
+def random_start(limits: JointLimits, seed: Array, draw: np.random.Generator) -> Array:
+    """Return a start anywhere in the ranges; a joint without end is half a turn off at most.
+
+    Args:
+        seed: Where joints without end are turned from in [rad].
+    """
+    lower = np.where(np.isfinite(limits.lower), limits.lower, seed - np.pi)
+    upper = np.where(np.isfinite(limits.upper), limits.upper, seed + np.pi)
+    start: Array = draw.uniform(lower, upper)
+    return start
