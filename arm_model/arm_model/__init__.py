@@ -15,8 +15,21 @@ z, w; twists linear before angular. ``now`` and all times are on the steady cloc
 
 from __future__ import annotations
 
-from .arrays import Array, checked, frozen, Mask, Native, Places
-from .example import ArmFiles, example_files
+from .arrays import (
+    Array,
+    checked,
+    combined,
+    frozen,
+    inverse,
+    Mask,
+    Native,
+    ORIGIN,
+    Places,
+    Pose,
+    RobotState,
+    rotation_of,
+    turned_twists,
+)
 from .exceptions import (
     ArmError,
     CommandError,
@@ -28,20 +41,17 @@ from .exceptions import (
 )
 from .kinematics import Kinematics
 from .limits import JointLimits, load_limits, merge_limits
-from .model import RobotModel
-from .names import ArmNames, names_of
-from .pose import combined, inverse, ORIGIN, Pose, rotation_of, turned_twists
-from .scene.allowed_collisions import AllowedCollisionMatrix
+from .model import ArmFiles, ArmNames, example_files, names_of, RobotModel
 from .scene.clearances import Clearances, Contact, LeastClearance, Proximity
 from .scene.compiled import compiled_scene, CompiledScene, CompiledSearch
-from .scene.objects import AttachedBody, CollisionObject
-from .scene.octomap import OCTOMAP_NAME, octomap_shapes
-from .scene.pairs import LinkPairs, sample_link_pairs, with_default_collisions
-from .scene.planning_scene import PlanningScene
-from .scene.shapes import (
+from .scene.links import LinkPairs, sample_link_pairs, with_default_collisions
+from .scene.objects import (
+    AllowedCollisionMatrix,
+    AttachedBody,
     Box,
     Capsule,
     Cells,
+    CollisionObject,
     Cone,
     Cylinder,
     Mesh,
@@ -50,8 +60,9 @@ from .scene.shapes import (
     Shape,
     Sphere,
 )
+from .scene.octomap import OCTOMAP_NAME, octomap_shapes
+from .scene.planning_scene import PlanningScene
 from .start_poses import pose_quality, start_pose
-from .state import RobotState
 
 __all__ = [
     'OCTOMAP_NAME',

@@ -1,14 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Arrays of numbers: their type, and their check at the border."""
+"""What all else is made of: arrays of numbers, poses of frames, states of joints."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+import pinocchio as pin
 
 from .exceptions import CommandError
 
@@ -16,7 +19,9 @@ Array = NDArray[np.float64]
 """Numbers in double precision; the shape stands in the docstring of each use."""
 
 Places = NDArray[np.int_]  # numbers of rows, from 0
+
 Mask = NDArray[np.bool_]  # yes or no for each joint or axis
+
 Native = Any  # an object of a library that has no types
 
 
@@ -42,3 +47,85 @@ def checked(values: Sequence[float] | Array, length: int, what: str) -> Array:
             f'{what}: number {place} is {array[place]}; every number must be finite'
         )
     return array
+
+
+UNIT_LENGTH_TOLERANCE = 1e-3  # how far the length of a quaternion may be off
+
+ROUNDING_TOLERANCE = 1e-9
+"""How far numbers of equal poses may be apart, which come from different products."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pose:
+    """Position and orientation of a frame in another."""
+
+    rotation: Array  # rotation matrix (3, 3), from the frame to the other
+    position: Array  # origin of the frame in the other in [m]
+
+    def is_close(self, other: Pose) -> bool:
+        """Whether another pose is the same but for rounding."""
+        return bool(
+            np.allclose(self.rotation, other.rotation, rtol=0.0, atol=ROUNDING_TOLERANCE)
+            and np.allclose(self.position, other.position, rtol=0.0, atol=ROUNDING_TOLERANCE)
+        )
+
+
+ORIGIN = Pose(frozen(np.eye(3)), frozen(np.zeros(3)))  # where a frame is in itself
+
+
+def combined(outer: Pose, inner: Pose) -> Pose:
+    """Return a pose in the frame in which the outer one is given."""
+    return Pose(outer.rotation @ inner.rotation, outer.position + outer.rotation @ inner.position)
+
+
+def rotation_of(quaternion: Sequence[float]) -> Array:
+    """Return the rotation matrix of a quaternion.
+
+    Args:
+        quaternion: x, y, z, w.
+
+    Raises:
+        CommandError: A number is not finite, or the length is not one.
+    """
+    length = math.hypot(*quaternion)
+    if not abs(length - 1.0) < UNIT_LENGTH_TOLERANCE:
+        raise CommandError(f'orientation {list(quaternion)}: its length is {length:.4g}, not 1')
+    matrix: Array = pin.Quaternion(np.array(quaternion) / length).toRotationMatrix()
+    return matrix
+
+
+def inverse(pose: Pose) -> Pose:
+    """Return the pose of the outer frame in the inner."""
+    return Pose(pose.rotation.T, -pose.rotation.T @ pose.position)
+
+
+def turned_twists(axes: Array, twists: Array) -> Array:
+    """Return twists along other axes.
+
+    Args:
+        axes: Rotation (3, 3) from the other axes to those of the twists.
+        twists: Twists as columns (6, n), or one twist (6).
+    """
+    parts = twists.reshape(2, 3, -1)
+    turned: Array = np.matmul(axes.T, parts).reshape(twists.shape)
+    return turned
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RobotState:
+    """State of motion of every joint."""
+
+    position: Array  # positions in [rad]
+    velocity: Array  # velocities in [rad/s]
+    acceleration: Array  # accelerations in [rad/s2]
+
+    @classmethod
+    def at_rest(cls, position: Sequence[float] | Array) -> RobotState:
+        """Return the state of standing still."""
+        zero = np.zeros(len(position))
+        return cls(frozen(position), frozen(zero), frozen(zero))
+
+    @property
+    def moving(self) -> bool:
+        """Whether a joint moves, or is about to."""
+        return bool(self.velocity.any() or self.acceleration.any())

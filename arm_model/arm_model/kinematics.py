@@ -14,9 +14,8 @@ import numpy as np
 import pinocchio as pin
 from urdf_reader import KinematicTree, Mimic
 
-from .arrays import Array, frozen, Mask, Native
+from .arrays import Array, frozen, Mask, Native, Pose
 from .exceptions import CommandError, ModelError
-from .pose import Pose
 
 CONTINUOUS_BOUND = 1e9
 """Range that a continuous joint is given in [rad], so that its position is one plain angle."""

@@ -6,25 +6,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 import copy
+from dataclasses import dataclass
 from itertools import combinations
 import math
 from pathlib import Path
 import threading
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from urdf_reader import EndEffector, find_group, KinematicTree, Pair, parse_srdf, read_urdf
 
-from .arrays import Array, frozen, Native
+from .arrays import Array, frozen, Native, Pose, turned_twists
 from .exceptions import CommandError, description_refused, limits_refused, ModelError, SceneError
 from .kinematics import Kinematics
 from .limits import JointLimits, load_limits, merge_limits
-from .pose import Pose, turned_twists
-from .scene.allowed_collisions import AllowedCollisionMatrix
 from .scene.clearances import Clearances, LeastClearance, Proximity
-from .scene.link_shapes import link_shapes
-from .scene.pairs import with_default_collisions
+from .scene.links import link_shapes, with_default_collisions
+from .scene.objects import AllowedCollisionMatrix
 from .scene.planning_scene import PlanningScene
 
 MIN_REACH = 0.01  # reach of a group that is shorter, such as a finger that slides, in [m]
@@ -424,3 +423,54 @@ def _text(path: Path, read: Callable[[str], object]) -> str:
     with description_refused(str(path)):
         read(text)
     return text
+
+
+FOLDER = Path(__file__).with_name('panda')
+
+
+@dataclass(frozen=True, slots=True)
+class ArmNames:
+    """What an arm's parts are called; empty for what is not known."""
+
+    joints: tuple[str, ...] = ()  # the joints, from the base to the tool
+    base: str = ''  # the base link
+    tool: str = ''  # the tool link
+
+
+@description_refused()
+def names_of(urdf: str, srdf: str = '', group: str = '', tip: str = '') -> ArmNames:
+    """Find the names of an arm.
+
+    Args:
+        srdf: Semantic description as XML text; without it, the arm is the longest chain.
+        tip: The tool link; by default the end of the chain.
+
+    Raises:
+        ModelError: A text cannot be read, or there is no such group or chain.
+    """
+    tree = read_urdf(urdf)
+    semantic = parse_srdf(srdf) if srdf else None
+    if semantic is not None and semantic.groups:
+        first = next(iter(semantic.arms), next(iter(semantic.groups)))
+        found = find_group(tree, semantic, group or first, tip or None)
+        return ArmNames(found.joints, found.base, found.tip)
+    links = [tree.root, *(joint.child for joint in tree.joints)]
+    end = tip or max(links, key=lambda link: len(_moving(tree, link)))
+    return ArmNames(tuple(_moving(tree, end)), tree.root, end)
+
+
+def _moving(tree: KinematicTree, end: str) -> list[str]:
+    return [joint.name for joint in tree.chain(tree.root, end) if joint.independent]
+
+
+class ArmFiles(NamedTuple):
+    """The files of an arm, in the order of :meth:`.RobotModel.from_files`."""
+
+    urdf: Path  # the description
+    srdf: Path  # groups, named poses, pairs of links that may touch
+    limits: Path  # limits of the joints, in the format of MoveIt's joint_limits.yaml
+
+
+def example_files() -> ArmFiles:
+    """Return the files of a Franka Emika Panda: 7 joints, a hand, capsules for its links."""
+    return ArmFiles(FOLDER / 'panda.urdf', FOLDER / 'panda.srdf', FOLDER / 'limits.yaml')

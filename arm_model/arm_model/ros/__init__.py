@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The robot model in ROS: from parameters, its frames beside those of TF, scenes of messages."""
 
-from .numbers import duration_fields, pose_of, seconds, xyz, xyzw
 from .planning_scene import (
     allowed_collisions,
     apply_planning_scene,
@@ -19,7 +18,7 @@ from .robot_parameters import (
     GroupModels,
     same_robot,
 )
-from .tf import FrameTree, TfListener
+from .tf import duration_fields, FrameTree, pose_of, seconds, TfListener, xyz, xyzw
 
 __all__ = [
     'Description',

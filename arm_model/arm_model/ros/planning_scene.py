@@ -23,15 +23,24 @@ from shape_msgs.msg import Mesh as MeshMessage
 from shape_msgs.msg import Plane as PlaneMessage
 from shape_msgs.msg import SolidPrimitive
 
-from ..arrays import Array
+from ..arrays import Array, combined, inverse, ORIGIN, Pose
 from ..exceptions import LinkNameError, ObjectNameError, SceneError
-from ..pose import combined, inverse, ORIGIN, Pose
-from ..scene.allowed_collisions import AllowedCollisionMatrix
-from ..scene.objects import AttachedBody, CollisionObject
+from ..scene.objects import (
+    AllowedCollisionMatrix,
+    AttachedBody,
+    Box,
+    CollisionObject,
+    Cone,
+    Cylinder,
+    Mesh,
+    PlacedShape,
+    Plane,
+    Shape,
+    Sphere,
+)
 from ..scene.octomap import OCTOMAP_NAME, octomap_shapes
 from ..scene.planning_scene import PlanningScene
-from ..scene.shapes import Box, Cone, Cylinder, Mesh, PlacedShape, Plane, Shape, Sphere
-from .numbers import pose_of, xyz, xyzw
+from .tf import pose_of, xyz, xyzw
 
 FrameOf = Callable[[str], Pose]
 """Returns the pose of a frame in the root link, or raises a SceneError where there is none."""

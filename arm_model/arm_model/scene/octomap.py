@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..exceptions import SceneError
-from .shapes import Cells, PlacedShape
+from .objects import Cells, PlacedShape
 
 OCTOMAP_NAME = '<octomap>'  # name of the octomap among the objects of a scene, as in MoveIt
 

@@ -14,14 +14,20 @@ from types import MappingProxyType
 import numpy as np
 import pinocchio as pin
 
-from ..arrays import Array, Mask, Native, Places
+from ..arrays import Array, combined, inverse, Mask, Native, Places, Pose
 from ..exceptions import LinkNameError, ObjectNameError, SceneError
 from ..kinematics import Kinematics
-from ..pose import combined, inverse, Pose
-from .allowed_collisions import AllowedCollisionMatrix
-from .objects import AttachedBody, CollisionObject
+from .objects import (
+    AllowedCollisionMatrix,
+    AttachedBody,
+    Cells,
+    check_padding,
+    CollisionObject,
+    native,
+    padded,
+    PlacedShape,
+)
 from .octomap import OCTOMAP_NAME
-from .shapes import Cells, check_padding, native, padded, PlacedShape
 
 
 @dataclass(frozen=True, slots=True)
