@@ -13,15 +13,17 @@ from .exceptions import (
     CodecError,
     ConfigError,
     DriveError,
+    Findings,
     LifecycleError,
     ObjectError,
     OtherMasterError,
+    Place,
     Problem,
+    RefusedError,
     SdoAbortError,
     SdoError,
     SdoTimeoutError,
 )
-from .findings import Findings, Place, RefusedError
 
 __all__ = [
     'BootError',

@@ -24,9 +24,10 @@ import msgpack
 import pytest
 
 from canopen_core import BusError, CodecError
-from canopen_core.can import Bus, datagram_reader, Frame, open_bus, STANDARD_ID_MAX
+from canopen_core.can import Bus, Frame, open_bus, STANDARD_ID_MAX
 from canopen_core.can.adapter import from_message, to_message
 from canopen_core.can.multicast import _is_local, decode, encode, MulticastBus
+from canopen_core.can.socket_bus import datagram_reader, library
 from canopen_core.can.socketcan import pack
 
 FRAMES = [
@@ -407,7 +408,7 @@ def test_waking_ends_a_batch(bus: Bus, name: str) -> None:
 
 def test_a_failure_within_a_batch_follows_the_frames_before_it() -> None:
     """What has come is received; the next receive reports the error of the socket."""
-    reader = datagram_reader.datagram_reader()
+    reader = datagram_reader()
     assert reader is not None
     frames: list[Frame] = []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
@@ -441,12 +442,12 @@ def test_without_a_compiler_there_is_one_warning(
     """And frames are received in Python."""
     monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path))
     monkeypatch.setenv('CC', '/bin/false')
-    datagram_reader.library.cache_clear()
+    library.cache_clear()
     try:
         with open_bus(name) as bus, open_bus(name) as other:
             other.send(FRAMES[0])
             assert unstamped(receive_count(bus, 1)) == FRAMES[:1]
     finally:
-        datagram_reader.library.cache_clear()
+        library.cache_clear()
     (warning,) = caplog.records
     assert 'CAN frames are read in Python' in warning.getMessage()

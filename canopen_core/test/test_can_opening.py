@@ -101,7 +101,7 @@ def test_virtual_buses_of_different_names_do_not_meet() -> None:
 
 def test_a_virtual_bus_that_nobody_reads_loses_and_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its queue has an end, so a forgotten bus does not fill the memory."""
-    monkeypatch.setattr('canopen_core.can.virtual.QUEUE_FRAMES', 10)
+    monkeypatch.setattr('canopen_core.can.bus.QUEUE_FRAMES', 10)
     name = free_virtual()
     with open_bus(name) as sender, open_bus(name) as idle:
         for number in range(15):

@@ -22,7 +22,7 @@ from canopen_core.eds import (
     parse_integer,
     text_from_bytes,
 )
-from canopen_core.eds.values import BYTE_TYPES, EdsValue, parse_value
+from canopen_core.eds.ini import BYTE_TYPES, EdsValue, parse_value
 from canopen_core.standard import (
     AccessType,
     byte_length,

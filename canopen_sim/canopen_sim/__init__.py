@@ -9,9 +9,7 @@ from .deviations import Fault, FaultInjection
 from .device import Device
 from .drive.axis import ServoModel
 from .drive.drive import Drive
-from .host import DeviceHost
-from .runner import DeviceRunner
-from .simulation import simulated_devices
+from .host import DeviceHost, DeviceRunner, simulated_devices
 
 __all__ = [
     'Device',

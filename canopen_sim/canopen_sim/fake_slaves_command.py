@@ -11,7 +11,7 @@ import sys
 
 from canopen_core import CanopenError
 
-from .simulation import simulated_devices
+from .host import simulated_devices
 
 
 def run(argv: Sequence[str] | None = None) -> int:

@@ -5,16 +5,22 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import contextlib
+from contextlib import contextmanager
+import logging
+from pathlib import Path
+import time
 
-from canopen_core.can import Frame
-from canopen_core.standard import ObjectDictionary
+from arm_canopen.config import BusConfig, load_bus, rate_units, reported_increments
+from canopen_core import BusError, CanopenError
+from canopen_core.can import Bus, BusThread, Frame, open_bus
+from canopen_core.standard import CobId, Index, NODE_ID_MAX, ObjectDictionary, sdo
 
 from .device import Device, RateUnits
 from .drive.axis import ServoModel
-from .objects.parameter_storage import ParameterMemory
-from .services.rpdo import Handler
-from .timed import NEVER
+from .object_store import NEVER, ParameterMemory
+from .pdo import Handler
 
 DEFECT_PAUSE = 0.1  # [s] after a defect in a device, before it is looked at again
 
@@ -163,3 +169,226 @@ class DeviceHost:
         for device in self.devices:
             for can_id, handler in device.handlers.items():
                 self._table.setdefault(can_id, []).append((device, handler))
+
+
+IDLE_WAIT = 1.0  # [s] longest wait when no device has a deadline
+STALL = 0.1  # [s] without a processor from which on devices count as having stood still
+
+logger = logging.getLogger(__name__)
+
+
+class DeviceRunner(BusThread):
+    """Waits for frames and deadlines, and gives them to the devices of a host.
+
+    A bus that goes away (interface down) is waited for; the devices go on meanwhile, as real
+    ones do. A defect in one device is logged, and the others go on.
+    """
+
+    def __init__(self, bus: Bus) -> None:
+        """Prepare; :meth:`start` starts the thread, and the caller closes the bus."""
+        super().__init__(bus, 'devices', self._serve, 'the simulation')
+        # the devices; add them before :meth:`start`, and leave them to the thread then:
+        # :meth:`call` gets at them
+        self.host = DeviceHost(self._send, _log_defect)
+
+    @property
+    def bus_name(self) -> str:
+        """Where the devices are, as `can_interface_name` writes it."""
+        return self._bus.name
+
+    def _serve(self) -> None:
+        host, woken = self.host, time.monotonic()
+        while not self.stopping:
+            host.advance(time.monotonic())
+            self.do_work()
+            rest = time.monotonic()
+            due = min(host.deadline, rest + IDLE_WAIT)
+            frames = self.receive(max(0.0, due - rest))
+            now = time.monotonic()
+            first = frames[0].timestamp or now if frames else due
+            stalled = (rest - woken) + max(0.0, now - max(rest, min(due, first)))
+            woken = now
+            for frame in _pass_over(frames, now) if now - first > STALL else frames:
+                host.receive(frame, frame.timestamp or now)
+            if stalled > STALL:
+                host.postpone_watches(stalled)
+
+    def _send(self, frame: Frame) -> None:
+        try:
+            self._bus.send(frame)
+        except BusError as error:
+            self.note_failure(error)
+
+
+def _pass_over(frames: list[Frame], now: float) -> list[Frame]:
+    """Return what devices see of frames that waited because they got no processor."""
+    kept = newest_process_data(frames)
+    syncs = sum(frame.can_id == CobId.SYNC for frame in frames)
+    if len(kept) == len(frames):
+        return frames
+    logger.warning(
+        'the simulated devices got no processor for %.2f s: %d SYNC and %d other frames of '
+        'process data are passed over, as by the mailboxes of a CAN controller',
+        now - (frames[0].timestamp or now),
+        max(0, syncs - 1),
+        len(frames) - len(kept) - max(0, syncs - 1),
+    )
+    return kept
+
+
+def newest_process_data(frames: Sequence[Frame]) -> list[Frame]:
+    """Return what the mailboxes of a CAN controller hold of frames that were not read in time.
+
+    A device that stood still sees the newest set-point, and does not follow all those of the past.
+    Of SDO and NMT, whose clients wait for their answers, all is kept.
+    """
+    newest = {frame.can_id: frame for frame in frames}
+    return [
+        frame
+        for frame in frames
+        if not _is_process_data(frame.can_id) or newest[frame.can_id] is frame
+    ]
+
+
+def _is_process_data(can_id: int) -> bool:
+    heartbeat = 0 < can_id - CobId.HEARTBEAT <= NODE_ID_MAX
+    return CobId.SYNC <= can_id < CobId.SDO_RESPONSE or heartbeat
+
+
+def _log_defect(device: Device, error: Exception) -> None:
+    logger.error('a defect in the simulated device %d', device.node_id, exc_info=error)
+
+
+ANSWER_TIME = 0.15  # [s] a device answers an SDO within some milliseconds, unless it is too busy
+EVIDENCE = {CobId.SDO_RESPONSE: 'SDO response', CobId.HEARTBEAT: 'heartbeat or boot-up'}
+"""Frames that only the device with a node id sends, by their first identifier."""
+
+
+class NodeIdCheck:
+    """Listens for devices with given node ids, beside other work of a start."""
+
+    def __init__(
+        self, bus: Bus, node_ids: Iterable[int], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """Request an answer of each; what was received before counts, too.
+
+        The bus has no other reader.
+        """
+        self.found: dict[int, str] = {}  # what was received from them, in words, by identifier
+        self._bus = bus
+        self._clock = clock
+        ids = [*node_ids]
+        self._known = {
+            base + node_id: f'{name} (0x{base + node_id:03X}) of node id {node_id}'
+            for base, name in EVIDENCE.items()
+            for node_id in ids
+        }
+        self._until = clock() + ANSWER_TIME
+        self._receive(0.0)
+        with contextlib.suppress(BusError):  # a bus that is down has no devices
+            for node_id in [] if self.found else ids:
+                request = sdo.UploadRequest(Index.DEVICE_TYPE, 0).encode()
+                bus.send(Frame(CobId.SDO_REQUEST + node_id, request))
+
+    def finish(self) -> None:
+        """Wait for the rest of the time in which a device would have answered.
+
+        Raises:
+            CanopenError: There are such devices; the message names their frames and the remedy.
+        """
+        readable = self._receive(0.0)  # what came beside other work, however long that took
+        while readable and not self.found and (left := self._until - self._clock()) > 0.0:
+            readable = self._receive(left)
+        if self.found:
+            raise CanopenError(
+                f'{self._bus.name} has devices with these node ids already; received: '
+                f'{", ".join(self.found[can_id] for can_id in sorted(self.found))}. End the other '
+                'simulated devices (fake_slaves, bringup --simulate), or choose another '
+                'can_interface_name'
+            )
+
+    def _receive(self, timeout: float) -> bool:
+        """Check received frames; return whether the bus can be read."""
+        try:
+            frames = self._bus.receive(timeout)
+        except BusError:
+            return False
+        for frame in frames:
+            plain = not (frame.is_remote or frame.is_extended or frame.is_error)
+            if plain and frame.can_id in self._known:
+                self.found[frame.can_id] = self._known[frame.can_id]
+        return True
+
+
+NO_POSITIONS: Mapping[str, float] = {}
+
+
+def add_devices(
+    host: DeviceHost,
+    bus: BusConfig,
+    positions: Mapping[str, float] = NO_POSITIONS,
+    memory: Callable[[int], ParameterMemory] | None = None,
+) -> None:
+    """Add the devices of a bus to a host, switched off.
+
+    Positions are where axes stand at the start, by name, in the units of bus.yml [rad or m], as
+    their absolute encoders report it; the others report 0 increments. ``memory`` makes what a
+    device keeps without power, by node id.
+
+    Raises:
+        CanopenError: The bus has no such axis, or it cannot report such a position.
+    """
+    if unknown := [name for name in positions if name not in bus.joints]:
+        known = ', '.join(bus.joints) or 'none'
+        raise CanopenError(f'positions: no drive {unknown[0]!r} in {bus.file}; drives: {known}')
+    for node in bus.nodes:
+        axes = node.axes if node.is_drive else ()
+        device = host.add(
+            node.node_id,
+            node.dictionary,
+            memory=None if memory is None else memory(node.node_id),
+            rate_units={axis.channel: rate_units(bus, node, axis) for axis in axes},
+        )
+        drives = {drive.number: drive for drive in device.drives}
+        for axis in axes:
+            if axis.name not in positions:
+                continue
+            if axis.channel not in drives:
+                raise CanopenError(f'positions: the EDS of {node.name} has no axis {axis.name}')
+            try:
+                increments = reported_increments(bus, node, axis, positions[axis.name])
+            except ValueError as error:
+                raise CanopenError(f'positions: {error}') from error
+            drives[axis.channel].count_from(increments)
+
+
+@contextmanager
+def simulated_devices(
+    bus_config: str | Path, bus: str = 'auto', positions: Mapping[str, float] = NO_POSITIONS
+) -> Iterator[DeviceRunner]:
+    """Simulate the devices of a bus.yml on a bus, in a thread that ends with the context.
+
+    Args:
+        bus_config: The bus.yml.
+        bus: Name of the bus, as for :func:`canopen_core.can.open_bus`.
+        positions: Where drives stand at the start, by name, in the units of bus.yml [rad or m].
+
+    Yields:
+        What runs them; ``runner.call`` gets at ``runner.host.devices``.
+
+    Raises:
+        ConfigError: The bus.yml or an EDS is wrong.
+        BusError: The bus cannot be opened.
+        CanopenError: The bus has no such drive, or it cannot report such a position; or devices
+            with these node ids are on it already.
+    """
+    config = load_bus(bus_config)
+    with open_bus(bus) as can:
+        runner = DeviceRunner(can)
+        add_devices(runner.host, config, positions)
+        NodeIdCheck(can, [device.node_id for device in runner.host.devices]).finish()
+        runner.start()
+        try:
+            yield runner
+        finally:
+            runner.stop()

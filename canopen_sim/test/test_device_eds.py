@@ -15,7 +15,7 @@ import pytest
 from canopen_core.eds import load_eds
 from canopen_core.standard import NmtCommand
 from canopen_sim.drive.objects import DriveObjects
-from canopen_sim.objects.object_store import Integer, ObjectStore
+from canopen_sim.object_store import Integer, ObjectStore
 
 TWO_AXES = EDS.with_name('cia402_two_axes.eds')
 FILES = pytest.mark.parametrize('path', [EDS, TWO_AXES], ids=lambda path: path.stem)

@@ -28,9 +28,8 @@ from canopen_core.can import (
     VirtualWire,
 )
 from canopen_core.standard import CobId, nmt_frame, NmtCommand, NmtState, sdo, tpdo_default
-from canopen_sim import DeviceHost, DeviceRunner, runner, simulated_devices
-from canopen_sim.node_id_check import NodeIdCheck
-from canopen_sim.runner import newest_process_data
+from canopen_sim import DeviceHost, DeviceRunner, host, simulated_devices
+from canopen_sim.host import newest_process_data, NodeIdCheck
 
 ARRIVAL = 10.0  # [s] a deadline, no measure
 IDS = range(2, 9)
@@ -262,7 +261,7 @@ def test_a_device_that_stood_still_does_not_live_through_what_it_missed(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """It answers one SYNC and not all of the past, and its log says how many it passed over."""
-    monkeypatch.setattr(runner, 'STALL', 0.0)
+    monkeypatch.setattr(host, 'STALL', 0.0)
     name = free_virtual()
     with open_bus(name) as bus, open_bus(name) as master:
         devices = DeviceRunner(bus)

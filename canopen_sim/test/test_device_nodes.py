@@ -202,7 +202,7 @@ class Services:
 
     def __init__(self, bus: Bus, other: Bus) -> None:
         """Start everything; needs an initialised context."""
-        from canopen_sim.nodes.fault_services import FaultServices
+        from canopen_sim.nodes.fake_slaves import FaultServices
 
         self.other = other  # the bus, as the rest of the network has it
         self.runner = DeviceRunner(bus)  # runs the devices

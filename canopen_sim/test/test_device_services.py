@@ -22,7 +22,7 @@ from canopen_core.standard import (
     ObjectEntry,
 )
 from canopen_sim import Device, Fault
-from canopen_sim.objects.parameter_storage import LOAD, ParameterFile, ParameterMemory, SAVE
+from canopen_sim.object_store import LOAD, ParameterFile, ParameterMemory, SAVE
 
 EMCY = 0x080 + NODE_ID
 

@@ -23,7 +23,7 @@ import can
 
 from canopen_core import BusError
 from canopen_core.can import can_interfaces, Frame, LogWriter, open_bus
-from canopen_core.can.load import BusLoad
+from canopen_core.can.frame import BusLoad
 from canopen_core.can.multicast import decode, encode
 from canopen_tools.monitor import FrameDescriber
 

@@ -8,7 +8,6 @@ The names here are the public API.
 from canopen_core.can import read_log
 
 from .eds_lint import EdsReport, lint_eds
-from .monitor.describe import FrameDescriber
-from .monitor.description import Description
+from .monitor.describe import Description, FrameDescriber
 
 __all__ = ['Description', 'EdsReport', 'FrameDescriber', 'lint_eds', 'read_log']

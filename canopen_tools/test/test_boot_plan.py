@@ -22,8 +22,8 @@ from arm_canopen.config import (
 from arm_canopen.config.model.boot_plan import WATCH_KEY
 from arm_canopen.master.configuration import Configurator
 from canopen_core.standard import pdo_object
-from canopen_tools.cli.diff import expected_defaults, expected_objects
-from canopen_tools.dcf.concise import device_writes
+from canopen_tools.cli.dcf import device_writes
+from canopen_tools.cli.objects import expected_defaults, expected_objects
 
 OTHER = 9 << 16 | 500  # an entry of 0x1016 that watches node 9
 

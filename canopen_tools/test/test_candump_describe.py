@@ -15,10 +15,10 @@ import pytest
 from canopen_core.can import Frame
 from canopen_core.standard import ConsumerHeartbeatTime
 from canopen_tools import Description, FrameDescriber
+from canopen_tools.candump import LineFormat, TimeStyle
+from canopen_tools.cli.arguments import split_ros_arguments
 from canopen_tools.monitor import FrameFilter, FrameKind
-from canopen_tools.monitor.line_format import LineFormat, TimeStyle
-from canopen_tools.monitor.value_text import value_text
-from canopen_tools.ros_arguments import split_ros_arguments
+from canopen_tools.monitor.sdo_follower import value_text
 
 GENERIC = [
     (0x000, '0102', 'NMT node 2  start'),

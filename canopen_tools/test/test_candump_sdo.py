@@ -12,8 +12,7 @@ import pytest
 from canopen_core.can import Frame
 from canopen_core.standard import sdo
 from canopen_tools import FrameDescriber
-from canopen_tools.monitor.object_names import ObjectNames
-from canopen_tools.monitor.sdo_follower import SdoFollower
+from canopen_tools.monitor.sdo_follower import ObjectNames, SdoFollower
 
 NAME = '0x1008:00 Name'
 # '>' goes to the device, '<' comes from it

@@ -17,14 +17,10 @@ from arm_canopen import BusConfig, load_bus
 from arm_canopen.config import SdoWrite
 from canopen_core.eds import load_eds
 from canopen_tools import lint_eds
-from canopen_tools.cli.diff import expected_objects
+from canopen_tools.cli.dcf import device_writes, encode_concise, master_writes
 from canopen_tools.cli.main import main
-from canopen_tools.dcf.concise import (
-    device_writes,
-    encode_concise,
-    master_writes,
-)
-from canopen_tools.dcf.master import master_dcf
+from canopen_tools.cli.objects import expected_objects
+from canopen_tools.dcf_master import master_dcf
 
 PANDA = REPOSITORY / 'arm_bringup' / 'robots' / 'panda' / 'bus.yml'
 

@@ -13,8 +13,8 @@ import pytest
 
 from arm_canopen import BusConfig, load_bus, NodeConfig, Severity
 from canopen_core.standard import ObjectDictionary
-from canopen_tools.cli.diff import expected_objects
-from canopen_tools.dcf.concise import device_writes
+from canopen_tools.cli.dcf import device_writes
+from canopen_tools.cli.objects import expected_objects
 
 NAME = 'joint'
 BUS = """

@@ -8,22 +8,27 @@ What reads and writes logs is loaded when it is used: it brings python-can.
 from importlib import import_module
 from typing import Any, TYPE_CHECKING
 
-from .bus import Bus, BusCounters, wall_clock_offset
-from .bus_thread import BusThread
+from .bus import Bus, BusCounters, VirtualBus, VirtualWire, wall_clock_offset
+from .bus_thread import BusThread, FrameRing, RecordedFrame
 from .candump_format import format_line, log_channel
-from .error_frames import (
+from .frame import (
+    BusLoad,
     controller_state,
     ControllerState,
     error_counters,
     error_text,
+    EXTENDED_ID_MAX,
+    Frame,
+    frame_bits,
     is_unacknowledged,
+    LoadFigures,
+    PAYLOAD_MAX,
+    STANDARD_ID_MAX,
+    stuff_bits_mean,
+    stuff_bits_worst,
 )
-from .frame import EXTENDED_ID_MAX, Frame, PAYLOAD_MAX, STANDARD_ID_MAX
-from .frame_ring import FrameRing, RecordedFrame
-from .interfaces import can_interfaces, CanInterface, missing_interface_text
-from .load import BusLoad, frame_bits, LoadFigures, stuff_bits_mean, stuff_bits_worst
 from .opening import AUTO, auto_names, open_bus, resolve_name
-from .virtual import VirtualBus, VirtualWire
+from .socketcan import can_interfaces, CanInterface, missing_interface_text
 
 if TYPE_CHECKING:
     from .frame_log import LogWriter, read_buses, read_log

@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+from collections import deque
+from dataclasses import dataclass
+from enum import Enum
 from typing import NamedTuple
 
 STANDARD_ID_MAX = 0x7FF  # 11 bits
@@ -38,3 +41,206 @@ def checked(frame: Frame) -> Frame:
     if not 0 <= frame.remote_length <= (PAYLOAD_MAX if frame.is_remote else 0):
         raise ValueError(f'{frame.remote_length} bytes cannot be requested by such a frame')
     return frame
+
+
+ERROR_CLASSES: tuple[tuple[int, str], ...] = (
+    (0x001, 'transmit timeout'),
+    (0x002, 'arbitration lost'),
+    (0x004, 'controller problem'),
+    (0x008, 'protocol violation'),
+    (0x010, 'transceiver problem'),
+    (0x020, 'no acknowledge'),
+    (0x040, 'bus off'),
+    (0x080, 'bus error'),
+    (0x100, 'controller restarted'),
+)
+"""Bit of the identifier and its meaning."""
+
+CONTROLLER_PROBLEMS: tuple[tuple[int, str], ...] = (
+    (0x01, 'receive buffer overflow'),
+    (0x02, 'transmit buffer overflow'),
+    (0x04, 'receive errors at warning level'),
+    (0x08, 'transmit errors at warning level'),
+    (0x10, 'receive error passive'),
+    (0x20, 'transmit error passive'),
+    (0x40, 'error active again'),
+)
+"""Bit of data[1] and its meaning, for a controller problem."""
+
+PROTOCOL_VIOLATIONS: tuple[tuple[int, str], ...] = (
+    (0x01, 'single bit'),
+    (0x02, 'frame format'),
+    (0x04, 'bit stuffing'),
+    (0x08, 'dominant bit not sent'),
+    (0x10, 'recessive bit not sent'),
+    (0x20, 'bus overload'),
+    (0x40, 'active error announcement'),
+    (0x80, 'on transmission'),
+)
+"""Bit of data[2] and its meaning, for a protocol violation."""
+
+_CONTROLLER = 0x004
+_PROTOCOL = 0x008
+_NO_ACKNOWLEDGE = 0x020
+_BUS_OFF = 0x040
+_RESTARTED = 0x100
+_COUNTERS = 0x200  # data[6] and data[7] are the transmit and receive error counters
+_WARNING_LEVEL, _PASSIVE, _ACTIVE_AGAIN = 0x0C, 0x30, 0x40  # of CONTROLLER_PROBLEMS
+
+
+class ControllerState(Enum):
+    """Error state of a CAN controller (ISO 11898-1, fault confinement); the value is in words."""
+
+    ACTIVE = 'error active'
+    WARNING = 'error warning'
+    PASSIVE = 'error passive'
+    BUS_OFF = 'bus off'
+
+
+def controller_state(frame: Frame) -> ControllerState | None:
+    """Return the state that an error frame reports, None when it reports none."""
+    if frame.can_id & _BUS_OFF:
+        return ControllerState.BUS_OFF
+    if frame.can_id & _RESTARTED:
+        return ControllerState.ACTIVE
+    problem = frame.data[1] if frame.can_id & _CONTROLLER and len(frame.data) > 1 else 0
+    if problem & _PASSIVE:
+        return ControllerState.PASSIVE
+    if problem & _WARNING_LEVEL:
+        return ControllerState.WARNING
+    return ControllerState.ACTIVE if problem & _ACTIVE_AGAIN else None
+
+
+def error_counters(frame: Frame) -> tuple[int, int] | None:
+    """Return the transmit and the receive error counter, None when the frame has none."""
+    if not frame.can_id & _COUNTERS or len(frame.data) < 8:
+        return None
+    return frame.data[6], frame.data[7]
+
+
+def is_unacknowledged(frame: Frame) -> bool:
+    """Whether an error frame reports that no other station has acknowledged a frame."""
+    return bool(frame.can_id & _NO_ACKNOWLEDGE)
+
+
+def error_text(frame: Frame) -> str:
+    """Describe an error frame, e.g. ``controller problem (transmit error passive)``."""
+    data = frame.data.ljust(8, b'\0')
+    parts = []
+    for bit, text in ERROR_CLASSES:
+        if not frame.can_id & bit:
+            continue
+        details = _details(bit, data)
+        parts.append(f'{text} ({details})' if details else text)
+    if frame.can_id & _COUNTERS:
+        parts.append(f'{data[6]} transmit and {data[7]} receive errors counted')
+    return ', '.join(parts) or f'error class 0x{frame.can_id:X}'
+
+
+def _details(error_class: int, data: bytes) -> str:
+    if error_class == _CONTROLLER:
+        return _named(CONTROLLER_PROBLEMS, data[1])
+    if error_class == _PROTOCOL:
+        return _named(PROTOCOL_VIOLATIONS, data[2])
+    return ''
+
+
+def _named(table: tuple[tuple[int, str], ...], bits: int) -> str:
+    return ', '.join(text for bit, text in table if bits & bit)
+
+
+_FRAME_BITS = 47  # [bit] without payload, with intermission
+_STUFFED_BITS = 34  # [bit] without payload
+_EXTENSION_BITS = 20  # [bit] of a 29-bit identifier
+_WORST_STUFF_DISTANCE = 4  # [bit]
+_MEAN_STUFF_DISTANCE = 30  # [bit] 2^5 - 2
+_SAMPLES = 10  # per window
+
+
+def frame_bits(size: int, *, is_extended: bool = False) -> int:
+    """Return the bits of a frame with a payload of size [byte]: no stuffing, with intermission."""
+    return _FRAME_BITS + 8 * size + (_EXTENSION_BITS if is_extended else 0)
+
+
+def stuff_bits_worst(size: int, *, is_extended: bool = False) -> int:
+    """Return how many bits stuffing adds to a frame at most."""
+    return (_stuffed_bits(size, is_extended) - 1) // _WORST_STUFF_DISTANCE
+
+
+def stuff_bits_mean(size: int, *, is_extended: bool = False) -> float:
+    """Return how many bits stuffing adds to a frame of random content on average."""
+    return (_stuffed_bits(size, is_extended) - 1) / _MEAN_STUFF_DISTANCE
+
+
+def _stuffed_bits(size: int, is_extended: bool) -> int:
+    return _STUFFED_BITS + 8 * size + (_EXTENSION_BITS if is_extended else 0)
+
+
+@dataclass(frozen=True, slots=True)
+class LoadFigures:
+    """What a bus carried in the last window."""
+
+    frames_per_second: float = 0.0  # frames in [1/s]
+    # share of the time that the bus was busy, 0 to 1, with the stuffing of random content
+    load: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Sample:
+    time: float  # [s]
+    frames: int
+    bits: float
+
+
+class BusLoad:
+    """Estimates the load from the frames that are sent and received.
+
+    Counting a frame is one addition; the arithmetic is done when the figures are read.
+    """
+
+    def __init__(self, bitrate: int, now: float, window: float = 1.0) -> None:
+        """Start at a steady time in [s]; figures look back window [s] when they are read often.
+
+        Raises:
+            ValueError: Bit rate in [bit/s] or window is not positive.
+        """
+        if bitrate <= 0 or window <= 0.0:
+            raise ValueError(f'bit rate {bitrate} and window {window} must be positive')
+        self._bitrate = bitrate
+        self._window = window
+        self._standard = [0] * (PAYLOAD_MAX + 1)  # frames by length of the payload
+        self._extended = [0] * (PAYLOAD_MAX + 1)
+        self._samples = deque([self._sample(now)])
+
+    def count(self, frame: Frame) -> None:
+        """Count a frame, sent or received; error frames are notes of the controller and free."""
+        if frame.is_error:
+            return
+        counts = self._extended if frame.is_extended else self._standard
+        counts[len(frame.data)] += 1
+
+    def figures(self, now: float) -> LoadFigures:
+        """Return the figures of the last window before a steady time in [s]."""
+        newest = self._sample(now)
+        samples = self._samples
+        while len(samples) > 1 and samples[1].time <= now - self._window:
+            samples.popleft()
+        oldest = samples[0]
+        if now - samples[-1].time >= self._window / _SAMPLES:
+            samples.append(newest)
+        span = now - oldest.time
+        if span <= 0.0:
+            return LoadFigures()
+        return LoadFigures(
+            (newest.frames - oldest.frames) / span,
+            (newest.bits - oldest.bits) / (span * self._bitrate),
+        )
+
+    def _sample(self, now: float) -> _Sample:
+        frames, bits = 0, 0.0
+        for is_extended, counts in ((False, self._standard), (True, self._extended)):
+            for size, count in enumerate(counts):
+                plain = frame_bits(size, is_extended=is_extended)
+                frames += count
+                bits += count * (plain + stuff_bits_mean(size, is_extended=is_extended))
+        return _Sample(now, frames, bits)

@@ -17,9 +17,8 @@ import socket
 import msgpack
 
 from ..exceptions import BusError, CodecError
-from .datagram_reader import datagram_reader, Source
 from .frame import checked, Frame, PAYLOAD_MAX, STANDARD_ID_MAX
-from .socket_bus import prepare_receiver, SocketBus
+from .socket_bus import datagram_reader, prepare_receiver, SocketBus, Source
 
 _ENTRIES = 11
 _MAP_HEADER = bytes((0x80 | _ENTRIES,))  # msgpack's of a map with fewer than 16 entries

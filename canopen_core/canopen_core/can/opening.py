@@ -21,11 +21,9 @@ import os
 import socket
 
 from ..exceptions import BusError
-from .bus import Bus
-from .interfaces import can_interfaces
+from .bus import Bus, open_virtual
 from .multicast import check_group, DEFAULT_GROUP, DEFAULT_PORT, MulticastBus
-from .socketcan import SocketCanBus
-from .virtual import open_virtual
+from .socketcan import can_interfaces, SocketCanBus
 
 AUTO = 'auto'
 _AUTO_INTERFACE = 'vcan0'

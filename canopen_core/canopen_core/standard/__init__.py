@@ -3,32 +3,23 @@
 """What CiA 301 and CiA 402 define: types, tables and codecs, without state or I/O."""
 
 from . import sdo
-from .cob_id import (
-    BIT_RATES_KBIT,
-    CAN_ID_MASK,
-    COB_ID_EXTENDED,
-    COB_ID_INVALID,
-    CobId,
-    NODE_ID_MAX,
-    NODE_ID_MIN,
-    PREDEFINED_MAX,
-    rpdo_default,
-    RTR_FORBIDDEN,
-    SYNC_PRODUCER,
-    TIME_CONSUMER,
-    TIME_PRODUCER,
-    tpdo_default,
-)
 from .datatypes import (
     bit_length,
     byte_length,
     DataType,
     decode,
     encode,
+    EVENT_DRIVEN,
     FIXED_BITS,
     integer_range,
+    MAPPED_LENGTH_MASK,
+    mapped_place,
+    MappedObject,
+    Number,
+    PdoCodec,
     REAL_FORMATS,
     SIGNED_BITS,
+    SYNCHRONOUS_MAX,
     UNSIGNED_BITS,
     Value,
 )
@@ -36,8 +27,11 @@ from .dictionary import (
     AccessType,
     DeviceProfile,
     drive_axes,
+    find_object,
     is_drive,
+    NUMBER,
     object_address,
+    object_path,
     ObjectCode,
     ObjectDictionary,
     ObjectEntry,
@@ -45,10 +39,17 @@ from .dictionary import (
     profile_number,
 )
 from .drive import (
+    ANALOG_EVENTS,
+    ANALOG_INPUTS,
     Controlword,
     CYCLIC_MODES,
+    DIGITAL_OUTPUTS,
     drive_state,
     DriveState,
+    EncoderObject,
+    ERROR_OBJECTS,
+    IO_GROUPS,
+    IoGroup,
     mode_title,
     OperationMode,
     STATE_WORDS,
@@ -56,29 +57,37 @@ from .drive import (
     statusword_text,
     TARGET_OBJECTS,
 )
-from .emcy import Emergency, error_code_text, error_register_text
-from .io_profiles import (
-    ANALOG_EVENTS,
-    ANALOG_INPUTS,
-    DIGITAL_OUTPUTS,
-    EncoderObject,
-    ERROR_OBJECTS,
-    IO_GROUPS,
-    IoGroup,
-)
 from .nmt import (
     ALL_NODES,
+    BIT_RATES_KBIT,
+    CAN_ID_MASK,
+    COB_ID_EXTENDED,
+    COB_ID_INVALID,
+    CobId,
     COMMANDED_STATES,
     ConsumerHeartbeatTime,
+    decode_time_of_day,
+    Emergency,
+    encode_time_of_day,
+    error_code_text,
+    error_register_text,
     nmt_addressee,
     nmt_frame,
     NmtCommand,
     NmtState,
+    NODE_ID_MAX,
+    NODE_ID_MIN,
     parse_heartbeat,
     parse_nmt,
+    PREDEFINED_MAX,
     RESETS,
+    rpdo_default,
+    RTR_FORBIDDEN,
+    SYNC_PRODUCER,
+    TIME_CONSUMER,
+    TIME_PRODUCER,
+    tpdo_default,
 )
-from .object_paths import find_object, NUMBER, object_path
 from .objects import (
     axis_of,
     AXIS_OFFSET,
@@ -95,17 +104,7 @@ from .objects import (
     PdoObject,
     slow_timeout,
 )
-from .pdo import (
-    EVENT_DRIVEN,
-    MAPPED_LENGTH_MASK,
-    mapped_place,
-    MappedObject,
-    Number,
-    PdoCodec,
-    SYNCHRONOUS_MAX,
-)
-from .sdo_abort import abort_text, AbortCode
-from .time_of_day import decode_time_of_day, encode_time_of_day
+from .sdo import abort_text, AbortCode
 
 __all__ = [
     'ALL_NODES',

@@ -31,7 +31,7 @@ from dataclasses import dataclass
 import math
 from typing import NamedTuple
 
-from ..timed import NEVER
+from ..object_store import NEVER
 from .switches import Switches
 
 LIMITER_STEP = 0.001  # [s] of the rate limiter

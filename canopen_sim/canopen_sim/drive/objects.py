@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 from canopen_core.standard import AXIS_OFFSET, Index, OperationMode, TARGET_OBJECTS
 
-from ..objects.object_store import Integer, ObjectStore
+from ..object_store import Integer, ObjectStore
 from .axis import Limits
 
 ACCELERATIONS = frozenset(

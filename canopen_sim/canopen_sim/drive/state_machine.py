@@ -13,7 +13,7 @@ from canopen_core.standard import AbortCode, OperationMode, Value
 from canopen_core.standard import DriveState as State
 
 from ..deviations import Fault
-from ..objects.object_store import Integer, refusal
+from ..object_store import Integer, refusal
 from .axis import Axis
 from .objects import DriveObjects
 

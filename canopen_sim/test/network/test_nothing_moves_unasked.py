@@ -53,7 +53,7 @@ from canopen_core.standard import (
     SYNCHRONOUS_MAX,
 )
 from canopen_sim import DeviceHost
-from canopen_sim.simulation import add_devices
+from canopen_sim.host import add_devices
 
 pytestmark = pytest.mark.slow
 

@@ -28,8 +28,8 @@ from arm_canopen import (
 from arm_canopen.master.sdo_client import BLOCK_MIN, BURST
 from canopen_core.can import Frame
 from canopen_core.standard import DataType, ObjectDictionary, ObjectEntry
-from canopen_sim.objects.object_store import ObjectStore
-from canopen_sim.services.sdo_server import SdoServer
+from canopen_sim.object_store import ObjectStore
+from canopen_sim.sdo_server import SdoServer
 
 NODE = 5
 REQUEST, RESPONSE = 0x600 + NODE, 0x580 + NODE

@@ -6,16 +6,15 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
 import difflib
+import os
+import sys
 from typing import Any, TYPE_CHECKING, TypeAlias
 
-from canopen_core import CanopenError
+from canopen_core import CanopenError, Problem
 from canopen_core.standard import NODE_ID_MAX, NODE_ID_MIN
-
-if TYPE_CHECKING:
-    SubParsers: TypeAlias = argparse._SubParsersAction[argparse.ArgumentParser]  # noqa: SLF001
-else:
-    SubParsers = object
 
 
 class UsageError(CanopenError):
@@ -44,6 +43,12 @@ class SuggestingParser(argparse.ArgumentParser):
         if choices is not None and value not in choices and (hint := _hint(str(value), choices)):
             raise argparse.ArgumentError(action, f'unknown {value!r}{hint}')
         super()._check_value(action, value)
+
+
+if TYPE_CHECKING:
+    SubParsers: TypeAlias = argparse._SubParsersAction[SuggestingParser]  # noqa: SLF001
+else:
+    SubParsers = object
 
 
 def _hint(text: str, known: Iterable[object]) -> str:
@@ -141,3 +146,105 @@ def apply_parameters(options: argparse.Namespace, parameters: Mapping[str, str])
         options.can = options.can or parameters.get('can_interface_name') or 'auto'
     if 'bus_config' in options:
         options.bus_config = options.bus_config or parameters.get('bus_config')
+
+
+RED, YELLOW, RESET = '\x1b[1;31m', '\x1b[33m', '\x1b[0m'
+
+
+def print_line(text: str = '') -> None:
+    """Write a line of the result.
+
+    Raises:
+        BrokenPipeError: Nobody reads any more.
+    """
+    sys.stdout.write(f'{text}\n')
+
+
+def warn(text: str) -> None:
+    """Write a line for a person, beside the result."""
+    with suppress(BrokenPipeError):
+        sys.stdout.flush()
+        sys.stderr.write(f'canopen: {text}\n')
+        sys.stderr.flush()
+
+
+def print_problem(problem: Problem, kind: str, color: str) -> None:
+    """Write a problem as compilers do, its remedy in the line below."""
+    place = f'{problem.file}:{problem.line}' if problem.line else str(problem.file)
+    key = f'{problem.key}: ' if problem.key else ''
+    print_line(f'{place}: {painted(kind, color)}: {key}{problem.message}')
+    if problem.remedy:
+        print_line(f'    {problem.remedy}')
+
+
+def painted(text: str, color: str) -> str:
+    """Return a text in colour, when a person looks at it."""
+    if not sys.stdout.isatty() or 'NO_COLOR' in os.environ:
+        return text
+    return f'{color}{text}{RESET}'
+
+
+def print_table(head: Sequence[str], rows: Sequence[Sequence[str]], right: str = '') -> None:
+    """Write a table; right names the columns that are flush right, separated by commas."""
+    flush_right = set(right.split(','))
+    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
+    for row in (head, *rows):
+        cells = (
+            cell.rjust(width) if title in flush_right else cell.ljust(width)
+            for cell, width, title in zip(row, widths, head, strict=True)
+        )
+        print_line('  '.join(cells).rstrip())
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun: ``1 error``, ``2 errors``."""
+    return f'{number} {noun}' if number == 1 else f'{number} {noun}s'
+
+
+_BEGIN, _END = '--ros-args', '--'
+_PARAMETER = frozenset({'-p', '--param'})
+_WITH_VALUE = frozenset(
+    {'-r', '--remap', '--params-file', '-e', '--enclave', '--log-level', '--log-config-file'}
+)
+
+
+@dataclass(slots=True)
+class Arguments:
+    """A command line, taken apart."""
+
+    own: list[str] = field(default_factory=list)  # what is not for ROS
+    # values of ``-p name:=value`` by name, without the node's name before it
+    parameters: dict[str, str] = field(default_factory=dict)
+
+
+def split_ros_arguments(argv: Sequence[str]) -> Arguments:
+    """Split the ROS arguments from a command line without the program.
+
+    Raises:
+        ValueError: A parameter has no value, or an option nothing behind it.
+    """
+    arguments = Arguments()
+    words = iter(argv)
+    in_ros = False
+    for word in words:
+        if word == _BEGIN:
+            in_ros = True
+        elif not in_ros:
+            arguments.own.append(word)
+        elif word == _END:
+            in_ros = False
+        elif word in _PARAMETER | _WITH_VALUE:
+            value = next(words, None)
+            if value is None:
+                raise ValueError(f'{word} needs a value')
+            if word in _PARAMETER:
+                name, text = _parameter(value)
+                arguments.parameters[name] = text
+    return arguments
+
+
+def _parameter(rule: str) -> tuple[str, str]:
+    name, assigned, value = rule.partition(':=')
+    if not assigned or not name:
+        raise ValueError(f'{rule!r} is not a parameter; write name:=value')
+    return name.rpartition(':')[2], value

@@ -15,13 +15,25 @@ from arm_canopen.config import (
     check_file,
     LoadEstimate,
     MOTION_OBJECTS,
+    RPDO,
+    TPDO,
     Traffic,
     UnitRule,
 )
+from canopen_core.eds import Eds
 from canopen_core.standard import Index
 
-from .arguments import bitrate, SubParsers
-from .output import counted, print_line, print_problem, print_table, RED, YELLOW
+from ..eds_lint import EdsReport, lint_eds
+from .arguments import (
+    bitrate,
+    counted,
+    print_line,
+    print_problem,
+    print_table,
+    RED,
+    SubParsers,
+    YELLOW,
+)
 
 MOTION_TITLES = {
     Index.PROFILE_VELOCITY: 'speed of moves',
@@ -33,7 +45,7 @@ MOTION_TITLES = {
 """Titles of columns; the values are in the units of bus.yml."""
 
 
-def add_parser(parsers: SubParsers) -> None:
+def add_check(parsers: SubParsers) -> None:
     """Add the verb."""
     parser = parsers.add_parser(
         'check',
@@ -175,3 +187,46 @@ def _figures(group: Iterable[Traffic], bit_rate: int) -> tuple[str, str, str, st
     share = sum(item.bits for item in items) / bit_rate
     rate = sum(item.rate for item in items)
     return str(items[0].size), f'{rate:.1f}', f'{share:.1%}', items[0].reason
+
+
+def add_eds(parsers: SubParsers) -> None:
+    """Add the verb."""
+    parser = parsers.add_parser(
+        'eds',
+        help='report what is wrong with EDS and DCF files',
+        description='Report what is wrong with EDS and DCF files (CiA 306), and what reading them '
+        'passes over. Exit code: 0, 1 with errors, 2 wrong usage.',
+    )
+    parser.add_argument('files', metavar='FILE', type=Path, nargs='+')
+    parser.add_argument('--strict', action='store_true', help='warnings count as errors')
+    parser.set_defaults(run=check_eds)
+
+
+def check_eds(options: argparse.Namespace) -> int:
+    """Check files; return the exit code."""
+    reports = [_show_report(path, lint_eds(path)) for path in options.files]
+    bad = any(report.errors or (options.strict and report.warnings) for report in reports)
+    return 1 if bad else 0
+
+
+def _show_report(path: Path, report: EdsReport) -> EdsReport:
+    for problem in report.errors:
+        print_problem(problem, 'error', RED)
+    for problem in report.warnings:
+        print_problem(problem, 'warning', YELLOW)
+    what = f'{_summary(report.eds)}; ' if report.eds is not None else ''
+    errors, warnings = len(report.errors), len(report.warnings)
+    print_line(f'{path}: {what}{counted(errors, "error")}, {counted(warnings, "warning")}')
+    return report
+
+
+def _summary(eds: Eds) -> str:
+    indices = {entry.index for entry in eds.dictionary}
+    parts = [
+        counted(len(indices), 'object'),
+        counted(len(RPDO.numbers(eds.dictionary)), 'RPDO'),
+        counted(len(TPDO.numbers(eds.dictionary)), 'TPDO'),
+    ]
+    if eds.node_id is not None:
+        parts.append(f'for node {eds.node_id}')
+    return ', '.join(parts)

@@ -17,12 +17,14 @@ import sys
 
 from canopen_core import CanopenError
 
-from ..ros_arguments import split_ros_arguments
-from . import check, dcf, diff, eds, new, objects, scan
-from .arguments import apply_parameters, SuggestingParser, UsageError
-from .output import warn
+from .arguments import apply_parameters, split_ros_arguments, SuggestingParser, UsageError, warn
+from .check import add_check, add_eds
+from .dcf import add_dcf
+from .new import add_new
+from .objects import add_diff, add_read_and_write
+from .scan import add_scan
 
-VERBS = (check, eds, new, scan, objects, diff, dcf)
+VERBS = (add_check, add_eds, add_new, add_scan, add_read_and_write, add_diff, add_dcf)
 INTERRUPTED = 130  # exit code of a program that Ctrl-C ended
 
 
@@ -62,8 +64,8 @@ def _parser() -> argparse.ArgumentParser:
         prog='canopen', description='Checks, reads and sets CANopen files, devices and buses.'
     )
     verbs = parser.add_subparsers(title='verbs', metavar='VERB', required=True)
-    for verb in VERBS:
-        verb.add_parser(verbs)
+    for add_verb in VERBS:
+        add_verb(verbs)
     return parser
 
 

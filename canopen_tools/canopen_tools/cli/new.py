@@ -17,11 +17,9 @@ from typing import TypeVar
 from canopen_core.eds import load_eds
 from canopen_core.standard import OperationMode
 
-from ..new_bus import bus_text, POSITION_MODES
-from ..new_device import contradiction, NewDevice, said_units, TURN, Units
-from .arguments import node_id, SubParsers, UsageError
+from ..new_bus import bus_text, contradiction, NewDevice, POSITION_MODES, said_units, TURN, Units
+from .arguments import node_id, print_line, SubParsers, UsageError
 from .check import show_check
-from .output import print_line
 
 T = TypeVar('T')
 DEVICE = re.compile('(?P<name>[A-Za-z][A-Za-z0-9_]*)=(?P<file>.+)@(?P<node>[^@]+)')
@@ -30,7 +28,7 @@ INCREMENTS = 'a number of increments other than 0, such as 360000, -36000.5 or 2
 """What a person writes for a turn or a metre."""
 
 
-def add_parser(parsers: SubParsers) -> None:
+def add_new(parsers: SubParsers) -> None:
     """Add the verb."""
     parser = parsers.add_parser(
         'new',

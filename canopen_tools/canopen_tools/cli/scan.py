@@ -23,9 +23,16 @@ from canopen_core.standard import (
     sdo,
 )
 
-from .arguments import add_bus_arguments, seconds, SubParsers
-from .output import counted, print_line, print_table, warn
-from .session import Session
+from .arguments import (
+    add_bus_arguments,
+    counted,
+    print_line,
+    print_table,
+    seconds,
+    SubParsers,
+    warn,
+)
+from .target import Session
 
 LISTEN = 1.5  # [s] many devices send a heartbeat each second
 ANSWER = 0.3  # [s]
@@ -69,7 +76,7 @@ class Found:
         return self.state is not None or self.answers
 
 
-def add_parser(parsers: SubParsers) -> None:
+def add_scan(parsers: SubParsers) -> None:
     """Add the verb."""
     parser = parsers.add_parser(
         'scan',

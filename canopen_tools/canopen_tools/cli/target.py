@@ -1,31 +1,161 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The device that a verb is about: by id or name, with its objects if a file describes them."""
+"""A connection to a bus for as long as a verb runs: one loop, one thread, no background.
+
+Beside a running master it only listens, unless `--query` is given: a device has one SDO channel
+by default, which belongs to the master (CiA 301, 7.2.4.1).
+"""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from functools import cache
+from time import monotonic
+from typing import Any, TypeVar
 
+from arm_canopen import MasterFrames, Promise, Scheduler, SdoClient
 from arm_canopen.config import BusConfig, DEFAULT_DRIVE, load_bus, NodeConfig
 from canopen_core import ObjectError
+from canopen_core.can import Bus, Frame
 from canopen_core.eds import load_eds
 from canopen_core.standard import (
+    CobId,
     DataType,
     find_object,
+    NmtState,
     NODE_ID_MAX,
     NODE_ID_MIN,
     NUMBER,
     ObjectDictionary,
     ObjectEntry,
+    parse_heartbeat,
     slow_timeout,
 )
 
-from ..monitor.object_names import ObjectNames
-from .arguments import UsageError
-from .output import warn
-from .session import Session
+from ..monitor.sdo_follower import ObjectNames
+from .arguments import UsageError, warn
+
+T = TypeVar('T')
+
+IDLE_WAIT = 0.1  # [s] longest wait for frames when nothing else is due
+QUIET = 0.02  # [s] without SDO frames, after which a transfer of somebody else counts as ended
+QUIET_WAIT = 2.0  # [s]
+
+
+class Session:
+    """Listens to a bus and runs coroutines on it."""
+
+    def __init__(self, bus: Bus, config: BusConfig | None = None) -> None:
+        """Begin to listen; the configuration helps to know a master by its frames."""
+        self.bus = bus
+        self.scheduler = Scheduler(monotonic())
+        self.states: dict[int, NmtState] = {}  # NMT states by node id, from their heartbeats
+        self.masters: set[str] = set()  # frames on the bus that only a master sends
+        self.listeners: list[Callable[[Frame], None]] = []  # called with every frame
+        self._clients: dict[int, SdoClient] = {}
+        self._sdo_times: dict[int, float] = {}
+        self._master_id = config.master.node_id if config is not None else None
+        self._master_frames = MasterFrames(config)
+
+    def listen(self, duration: float, until: Callable[[], bool] = lambda: False) -> None:
+        """Listen for a time in [s], or until a condition holds."""
+        end = monotonic() + duration
+        while not until() and (left := end - monotonic()) > 0.0:
+            self._step(left)
+
+    def run(self, coroutine: Coroutine[Promise[Any], None, T]) -> T:
+        """Run a coroutine to its end; returns its result or raises its error."""
+        self.scheduler.advance(monotonic())
+        task = self.scheduler.spawn(coroutine)
+        while not task.done:
+            self._step(IDLE_WAIT)
+        return task.result()
+
+    def send(self, frame: Frame) -> None:
+        """Send a frame.
+
+        Raises:
+            BusError: The interface refuses it.
+        """
+        self.bus.send(frame)
+
+    def client(
+        self, node_id: int, name: str = '', dictionary: ObjectDictionary | None = None
+    ) -> SdoClient:
+        """Return the SDO client for a device whose objects are of these types."""
+        client = self._clients.get(node_id)
+        if client is None:
+            name = name or f'node {node_id}'
+            client = SdoClient(
+                node_id,
+                name,
+                self.scheduler,
+                self.send,
+                dictionary=dictionary,
+                on_odd=lambda text: warn(f'{name} {text}'),
+            )
+            self._clients[node_id] = client
+        return client
+
+    def read(
+        self, client: SdoClient, index: int, subindex: int, timeout: float, *, block: bool = False
+    ) -> bytes:
+        """Read an object of a device.
+
+        Raises:
+            SdoError: The device refuses, or does not answer.
+        """
+
+        async def upload() -> bytes:
+            return await client.read(index, subindex, timeout, block=block)
+
+        return self.run(upload())
+
+    def await_quiet(self, node_id: int) -> None:
+        """Wait until no one else talks to the SDO server of a device, for a while at most."""
+        self._step(0.0)
+        self.listen(QUIET_WAIT, lambda: monotonic() - self._sdo_times.get(node_id, 0.0) > QUIET)
+
+    def _step(self, wait: float) -> None:
+        deadline = self.scheduler.next_deadline()
+        if deadline is not None:
+            wait = min(wait, deadline - monotonic())
+        for frame in self.bus.receive(max(0.0, wait)):
+            self.scheduler.set_time(frame.timestamp)
+            if not frame.is_extended and not frame.is_error:
+                self._take(frame)
+        self.scheduler.advance(monotonic())
+
+    def _take(self, frame: Frame) -> None:
+        for listener in self.listeners:
+            listener(frame)
+        function, node_id = frame.can_id & 0x780, frame.can_id & 0x7F
+        self._note_master(frame, function, node_id)
+        if not NODE_ID_MIN <= node_id <= NODE_ID_MAX or frame.is_remote:
+            return
+        if function == CobId.HEARTBEAT:
+            state = parse_heartbeat(frame.data)
+            if state is not None and node_id != self._master_id:
+                self.states[node_id] = state
+        elif function == CobId.SDO_REQUEST:
+            self._sdo_times[node_id] = monotonic()
+            if node_id in self._clients:
+                self._clients[node_id].receive_request(frame)
+        elif function == CobId.SDO_RESPONSE and node_id in self._clients:
+            self._clients[node_id].receive(frame)
+
+    def _note_master(self, frame: Frame, function: int, node_id: int) -> None:
+        """Note what only a master sends; own frames never arrive here."""
+        kind = self._master_frames.read(frame)
+        if kind is not None:
+            self.masters.add(kind.evidence.title)
+        elif function == CobId.SDO_REQUEST and node_id:
+            self.masters.add('SDO requests')
+        elif function == CobId.HEARTBEAT and frame.is_remote:
+            self.masters.add('node guarding')
+
 
 TIMEOUT = 0.5  # [s]
 LISTEN = 0.15  # [s] before the first request; a master sends SYNC more often

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Frames in words: what each one on a CANopen bus means."""
 
-from .describe import FrameDescriber
-from .description import Description, FrameFilter, FrameKind
+from .describe import Description, FrameDescriber, FrameFilter, FrameKind
 
 __all__ = ['Description', 'FrameDescriber', 'FrameFilter', 'FrameKind']

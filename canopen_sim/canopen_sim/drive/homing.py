@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 from canopen_core.standard import Controlword, OperationMode, Statusword
 
-from ...services.sync_consumer import SyncConsumer
-from ...timed import NEVER
-from ..axis import Axis, Limits
-from ..objects import DriveObjects
-from ..switches import INDEX_METHODS, PRESENT_POSITION_METHODS, REFERENCES, Switches
-from .mode import Mode, TARGET_REACHED
+from ..messages import SyncConsumer
+from ..object_store import NEVER
+from .axis import Axis, Limits
+from .modes import Mode, TARGET_REACHED
+from .objects import DriveObjects
+from .switches import INDEX_METHODS, PRESENT_POSITION_METHODS, REFERENCES, Switches
 
 HOMING_START = int(Controlword.HOMING_START)
 ATTAINED = int(Statusword.HOMING_ATTAINED)

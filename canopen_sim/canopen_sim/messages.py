@@ -6,19 +6,34 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+import contextlib
+from datetime import datetime, timedelta
 
+from canopen_core import CodecError
 from canopen_core.can import Frame
 from canopen_core.standard import (
     AbortCode,
     CAN_ID_MASK,
     COB_ID_INVALID,
+    CobId,
+    decode_time_of_day,
     Emergency,
     Index,
+    SYNC_PRODUCER,
+    TIME_CONSUMER,
+    TIME_PRODUCER,
     Value,
 )
 
-from ..objects.object_store import check_cob_id, Integer, ObjectStore, refusal
-from ..timed import NEVER
+from .object_store import (
+    check_can_id,
+    check_cob_id,
+    FRAME_BITS,
+    Integer,
+    NEVER,
+    ObjectStore,
+    refusal,
+)
 
 GENERIC_ERROR = 0x01
 GENERIC_CODE = 0x1000
@@ -180,3 +195,125 @@ def _presence_check(count: Integer, number: int, variable: Integer) -> Callable[
             raise refusal(AbortCode.NO_DATA, variable.entry)
 
     return check
+
+
+MICROSECOND = 1e-6  # [s]
+PERIOD_WEIGHT = 0.125  # weight of a new interval in the measured period
+PERIOD_MAX = 1.0  # [s] a longer interval is a pause
+LOST_PERIODS = 3.0  # SYNC is gone after so many periods without one
+
+
+class SyncConsumer:
+    """Counts SYNC messages and measures their period."""
+
+    def __init__(
+        self,
+        store: ObjectStore,
+        handle: Callable[[int, float], None],
+        length_error: Callable[[bool, float], None],
+        changed: Callable[[], None],
+    ) -> None:
+        """Bind 0x1005, 0x1006, 0x1007 and 0x1019.
+
+        ``handle`` is called with the counter (0 without one) and the time of each SYNC,
+        ``length_error`` with whether its length was wrong, and ``changed`` when SYNC has another
+        identifier from now on.
+        """
+        # time between two SYNCs in [s], from 0x1006 or else measured; 0 when unknown
+        self.period = 0.0
+        self.last_time = float('-inf')  # steady time of the last SYNC in [s]
+        self._paused = False
+        self._handle = handle
+        self._length_error = length_error
+        self._changed = changed
+        self._cob_id = store.integer(Index.SYNC_COB_ID, default=CobId.SYNC)
+        self._cob_id.check = self._check_cob_id
+        self._cob_id.listener = lambda _now: self._changed()
+        self._cycle = store.integer(Index.CYCLE_PERIOD)  # [us]
+        self._cycle.listener = lambda _now: self.reset()
+        self._overflow = store.integer(Index.SYNC_OVERFLOW)
+        self._window = store.integer(Index.SYNC_WINDOW)  # [us]
+
+    @property
+    def can_id(self) -> int:
+        """Identifier of the SYNC message."""
+        return self._cob_id.value & CAN_ID_MASK
+
+    def alive(self, now: float) -> bool:
+        """Return whether SYNC comes regularly at this time."""
+        return self.period > 0.0 and now - self.last_time < LOST_PERIODS * self.period
+
+    def window_closed(self, now: float) -> bool:
+        """Return whether it is too late for synchronous PDOs of this period (0x1007)."""
+        window = self._window.value * MICROSECOND
+        return window > 0.0 and now - self.last_time > window
+
+    def reset(self) -> None:
+        """Forget what was measured."""
+        self.period = self._cycle.value * MICROSECOND
+        self.last_time = float('-inf')
+        self._paused = False
+
+    def receive(self, frame: Frame, now: float) -> None:
+        """Process a SYNC; one of the wrong length is reported as well."""
+        self._length_error(len(frame.data) != bool(self._overflow.value), now)
+        if not self._cycle.value:
+            self._measure(now)
+        self.last_time = now
+        self._handle(frame.data[0] if frame.data else 0, now)
+
+    def _measure(self, now: float) -> None:
+        interval = now - self.last_time
+        if self.alive(now):
+            self.period += PERIOD_WEIGHT * (interval - self.period)
+            self._paused = False
+        elif self.period and not self._paused:
+            self._paused = True  # one long interval is a pause, two are another period
+        else:
+            self.period = interval if interval < PERIOD_MAX else 0.0
+            self._paused = False
+
+    def _check_cob_id(self, value: Value) -> None:
+        if isinstance(value, int) and value & SYNC_PRODUCER:
+            raise refusal(AbortCode.VALUE_RANGE, self._cob_id.entry)
+        check_can_id(self._cob_id.entry, value)
+
+
+class TimeConsumer:
+    """Keeps the network's time of the last TIME message."""
+
+    def __init__(self, store: ObjectStore, changed: Callable[[], None]) -> None:
+        """Bind 0x1012; ``changed`` is called when TIME is wanted, or under another identifier."""
+        self._cob_id = store.integer(Index.TIME_COB_ID)
+        self._cob_id.check = self._check
+        self._cob_id.listener = lambda _now: changed()
+        self._received: tuple[datetime, float] | None = None
+
+    @property
+    def can_id(self) -> int | None:
+        """Identifier of the TIME message, None when the device takes none."""
+        value = self._cob_id.value
+        return value & CAN_ID_MASK if value & TIME_CONSUMER else None
+
+    def at(self, now: float) -> datetime | None:
+        """Return the network's time at steady time ``now`` in [s], None before any message."""
+        if self._received is None:
+            return None
+        time, moment = self._received
+        return time + timedelta(seconds=now - moment)
+
+    def reset(self) -> None:
+        """Forget the time, as after switching on."""
+        self._received = None
+
+    def receive(self, frame: Frame, now: float) -> None:
+        """Process a TIME message; one of another length is ignored."""
+        with contextlib.suppress(CodecError):
+            self._received = decode_time_of_day(frame.data), now
+
+    def _check(self, value: Value) -> None:
+        word, held = int(value) if isinstance(value, int) else 0, self._cob_id.value
+        used = TIME_CONSUMER | TIME_PRODUCER
+        if word & used and held & used and (word ^ held) & FRAME_BITS:
+            raise refusal(AbortCode.VALUE_RANGE, self._cob_id.entry)
+        check_can_id(self._cob_id.entry, word & CAN_ID_MASK)

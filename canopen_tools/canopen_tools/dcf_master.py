@@ -43,7 +43,7 @@ from canopen_core.standard import (
     TIME_PRODUCER,
 )
 
-from ..eds_lint import LISTS, proper_list
+from .eds_lint import LISTS, proper_list
 
 
 @dataclass(frozen=True, slots=True)

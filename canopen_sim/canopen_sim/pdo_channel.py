@@ -30,7 +30,7 @@ from canopen_core.standard import (
     Value,
 )
 
-from ..objects.object_store import check_cob_id, ObjectStore, refusal, Scalar, Variable
+from .object_store import check_cob_id, ObjectStore, refusal, Scalar, Variable
 
 TRANSMISSION_EVENT = (254, 255)
 INHIBIT_UNIT = 0.0001  # [s]
