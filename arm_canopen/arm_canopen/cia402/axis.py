@@ -360,7 +360,7 @@ class Axis:
             self.warn(f'stays halted: {NOT_TAKEN}')
             return halt.bits(mode)
         held = halt.bits(mode)
-        if held and mode.cyclic:
+        if held and mode.cyclic and (self.view.shows_torque or mode.number not in TORQUE_MODES):
             mode.preload(self.view.actual())  # from there it goes on
         # ends with the edge where no acknowledge comes before
         return bits | (held if bits & NEW_SET_POINT else before)

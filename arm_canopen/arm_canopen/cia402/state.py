@@ -310,6 +310,11 @@ class AxisState:
         return (self._torque.value or 0) if self._torque is not None else 0
 
     @property
+    def shows_torque(self) -> bool:
+        """Whether a PDO carries 0x6077."""
+        return self._torque is not None
+
+    @property
     def effort(self) -> float:
         """Actual torque."""
         return self.units.effort.from_device(self.torque_dev)

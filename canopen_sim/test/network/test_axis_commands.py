@@ -80,6 +80,10 @@ def test_a_switch_to_torque_keeps_the_load(*, mapped: bool) -> None:
     assert abs(first) == pytest.approx(150, abs=30)
     net.run(0.2)
     assert net.motor() == pytest.approx(held, abs=0.05)
+    net.do(JOINT, 'halt')
+    net.run(0.2)
+    halted = struct.unpack('<h', net.frames(0x400 + NODE_ID)[-1][4:6])[0]
+    assert halted == pytest.approx(first, abs=30)  # the next target begins with the load, too
 
 
 @pytest.mark.parametrize('mode', TORQUE_MODES, ids=by_name)

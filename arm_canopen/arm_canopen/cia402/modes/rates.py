@@ -158,7 +158,8 @@ class CyclicTorque(MasterRamped):
     number = OperationMode.CYCLIC_TORQUE
 
     def brake(self) -> None:
-        """Rely on bit 8."""
+        """Rely on bit 8, and end the ramp: the torque that is commanded may hold a load."""
+        self._goal = self._value
 
     def preload(self, actual: Actual) -> Promise[None]:
         """Keep the torque that the drive has, so that it drops no load."""
