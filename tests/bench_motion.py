@@ -33,8 +33,13 @@ from arm_bringup.robots import installed_robots_folder
 from arm_model import Array, load_limits, RobotModel
 from arm_servo import JogRequest, MotionCore, SetPoint, TwistCommand
 from arm_servo.core.gateway import CommandGateway, start_worker
-from arm_servo.io.following import FollowingLimits, FollowingWatch
-from arm_servo.io.motion_thread import JointFeedback, MotionCycle, MotionThread
+from arm_servo.motion_thread import (
+    FollowingLimits,
+    FollowingWatch,
+    JointFeedback,
+    MotionCycle,
+    MotionThread,
+)
 from canopen_core.can import Frame
 from canopen_core.standard import CobId
 from realtime_loop import raise_priority

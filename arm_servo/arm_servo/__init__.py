@@ -12,12 +12,21 @@ remedy, and is the outcome of the motion that it ends.
 
 from __future__ import annotations
 
-from .controllers.controller import ArmState, Controller, Outcome, SetPoint, Source
+from .controllers.controller import (
+    ArmState,
+    Cause,
+    Controller,
+    Limiter,
+    MotionReport,
+    NotReadyError,
+    Outcome,
+    SetPoint,
+    Source,
+)
 from .controllers.jog import JointCommand, PoseCommand, ServoSettings, TwistCommand
 from .controllers.trajectory import Execution, ExecutionSettings, Feedback, Phase
-from .core.motion_core import check_arm, MotionCore
-from .core.preparation import CoreSettings
-from .core.requests import (
+from .controllers.velocity_ik import IkSettings, VelocityBoundsSettings
+from .core.mailbox import (
     DisplacementRequest,
     JogRequest,
     PauseRequest,
@@ -25,10 +34,8 @@ from .core.requests import (
     StopRequest,
     TargetRequest,
 )
-from .exceptions import NotReadyError
-from .jog.velocity_bounds import VelocityBoundsSettings
-from .jog.velocity_ik import IkSettings
-from .report import Cause, Limiter, MotionReport
+from .core.motion_core import check_arm, MotionCore
+from .core.preparation import CoreSettings
 from .ros.parameter_check import check_parameters
 
 __all__ = [

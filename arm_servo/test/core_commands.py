@@ -1,30 +1,151 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Commands to a core in a loop without other threads."""
+"""Commands to a core in a loop without other threads, and what comes of them: motion out."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 import math
 
 import numpy as np
+import pinocchio as pin
 
-from arm_model import Array, Pose
+from arm_model import Array, JointLimits, Pose, RobotModel, RobotState
 from arm_servo import (
     DisplacementRequest,
     Execution,
     JogRequest,
     JointCommand,
+    Limiter,
     MotionCore,
+    MotionReport,
     PauseRequest,
+    Phase,
     PoseCommand,
+    SetPoint,
     SpeedRequest,
     StopRequest,
     TargetRequest,
     TwistCommand,
 )
-from arm_servo.core.requests import by_joint, ImmediateRequest, MotionRequest
-from arm_trajectory import TrajectoryGoal
+from arm_servo.controllers.jog import Command, ServoSource
+from arm_servo.core.mailbox import by_joint, ImmediateRequest, MotionRequest
+from arm_servo.core.safety_filter import SafetyFilter
+from arm_trajectory import GoalPoint, OnlineTrajectoryGenerator, TrajectoryGoal
+
+PERIOD = 0.01  # cycle of the tests in [s]: slower than in use, so that they are quick
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """What came out of a run."""
+
+    states: list[RobotState]  # state after every cycle, the start first
+    report: MotionReport  # the last report
+    held_up: list[Limiter]  # what the safety filter held up, by any cycle
+    moved: Array  # twist from the first pose to the last, in the base
+
+
+def twist_between(model: RobotModel, start: Array, end: Array) -> Array:
+    """Return the twist from one pose to another in unit time."""
+    before, after = model.pose(start), model.pose(end)
+    angular = pin.log3(after.rotation @ before.rotation.T)
+    return np.concatenate((after.position - before.position, angular))
+
+
+def run(
+    model: RobotModel,
+    start: Array | RobotState,
+    command: Command | Callable[[float], Command],
+    duration: float,
+    period: float = PERIOD,
+) -> Run:
+    """Carry out a command, or one that changes with time, for a time [s]."""
+    source, generator = ServoSource(model), OnlineTrajectoryGenerator(model.limits)
+    safety_filter = SafetyFilter(model, generator)
+    state = start if isinstance(start, RobotState) else RobotState.at_rest(start)
+    safety_filter.reset(state)
+    states, held_up, report = [state], [], MotionReport()
+    for step in range(round(duration / period)):
+        now = command(step * period) if callable(command) else command
+        answer = source.step(state, now, period)
+        report = answer.report
+        plan = generator.to_velocity(state, answer.velocity)
+        assert plan is not None
+        state, limiter = safety_filter.step(state, plan.at(period), period, 0.005)
+        held_up += [limiter] if limiter is not None else []
+        states.append(state)
+    moved = twist_between(model, states[0].position, state.position)
+    return Run(states, report, held_up, moved)
+
+
+STREAM_PERIOD = 0.004  # cycle of the streams in [s]
+
+
+def kept(limits: JointLimits, states: list[RobotState], period: float = STREAM_PERIOD) -> None:
+    """Make sure that set-points keep every limit, also where only positions are seen."""
+    position = np.array([state.position for state in states])
+    velocity = np.array([state.velocity for state in states])
+    acceleration = np.array([state.acceleration for state in states])
+    assert np.all(position <= limits.upper + 1e-6)
+    assert np.all(position >= limits.lower - 1e-6)
+    assert np.all(np.abs(velocity) <= limits.velocity * 1.0001)
+    assert np.all(np.abs(acceleration) <= limits.acceleration * 1.0001)
+    assert np.all(np.abs(np.diff(acceleration, axis=0)) <= limits.jerk * period * 1.0001)
+    speeds = np.diff(position, axis=0) / period
+    assert np.all(np.abs(speeds) <= limits.velocity * 1.001)
+    changes = np.diff(speeds, axis=0) / period
+    rounding = 1e-7 / period**2  # [rad/s^2]: where one section follows another
+    assert np.all(np.abs(changes) <= limits.acceleration * 1.001 + rounding)
+    assert np.all(np.abs(np.diff(changes, axis=0)) <= limits.jerk * period * 1.3)
+
+
+def wave(model: RobotModel, start: Array, kind: str, step: float = 1.5) -> TrajectoryGoal:
+    """Return a trajectory of three points, linear (l), cubic (c) or quintic (q)."""
+    count = len(model)
+    ends = [np.linspace(0.3, -0.2, count), np.linspace(-0.2, 0.3, count), np.full(count, 0.1)]
+    speeds = [np.linspace(-0.1, 0.1, count), np.linspace(0.1, -0.1, count), np.zeros(count)]
+    points = [
+        GoalPoint(
+            step * (number + 1),
+            tuple(start + end),
+            tuple(speed) if kind in 'cq' else (),
+            (0.0,) * count if kind == 'q' else (),
+        )
+        for number, (end, speed) in enumerate(zip(ends, speeds, strict=True))
+    ]
+    return TrajectoryGoal(model.joints, points)
+
+
+Event = Callable[[MotionCore, float], object]
+
+
+def stream(
+    core: MotionCore, duration: float, events: Mapping[float, Event] | None = None
+) -> list[SetPoint]:
+    """Step a core for a time [s], with events at times [s]."""
+    pending = sorted((events or {}).items(), key=lambda each: each[0])
+    points = []
+    for step in range(round(duration / STREAM_PERIOD)):
+        now = step * STREAM_PERIOD
+        while pending and pending[0][0] <= now:
+            pending.pop(0)[1](core, now)
+        points.append(core.step(now, STREAM_PERIOD))
+    return points
+
+
+def follow_to_the_end(
+    core: MotionCore, execution: Execution, longest: float = 20.0
+) -> list[RobotState]:
+    """Step a core until a trajectory is done, and return the states."""
+    states = [core.state]
+    for step in range(round(longest / STREAM_PERIOD)):
+        if execution.phase is Phase.DONE:
+            return states
+        states.append(core.step(step * STREAM_PERIOD, STREAM_PERIOD).state)
+    raise AssertionError(f'the trajectory is not done after {longest} s')
+
 
 TIMEOUT = 0.1  # time for which a jog counts in [s]
 

@@ -1,20 +1,173 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Commands to a gateway as its clients give them, prepared in the test's own thread."""
+"""Cores behind a gateway, cycle by cycle: commands, ideal drives without a bus, arms elsewhere."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, Future
+from dataclasses import replace
 from typing import Any
 
+from model_robots import ready, robot
 import numpy as np
 
-from arm_servo import DisplacementRequest, JogRequest, JointCommand, Outcome, TwistCommand
+from arm_canopen import AxisFeedback, DriveState, MotionSource, Setpoint
+from arm_model import Array, RobotModel
+from arm_servo import (
+    CoreSettings,
+    DisplacementRequest,
+    JogRequest,
+    JointCommand,
+    MotionCore,
+    Outcome,
+    SetPoint,
+    TwistCommand,
+)
 from arm_servo.core.gateway import CommandGateway
+from arm_servo.core.mailbox import by_joint
 from arm_servo.core.motion_queue import MotionCommand
-from arm_servo.core.requests import by_joint
+from arm_servo.drive_source import DriveSource
+from arm_servo.motion_thread import FollowingLimits, FollowingWatch, JointFeedback, MotionCycle
+from arm_trajectory import GoalPoint, TrajectoryGoal
+
+PERIOD = 0.01
+
+
+class Drives:
+    """Drives that go to their set-points at once.
+
+    Attributes:
+        gateway: Commands to the core that moves them.
+        source: The source under test.
+        axes: State of each drive; to be changed by tests.
+        path: Positions commanded so far, a row for each cycle.
+    """
+
+    def __init__(
+        self,
+        name: str = 'panda',
+        worker: Executor | None = None,
+        model: RobotModel | None = None,
+        begin: Sequence[float] | None = None,
+        settings: CoreSettings | None = None,
+    ) -> None:
+        self.now = 100.0
+        core = MotionCore(model or robot(name), settings)
+        self.gateway = CommandGateway(core, worker or InlineWorker(), lambda: self.now)
+        self.source = DriveSource(self.gateway)
+        self.axes = [
+            AxisFeedback(joint, True, DriveState.OPERATION_ENABLED, 8, at, 0.0, at, True)
+            for joint, at in zip(
+                self.gateway.model.joints, begin or ready(name).tolist(), strict=True
+            )
+        ]
+        self.path: list[Array] = []
+        self.attachments: list[MotionSource] = []
+
+    def place(self, positions: Sequence[float]) -> None:
+        """Move the drives to another place."""
+        self.axes = [
+            replace(axis, position=at, setpoint=at)
+            for axis, at in zip(self.axes, positions, strict=True)
+        ]
+
+    def attach(self) -> None:
+        """Give the source its drives."""
+        self.source.attach(self._attached)
+
+    def _attached(self, source: MotionSource) -> Future[None]:
+        self.attachments.append(source)
+        future = Future[None]()
+        future.set_result(None)
+        return future
+
+    def run(self, cycles: int = 1) -> Sequence[Setpoint | None]:
+        """Run some cycles; return the set-points of the last."""
+        answer: Sequence[Setpoint | None] = []
+        for _ in range(cycles):
+            self.now += PERIOD
+            answer = self.source.update(self.now, PERIOD, self.axes)
+            for number, point in enumerate(answer):
+                if point is not None:
+                    self.axes[number] = replace(
+                        self.axes[number],
+                        position=point.position,
+                        setpoint=point.position,
+                        velocity=point.velocity,
+                    )
+            self.path.append(np.array([axis.setpoint for axis in self.axes]))
+        return answer
+
+
+class Elsewhere:
+    """An arm whose drives take set-points, and publish their state.
+
+    Attributes:
+        at: Where it is in [rad].
+        is_published: Whether its state is published.
+        moves: Whether it goes to set-points.
+        delay: How many set-points it is behind.
+        sag: How far it stands below its set-points in [rad].
+        points: All set-points so far.
+    """
+
+    def __init__(
+        self, following: FollowingLimits | None = None, worker: Executor | None = None
+    ) -> None:
+        model = robot('gp110')
+        self.now = 50.0
+        self.at = np.array(ready('gp110'))
+        self.is_published = True
+        self.moves = True
+        self.delay = 0
+        self.sag = 0.0
+        self.points: list[SetPoint] = []
+        self._way: deque[Array] = deque()
+        self.gateway = CommandGateway(
+            MotionCore(model), worker or InlineWorker(), lambda: self.now
+        )
+        self.feedback = JointFeedback(model.joints, 0.2)
+        watch = FollowingWatch(model.limits, following or FollowingLimits(), PERIOD)
+        self.cycle = MotionCycle(self.gateway, self.feedback, self.take, watch)
+
+    def take(self, point: SetPoint) -> None:
+        """Go to a set-point, at once or some cycles later."""
+        self.points.append(point)
+        self._way.append(np.array(point.state.position))
+        while len(self._way) > self.delay:
+            here = self._way.popleft()
+            self.at = here if self.moves else self.at
+
+    def run(self, cycles: int = 1) -> None:
+        """Run some cycles."""
+        for _ in range(cycles):
+            self.now += PERIOD
+            if self.is_published:
+                at = (self.at - self.sag).tolist()
+                self.feedback.receive(self.gateway.model.joints, at, [], self.now)
+            self.cycle.step(self.now, PERIOD)
+
+    def path(self) -> Array:
+        """Return the positions commanded so far, a row for each."""
+        return np.array([point.state.position for point in self.points])
+
+
+def swing(arm: Elsewhere, far: float = 0.3) -> TrajectoryGoal:
+    """Return a trajectory of all joints."""
+    return TrajectoryGoal(arm.gateway.model.joints, [GoalPoint(2.0, (arm.at + far).tolist())])
+
+
+def jog_elsewhere(arm: Elsewhere, cycles: int, speed: float = 0.5) -> list[str]:
+    """Jog the first joint with a command in each cycle; return why commands were refused."""
+    refusals = []
+    for _ in range(cycles):
+        future = jog(arm.gateway, {'joint_1_s': speed}, arm.now)
+        arm.run()
+        if (error := future.exception(0.0)) is not None:
+            refusals.append(str(error))
+    return refusals
 
 
 class InlineWorker(Executor):

@@ -15,9 +15,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
-from servo_commands import jog, move_by, SteppedWorker, twist
-from servo_drives import Drives, PERIOD
-from servo_elsewhere import Elsewhere
+from servo_commands import Drives, Elsewhere, jog, move_by, PERIOD, SteppedWorker, twist
 
 from arm_canopen import Refusal, RefusalCause
 from arm_model import Array, combined, Pose

@@ -13,7 +13,7 @@ from model_robots import texts
 import pytest
 import rclpy
 from ros_client import RosClient
-from servo_listener import ServoListener, TIMEOUT
+from servo_nodes import ServoListener, TIMEOUT
 
 from arm_servo.teleop.servo_gamepad import ServoGamepad
 from operator_input.ros import serve_teleop

@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 from model_robots import table, texts
 import numpy as np
 import pytest
-from servo_commands import jog, move_by, SteppedWorker, twist
-from servo_drives import Drives, PERIOD
+from servo_commands import Drives, jog, move_by, PERIOD, SteppedWorker, twist
 
 from arm_canopen import Refusal, RefusalCause
 from arm_model import CommandError, RobotModel
@@ -30,12 +29,11 @@ from arm_servo import (
     Source,
     StopRequest,
 )
-from arm_servo.controllers.target import SingleTarget
+from arm_servo.controllers.controller import SingleTarget
 from arm_servo.core.gateway import start_worker
+from arm_servo.core.mailbox import by_joint, MAX_CYCLE_AGE
 from arm_servo.core.motion_queue import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand
 from arm_servo.core.preparation import CommandBasis, Motion
-from arm_servo.core.requests import by_joint
-from arm_servo.core.snapshot import MAX_CYCLE_AGE
 from arm_trajectory import GoalCode, GoalError, GoalPoint, StateMovedError, TrajectoryGoal
 
 pytestmark = pytest.mark.slow

@@ -26,9 +26,8 @@ from arm_model import (
     RobotState,
 )
 from arm_servo import JogRequest, JointCommand, MotionCore, Outcome, SetPoint
-from arm_servo.core.moving_arms import MovingArms
-from arm_servo.core.requests import by_joint
-from arm_servo.core.safety_filter import SafetyFilter
+from arm_servo.core.mailbox import by_joint
+from arm_servo.core.safety_filter import MovingArms, SafetyFilter
 from arm_trajectory import GoalCode, GoalPoint, OnlineTrajectoryGenerator, TrajectoryGoal
 
 PERIOD = 0.01

@@ -10,17 +10,15 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from servo_commands import jog, SteppedWorker
-from servo_drives import Drives
-from servo_goals import GoalNode
+from servo_commands import Drives, jog, SteppedWorker
+from servo_nodes import GoalNode
 from std_srvs.srv import Trigger
 
 from arm_servo import Source, SpeedRequest, StopRequest, TargetRequest
 from arm_servo.controllers.controller import Outcome
 from arm_servo.core.motion_queue import MotionCommand
-from arm_servo.ros.trajectory import controller
-from arm_servo.ros.trajectory.action import TrajectoryAction
-from arm_servo.ros.trajectory.controller import TrajectoryPause
+from arm_servo.ros import trajectory as controller
+from arm_servo.ros.trajectory import TrajectoryAction, TrajectoryPause
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
 
 

@@ -9,13 +9,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from servo_commands import outcome
-from servo_drives import Drives, PERIOD
+from servo_commands import Drives, outcome, PERIOD
 
 from arm_canopen import CanopenError, Refusal, RefusalCause
 from arm_servo import MotionCore, NotReadyError, Phase, Source, SpeedRequest
 from arm_servo.core.motion_queue import MotionCommand
-from arm_servo.io.drive_source import NOT_ATTACHED, why_not
+from arm_servo.drive_source import NOT_ATTACHED, why_not
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
 
 

@@ -11,18 +11,16 @@ from typing import Any
 
 import pytest
 from sensor_msgs.msg import JointState
-from servo_drives import Drives, PERIOD
-from servo_goals import GoalNode
+from servo_commands import Drives, PERIOD
+from servo_nodes import GoalNode
 
 from arm_model import CommandError
 from arm_servo import NotReadyError, PauseRequest, SpeedRequest, TargetRequest
+from arm_servo.ros import gripper as controller
 from arm_servo.ros import motion_goals
-from arm_servo.ros.gripper import controller
-from arm_servo.ros.gripper.controller import GripperController
-from arm_servo.ros.gripper.interfaces import PARALLEL, SINGLE
-from arm_servo.ros.gripper.parameters import GripperParameters
+from arm_servo.ros.gripper import GripperController, GripperParameters, PARALLEL, SINGLE
 from arm_servo.ros.group_motion import set_tool_active
-from arm_servo.ros.trajectory.controller import TrajectoryController
+from arm_servo.ros.trajectory import TrajectoryController
 
 pytestmark = pytest.mark.slow
 

@@ -10,9 +10,8 @@ from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix, Plann
 import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
-from servo_commands import jog
-from servo_drives import Drives, PERIOD
-from servo_scenes import Listener
+from servo_commands import Drives, jog, PERIOD
+from servo_nodes import Listener
 
 from arm_model import CommandError, RobotModel
 from arm_servo import TargetRequest

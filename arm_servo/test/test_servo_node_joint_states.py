@@ -14,14 +14,10 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
-from servo_drives import Drives, PERIOD
+from servo_commands import Drives, PERIOD
 from urdf_reader import Mimic
 
-from arm_servo.ros.joint_state_broadcaster import (
-    JointSamples,
-    JointStateBroadcaster,
-    MAX_AGE,
-)
+from arm_servo.ros.controller_manager import JointSamples, JointStateBroadcaster, MAX_AGE
 
 
 def ready() -> tuple[Drives, JointSamples]:

@@ -11,12 +11,11 @@ import time
 
 import numpy as np
 import pytest
+from servo_commands import Elsewhere, jog_elsewhere, outcome, PERIOD, swing
 from servo_commands import jog as jog_joints
-from servo_commands import outcome
-from servo_elsewhere import Elsewhere, jog, PERIOD, swing
 
 from arm_servo import MotionCore, NotReadyError
-from arm_servo.io.motion_thread import JointFeedback, MotionThread
+from arm_servo.motion_thread import JointFeedback, MotionThread
 from arm_trajectory import GoalCode
 
 
@@ -53,12 +52,12 @@ def test_it_begins_where_others_have_moved_the_arm_by_little(aside: float) -> No
     """A way that is no more than a cycle's at full speed is not made in one cycle either."""
     arm = Elsewhere()
     arm.run(5)
-    jog(arm, 20)
+    jog_elsewhere(arm, 20)
     arm.run(80)
     arm.at = arm.at + aside
     arm.run(2)
     before, sent = np.array(arm.at), len(arm.points)
-    jog(arm, 2)
+    jog_elsewhere(arm, 2)
     assert np.abs(arm.path()[sent] - before).max() < 1e-4
 
 
@@ -66,18 +65,18 @@ def test_an_arm_that_stands_a_little_off_is_not_sent_there() -> None:
     """What a drive lacks to its set-point at rest does not shift the next motion."""
     arm = Elsewhere()
     arm.run(5)
-    jog(arm, 20)
+    jog_elsewhere(arm, 20)
     arm.run(80)
     last = arm.path()[-1]
     arm.sag = 0.01
     arm.run(3)
     sent = len(arm.points)
-    jog(arm, 2)
+    jog_elsewhere(arm, 2)
     assert np.abs(arm.path()[sent] - last).max() > 0.005  # it was seen to move: begins there
     arm.run(80)
     last = arm.path()[-1]
     sent = len(arm.points)
-    jog(arm, 2)
+    jog_elsewhere(arm, 2)
     assert np.abs(arm.path()[sent] - last).max() < 1e-4
 
 
@@ -88,7 +87,7 @@ def test_a_cycle_that_raises_is_the_end_and_the_arm_comes_to_rest(
     """The thread reports the error, and brakes without the core before it ends."""
     arm = Elsewhere()
     arm.run(5)
-    jog(arm, 30)
+    jog_elsewhere(arm, 30)
     failed = threading.Event()
 
     def step(*_: object) -> None:

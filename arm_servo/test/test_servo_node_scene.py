@@ -16,8 +16,8 @@ from moveit_msgs.srv import GetPlanningScene
 import pytest
 from rclpy.serialization import serialize_message
 from ros_client import RosClient
-from servo_drives import Drives
-from servo_scenes import Listener
+from servo_commands import Drives
+from servo_nodes import Listener
 from shape_msgs.msg import SolidPrimitive
 
 from arm_model import Clearances, RobotModel

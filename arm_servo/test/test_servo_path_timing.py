@@ -9,12 +9,12 @@ import math
 import re
 
 import core_commands
+from core_commands import kept, STREAM_PERIOD
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from model_robots import ready, robot, ROBOTS, table, texts
 import numpy as np
 import pytest
-from servo_streams import kept, PERIOD
 
 from arm_model import Array, JointLimits, RobotModel, RobotState
 from arm_servo import ArmState, CoreSettings, Execution, ExecutionSettings, MotionCore, Phase
@@ -89,8 +89,8 @@ def time_optimal(
 def follow(core: MotionCore, execution: Execution) -> tuple[list[RobotState], float]:
     """Follow a trajectory to its end; return the states, and how far off its path they were."""
     states, off = [core.state], 0.0
-    for step in range(round(30.0 / PERIOD)):
-        states.append(core.step(step * PERIOD, PERIOD).state)
+    for step in range(round(30.0 / STREAM_PERIOD)):
+        states.append(core.step(step * STREAM_PERIOD, STREAM_PERIOD).state)
         error = execution.feedback.desired.position - states[-1].position
         off = max(off, float(np.abs(error).max()))
         if execution.phase is Phase.DONE:
@@ -182,8 +182,8 @@ def test_a_swing_within_the_limits_is_followed_exactly() -> None:
     execution = core_commands.follow(core, goal)
     states, off = follow(core, execution)
     assert off < EXACT
-    asked = {round(point.time / PERIOD): point.positions[0] for point in goal.points[:-1]}
-    late = round((len(states) * PERIOD - goal.points[-1].time) / PERIOD)
+    asked = {round(point.time / STREAM_PERIOD): point.positions[0] for point in goal.points[:-1]}
+    late = round((len(states) * STREAM_PERIOD - goal.points[-1].time) / STREAM_PERIOD)
     found = min(
         max(abs(states[number + shift].position[0] - at) for number, at in asked.items())
         for shift in range(late + 1)
@@ -281,7 +281,9 @@ def test_goals_replace_each_other_on_their_paths(name: str, seed: int) -> None:
         core, quick(name, begin + rng.uniform(-0.5, 0.5, len(begin)), 1.2)
     )
     count = int(rng.integers(20, 300))
-    states.extend(core.step(number * PERIOD, PERIOD).state for number in range(count))
+    states.extend(
+        core.step(number * STREAM_PERIOD, STREAM_PERIOD).state for number in range(count)
+    )
     try:
         execution = core_commands.follow(
             core, quick(name, begin + rng.uniform(-0.5, 0.5, len(begin)), 1.0)
@@ -309,7 +311,7 @@ def test_set_points_that_leave_the_path_end_the_trajectory() -> None:
     for step in range(300):
         held = state if step < 150 else RobotState.at_rest(state.position)
         arm = ArmState(held, held, 0.0, 1.0, is_paused=False, is_held=False)
-        after = execution.update(arm, PERIOD)
+        after = execution.update(arm, STREAM_PERIOD)
         state = after if step < 150 and after is not None else held
     assert execution.ending is not None
     assert execution.ending.code is GoalCode.PATH_TOLERANCE_VIOLATED

@@ -10,8 +10,7 @@ from itertools import pairwise
 from model_robots import ready, robot, table, texts
 import numpy as np
 import pytest
-from servo_commands import jog, move_by, SteppedWorker
-from servo_drives import Drives, PERIOD
+from servo_commands import Drives, jog, move_by, PERIOD, SteppedWorker
 
 from arm_model import (
     Array,

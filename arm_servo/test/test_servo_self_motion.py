@@ -6,8 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from servo_commands import twist
-from servo_drives import Drives
+from servo_commands import Drives, twist
 
 IN_PLANE = {
     'x': [0.12, 0.0, 0.0, 0.0, 0.0, 0.0],

@@ -13,7 +13,7 @@ from isolation import Isolation
 from model_robots import texts
 import pytest
 from ros_client import RosClient
-from servo_listener import ServoListener, TIMEOUT
+from servo_nodes import ServoListener, TIMEOUT
 from terminals import Pane
 
 pytestmark = [

@@ -8,12 +8,12 @@ from dataclasses import replace
 import math
 
 import core_commands
+from core_commands import follow_to_the_end, kept, stream, STREAM_PERIOD, wave
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from model_robots import chain, ready, robot, ROBOTS
 import numpy as np
 import pytest
-from servo_streams import follow_to_the_end, kept, PERIOD, stream, wave
 
 from arm_model import Array, RobotState
 from arm_servo import CoreSettings, ExecutionSettings, MotionCore, Outcome, Phase
@@ -82,7 +82,7 @@ def test_points_are_passed_at_their_times(kind: str) -> None:
     goal = wave(robot('prbt'), ready('prbt'), kind)
     states = follow_to_the_end(core, core_commands.follow(core, goal))
     for point in goal.points[:-1]:
-        there = states[round(point.time / PERIOD)]
+        there = states[round(point.time / STREAM_PERIOD)]
         assert there.position == pytest.approx(point.positions, abs=2e-3)
         assert there.velocity == pytest.approx(point.velocities, abs=5e-2)
 
@@ -96,7 +96,7 @@ def test_pause_and_resume_stay_on_the_path(kind: str) -> None:
     events = {0.7: lambda c, _: core_commands.pause(c), 1.6: lambda c, _: core_commands.resume(c)}
     states = [point.state for point in stream(core, 6.0, events)]
     at_rest = [not state.moving for state in states]
-    assert any(at_rest[round(0.8 / PERIOD) : round(1.6 / PERIOD)])
+    assert any(at_rest[round(0.8 / STREAM_PERIOD) : round(1.6 / STREAM_PERIOD)])
     assert states[-1].position == pytest.approx(goal.points[-1].positions, abs=1e-6)
     assert off_the_path(states, path_of(core)) < 1e-3
     kept(robot('panda').limits, states)
@@ -124,7 +124,7 @@ def test_a_speed_override_takes_as_much_longer() -> None:
     core_commands.override(core, 0.5)
     execution = core_commands.follow(core, wave(robot('prbt'), ready('prbt'), 'q'))
     states = follow_to_the_end(core, execution)
-    assert len(states) * PERIOD == pytest.approx(9.0, abs=0.05)
+    assert len(states) * STREAM_PERIOD == pytest.approx(9.0, abs=0.05)
 
 
 @pytest.mark.parametrize('name', ROBOTS)
@@ -250,7 +250,7 @@ def test_a_later_begin_is_planned_before_it(name: str, seed: int, ahead: float) 
         followed = follow_to_the_end(core, execution)
     assert execution.ending is not None
     assert execution.ending.code is GoalCode.SUCCESSFUL, execution.ending
-    assert len(followed) * PERIOD == pytest.approx(4.5 + ahead, abs=0.1)
+    assert len(followed) * STREAM_PERIOD == pytest.approx(4.5 + ahead, abs=0.1)
     assert followed[-1].position == pytest.approx(goal.points[-1].positions, abs=1e-6)
     kept(robot(name).limits, states + followed[1:])
 
@@ -277,7 +277,7 @@ def test_a_trajectory_that_has_begun_is_joined() -> None:
     core = core_of('prbt')
     goal = replace(wave(robot('prbt'), ready('prbt'), 'q'), age=2.0)
     states = follow_to_the_end(core, core_commands.follow(core, goal))
-    assert len(states) * PERIOD == pytest.approx(2.5, abs=0.05)
+    assert len(states) * STREAM_PERIOD == pytest.approx(2.5, abs=0.05)
     assert states[-1].position == pytest.approx(goal.points[-1].positions, abs=1e-6)
 
 
@@ -311,7 +311,7 @@ def lagging(core: MotionCore, lag: Array, cycles: int) -> None:
     for step in range(cycles):
         state = core.state
         measured = RobotState(state.position - lag, state.velocity, state.acceleration)
-        core.step(step * PERIOD, PERIOD, measured)
+        core.step(step * STREAM_PERIOD, STREAM_PERIOD, measured)
 
 
 def test_a_path_violation_names_joint_amount_and_time() -> None:
@@ -434,7 +434,7 @@ def test_joints_that_a_goal_of_some_leaves_out_stand_where_they_were_commanded_t
     core = core_of('prbt', ExecutionSettings(rules=GoalRules(partial=True)))
     core_commands.follow(core, TrajectoryGoal(names, [GoalPoint(2.0, tuple(start + 0.3))]))
     for step in range(100):
-        core.step(step * PERIOD, PERIOD)
+        core.step(step * STREAM_PERIOD, STREAM_PERIOD)
     accepted = core.state
     assert accepted.velocity[0] > 0.05
     goal = TrajectoryGoal([names[4]], [GoalPoint(1.5, (start[4],))])
@@ -458,7 +458,11 @@ def test_a_turn_of_a_continuous_joint_is_no_error() -> None:
         state = core.state
         wrapped = np.array(state.position)
         wrapped[0] = np.arctan2(np.sin(wrapped[0]), np.cos(wrapped[0]))
-        core.step(step * PERIOD, PERIOD, RobotState(wrapped, state.velocity, state.acceleration))
+        core.step(
+            step * STREAM_PERIOD,
+            STREAM_PERIOD,
+            RobotState(wrapped, state.velocity, state.acceleration),
+        )
     assert execution.ending is not None
     assert execution.ending.code is GoalCode.SUCCESSFUL, execution.ending.reason
 
@@ -481,10 +485,13 @@ def test_a_trajectory_that_is_paused_before_its_begin_does_not_move_the_arm(
         core_commands.pause(core)
         core_commands.follow(core, goal)
     for step in range(300):
-        assert core.step(step * PERIOD, PERIOD).state.position.tolist() == begin.tolist()
+        assert (
+            core.step(step * STREAM_PERIOD, STREAM_PERIOD).state.position.tolist()
+            == begin.tolist()
+        )
     core_commands.resume(core)
     for step in range(300, 900):
-        core.step(step * PERIOD, PERIOD)
+        core.step(step * STREAM_PERIOD, STREAM_PERIOD)
     assert core.state.position == pytest.approx(begin + 0.2, abs=1e-6)
 
 
@@ -497,10 +504,10 @@ def test_a_canceled_trajectory_that_waits_in_a_pause_ends() -> None:
     execution = core_commands.follow(
         core, TrajectoryGoal(core.model.joints, [GoalPoint(2.0, there)])
     )
-    core.step(0.0, PERIOD)
+    core.step(0.0, STREAM_PERIOD)
     core_commands.stop(core)
     core_commands.resume(core)
     for step in range(1, 20):
-        core.step(step * PERIOD, PERIOD)
+        core.step(step * STREAM_PERIOD, STREAM_PERIOD)
     assert execution.phase is Phase.DONE
     assert core.state.position.tolist() == ready('panda').tolist()

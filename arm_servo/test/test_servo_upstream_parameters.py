@@ -19,9 +19,9 @@ import yaml
 from arm_model import ModelError
 from arm_model.ros import GroupModels
 from arm_servo import check_parameters, CoreSettings, MotionCore
-from arm_servo.ros.group_motion import Offers
-from arm_servo.ros.parameter_check import check_names, ParameterSheet
-from arm_servo.ros.servo.parameters import declare_servo, ServoParameters
+from arm_servo.ros.group_motion import check_names, Offers
+from arm_servo.ros.parameter_check import ParameterSheet
+from arm_servo.ros.servo_commands import declare_servo, ServoParameters
 from arm_servo.ros.topics_backend import build_motion
 
 pytestmark = pytest.mark.slow

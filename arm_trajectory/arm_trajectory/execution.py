@@ -200,12 +200,7 @@ class CatchUpInterpolator:
         self._generator = generator
         self._plan: Plan | None = None
         self._elapsed = 0.0
-        self._exact = False
-
-    @property
-    def exact(self) -> bool:
-        """Whether the last step was taken exactly: it is on what is followed."""
-        return self._exact
+        self.exact = False  # whether the last step is exactly on what is followed
 
     def step(
         self, state: RobotState, ahead: Callable[[float], RobotState], period: float
@@ -220,9 +215,9 @@ class CatchUpInterpolator:
         """
         wanted = ahead(period)
         if self._allowed(state, wanted, period):
-            self._plan, self._exact = None, True
+            self._plan, self.exact = None, True
             return wanted
-        self._exact = False
+        self.exact = False
         kept = self._kept(state, ahead)
         if kept and self._plan is not None and self._elapsed + period >= self._plan.duration:
             self._plan, kept = None, False  # met within this period
@@ -248,14 +243,14 @@ class CatchUpInterpolator:
         if not self._soft(state, wanted, period):
             return False
         most = self._limits.jerk * period
-        jolt, shift = FOLLOWING_JERK_TOLERANCE if self._exact else (JERK_TOLERANCE, JERK_TOLERANCE)
+        jolt, shift = FOLLOWING_JERK_TOLERANCE if self.exact else (JERK_TOLERANCE, JERK_TOLERANCE)
         mean = 0.5 * (state.acceleration + wanted.acceleration) * period
         if np.any(np.abs(wanted.velocity - state.velocity - mean) > jolt * most * period):
             return False
         bend = (2.0 * state.acceleration + wanted.acceleration) / 6.0 * period
         way = wanted.position - state.position - (state.velocity + bend) * period
         allowed = shift * most * period**2
-        if not self._exact:  # seen on the positions it is a change of speed
+        if not self.exact:  # seen on the positions it is a change of speed
             allowed = np.minimum(
                 allowed, ACCELERATION_TOLERANCE * self._limits.acceleration * period**2
             )

@@ -1,6 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The interface of what moves an arm, and what comes out of it."""
+"""What moves an arm: its interface, what comes out of it, and the simplest of its kind.
+
+A :class:`Controller` moves the arm cycle by cycle, as :class:`SingleTarget` does; its
+:class:`MotionReport` says what limits a step, its :class:`Outcome` how it ended.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +12,82 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from enum import Enum
 
-from arm_model import ArmError, RobotState
-from arm_trajectory import GoalCode, GoalError
+import numpy as np
 
-from ..report import MotionReport
+from arm_model import ArmError, Array, frozen, RobotState
+from arm_trajectory import GoalCode, GoalError, OnlineTrajectoryGenerator, Plan
+
+
+class Cause(Enum):
+    """Why a motion is slower than asked."""
+
+    JOINT_POSITION = 'joint limit'
+    JOINT_VELOCITY = 'joint speed'
+    JOINT_ACCELERATION = 'joint acceleration'
+    COLLISION = 'collision'
+    SINGULARITY = 'singularity'
+    HOLD = 'path'
+    SOLVER = 'solver'
+
+
+@dataclass(frozen=True, slots=True)
+class Limiter:
+    """One thing that limits a motion."""
+
+    cause: Cause  # its kind
+    name: str  # what it is: a joint, two links, an axis of the tool
+    # way left in [rad] or [m], speed asked in [rad/s], or measure of the singularity
+    amount: float
+    factor: float  # what it leaves of the asked speed, 0 to 1
+
+    def __str__(self) -> str:
+        """Describe it in a few words."""
+        if self.cause is Cause.COLLISION:
+            return f'collision: {self.name} at {1e3 * self.amount:.0f} mm, {self.factor:.2f}x'
+        if self.cause is Cause.JOINT_POSITION:
+            left = round(self.amount, 3) + 0.0  # never -0.000
+            return f'joint limit: {self.name}, {left:.3f} left, {self.factor:.2f}x'
+        if self.cause is Cause.JOINT_VELOCITY:
+            return f'joint speed: {self.name} would need {self.amount:.2f}, {self.factor:.2f}x'
+        return f'{self.cause.value}: {self.name}, {self.factor:.2f}x'
+
+
+@dataclass(frozen=True, slots=True)
+class MotionReport:
+    """How a command is carried out."""
+
+    factor: float = 1.0  # achieved share of the asked speed; 1 when nothing limits it
+    limiters: tuple[Limiter, ...] = ()  # what limits it, the strongest first
+
+    def __post_init__(self) -> None:
+        """Sort the limiters, so that the first is the one that matters."""
+        if len(self.limiters) > 1:
+            strongest = tuple(sorted(self.limiters, key=lambda limiter: limiter.factor))
+            object.__setattr__(self, 'limiters', strongest)
+
+    def with_limiter(self, limiter: Limiter) -> MotionReport:
+        """Return the report with one limiter more."""
+        return MotionReport(min(self.factor, limiter.factor), (limiter, *self.limiters))
+
+    def __str__(self) -> str:
+        """Describe it in one line."""
+        if not self.limiters:
+            return 'free'
+        return '; '.join(str(limiter) for limiter in self.limiters)
+
+
+class NotReadyError(ArmError):
+    """Nothing can be commanded before the arm's position is known.
+
+    Scenarios: a command before the first joint state, or after the set-point was dropped.
+    """
+
+
+class BackendError(ArmError):
+    """The back end cannot start; the message names the remedy.
+
+    Scenarios: a bus.yml with mistakes, a CAN interface that is not there, a bus with a master.
+    """
 
 
 class Source(Enum):
@@ -70,21 +146,13 @@ class ArmState:
 
 
 class Controller(ABC):
-    """What moves the arm, cycle by cycle.
+    """What moves the arm, cycle by cycle."""
 
-    Attributes:
-        source: Its kind.
-        outcome: How it ended; None while it goes on.
-        report: What limits its last step.
-        on_path: Whether its last step is on a path that was checked for collisions.
-        brakes: Whether it may still bring the arm to rest out of another motion.
-    """
-
-    source: Source
-    outcome: Outcome | None = None
-    report = MotionReport()
-    on_path = False
-    brakes = True
+    source: Source  # its kind
+    outcome: Outcome | None = None  # how it ended; None while it goes on
+    report = MotionReport()  # what limits its last step
+    on_path = False  # whether its last step is on a path that was checked for collisions
+    brakes = True  # whether it may still bring the arm to rest out of another motion
 
     @abstractmethod
     def update(self, arm: ArmState, period: float) -> RobotState | None:
@@ -101,3 +169,48 @@ class Controller(ABC):
     def end(self, outcome: Outcome) -> None:
         """End at once, unless it has ended: something else moves the arm now, or nothing."""
         self.outcome = self.outcome or outcome
+
+
+ARRIVAL_TOLERANCE = 1e-6  # how near to the target the set-points must be to have arrived in [rad]
+MIN_SPEED_FACTOR = 0.01  # least share of the speed that a target is approached with
+
+
+class SingleTarget(Controller):
+    """Plans to one target, anew in every cycle."""
+
+    source = Source.TARGET
+
+    def __init__(
+        self, target: Array, max_speed: float, generator: OnlineTrajectoryGenerator
+    ) -> None:
+        self.target = frozen(target)
+        self._max_speed, self._generator = max_speed, generator
+        self._planned_for, self._planner = 0.0, generator
+
+    def plan(self, state: RobotState, speed_scaling: float) -> Plan | None:
+        """Return the way to the target as it is driven; None where there is none."""
+        speed_scaling = max(speed_scaling, MIN_SPEED_FACTOR)
+        if speed_scaling != self._planned_for:
+            self._planned_for = speed_scaling
+            self._planner = OnlineTrajectoryGenerator(
+                self._generator.limits.scaled(speed_scaling, fastest=self._max_speed)
+            )
+        return self._planner.to_state(state, RobotState.at_rest(self.target))
+
+    def update(self, arm: ArmState, period: float) -> RobotState | None:
+        """Return the next state; None to come to rest."""
+        state = arm.commanded
+        if arm.is_held or arm.speed_scaling == 0.0:
+            return None
+        plan = self.plan(state, arm.speed_scaling)
+        if plan is None:
+            if not state.moving:
+                self.end(Outcome(GoalCode.INVALID_GOAL, 'no motion leads to the target'))
+            return None
+        return RobotState.at_rest(self.target) if plan.duration <= period else plan.at(period)
+
+    def conclude(self, arm: ArmState, state: RobotState) -> bool:
+        """Return whether it is over: it ends where the arm rests at the target."""
+        if not state.moving and np.allclose(state.position, self.target, atol=ARRIVAL_TOLERANCE):
+            self.end(Outcome(GoalCode.SUCCESSFUL, 'the target is reached'))
+        return super().conclude(arm, state)

@@ -16,9 +16,8 @@ import pinocchio as pin
 from arm_model import Array, Mask, Pose, RobotModel, RobotState, turned_twists
 from arm_trajectory import OnlineTrajectoryGenerator
 
-from ..jog.velocity_ik import BASE, IkAnswer, IkSettings, TwistTask, VelocityIk
-from ..report import Cause, Limiter, MotionReport
-from .controller import ArmState, Controller, Source
+from .controller import ArmState, Cause, Controller, Limiter, MotionReport, Source
+from .velocity_ik import BASE, IkAnswer, IkSettings, TwistTask, VelocityIk
 
 NO_AXES: Mask = np.zeros(6, dtype=np.bool_)  # mask of no axis of a twist
 
@@ -184,11 +183,7 @@ class ServoSource:
 
 
 class Jog(Controller):
-    """Carries out the latest jog command; without a fresh one it brings the arm to rest.
-
-    Attributes:
-        client: Who sent the command.
-    """
+    """Carries out the latest jog command; without a fresh one it brings the arm to rest."""
 
     source = Source.JOG
 
@@ -204,7 +199,7 @@ class Jog(Controller):
         self._solved: Command | None = None  # of which there are joint speeds
         self._velocity: Array = np.zeros(len(model))
         self._due = 0.0
-        self.client: Hashable = None
+        self.client: Hashable = None  # who sent the command
 
     def begin(self) -> None:
         """Begin to jog: nothing is held yet."""
@@ -212,11 +207,7 @@ class Jog(Controller):
         self._command = self._solved = self.outcome = None
 
     def take(self, command: Command, fresh_until: float, client: Hashable) -> None:
-        """Set the command.
-
-        Args:
-            fresh_until: Steady time until which it counts in [s].
-        """
+        """Set the command, which counts until a steady time in [s]."""
         self._command, self._fresh_until, self.client = command, fresh_until, client
         self._slowing_since = None
 

@@ -90,12 +90,9 @@ class Execution(Controller):
         state: RobotState,
         speed_scaling: float,
         settings: ExecutionSettings,
-        wait: float = 0.0,
+        wait: float = 0.0,  # how long to wait at rest in [s]; the state is one of rest then
     ) -> None:
         """Accept a trajectory.
-
-        Args:
-            wait: How long to wait at rest in [s]; the state is one of rest then.
 
         Raises:
             GoalError: It is refused.
@@ -121,11 +118,7 @@ class Execution(Controller):
         self.feedback = Feedback(0.0, RobotState.at_rest(begin_point.position), state, timer)
 
     def contact(self, check: PathCheck, begin: float = 0.0) -> PathContact | None:
-        """Return the first contact on its path; for any thread.
-
-        Args:
-            begin: Time of the path from which on it is looked for in [s].
-        """
+        """Return the first contact on its path from a time of it in [s] on; for any thread."""
         found = check.contact(
             lambda times: self.path.positions(times + begin), max(self.path.duration - begin, 0.0)
         )
@@ -137,11 +130,7 @@ class Execution(Controller):
         return self._state(*TrajectoryTimer.foreseen(self._limits, self.path, timer, ahead)[:3])
 
     def timer(self, speed_scaling: float) -> TimerState:
-        """Return how it runs from now on.
-
-        Args:
-            speed_scaling: Wanted speed scaling, 0 to 1.
-        """
+        """Return how it runs from now on."""
         return self.feedback.timer._replace(wanted=self._wanted(speed_scaling))
 
     def elapse(self, time: float) -> None:

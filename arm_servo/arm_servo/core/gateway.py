@@ -19,23 +19,25 @@ import time
 from arm_model import ArmError, Array, PlanningScene, RobotModel, RobotState
 from arm_trajectory import GoalCode
 
-from ..controllers.controller import JOGGING, MOTIONS, SetPoint, Source
+from ..controllers.controller import JOGGING, MOTIONS, NotReadyError, SetPoint, Source
 from ..controllers.trajectory import Execution
-from ..exceptions import NotReadyError
-from .mailbox import BEGINS, Cycle, Mailbox, TOGETHER
-from .motion_core import MotionCore
-from .motion_queue import MotionCommand, MotionQueue
-from .moving_arms import Neighbours
-from .preparation import PreparedScene
-from .requests import (
+from .mailbox import (
+    BEGINS,
     check_request,
+    Cycle,
     ImmediateRequest,
     JogRequest,
+    Mailbox,
     MotionRequest,
     PauseRequest,
+    Snapshot,
     StopRequest,
+    TOGETHER,
 )
-from .snapshot import Snapshot
+from .motion_core import MotionCore
+from .motion_queue import MotionCommand, MotionQueue
+from .preparation import PreparedScene
+from .safety_filter import Neighbours
 
 MAX_QUEUED_JOGS = 1000  # jog commands that may wait for the cycle
 
@@ -54,11 +56,6 @@ class CommandGateway:
 
     :meth:`update`, :meth:`reset` and :meth:`abandon` are for the cycle, and the kinematics of the
     core's model belong to it; the rest is for any thread. Times are steady times in [s].
-
-    Attributes:
-        model: The arm.
-        snapshot: What the core did in the last cycle.
-        is_following: Whether the arm is commanded, also to bring it to rest.
     """
 
     def __init__(
@@ -71,9 +68,10 @@ class CommandGateway:
             worker: Prepares motions, one after the other; see :func:`start_worker`.
             clock: Steady time, the one of the cycle.
         """
-        self.model: RobotModel = core.model
+        self.model: RobotModel = core.model  # the arm
+        # what the core did in the last cycle
         self.snapshot = Snapshot(0.0, None, None, 'the cycle has not begun yet')
-        self.is_following = False
+        self.is_following = False  # whether the arm is commanded, also to bring it to rest
         self._lost = ''  # why an arm that followed comes to rest
         self._core, self._worker, self._clock = core, worker, clock
         self._mailbox = Mailbox()
@@ -167,14 +165,11 @@ class CommandGateway:
         source: Source,
         client: Hashable,
         *,
-        is_zero: bool = False,
+        is_zero: bool = False,  # whether it commands standing still, with which the client lets go
+        # steady time until which it moves the arm in [s]; by default not beyond now
         expires: float = -math.inf,
     ) -> None:
         """Record a command of a client that may send one after the other.
-
-        Args:
-            is_zero: Whether it commands standing still, with which the client lets go.
-            expires: Steady time until which it moves the arm in [s]; by default not beyond now.
 
         Raises:
             NotReadyError: The arm has stopped since the client began; it has to let go first.
@@ -246,26 +241,20 @@ class CommandGateway:
         self,
         now: float,
         period: float,
-        measured: RobotState | None,
+        measured: RobotState | None,  # what the drives report; None while that is not whole
+        # positions last commanded to the drives in [rad], where it takes over
         begin: Array | None,
-        blocked: str,
+        blocked: str,  # why the arm cannot follow, with the remedy; empty when it can
         *,
+        # what to report of an arm that followed; by default why it cannot
         explain: Callable[[], Loss] | None = None,
-        is_gone: bool = False,
-        ages: Array | None = None,
+        is_gone: bool = False,  # no drive is left to be brought to rest
+        ages: Array | None = None,  # how old the measured values of each joint are in [s]
     ) -> SetPoint | None:
         """Carry out what was commanded, and return the set-point of this cycle.
 
         It takes the arm over at rest when nothing is in the way. When something comes in the way
         the arm comes to rest, a trajectory on its path, and commands are refused.
-
-        Args:
-            measured: What the drives report; None while that is not whole.
-            begin: Positions last commanded to the drives in [rad], where it takes over.
-            blocked: Why the arm cannot follow, with the remedy; empty when it can.
-            explain: What to report of an arm that followed; by default why it cannot.
-            is_gone: No drive is left to be brought to rest.
-            ages: How old the measured values of each joint are in [s].
 
         Returns:
             None while the arm does not follow.

@@ -1,19 +1,212 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The one way to the cycle: orders from any thread, and the order in which they count."""
+"""What passes between any thread and the cycle: requests, the mailbox of orders, the snapshot.
+
+A request is a value and moves nothing; a trajectory is requested by a
+:class:`arm_trajectory.TrajectoryGoal`. The :class:`Mailbox` is the one way to the cycle, and knows
+the order in which commands count. A :class:`Snapshot` is the way back.
+"""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass, replace
+from enum import IntEnum
 import math
 
+import numpy as np
+
+from arm_model import (
+    Array,
+    checked,
+    combined,
+    CommandError,
+    JointLimits,
+    Mask,
+    Pose,
+    RobotModel,
+    RobotState,
+)
+from arm_trajectory import TrajectoryGoal
 from robot_primitives import StreamGate, StreamRules
 
-from ..controllers.controller import MOTIONS, Source
-from ..exceptions import NotReadyError
-from .snapshot import MAX_CYCLE_AGE
+from ..controllers.controller import Controller, MOTIONS, NotReadyError, SetPoint, Source
+from ..controllers.jog import Command, JointCommand, PoseCommand, TwistCommand
+from ..controllers.trajectory import Execution
+
+ROTATION_TOLERANCE = 1e-3  # how far a rotation may be from one, for rounding of quaternions
+
+
+class CommandType(IntEnum):
+    """Kinds of commands, numbered as in moveit_msgs/srv/ServoCommandType."""
+
+    JOINT_JOG = 0
+    TWIST = 1
+    POSE = 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JogRequest:
+    """Move the tool or joints at a speed, or track a pose, until the request expires."""
+
+    command: Command  # what the arm does
+    expires: float  # steady time at which the request expires in [s]
+    # link, or pose in the base, about whose origin a twist turns and along whose axes it is given,
+    # and in which a pose is given; None for the tip, and for the base
+    frame: str | Pose | None = None
+    client: Hashable = None  # who asks: standing still is a command only for the client that jogs
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether it asks for standing still."""
+        if isinstance(self.command, TwistCommand):
+            return not self.command.twist.any()
+        return isinstance(self.command, JointCommand) and not self.command.velocity.any()
+
+
+@dataclass(frozen=True, slots=True)
+class DisplacementRequest:
+    """Move joints on by amounts; displacements add up while they are carried out."""
+
+    displacements: Mapping[str, float]  # how far in [rad] by joint
+    max_speed: float = math.inf  # greatest speed of a joint in [rad/s]
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether it asks for standing still."""
+        return not any(self.displacements.values())
+
+    def beyond(self, before: MotionRequest) -> DisplacementRequest:
+        """Return it beyond another displacement; anything else it takes the place of."""
+        if not isinstance(before, DisplacementRequest):
+            return self
+        if self.is_zero:
+            return before
+        ways = {name: before.displacements.get(name, 0.0) for name in self.displacements}
+        sums = {name: way + ways[name] for name, way in self.displacements.items()}
+        return replace(self, displacements={**before.displacements, **sums})
+
+
+@dataclass(frozen=True, slots=True)
+class TargetRequest:
+    """Move joints to positions; the others come to rest."""
+
+    positions: Mapping[str, float]  # targets in [rad] by joint
+    max_speed: float = math.inf  # greatest speed of a joint in [rad/s]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StopRequest:
+    """Come to rest: a trajectory on its path, anything else in the shortest time."""
+
+    reason: str = 'stopped'  # why, for the outcome of the motion that this ends
+    # what is stopped; other sources go on. None for whatever moves the arm
+    sources: tuple[Source, ...] | None = None
+    motion: Controller | None = (
+        None  # the motion that is stopped; another one goes on. None for any
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class PauseRequest:
+    """Come to rest, a trajectory on its path, and refuse jogging; or go on after that."""
+
+    is_paused: bool = True  # whether to come to rest; else to go on
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedRequest:
+    """Set the speed override of trajectories and targets."""
+
+    speed: float  # 0 to 1; 0 is a pause
+
+
+MotionRequest = DisplacementRequest | TargetRequest | TrajectoryGoal
+"""Requests that are planned, and checked for collisions, before they may begin."""
+
+ImmediateRequest = JogRequest | StopRequest | PauseRequest | SpeedRequest
+"""Requests for which nothing is planned: they count from the next cycle on."""
+
+
+def check_limits(limits: JointLimits, target: Array) -> None:
+    """Check that joints may be at positions in [rad].
+
+    Raises:
+        CommandError: One is beyond its limits.
+    """
+    beyond = (target < limits.lower) | (target > limits.upper)
+    if beyond.any():
+        joint = int(np.argmax(beyond))
+        raise CommandError(
+            f'{limits.names[joint]}: {target[joint]:.4f} is beyond its limits'
+            f' {limits.lower[joint]:.4f}..{limits.upper[joint]:.4f}'
+        )
+
+
+def by_joint(model: RobotModel, values: Mapping[str, float], what: str) -> tuple[Array, Mask]:
+    """Put numbers in the order of the joints.
+
+    Returns:
+        The numbers, 0 where none is given, and the mask of those that are.
+
+    Raises:
+        CommandError: No joint is named, one is unknown, or a number is not finite.
+    """
+    if not values:
+        raise CommandError(f'{what}: no joint is named')
+    places = [model.index(name) for name in values]
+    numbers = checked(list(values.values()), len(values), what)
+    ordered, mask = np.zeros(len(model)), np.zeros(len(model), dtype=np.bool_)
+    ordered[places], mask[places] = numbers, True
+    return ordered, mask
+
+
+def check_request(model: RobotModel, request: ImmediateRequest) -> None:
+    """Check a request for which nothing is planned.
+
+    Raises:
+        CommandError: A number is not finite or out of its range, the count is wrong, the link is
+            unknown, or the axes are no rotation.
+    """
+    if isinstance(request, SpeedRequest) and not 0.0 <= request.speed <= 1.0:
+        raise CommandError(f'speed override {request.speed}: it must be between 0 and 1')
+    if not isinstance(request, JogRequest):
+        return
+    command = request.command
+    if isinstance(command, TwistCommand):
+        checked(command.twist, 6, 'twist')
+        model.check_link(command.link)
+        if command.axes is not None:
+            _check_rotation(command.axes, 'axes')
+    elif isinstance(command, PoseCommand):
+        checked(command.pose.position, 3, 'position')
+        _check_rotation(command.pose.rotation, 'rotation')
+    else:
+        checked(command.velocity, len(model), 'velocities')
+    if not math.isfinite(request.expires):
+        raise CommandError(f'a jog expires at {request.expires} s: it must be finite')
+
+
+def in_base(model: RobotModel, positions: Array, request: JogRequest) -> Command:
+    """Return the command of a request, about the tip and in the base."""
+    command, frame = request.command, request.frame
+    if frame is None or isinstance(command, JointCommand):
+        return command
+    place = model.pose(positions, frame) if isinstance(frame, str) else frame
+    if isinstance(command, PoseCommand):
+        return replace(command, pose=combined(place, command.pose))
+    linear, angular = place.rotation @ command.twist[:3], place.rotation @ command.twist[3:]
+    lever = model.pose(positions).position - place.position
+    return TwistCommand(np.concatenate((linear + np.cross(angular, lever), angular)))
+
+
+def _check_rotation(values: Array, what: str) -> None:
+    rotation = checked(np.ravel(values), 9, what).reshape(3, 3)
+    off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
+    if off > ROTATION_TOLERANCE or np.linalg.det(rotation) < 0.0:
+        raise CommandError(f'{what}: not a rotation; is the quaternion of unit length?')
+
 
 BEGINS = 'the arm has just begun to follow'
 
@@ -54,17 +247,14 @@ Order = Callable[[Cycle], bool]  # carried out in a cycle; False for again in th
 
 
 class Mailbox:
-    """Orders from any thread, carried out by the thread of the cycle.
-
-    Attributes:
-        gate: Refuses what a stop or a newer command has made void.
-        refused: When a motion was refused last, as the arm did not follow, in [s].
-    """
+    """Orders from any thread, carried out by the thread of the cycle."""
 
     def __init__(self) -> None:
         self._orders: deque[Order] = deque()
         self.post = self._orders.append
+        # refuses what a stop or a newer command has made void
         self.gate = StreamGate[Source](MOTIONS, RULES)
+        # when a motion was refused last, as the arm did not follow, in [s]
         self.refused = -math.inf
 
     def __len__(self) -> int:
@@ -99,3 +289,48 @@ class Mailbox:
             raise NotReadyError(cycle.blocked)
         if (age := cycle.now - since) > MAX_CYCLE_AGE:
             raise NotReadyError(f'the cycle stood still for {age:.2f} s')
+
+
+MAX_CYCLE_AGE = 0.25
+"""Age of a cycle at which the cycle stands still: commands are refused, as they would surprise."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Snapshot:
+    """What the core did in a cycle."""
+
+    time: float  # steady time of the cycle in [s]
+    set_point: SetPoint | None  # what was commanded; None while the arm does not follow
+    measured: RobotState | None  # what was measured; None before the first feedback
+    blocked: str  # why the arm does not follow, with the remedy; empty while it does
+    source: Source = Source.NONE  # what moves it
+    paused: bool = False  # whether it is paused
+    speed: float = 1.0  # speed override, 0 to 1
+    cycles: int = 0  # cycles so far in which the arm followed
+    period: float = 0.01  # period of the cycle in [s]
+    # the trajectory that was followed last; None before the first
+    execution: Execution | None = None
+    # how old the measured values of each joint were in the cycle in [s]; None where they are as
+    # old as the cycle
+    ages: Array | None = None
+
+    @property
+    def speed_scaling(self) -> float:
+        """Speed override that counts, 0 to 1: none while it is paused."""
+        return 0.0 if self.paused else self.speed
+
+    @property
+    def reference(self) -> RobotState | None:
+        """Where the arm is to be: where it stands while it does not follow; None while unknown."""
+        if self.set_point is not None:
+            return self.set_point.state
+        if self.measured is None or not np.isfinite(self.measured.position).all():
+            return None
+        return RobotState.at_rest(self.measured.position)
+
+    def stale(self, age: float) -> str:
+        """Return that the cycle does not run; empty when it does."""
+        if age <= MAX_CYCLE_AGE:
+            return ''
+        begun = f'{age:.1f} s ago' if self.time else 'never'
+        return f'the cycle does not run (the last was {begun}); is the bus up?'

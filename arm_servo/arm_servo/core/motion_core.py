@@ -30,20 +30,20 @@ from arm_trajectory import GoalCode, OnlineTrajectoryGenerator, StateMovedError
 
 from ..controllers.controller import (
     ArmState,
+    Cause,
     CONTINUED,
     Controller,
+    Limiter,
+    MotionReport,
+    NotReadyError,
     Outcome,
     SetPoint,
+    SingleTarget,
     Source,
 )
 from ..controllers.jog import Jog
-from ..controllers.target import SingleTarget
 from ..controllers.trajectory import Execution
-from ..exceptions import NotReadyError
-from ..report import Cause, Limiter, MotionReport
-from .moving_arms import Neighbours
-from .preparation import CommandBasis, CoreSettings, Motion, Preparation, PreparedScene
-from .requests import (
+from .mailbox import (
     by_joint,
     check_limits,
     check_request,
@@ -55,7 +55,8 @@ from .requests import (
     PauseRequest,
     StopRequest,
 )
-from .safety_filter import SafetyFilter
+from .preparation import CommandBasis, CoreSettings, Motion, Preparation, PreparedScene
+from .safety_filter import Neighbours, SafetyFilter
 
 PREPARED_STATE_TOLERANCE = 0.01
 """How far the arm may be from where a trajectory was prepared in [rad]."""

@@ -16,13 +16,11 @@ from typing import Any
 from arm_model import ArmError, RobotState
 from arm_trajectory import GoalCode, StateMovedError, TrajectoryGoal
 
-from ..controllers.controller import Outcome, refused, Source
+from ..controllers.controller import NotReadyError, Outcome, refused, Source
 from ..controllers.trajectory import Execution
-from ..exceptions import NotReadyError
-from .mailbox import Cycle, Mailbox
+from .mailbox import Cycle, DisplacementRequest, Mailbox, MotionRequest, StopRequest
 from .motion_core import MotionCore
 from .preparation import CommandBasis, Motion
-from .requests import DisplacementRequest, MotionRequest, StopRequest
 
 MAX_QUEUED_MOTIONS = 50  # motions that may wait to be prepared
 

@@ -28,11 +28,10 @@ from arm_trajectory import (
     TrajectoryGoal,
 )
 
-from ..controllers.controller import Source
+from ..controllers.controller import SingleTarget, Source
 from ..controllers.jog import ServoSettings
-from ..controllers.target import SingleTarget
 from ..controllers.trajectory import Execution, ExecutionSettings
-from .requests import by_joint, check_limits, DisplacementRequest, MotionRequest
+from .mailbox import by_joint, check_limits, DisplacementRequest, MotionRequest
 
 Motion = Execution | SingleTarget  # what has a goal, and an outcome once it ended
 
@@ -107,14 +106,9 @@ class Preparation:
     def __init__(
         self, model: RobotModel, catch_up: OnlineTrajectoryGenerator, settings: CoreSettings
     ) -> None:
-        """Prepare.
-
-        Args:
-            catch_up: Plans how executions catch up; used in the cycle only.
-        """
         self._model = model
         self._limits = model.limits
-        self._catch_up = catch_up
+        self._catch_up = catch_up  # how executions catch up; used in the cycle only
         self._settings = settings
         self._generator = OnlineTrajectoryGenerator(
             model.limits

@@ -16,16 +16,20 @@ from arm_model import ModelError, RobotModel
 from arm_model.ros import declare_groups
 from node_runner import destroyed_if_refused
 
+from ..controllers.controller import BackendError
 from ..core.gateway import CommandGateway, start_worker
 from ..core.motion_core import MotionCore
 from ..core.preparation import CoreSettings
-from ..exceptions import BackendError
-from ..io.drive_source import DriveSource
-from .controller_manager import ControllerManager, declare_manager
-from .group_motion import build_groups, by_check, MakeNode, Offers
-from .joint_state_broadcaster import JointStateBroadcaster
-from .other_programs import watch_other_programs
-from .parameter_check import check_names
+from ..drive_source import DriveSource
+from .controller_manager import ControllerManager, declare_manager, JointStateBroadcaster
+from .group_motion import (
+    build_groups,
+    by_check,
+    check_names,
+    MakeNode,
+    Offers,
+    watch_other_programs,
+)
 from .scene_listener import SceneListener
 
 if TYPE_CHECKING:
@@ -36,9 +40,6 @@ ATTACH_PERIOD = 0.2  # time between two tries to attach when the bus starts in [
 
 def serve_canopen(stop: threading.Event, offers: Offers) -> None:
     """Run the master with motion cores until stopped; the drives are disabled then.
-
-    Args:
-        stop: Set by Ctrl-C and SIGTERM.
 
     Raises:
         BackendError: The bus cannot be configured or opened, or has a master.

@@ -1,6 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The groups of a robot that are moved: the motion core of each, and the nodes that command it."""
+"""The groups of a robot that are moved: the motion core of each, and the nodes that command it.
+
+The nodes refuse misspelt parameters. Two programs for one arm cannot run together, and the log
+says so.
+"""
 
 from __future__ import annotations
 
@@ -13,19 +17,18 @@ from rclpy.node import Node
 
 from arm_model import ModelError, RobotModel
 from arm_model.ros import GroupModels, same_robot
-from node_runner import ParameterReader
+from node_runner import ParameterReader, refuse_misspelt
 
 from ..controllers.controller import Source
 from ..core.gateway import CommandGateway
+from ..core.mailbox import StopRequest
 from ..core.preparation import CoreSettings
-from ..core.requests import StopRequest
 from .controller_manager import Controller
-from .gripper.controller import GripperController
-from .gripper.parameters import declare_gripper
-from .servo.node import Servo
-from .servo.parameters import declare_servo, PREFIX, ServoParameters
-from .trajectory.controller import TrajectoryController
-from .trajectory.parameters import declare_check, declare_trajectory, TrajectoryParameters
+from .gripper import declare_gripper, GripperController
+from .servo import Servo
+from .servo_commands import declare_servo, PREFIX, ServoParameters
+from .trajectory import TrajectoryController
+from .trajectory_goals import declare_check, declare_trajectory, TrajectoryParameters
 
 TRAJECTORY_KIND = 'joint_trajectory_controller/JointTrajectoryController'
 
@@ -70,11 +73,7 @@ class MovedGroup:
     is_checked: bool = True  # whether the group is checked for collision
 
     def entries(self, period: float) -> list[Controller]:
-        """Return the trajectory controller, if there is one, as MoveIt and rqt look for it.
-
-        Args:
-            period: Period of its cycle in [s]; 0 is unknown.
-        """
+        """Return the trajectory controller, if there is one, as MoveIt and rqt look for it."""
         if self.set_active is None:
             return []
         interfaces = [f'{joint}/position' for joint in self.gateway.model.joints]
@@ -203,3 +202,94 @@ def by_check(groups: Sequence[MovedGroup]) -> tuple[list[CommandGateway], list[C
         [each.gateway for each in groups if each.is_checked is wanted] for wanted in (True, False)
     )
     return checked, others
+
+
+OF_OTHERS = (
+    *('publish_robot_description', 'publish_robot_description_semantic'),
+    *('robot_description_name', 'publish_dynamic_joint_states'),
+    *(
+        f'moveit_servo.{name}'
+        for name in (
+            *('check_octomap_collisions', 'command_out_topic', 'command_out_type', 'joint_topic'),
+            *('publish_joint_accelerations', 'scene_collision_proximity_threshold'),
+        )
+    ),
+)
+"""Parameters that have no effect on some nodes, and look like those that have."""
+
+OF_PROGRAM = {'backend', 'jogging', 'trajectories'}  # read by motion_node before its nodes
+
+
+def check_names(nodes: Sequence[Node]) -> None:
+    """Refuse misspelt parameters of the nodes of a program, and log once those of none of them.
+
+    Configurations of MoveIt and ros2_control have many of the latter, and work as they are.
+
+    Raises:
+        ParameterError: A name looks like one that there is.
+    """
+    unknown = {name for node in nodes for name in refuse_misspelt(node, OF_OTHERS)} - OF_PROGRAM
+    unused = [name for name in unknown if not any(node.has_parameter(name) for node in nodes)]
+    if unused:
+        names = ', '.join(sorted(unused))
+        nodes[0].get_logger().info(f'parameters without effect here: {names}')
+
+
+WATCH_PERIOD = 1.0  # time between two looks at the graph in [s]
+OWN_SERVICE = 'pause'  # service that the trajectory controller of this package has, and no other
+
+
+def watch_other_programs(nodes: Sequence[Node], outputs: Sequence[str] = ()) -> None:
+    """Log an error for each program that moves the arm, too, when it appears."""
+    known: set[str] = set()
+
+    def look() -> None:
+        conflicts = {*same_names(nodes)}.union(
+            *(_around_output(nodes[0], output) for output in outputs)
+        )
+        for conflict in sorted(conflicts - known):
+            nodes[0].get_logger().error(conflict)
+        known.clear()
+        known.update(conflicts)
+
+    nodes[0].create_timer(WATCH_PERIOD, look)
+
+
+def same_names(nodes: Sequence[Node]) -> list[str]:
+    """Return what is wrong where another node has the name of one of these."""
+    graph = [
+        f'{namespace.rstrip("/")}/{name}'
+        for name, namespace in nodes[0].get_node_names_and_namespaces()
+    ]
+    own = [node.get_fully_qualified_name() for node in nodes]
+    return [
+        f'another program has a node {name}, too: clients reach both, and both move the arm. End'
+        ' one of them, or give one a namespace (-r __ns:=/NAME)'
+        for name in own
+        if graph.count(name) > own.count(name)
+    ]
+
+
+def _around_output(node: Node, output: str) -> list[str]:
+    """Return what is wrong with others that publish set-points, or that receive them."""
+    topic = node.resolve_topic_name(output)
+    publishers = node.get_publishers_info_by_topic(topic)
+    conflicts = []
+    if len(publishers) > 1:
+        names = sorted(
+            {f'{info.node_namespace.rstrip("/")}/{info.node_name}' for info in publishers}
+        )
+        conflicts.append(
+            f'{len(publishers)} publishers of set-points on {topic} ({", ".join(names)}): the arm'
+            ' cannot follow both. End one of them'
+        )
+    services = {name for name, _ in node.get_service_names_and_types()}
+    for info in node.get_subscriptions_info_by_topic(topic):
+        receiver = f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+        if f'{receiver}/{OWN_SERVICE}' in services:
+            conflicts.append(
+                f'{receiver} takes the set-points on {topic}, and is a trajectory controller of'
+                ' arm_servo: each of them would be a trajectory that comes to rest. Run'
+                ' motion_node with backend:=topics in the place of both programs'
+            )
+    return conflicts

@@ -5,12 +5,16 @@
 rclpy runs a goal in a callback or coroutine, which would keep the executor from everything else;
 here timers watch the commands. A goal that cannot be carried out is accepted and aborted at once,
 since a rejection could carry neither code nor reason.
+
+What is refused of topics is remembered: for the status as long as it is fresh, for the log once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+import math
+import re
 import time
 from typing import Any, TypeVar
 
@@ -50,20 +54,13 @@ class MotionGoals(GoalServer[GoalT]):
         action: Any,  # noqa: ANN401  # rclpy has no types here
         name: str,
         *,
-        accept: Callable[[int], GoalT],
+        accept: Callable[[int], GoalT],  # makes the record of a goal from its number
+        # requests the motion of a goal with its number; raises an ArmError where it is refused
         request: Callable[[GoalT], MotionCommand],
-        canceled: str,
+        canceled: str,  # reason of an outcome that a client has asked for
         conclude: Callable[[GoalT], tuple[Ending, Any]],
         fail: Callable[[GoalT, Exception], Any],
     ) -> None:
-        """Offer the action.
-
-        Args:
-            accept: Makes the record of a goal from its number.
-            request: Requests the motion of a goal with its number; raises an ArmError where it
-                is refused.
-            canceled: Reason of an outcome that a client has asked for.
-        """
         self._gateway = gateway
         self._request, self._canceled = request, canceled
         super().__init__(
@@ -102,3 +99,52 @@ class MotionGoals(GoalServer[GoalT]):
     def _end_motion(self, goal: GoalT) -> None:
         if goal.command is not None:
             self._gateway.cancel(goal.command, self._canceled)
+
+
+STATUS_PERIOD = 0.5  # how long a refusal stands in the status in [s]
+
+REPEAT_PERIOD = 5.0
+"""Time without a refusal after which one that was logged is logged again in [s]."""
+
+NUMBER_PATTERN = re.compile(r'(?<![\w.])\d+(\.\d+)?')
+"""What differs from message to message of one stream, such as the age of its stamps."""
+
+
+class LoggedReasons:
+    """Which reasons of one stream are in the log already."""
+
+    def __init__(self) -> None:
+        self._logged = ('', -math.inf)
+
+    def is_new(self, reason: str, now: float) -> bool:
+        """Return whether a reason is to be logged; one that differs in numbers only is not."""
+        kind, (logged, seen) = NUMBER_PATTERN.sub('', reason), self._logged
+        self._logged = (kind, now)
+        return kind != logged or now - seen >= REPEAT_PERIOD
+
+
+class Refusals:
+    """Remembers the last refusal; any thread may note one, a single thread reports."""
+
+    def __init__(self) -> None:
+        self._last = ('', -math.inf)
+        self._logged = LoggedReasons()
+
+    def note(self, reason: str, now: float) -> None:
+        """Note why a command was refused."""
+        self._last = (reason, now)
+
+    def clear(self, sent: float) -> None:
+        """Note that a command of a time in [s] was taken: a refusal since then stands."""
+        if self._last[1] <= sent:
+            self._last = ('', -math.inf)
+
+    def fresh(self, now: float) -> str:
+        """Return the refusal for the status; empty when there is none."""
+        reason, since = self._last
+        return reason if now - since <= STATUS_PERIOD else ''
+
+    def to_log(self, now: float) -> str:
+        """Return the refusal if it is not in the log; one that differs in numbers only is."""
+        reason = self.fresh(now)
+        return reason if reason and self._logged.is_new(reason, now) else ''

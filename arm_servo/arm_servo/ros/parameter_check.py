@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Names of parameters: what the nodes refuse, and what they would refuse of a file."""
+"""What the nodes would refuse of a parameter file."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from types import SimpleNamespace
 from typing import Any, cast, TYPE_CHECKING
@@ -18,38 +18,6 @@ if TYPE_CHECKING:
 
 Declare = Callable[['Node'], object]  # declares the parameters of a node
 EVERY_NODE = '/**'  # name in a parameter file that stands for all nodes
-
-OF_OTHERS = (
-    *('publish_robot_description', 'publish_robot_description_semantic'),
-    *('robot_description_name', 'publish_dynamic_joint_states'),
-    *(
-        f'moveit_servo.{name}'
-        for name in (
-            *('check_octomap_collisions', 'command_out_topic', 'command_out_type', 'joint_topic'),
-            *('publish_joint_accelerations', 'scene_collision_proximity_threshold'),
-        )
-    ),
-)
-"""Parameters that have no effect on some nodes, and look like those that have."""
-
-OF_PROGRAM = {'backend', 'jogging', 'trajectories'}  # read by motion_node before its nodes
-
-
-def check_names(nodes: Sequence[Node]) -> None:
-    """Refuse misspelt parameters of the nodes of a program, and log once those of none of them.
-
-    Configurations of MoveIt and ros2_control have many of the latter, and work as they are.
-
-    Raises:
-        ParameterError: A name looks like one that there is.
-    """
-    from node_runner import refuse_misspelt
-
-    unknown = {name for node in nodes for name in refuse_misspelt(node, OF_OTHERS)} - OF_PROGRAM
-    unused = [name for name in unknown if not any(node.has_parameter(name) for node in nodes)]
-    if unused:
-        names = ', '.join(sorted(unused))
-        nodes[0].get_logger().info(f'parameters without effect here: {names}')
 
 
 def check_parameters(models: GroupModels, document: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -65,6 +33,8 @@ def check_parameters(models: GroupModels, document: Mapping[str, Any]) -> list[t
         Name of the node, and why it refuses: the first mistake of each.
     """
     from node_runner import ParameterError, refuse_misspelt
+
+    from .group_motion import OF_OTHERS
 
     problems = []
     for name, declare in _nodes(models, document).items():
@@ -83,12 +53,11 @@ def _nodes(models: GroupModels, document: Mapping[str, Any]) -> dict[str, Declar
     from arm_model.ros import same_robot
     from node_runner import ParameterReader
 
-    from ..io.topic_output import ARRAY, declare_loop, declare_output, TRAJECTORY
-    from .controller_manager import declare_manager
-    from .gripper.parameters import declare_gripper
-    from .joint_state_broadcaster import declare_broadcaster
-    from .servo.parameters import declare_servo, PREFIX
-    from .trajectory.parameters import declare_check, declare_trajectory
+    from .controller_manager import declare_broadcaster, declare_manager
+    from .gripper import declare_gripper
+    from .servo_commands import declare_servo, PREFIX
+    from .topics_backend import ARRAY, declare_loop, declare_output, TRAJECTORY
+    from .trajectory_goals import declare_check, declare_trajectory
 
     main, *others = models.arms
 
@@ -139,11 +108,6 @@ class ParameterSheet:
     """What declarations need of a node; made of the tables of a parameter file."""
 
     def __init__(self, name: str, table: Mapping[str, Any]) -> None:
-        """Read what the file has for a node.
-
-        Args:
-            table: Parameters by name; tables in it are names with dots.
-        """
         self._name = name
         self._parameter_overrides = {
             key: SimpleNamespace(name=key, value=value) for key, value in flat(table).items()

@@ -1,40 +1,59 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The back end for drives elsewhere: joint states in, a loop for each group, set-points out."""
+"""The back end for drives elsewhere: joint states in, a loop for each group, set-points out.
+
+Set-points are messages to a controller elsewhere, as moveit_servo sends them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 import threading
 import time
 
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from arm_model import RobotModel
-from arm_model.ros import declare_groups, declare_robot
+from arm_model import ModelError, RobotModel
+from arm_model.ros import declare_groups, declare_robot, duration_fields
 from node_runner import (
+    declare_thread_priority,
     LINGER,
     log_defects,
     notify_ready,
+    ParameterReader,
     raise_thread_priority,
     settle_process_memory,
     spin,
 )
 
+from ..controllers.controller import SetPoint
 from ..core.gateway import CommandGateway, start_worker
 from ..core.motion_core import MotionCore
 from ..core.preparation import CoreSettings
-from ..io.following import FollowingWatch
-from ..io.motion_thread import JointFeedback, MotionCycle, MotionThread
-from ..io.topic_output import ARRAY, declare_loop, declare_output, TopicOutput, TRAJECTORY
+from ..motion_thread import (
+    FollowingLimits,
+    FollowingWatch,
+    JointFeedback,
+    MotionCycle,
+    MotionThread,
+)
 from .controller_manager import ControllerManager, declare_manager
-from .group_motion import build_arm, build_groups, by_check, MakeNode, Offers
-from .other_programs import watch_other_programs
-from .parameter_check import check_names
+from .group_motion import (
+    build_arm,
+    build_groups,
+    by_check,
+    check_names,
+    MakeNode,
+    Offers,
+    watch_other_programs,
+)
 from .scene_listener import SceneListener
-from .servo.parameters import PREFIX
+from .servo_commands import PREFIX
 
 ARRAY_TOPIC = 'forward_position_controller/commands'
 """Default of command_out_topic, the name that ros2_controllers' examples use; that of a group
@@ -42,11 +61,7 @@ beside the main one begins with the group's name."""
 
 
 def serve_topics(stop: threading.Event, offers: Offers) -> None:
-    """Move a robot until stopped; it comes to rest before that ends.
-
-    Args:
-        stop: Set by Ctrl-C and SIGTERM.
-    """
+    """Move a robot until stopped; it comes to rest before that ends."""
     nodes: list[Node] = []
     with ExitStack() as stack:
 
@@ -131,11 +146,7 @@ def _beside_a_controller(servo: Node) -> MotionThread:
 
 
 class TopicDrives:
-    """Drives elsewhere under a core: joint states in, set-points out.
-
-    Attributes:
-        thread: Steps the core; not started yet.
-    """
+    """Drives elsewhere under a core: joint states in, set-points out."""
 
     def __init__(
         self,
@@ -144,13 +155,8 @@ class TopicDrives:
         settings: CoreSettings,
         *,
         prefix: str = '',
-        output: tuple[str, str],
+        output: tuple[str, str],  # default of topic and type of the set-points
     ) -> None:
-        """Declare how the loop runs, subscribe and advertise.
-
-        Args:
-            output: Default of topic and type of the set-points.
-        """
         loop, wanted = declare_loop(node, prefix), declare_output(node, prefix, *output)
         self.gateway = CommandGateway(MotionCore(model, settings), start_worker())
         self.period, self.topic, self.joint_topic = loop.period, wanted.topic, loop.joint_topic
@@ -166,8 +172,122 @@ class TopicDrives:
         publish = TopicOutput(node, wanted, list(model.joints), loop.period)
         watch = FollowingWatch(model.limits, loop.following, loop.period)
         cycle = MotionCycle(self.gateway, feedback, publish, watch)
-        self.thread = MotionThread(cycle, loop.period, begin)
+        self.thread = MotionThread(cycle, loop.period, begin)  # steps the core; not started yet
 
     def prepare(self) -> bool:
         """Return that nothing was got back: the drives stay with their client."""
         return False
+
+
+TRAJECTORY = 'trajectory_msgs/JointTrajectory'
+ARRAY = 'std_msgs/Float64MultiArray'
+
+THREAD_PRIORITY = 40
+"""SCHED_FIFO priority of the loop, unless a parameter says another; that of moveit_servo."""
+
+
+@dataclass(frozen=True, slots=True)
+class OutputParameters:
+    """What is published."""
+
+    topic: str  # where to
+    kind: str  # :data:`TRAJECTORY` or :data:`ARRAY`
+    positions: bool  # positions are in it
+    velocities: bool  # velocities are in it
+    accelerations: bool  # accelerations are in it; only in trajectories
+
+
+def declare_output(node: Node, prefix: str, topic: str, kind: str) -> OutputParameters:
+    """Declare moveit_servo's parameters of the output.
+
+    Raises:
+        ModelError: The type is unknown, or does not carry what is to be in it.
+    """
+    read = ParameterReader(node, prefix)
+    parameters = OutputParameters(
+        read.text('command_out_topic', topic, 'where set-points are published'),
+        read.text('command_out_type', kind, f'{TRAJECTORY} or {ARRAY}'),
+        read.flag('publish_joint_positions', 'positions are in it', default=True),
+        read.flag('publish_joint_velocities', 'velocities are in it', default=kind == TRAJECTORY),
+        read.flag('publish_joint_accelerations', 'accelerations are in it', default=False),
+    )
+    if parameters.kind not in {TRAJECTORY, ARRAY}:
+        raise ModelError(
+            f'{prefix}command_out_type is {parameters.kind!r}: {TRAJECTORY} or {ARRAY}'
+        )
+    chosen = parameters.positions + parameters.velocities + parameters.accelerations
+    if not chosen or (parameters.kind == ARRAY and (chosen > 1 or parameters.accelerations)):
+        raise ModelError(
+            f'{prefix}publish_joint_...: an array has positions or velocities, a trajectory at'
+            ' least one of them'
+        )
+    return parameters
+
+
+@dataclass(frozen=True, slots=True)
+class LoopParameters:
+    """How the loop runs."""
+
+    period: float  # its period in [s]
+    joint_topic: str  # topic of the joint states
+    joint_timeout: float  # age at which a joint state counts no more in [s]
+    priority: int  # SCHED_FIFO priority of its thread; 0 is none
+    following: FollowingLimits  # when the arm counts as not following
+
+
+def declare_loop(node: Node, prefix: str) -> LoopParameters:
+    """Declare how the loop runs."""
+    read = ParameterReader(node, prefix)
+    return LoopParameters(
+        read.number('publish_period', 0.01, (0.001, 0.1), 'period of the loop [s]'),
+        read.text('joint_topic', 'joint_states', 'topic of the joint states'),
+        read.number(
+            'joint_state_timeout',
+            0.5,
+            (0.02, 10.0),
+            'silence of a joint at which the arm comes to rest [s]',
+        ),
+        declare_thread_priority(read, THREAD_PRIORITY),
+        FollowingLimits(
+            read.number(
+                'following_error_limit',
+                0.2,
+                (0.0, 10.0),
+                'distance of a joint from where it was sent at which the arm comes to rest [rad];'
+                ' 0 is any',
+            ),
+            read.number(
+                'following_delay', 0.2, (0.0, 1.0), 'how late it may be where it was sent [s]'
+            ),
+        ),
+    )
+
+
+class TopicOutput:
+    """Publishes set-points; for the thread of the cycle."""
+
+    def __init__(
+        self, node: Node, parameters: OutputParameters, joints: list[str], period: float
+    ) -> None:
+        kind = Float64MultiArray if parameters.kind == ARRAY else JointTrajectory
+        self._publisher = node.create_publisher(kind, parameters.topic, 10)
+        self._parameters, self._joints = parameters, joints
+        self._duration = duration_fields(period)
+
+    def __call__(self, point: SetPoint) -> None:
+        """Publish a set-point."""
+        wanted, state = self._parameters, point.state
+        if wanted.kind == ARRAY:
+            values = state.position if wanted.positions else state.velocity
+            self._publisher.publish(Float64MultiArray(data=values.tolist()))
+            return
+        row = JointTrajectoryPoint()
+        if wanted.positions:
+            row.positions = state.position.tolist()
+        if wanted.velocities:
+            row.velocities = state.velocity.tolist()
+        if wanted.accelerations:
+            row.accelerations = state.acceleration.tolist()
+        row.time_from_start.sec = self._duration['sec']
+        row.time_from_start.nanosec = self._duration['nanosec']
+        self._publisher.publish(JointTrajectory(joint_names=self._joints, points=[row]))

@@ -75,16 +75,12 @@ def rest_of(jog: Jog | None) -> Jog:
 
 @dataclass(frozen=True, slots=True)
 class Scales:
-    """Full speeds of the servo [m/s], [rad/s]; the defaults are those of moveit_servo.
-
-    Attributes:
-        unitless: The servo multiplies by these itself; else it receives speeds.
-    """
+    """Full speeds of the servo [m/s], [rad/s]; the defaults are those of moveit_servo."""
 
     linear: float = 0.4
     rotational: float = 0.8
     joint: float = 0.5
-    unitless: bool = True
+    unitless: bool = True  # the servo multiplies by these itself; else it receives speeds
 
     def to_message(self, jog: Jog) -> Jog:
         """Return the numbers that the servo is sent for a motion."""
@@ -101,16 +97,11 @@ class Steps:
 
     A step is a motion of a certain time, so it works with every servo; begin and end have the same
     ramps, so the way is speed times time.
-
-    Attributes:
-        linear: Of the tool [m].
-        angular: Of the tool, and of a joint [rad].
-        duration: Least time of a step [s].
     """
 
-    linear: float = 1e-3
-    angular: float = math.radians(1.0)
-    duration: float = 0.2
+    linear: float = 1e-3  # of the tool [m]
+    angular: float = math.radians(1.0)  # of the tool, and of a joint [rad]
+    duration: float = 0.2  # least time of a step [s]
 
     def pulse(self, jog: Jog, scales: Scales) -> tuple[Jog, float]:
         """Return the motion that makes a step, and how long it takes [s].

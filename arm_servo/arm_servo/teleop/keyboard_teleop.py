@@ -18,7 +18,7 @@ from operator_input import (
     Style,
 )
 
-from ..core.requests import CommandType
+from ..core.mailbox import CommandType
 from .jog import CartesianJog, Frame, Jog, JointJog, ServoReport, ServoRequest, Steps, Vector
 
 if TYPE_CHECKING:
@@ -85,14 +85,7 @@ REQUESTS: dict[str, Request] = {
 
 
 class KeyboardTeleop(KeyMapping):
-    """Moves while a key of the map is held, or by one step for each stroke.
-
-    Attributes:
-        speed: Share of full speed, up to 1.
-        frame: Along whose axes the tool is jogged.
-        sign: Direction of the joint keys, 1 or -1.
-        stepping: Each stroke is one step.
-    """
+    """Moves while a key of the map is held, or by one step for each stroke."""
 
     introduction = HELP
     robot: ServoLink
@@ -106,10 +99,10 @@ class KeyboardTeleop(KeyMapping):
         steps: Steps,
     ) -> None:
         super().__init__(robot, held, stream)
-        self.speed = speed
-        self.frame = Frame.BASE
-        self.sign = 1
-        self.stepping = False
+        self.speed = speed  # share of full speed, up to 1
+        self.frame = Frame.BASE  # along whose axes the tool is jogged
+        self.sign = 1  # direction of the joint keys, 1 or -1
+        self.stepping = False  # each stroke is one step
         self._steps = steps
         self._step: tuple[Jog, float] | None = None  # motion and its end
         self._last_note = ('', 0.0)  # a key that moves nothing, and when it was struck last

@@ -28,10 +28,6 @@ class GamepadTeleop(DeadmanMapping):
     """Moves while the deadman is held and a stick is away from rest.
 
     At rest it asks for nothing, so that it does not overrule a trajectory.
-
-    Attributes:
-        frame: Along whose axes the tool is jogged.
-        joint: Place of the joint that the d-pad moves.
     """
 
     robot: ServoLink
@@ -46,8 +42,8 @@ class GamepadTeleop(DeadmanMapping):
     ) -> None:
         """Start idle, with the shares of full speed at a stick's end, without and with turbo."""
         super().__init__(robot, deadman, stream, warn)
-        self.frame = Frame.BASE
-        self.joint = 0
+        self.frame = Frame.BASE  # along whose axes the tool is jogged
+        self.joint = 0  # place of the joint that the d-pad moves
         self._speeds = dict(zip((Grip.HELD, Grip.TURBO), speeds, strict=True))
 
     def wanted(self, now: float) -> Jog | None:
@@ -98,9 +94,6 @@ class ServoGamepad(TeleopNode):
     @destroyed_when_refused
     def __init__(self, devices: InputDevices | None = None) -> None:
         """Declare the parameters, and connect.
-
-        Args:
-            devices: Where gamepads are; those of this machine when it is None.
 
         Raises:
             ParameterError: A parameter is misspelt or makes no sense.

@@ -27,7 +27,7 @@ from arm_model import ArmNames, ModelError, names_of
 from node_runner import LATCHED, ParameterReader
 from operator_input import CommandStream
 
-from ..core.requests import CommandType
+from ..core.mailbox import CommandType
 from .jog import (
     Frame,
     Jog,
@@ -56,13 +56,6 @@ class ServoSettings:
     """Asks the servo, again and again until it has answered."""
 
     def __init__(self, node: Node, servo: str, changed: Callable[[], None]) -> None:
-        """Prepare.
-
-        Args:
-            node: The node that asks.
-            servo: Full name of the servo's node.
-            changed: Called when all answers are there.
-        """
         self._client = node.create_client(GetParameters, f'{servo}/get_parameters')
         self._changed = changed
         self._values: dict[str, Any] = {}

@@ -1,26 +1,127 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The motion core in a thread of its own, for drives that are commanded over topics."""
+"""The motion core in a thread of its own, for drives that are commanded over topics.
+
+It watches whether the arm goes where it is sent, however late drives and joint states are.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 import math
 import threading
 import time
 
 import numpy as np
 
-from arm_model import Array, frozen, RobotState
+from arm_model import Array, frozen, JointLimits, RobotState
 from arm_trajectory import GoalCode, hard_brake
 from realtime_loop import CycleTimer
 from robot_primitives import JointSample, JointStateStore
 
-from ..controllers.controller import SetPoint, Source
-from ..core.gateway import CommandGateway
-from ..report import MotionReport
-from .following import FollowingWatch
+from .controllers.controller import MotionReport, SetPoint, Source
+from .core.gateway import CommandGateway
+
+REST_TOLERANCE = 0.002
+"""How far an arm at rest may turn by itself in [rad]; more was done by others."""
+
+MEAN_GAIN = 0.1  # share of a new measurement in the mean and in the noise of an arm at rest
+
+NOISE_ALLOWANCE, MEAN_ALLOWANCE = 8.0, 2.0
+"""How many times its noise a measurement, and the mean of many, may be off by itself."""
+
+ARRIVAL_TOLERANCE = 0.02
+"""The same while it may still be on its last way, from all that was commanded."""
+
+
+@dataclass(frozen=True, slots=True)
+class FollowingLimits:
+    """When an arm counts as not following."""
+
+    error: float = 0.2  # how far a joint may be from where it was sent in [rad]; 0 is any distance
+    delay: float = 0.2  # how late it may be there in [s]
+
+
+class FollowingWatch:
+    """Compares measured positions with all that was commanded during the delay.
+
+    An arm that follows late is somewhere between these commands, so its error is zero at any
+    speed; one that does not follow is left behind.
+    """
+
+    def __init__(self, joints: JointLimits, limits: FollowingLimits, period: float) -> None:
+        self._joints = joints
+        self._limits = limits
+        self._commands = np.zeros((math.ceil(limits.delay / period) + 1, len(joints)))
+        self._turn = 0
+        self._quiet = math.ceil(limits.delay / period)
+        self._still = 0
+        self._rest = self._mean = self._last = self._commands[0]
+        self._noise = np.zeros(len(joints))
+
+    def begin(self, positions: Array) -> None:
+        """Begin where the arm stands."""
+        self._commands[:] = positions
+        self._rest = self._mean = self._last = positions
+
+    def command(self, positions: Array) -> None:
+        """Note the command of a cycle."""
+        self._turn = (self._turn + 1) % len(self._commands)
+        self._commands[self._turn] = positions
+
+    def errors(self, measured: Array) -> Array:
+        """Return how far each joint is from all of its commands in [rad]."""
+        measured = self._unwound(measured, self._commands[self._turn])
+        lower, upper = self._commands.min(axis=0), self._commands.max(axis=0)
+        errors: Array = np.maximum(np.maximum(lower - measured, measured - upper), 0.0)
+        return errors
+
+    def moved(self, measured: Array, *, quiet: bool) -> bool:
+        """Whether others have moved the arm since it came to rest; once a cycle.
+
+        Drives need not stand exactly where they were sent, so what counts is where they stood.
+        Encoders are noisy: how much so is learned at rest.
+        """
+        self._still = self._still + 1 if quiet else 0
+        if self._still <= 1:
+            self._mean = self._last = measured
+        allowed = np.maximum(REST_TOLERANCE, NOISE_ALLOWANCE * self._noise)
+        self._learn(measured)
+        if self._still <= self._quiet:
+            self._rest = self._mean
+            return quiet and bool(self.errors(measured).max() > ARRIVAL_TOLERANCE)
+        aside = np.abs(self._unwound(measured, self._rest) - self._rest)
+        drifted = np.abs(self._mean - self._rest)
+        return bool(
+            np.any(aside > allowed)
+            or np.any(drifted > np.maximum(REST_TOLERANCE, MEAN_ALLOWANCE * self._noise))
+        )
+
+    def _learn(self, measured: Array) -> None:
+        """Update the mean and the noise by a measurement."""
+        near = self._unwound(measured, self._last)
+        self._noise = self._noise + MEAN_GAIN * (np.abs(near - self._last) - self._noise)
+        self._last = near
+        self._mean = self._mean + MEAN_GAIN * (self._unwound(measured, self._mean) - self._mean)
+
+    def _unwound(self, measured: Array, near: Array) -> Array:
+        """Add whole turns to continuous joints."""
+        return near - self._joints.error(near, measured)
+
+    def problem(self, measured: Array) -> str:
+        """Describe the joint that does not follow; empty when all do."""
+        errors = self.errors(measured)
+        worst = int(np.argmax(errors))
+        if not 0.0 < self._limits.error < errors[worst]:
+            return ''
+        joint = self._joints.names[worst]
+        return (
+            f'{joint} does not follow: it is {errors[worst]:.3f} rad from where it was sent; does'
+            ' its controller take set-points, and is its way free? Let go, and command again'
+        )
+
 
 RESYNC_SILENCE = 0.3
 """Silence of all clients in [s] after which an arm that did not follow accepts commands."""
@@ -71,36 +172,23 @@ class JointFeedback(JointStateStore):
 
 
 class MotionCycle:
-    """What is done in a cycle; reads no clock.
-
-    Attributes:
-        closing: Why the arm comes to rest for good; empty before the end.
-    """
+    """What is done in a cycle; reads no clock."""
 
     def __init__(
         self,
         gateway: CommandGateway,
         feedback: JointFeedback,
+        # takes the set-points while something moves, and the last at rest
         output: Callable[[SetPoint], None],
         watch: FollowingWatch,
     ) -> None:
-        """Wait for the arm.
-
-        Args:
-            output: Takes the set-points while something moves, and the last at rest.
-        """
         self._gateway, self._feedback, self._output = gateway, feedback, output
         self._state = RobotState.at_rest(np.zeros(len(gateway.model)))
         self._watch = watch
-        self.closing = ''
+        self.closing = ''  # why the arm comes to rest for good; empty before the end
         self._compared = -math.inf
         self._failure, self._failed = '', -math.inf
-        self._quiet = True
-
-    @property
-    def at_rest(self) -> bool:
-        """Whether nothing moves."""
-        return self._quiet
+        self.at_rest = True  # whether nothing moves
 
     def step(self, now: float, period: float) -> None:
         """Run a cycle."""
@@ -132,7 +220,7 @@ class MotionCycle:
         """Slow the last set-point down, without the core; for when the core has failed."""
         self._state = hard_brake(self._state, self._gateway.model.limits, period)
         self._output(SetPoint(self._state, Source.NONE, MotionReport()))
-        self._quiet = not self._state.moving
+        self.at_rest = not self._state.moving
 
     def _kept(self, now: float) -> str:
         """Return why the arm did not follow, as long as somebody goes on to command it."""
@@ -142,10 +230,10 @@ class MotionCycle:
 
     def _compare(self, position: Array, now: float) -> str:
         """Begin where others have moved the arm at rest; say when it does not follow."""
-        if self._watch.moved(position, quiet=self._quiet):
+        if self._watch.moved(position, quiet=self.at_rest):
             self._gateway.reset(position)
             self._watch.begin(position)
-        if self._quiet:
+        if self.at_rest:
             return ''
         if self._feedback.time == self._compared:  # nothing new was received
             return ''
@@ -157,29 +245,21 @@ class MotionCycle:
         self._state = point.state
         self._watch.command(self._state.position)
         idle = point.source is Source.NONE and not point.state.moving
-        if not (idle and self._quiet):
+        if not (idle and self.at_rest):
             self._output(point)
-        self._quiet = idle
+        self.at_rest = idle
 
 
 class MotionThread:
-    """Runs cycles at absolute deadlines of the monotonic clock; after a stall it skips some.
-
-    Attributes:
-        error: What a cycle has raised; the arm was braked, and no cycle follows.
-        ended: Set when the last cycle is over.
-    """
+    """Runs cycles at absolute deadlines of the monotonic clock; after a stall it skips some."""
 
     def __init__(
         self, cycle: MotionCycle, period: float, begin: Callable[[], None] = lambda: None
     ) -> None:
-        """Prepare.
-
-        Args:
-            begin: Called once in the thread, before the first cycle.
-        """
+        """Prepare; ``begin`` is called once in the thread, before the first cycle."""
+        # what a cycle has raised; the arm was braked, and no cycle follows
         self.error: Exception | None = None
-        self.ended = threading.Event()
+        self.ended = threading.Event()  # set when the last cycle is over
         self._cycle, self._period = cycle, period
         self._begin = begin
         self._failed: Callable[[], None] = lambda: None
@@ -188,11 +268,7 @@ class MotionThread:
         self._thread = threading.Thread(target=self._run, name='motion', daemon=True)
 
     def start(self, failed: Callable[[], None] = lambda: None) -> None:
-        """Begin to run.
-
-        Args:
-            failed: Called in the thread when a cycle has raised, see :attr:`error`.
-        """
+        """Begin to run."""
         self._failed = failed
         self._thread.start()
 

@@ -1,12 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The servo's topics and services on a node."""
+"""MoveIt's servo node: topics and services of moveit_servo on the motion core.
+
+Its status has moveit_servo's code, and in words what limits the motion.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
+from enum import IntEnum
 from functools import partial
 import time
 import traceback
@@ -25,14 +29,76 @@ from arm_model import ArmError, CommandError, ModelError
 from arm_model.ros import seconds, TfListener
 from arm_trajectory import GoalCode
 
-from ...controllers.controller import JOGGING, Outcome, Source
-from ...core.gateway import CommandGateway
-from ...core.requests import CommandType, DisplacementRequest, JogRequest, StopRequest
-from ...exceptions import NotReadyError
-from ..refusals import Refusals
-from .command_converter import CommandConverter
-from .parameters import PREFIX, read_scales, Scales, ServoParameters
-from .status import status_of
+from ..controllers.controller import Cause, JOGGING, MotionReport, NotReadyError, Outcome, Source
+from ..core.gateway import CommandGateway
+from ..core.mailbox import CommandType, DisplacementRequest, JogRequest, Snapshot, StopRequest
+from .motion_goals import Refusals
+from .servo_commands import CommandConverter, PREFIX, read_scales, Scales, ServoParameters
+
+HALTED_SPEED_FACTOR = 0.02  # share of the asked speed below which a motion counts as halted
+
+
+class StatusCode(IntEnum):
+    """Codes of moveit_msgs/msg/ServoStatus in Jazzy."""
+
+    INVALID = -1
+    NO_WARNING = 0
+    DECELERATE_FOR_APPROACHING_SINGULARITY = 1
+    HALT_FOR_SINGULARITY = 2
+    DECELERATE_FOR_LEAVING_SINGULARITY = 3
+    DECELERATE_FOR_COLLISION = 4
+    HALT_FOR_COLLISION = 5
+    JOINT_BOUND = 6
+
+
+def code_of(report: MotionReport) -> StatusCode:
+    """Return the code for what limits most; speed and acceleration have none."""
+    for limiter in report.limiters:
+        halted = limiter.factor < HALTED_SPEED_FACTOR
+        if limiter.cause is Cause.COLLISION:
+            return StatusCode.HALT_FOR_COLLISION if halted else StatusCode.DECELERATE_FOR_COLLISION
+        if limiter.cause is Cause.SINGULARITY:
+            return (
+                StatusCode.HALT_FOR_SINGULARITY
+                if halted
+                else StatusCode.DECELERATE_FOR_APPROACHING_SINGULARITY
+            )
+        if limiter.cause is Cause.JOINT_POSITION:
+            return StatusCode.JOINT_BOUND
+    return StatusCode.NO_WARNING
+
+
+def status_of(
+    snapshot: Snapshot, refusal: str, paused: str, capped: str, age: float = 0.0
+) -> tuple[int, str]:
+    """Return code and message.
+
+    Args:
+        refusal: Why the last command was refused, with the remedy; empty when it was not.
+    """
+    if refusal:
+        return int(StatusCode.INVALID), refusal
+    if stale := snapshot.stale(age):
+        return int(StatusCode.INVALID), stale
+    if snapshot.set_point is None or snapshot.blocked:
+        return int(StatusCode.INVALID), snapshot.blocked
+    if paused:
+        return int(StatusCode.NO_WARNING), paused
+    if snapshot.paused:
+        return int(StatusCode.NO_WARNING), 'the arm is held; ~/resume of the trajectory controller'
+    report = snapshot.set_point.report
+    if snapshot.source is not Source.JOG:
+        words = _idle(snapshot.source)
+        return int(code_of(report)), f'{words}; {report}' if report.limiters else words
+    words = str(report) if not capped else f'{capped}; {report}'
+    return int(code_of(report)), words
+
+
+def _idle(source: Source) -> str:
+    if source is Source.TRAJECTORY:
+        return 'a trajectory moves the arm; a command takes over'
+    return 'moves to a target' if source is Source.TARGET else 'ready'
+
 
 Convert = Callable[[Any, float], JogRequest | DisplacementRequest]
 
@@ -43,20 +109,12 @@ class ServoModes:
     """Says which commands are admitted.
 
     Until somebody chooses a type every command is taken for what it is.
-
-    Attributes:
-        paused: Why the servo takes no commands; empty when it does.
     """
 
     def __init__(self, node: Node, stop: Callable[[str], None], renew: Callable[[], None]) -> None:
-        """Offer the services.
-
-        Args:
-            stop: Brings jogging to rest, for a reason.
-            renew: Takes what comes from now on for a new jog.
-        """
-        self.paused = ''
-        self._stop_jogging, self._renew = stop, renew
+        self.paused = ''  # why the servo takes no commands; empty when it does
+        self._stop_jogging = stop  # brings jogging to rest, for a reason
+        self._renew = renew  # takes what comes from now on for a new jog
         self._kind: CommandType | None = None
         node.create_service(ServoCommandType, '~/switch_command_type', self._switch)
         node.create_service(SetBool, '~/pause_servo', self._pause)

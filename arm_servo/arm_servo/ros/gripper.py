@@ -1,29 +1,151 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The gripper controller's actions on a node."""
+"""The gripper controller on a node: its parameters, under gripper_controllers' names, and actions.
+
+Both actions, for one joint and for several, become single targets of the joints.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+import math
 import time
 from typing import Any
 
+from control_msgs.action import GripperCommand, ParallelGripperCommand
 import numpy as np
 from rclpy.node import Node
+from sensor_msgs.msg import JointState
 
-from arm_model import Array, RobotState
+from arm_model import Array, CommandError, RobotState
 from arm_trajectory import GoalCode
+from node_runner import ParameterReader
 from node_runner.action_goals import Ending
 
-from ...controllers.controller import CONTINUED, Outcome, refused, Source
-from ...core.gateway import CommandGateway
-from ...core.motion_queue import MotionCommand
-from ...core.requests import TargetRequest
-from ..motion_goals import MotionGoal, MotionGoals
-from .interfaces import GripperInterface, GripperState, PARALLEL, SINGLE
-from .parameters import GripperParameters
+from ..controllers.controller import CONTINUED, Outcome, refused, Source
+from ..core.gateway import CommandGateway
+from ..core.mailbox import TargetRequest
+from ..core.motion_queue import MotionCommand
+from .motion_goals import MotionGoal, MotionGoals
+
+
+@dataclass(frozen=True, slots=True)
+class GripperState:
+    """Where a gripper is."""
+
+    joints: Sequence[str]  # names of its joints
+    measured: RobotState  # what was measured of them
+    stalled: bool = False  # it does not move although it is not at the goal
+    reached: bool = False  # it is at the goal
+
+
+@dataclass(frozen=True, slots=True)
+class GripperInterface:
+    """An action of a gripper; its goals and messages have no type."""
+
+    action: Any
+    name: str
+    request: Callable[[Any, Sequence[str]], TargetRequest]  # what a goal asks of the joints
+    asks_effort: Callable[[Any], bool]  # whether a goal asks for a limit of effort
+
+    def feedback(self, state: GripperState) -> Any:  # noqa: ANN401
+        """Return a state as feedback."""
+        return _message(self.action.Feedback, state)
+
+    def result(self, state: GripperState) -> Any:  # noqa: ANN401
+        """Return a state as result."""
+        return _message(self.action.Result, state)
+
+
+def _single_request(goal: Any, joints: Sequence[str]) -> TargetRequest:  # noqa: ANN401
+    return TargetRequest(_finite({joints[0]: goal.command.position}))
+
+
+def _parallel_request(goal: Any, joints: Sequence[str]) -> TargetRequest:  # noqa: ANN401
+    """Return what a goal asks; one joint need not be named."""
+    command = goal.command
+    names = list(command.name) or list(joints[:1])
+    if len(names) != len(command.position):
+        raise CommandError(f'{len(names)} names, but {len(command.position)} positions')
+    if lost := [name for name in names if name not in joints]:
+        raise CommandError(f'no joint {lost[0]!r} in the gripper; joints: {", ".join(joints)}')
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise CommandError(f'joint {twice[0]!r} is named twice')
+    if wrong := [speed for speed in command.velocity if not speed >= 0.0]:
+        raise CommandError(f'velocity {wrong[0]}: it must be above 0, or 0 for the limit')
+    speeds = [speed for speed in command.velocity if speed > 0.0]
+    targets = _finite(dict(zip(names, command.position, strict=True)))
+    return TargetRequest(targets, min(speeds, default=math.inf))
+
+
+def _finite(positions: Mapping[str, float]) -> Mapping[str, float]:
+    for name, position in positions.items():
+        if not math.isfinite(position):
+            raise CommandError(f'{name}: {position} is no position')
+    return positions
+
+
+def _message(kind: Any, state: GripperState) -> Any:  # noqa: ANN401
+    """Return a state as a message, which may lack some of the fields."""
+    measured = state.measured
+    fields = {
+        'position': float(measured.position[0]),
+        'state': JointState(
+            name=list(state.joints),
+            position=measured.position.tolist(),
+            velocity=measured.velocity.tolist(),
+        ),
+        'stalled': state.stalled,
+        'reached_goal': state.reached,
+    }
+    known = kind.get_fields_and_field_types()
+    return kind(**{name: value for name, value in fields.items() if name in known})
+
+
+SINGLE = GripperInterface(
+    GripperCommand, '~/gripper_cmd', _single_request, lambda goal: bool(goal.command.max_effort)
+)
+"""The position of the one joint."""
+
+PARALLEL = GripperInterface(
+    ParallelGripperCommand,
+    '~/parallel_gripper_cmd',
+    _parallel_request,
+    lambda goal: any(goal.command.effort),
+)
+"""Positions of joints, and how fast at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class GripperParameters:
+    """How the gripper controller behaves."""
+
+    goal_tolerance: float  # how far a joint may be off at the goal in [rad] or [m]
+    stall_velocity: float  # speed below which a joint does not move in [rad/s] or [m/s]
+    # time without motion in front of the goal after which it is stalled in [s]
+    stall_timeout: float
+    allow_stalling: bool  # whether a goal that ends stalled succeeds: something is held
+
+
+def declare_gripper(node: Node) -> GripperParameters:
+    """Declare the parameters of the gripper controller."""
+    read = ParameterReader(node)
+    return GripperParameters(
+        read.number(
+            'goal_tolerance', 0.002, (0.0, 10.0), 'how far a joint may be off [rad] or [m]'
+        ),
+        read.number(
+            'stall_velocity_threshold',
+            0.001,
+            (0.0, 10.0),
+            'speed below which a joint does not move [rad/s] or [m/s]',
+        ),
+        read.number('stall_timeout', 1.0, (0.05, 60.0), 'time without motion that is a stall [s]'),
+        read.flag('allow_stalling', 'a goal that ends stalled succeeds', default=False),
+    )
+
 
 WATCH_RATE = 20.0  # rate of feedback in [Hz]
 
@@ -55,14 +177,10 @@ class GripperController:
         node: Node,
         gateway: CommandGateway,
         parameters: GripperParameters,
-        check_active: Callable[[], None],
+        check_active: Callable[[], None],  # raises an ArmError where no motion may begin
         prepare: Callable[[], object],
     ) -> None:
-        """Offer them; the first only for a gripper of one joint.
-
-        Args:
-            check_active: Raises an ArmError where no motion may begin.
-        """
+        """Offer them; the first only for a gripper of one joint."""
         self._node, self._gateway = node, gateway
         self._parameters = parameters
         self._check_active, self._prepare = check_active, prepare

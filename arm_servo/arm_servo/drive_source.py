@@ -14,8 +14,8 @@ from arm_canopen import AxisFeedback, MotionSource, Refusal, RefusalCause, Setpo
 from arm_model import Array, frozen, RobotState
 from arm_trajectory import GoalCode
 
-from ..controllers.controller import Source
-from ..core.gateway import CommandGateway
+from .controllers.controller import Source
+from .core.gateway import CommandGateway
 
 POWER = 'look after its power and its cable'
 MODE = 'call its ~/cyclic_position_mode or ~/interpolated_position_mode'
@@ -169,12 +169,7 @@ class DriveSource:
     """
 
     def __init__(self, gateway: CommandGateway) -> None:
-        """Wait for the drives.
-
-        Args:
-            gateway: Commands to the core; it is stepped here only.
-        """
-        self._gateway = gateway
+        self._gateway = gateway  # it is stepped here only
         self._axes = list(gateway.model.joints)
         self._released: dict[str, Refusal | str] = dict.fromkeys(self._axes, NOT_ATTACHED)
         self._left: set[str] = set()  # drives that dropped out since all of them followed

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Trajectories on the controller's topic: one is a request, a stream that goes on is none."""
+"""Streams of clients that go on after a stop move nothing: jogs that are held, trajectories."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ import pytest
 import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
-from servo_drives import Drives, PERIOD
+from servo_commands import Drives, PERIOD
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_canopen import Refusal, RefusalCause
 from arm_model import JointLimits
-from arm_servo import CoreSettings, ExecutionSettings
-from arm_servo.core.mailbox import TOGETHER
-from arm_servo.ros.trajectory.controller import TrajectoryController
-from arm_servo.ros.trajectory.parameters import declare_trajectory
+from arm_servo import CoreSettings, ExecutionSettings, JogRequest, JointCommand, Source
+from arm_servo.core.mailbox import by_joint, TOGETHER
+from arm_servo.ros.trajectory import TrajectoryController
+from arm_servo.ros.trajectory_goals import declare_trajectory
 from arm_trajectory import GoalRules
 
 STEP = 0.004  # how far each trajectory of a stream goes in [rad]
@@ -126,8 +126,8 @@ def halts(arm: Arm) -> None:
     arm.drives.source.released('panda_joint1', Refusal(RefusalCause.COMMANDED, 'halted'))
 
 
-def faults(arm: Arm) -> None:
-    """A drive faults, and somebody resets it."""
+def drive_faults(arm: Arm) -> None:
+    """A drive drive_faults, and somebody resets it."""
     axis = arm.drives.axes[1]
     arm.drives.axes[1] = replace(axis, followable=False, refusal=Refusal(RefusalCause.FAULT))
     arm.drives.run(100)
@@ -135,7 +135,7 @@ def faults(arm: Arm) -> None:
 
 
 @pytest.mark.parametrize('pause', [0.0, 0.6, 3.0])
-@pytest.mark.parametrize('happens', [halts, faults])
+@pytest.mark.parametrize('happens', [halts, drive_faults])
 def test_a_stream_that_goes_on_moves_no_arm_that_was_stopped(
     arm: Arm, happens: Callable[[Arm], None], pause: float
 ) -> None:
@@ -237,3 +237,140 @@ def test_an_empty_trajectory_stops(arm: Arm) -> None:
     arm.wait(1.0)
     assert arm.position == rest
     assert max(abs(b[0] - a[0]) for a, b in pairwise(arm.drives.path)) < 0.02
+
+
+class Stick:
+    """A client that jogs the first joint of an arm whose drives others may take."""
+
+    def __init__(self, client: str = 'stick') -> None:
+        self.drives = Drives()
+        self.drives.attach()
+        self.drives.run(2)
+        self.client = client
+        self.refusals: list[str] = []
+
+    def push(self, speed: float, cycles: int = 1) -> None:
+        """Command a speed in each cycle, as the servo node does."""
+        for _ in range(cycles):
+            velocities = {'panda_joint1': speed}
+            command = JointCommand(*by_joint(self.drives.gateway.model, velocities, 'velocities'))
+            request = JogRequest(command, self.drives.now + 0.1, client=self.client)
+            future = self.drives.gateway.command(request, self._get_ready)
+            self.drives.run()
+            if (error := future.exception(0.0)) is not None:
+                self.refusals.append(str(error))
+
+    def wait(self, seconds: float) -> None:
+        """Command nothing."""
+        self.drives.run(round(seconds / PERIOD))
+
+    @property
+    def position(self) -> float:
+        """Where the joint was sent in [rad]."""
+        return self.drives.axes[0].setpoint
+
+    def _get_ready(self) -> None:
+        if self.drives.source.detached:
+            self.drives.attach()
+
+
+def halt(stick: Stick) -> None:
+    """Halt a drive from outside."""
+    stick.drives.source.released('panda_joint1', Refusal(RefusalCause.COMMANDED, 'halted'))
+
+
+def is_enabled(stick: Stick) -> None:
+    """Select the mode in which the drives follow, as ``--enable`` does."""
+    for name in stick.drives.source.axes:
+        selected = Refusal(RefusalCause.MODE_SELECTED, 'Cyclic synchronous position')
+        stick.drives.source.released(name, selected)
+
+
+def faults(stick: Stick) -> None:
+    """Fault a drive, and reset it from outside."""
+    axis = stick.drives.axes[1]
+    faulted = Refusal(RefusalCause.FAULT)
+    stick.drives.axes[1] = replace(axis, followable=False, refusal=faulted)
+    stick.drives.run(100)
+    stick.drives.axes[1] = axis
+
+
+@pytest.mark.parametrize('pause', [0.0, 0.6, 3.0])
+@pytest.mark.parametrize('happens', [halt, is_enabled, faults])
+def test_a_stick_that_is_held_moves_nothing_after_a_stop(
+    happens: Callable[[Stick], None], pause: float
+) -> None:
+    """Its commands pause as a stalled process makes them; let go and pushed again, it moves."""
+    stick = Stick()
+    stick.push(0.2, 50)
+    assert stick.drives.gateway.snapshot.source is Source.JOG
+    happens(stick)
+    stick.wait(1.0)
+    rest, attached = stick.position, len(stick.drives.attachments)
+    stick.wait(pause)
+    stick.push(0.2, 100)
+    assert stick.position == pytest.approx(rest, abs=1e-6)
+    assert len(stick.drives.attachments) == attached
+    assert 'release and jog again' in stick.refusals[-1]
+    assert 'call its ~/cyclic_position_mode' not in stick.refusals[-1]  # it is selected
+    stick.push(0.0)
+    stick.push(0.2, 50)
+    assert stick.position > rest + 0.02
+
+
+def test_a_stick_that_is_held_moves_no_arm_that_is_enabled() -> None:
+    """It was pushed while the drives were disabled; they were enabled for something else."""
+    stick = Stick()
+    stick.wait(1.0)
+    enabled, disabled = list(stick.drives.axes), Refusal(RefusalCause.NOT_ENABLED)
+    stick.drives.axes = [replace(axis, followable=False, refusal=disabled) for axis in enabled]
+    stick.wait(0.1)
+    stick.push(0.2, 100)
+    stick.drives.axes = enabled
+    rest = stick.position
+    stick.push(0.2, 100)
+    assert stick.position == pytest.approx(rest, abs=1e-6)
+    stick.push(0.0)
+    stick.push(0.2, 50)
+    assert stick.position > rest + 0.02
+
+
+def test_a_new_push_gets_the_drives_back() -> None:
+    """The stick was let go before somebody took a drive."""
+    stick = Stick()
+    stick.push(0.2, 50)
+    stick.push(0.0)
+    stick.wait(1.0)
+    halt(stick)
+    stick.wait(0.1)
+    rest = stick.position
+    stick.push(0.2, 50)
+    assert stick.position > rest + 0.02
+
+
+def test_others_need_not_let_go() -> None:
+    """Only who held when the arm stopped."""
+    stick = Stick()
+    stick.push(0.2, 50)
+    halt(stick)
+    stick.wait(1.0)
+    rest, stick.client = stick.position, 'another'
+    stick.push(0.2, 50)
+    assert stick.position > rest + 0.02
+
+
+@pytest.mark.parametrize('pause', [1.0, 3.0, 6.0])
+@pytest.mark.parametrize('happens', [halt, is_enabled, faults])
+def test_who_was_silent_before_a_stop_moves_the_arm_after_it(
+    happens: Callable[[Stick], None], pause: float
+) -> None:
+    """A client that lets go by silence, as those of moveit_servo do, held nothing."""
+    stick = Stick()
+    stick.push(0.2, 50)
+    stick.wait(5.0)
+    happens(stick)
+    stick.wait(pause)
+    rest = stick.position
+    stick.push(0.2, 50)
+    assert stick.refusals == []
+    assert stick.position > rest + 0.02

@@ -9,6 +9,8 @@ just so much that no joint is asked for more than its share of speed. The others
 A straight arm can fold to either side, and both bring the tool back. An arm that ran through the
 straight pose would come back on the other side, where a joint limit or a link may soon be in the
 way. So the joints are braked in front of it, and leave it to the side where they were.
+
+``command`` is the scaled twist that is asked (6).
 """
 
 from __future__ import annotations
@@ -74,11 +76,7 @@ class Directions:
         return bool(self.damping.any())
 
     def slowed(self, command: Array, fastest: float) -> Directions:
-        """Return these with the last direction damped to a speed of the joints along it.
-
-        Args:
-            command: Scaled twist that is asked (6).
-        """
+        """Return these with the last direction damped to a speed of the joints along it."""
         asked, least = abs(float(command @ self.tool[:, -1])), self.least
         needed = asked * least / max(fastest, MIN_SPEED) - least * least
         if needed <= self.damping[-1]:
@@ -125,16 +123,11 @@ def directions(jacobian: Array, command: Array, correction: Array, fastest: Arra
     return Directions(tool, joints, values, damping, share)
 
 
-def distance_to_singularity(
-    jacobian_at: Callable[[Array], Array], position: Array, found: Directions
-) -> float:
+def distance_to_singularity(jacobian_at: JacobianAt, position: Array, found: Directions) -> float:
     """Return how far along the last joint direction its singular value is gone, to first order.
 
     At the border of the reach the arm folds there to one side or the other: an arm that goes on
     comes back on the other side.
-
-    Args:
-        jacobian_at: Scaled Jacobian of joint positions.
 
     Returns:
         The way in [rad], below zero against the direction; infinity where there is none.
@@ -146,7 +139,7 @@ def distance_to_singularity(
 
 
 def way_out(
-    jacobian_at: Callable[[Array], Array], position: Array, found: Directions, command: Array
+    jacobian_at: JacobianAt, position: Array, found: Directions, command: Array
 ) -> Array | None:
     """Find joint speeds that lead out of a singular pose in the sense of a command.
 
@@ -155,10 +148,6 @@ def way_out(
     positive curvature moves the tool as asked; one with none, that yet turns J'u, leaves the tool
     in place and brings the lost direction back. Where every curvature is negative the tool is at
     the border of its reach.
-
-    Args:
-        jacobian_at: Scaled Jacobian of joint positions.
-        command: Scaled twist (6).
 
     Returns:
         A unit vector of joint speeds, of either sense; None when there is none.
@@ -202,16 +191,11 @@ class ReachLimit:
     """Stops in front of singular poses, and leads out of them.
 
     It remembers the sense in which a pose is left and where it was entered, and the last place
-    where the arm could do what was asked.
+    where the arm could do what was asked. A singular pose is left with the share ``escape`` of a
+    joint's speed; braking plans with the share ``braking`` of acceleration and jerk.
     """
 
     def __init__(self, limits: JointLimits, escape: float, braking: float) -> None:
-        """Remember nothing yet.
-
-        Args:
-            escape: Share of a joint's speed with which it leaves a singular pose.
-            braking: Share of acceleration and jerk that braking plans with.
-        """
         self._limits = limits
         self._escape, self._braking = escape, braking
         self._least_acceleration = braking * float(limits.acceleration.min())
@@ -228,12 +212,7 @@ class ReachLimit:
     def slowed(
         self, jacobian_at: JacobianAt, position: Array, found: Directions, command: Array
     ) -> Directions:
-        """Brake in front of the border, so as not to fold to the other side.
-
-        Args:
-            jacobian_at: Scaled Jacobian of joint positions.
-            command: Scaled twist that is asked (6).
-        """
+        """Brake in front of the border, so as not to fold to the other side."""
         self._remember(position, good=bool(command.any()) and not found.damped)
         asked = float(command @ found.tool[:, -1])
         nearest = found.least / MAX_SINGULAR_VALUE_RATE
@@ -262,12 +241,7 @@ class ReachLimit:
     def way_out(
         self, jacobian_at: JacobianAt, position: Array, found: Directions, command: Array
     ) -> WayOut | None:
-        """Return the way out of a singular pose, where the command needs one and has one.
-
-        Args:
-            jacobian_at: Scaled Jacobian of joint positions.
-            command: Scaled twist that is asked (6).
-        """
+        """Return the way out of a singular pose, where the command needs one and has one."""
         if not (found.lost.any() and command.any()):
             self._sense = self._entered = None
             return None
