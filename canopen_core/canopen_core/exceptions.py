@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Everything that the CANopen packages raise.
+"""Everything that the CANopen packages raise, and the findings of a configuration.
 
 ::
 

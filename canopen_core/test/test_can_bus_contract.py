@@ -6,20 +6,37 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
 from functools import partial
+import itertools
+import logging
 import math
+import os
 import socket
+import subprocess
+import sys
+import threading
 from threading import Thread, Timer
 from time import monotonic, sleep
 from typing import TypeAlias
 
-from can_addresses import free_multicast, free_virtual
-from can_receiving import DEADLINE, receive_count, unstamped
+from can_addresses import DEADLINE, free_multicast, free_virtual, receive_count, unstamped
 import pytest
 
 from canopen_core import BusError
-from canopen_core.can import Bus, can_interfaces, Frame, open_bus
+from canopen_core.can import (
+    Bus,
+    BusThread,
+    can_interfaces,
+    CanInterface,
+    Frame,
+    open_bus,
+    opening,
+    resolve_name,
+    VirtualBus,
+    VirtualWire,
+)
 from canopen_core.can.adapter import AdapterBus
 from canopen_core.can.socket_bus import SocketBus
 
@@ -282,3 +299,194 @@ def test_threads_may_close_and_open_buses_while_others_use_them(connect: Open) -
     for server in servers:
         server.join(10 * DEADLINE)
     assert len(served) == len(servers)
+
+
+MULTICAST = f'udp_multicast:239.74.7.2:{43113 + os.getuid() % 10_000}'
+
+
+@pytest.mark.parametrize(
+    ('interfaces', 'expected'),
+    [
+        ({}, MULTICAST),
+        ({'vcan0': CanInterface('vcan0', is_up=True, queue_length=1000)}, 'vcan0'),
+        (
+            {'vcan0': CanInterface('vcan0', is_up=False, queue_length=1000)},
+            MULTICAST,
+        ),
+        (
+            {'can0': CanInterface('can0', is_up=True, queue_length=10)},
+            MULTICAST,
+        ),
+    ],
+    ids=['none', 'vcan0', 'vcan0 down', 'real can0'],
+)
+def test_auto_takes_vcan0_when_it_is_up_and_never_real_hardware(
+    monkeypatch: pytest.MonkeyPatch, interfaces: dict[str, CanInterface], expected: str
+) -> None:
+    """Without a name nothing real is ever driven."""
+    monkeypatch.setattr(opening, 'can_interfaces', lambda: interfaces)
+    monkeypatch.setenv('ROS_DOMAIN_ID', '7')
+    assert resolve_name('auto') == expected
+
+
+def test_users_and_domains_have_buses_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And further ones for further robots: no two of them are the same."""
+    monkeypatch.setattr(opening, 'can_interfaces', dict)
+    names: list[str] = []
+    for user in (0, 1000, 1001):
+        monkeypatch.setattr(os, 'getuid', lambda user=user: user)
+        for domain in ('', '1', '232'):
+            monkeypatch.setenv('ROS_DOMAIN_ID', domain)
+            assert resolve_name('auto') == resolve_name('auto')
+            names += itertools.islice(opening.auto_names(), 3)
+    assert len(set(names)) == len(names)
+    for name in names:
+        with open_bus(name) as bus:
+            assert bus.name == name
+
+
+def test_auto_says_which_bus_it_took(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The choice is logged, and the bus has the name of what was chosen."""
+    chosen = free_virtual()
+    monkeypatch.setattr(opening, 'resolve_name', lambda name: chosen)
+    with caplog.at_level(logging.INFO), open_bus('auto') as bus:
+        assert bus.name == chosen
+    assert f'auto is {chosen}' in caplog.text
+
+
+@pytest.mark.parametrize('name', ['can0', 'udp_multicast', 'virtual:x', 'pcan:X@500000'])
+def test_other_names_mean_themselves(name: str) -> None:
+    """Only auto is a choice."""
+    assert resolve_name(name) == name
+
+
+@pytest.mark.parametrize('name', ['', ':', ':x', 'virtual:', 'pcan:'])
+def test_names_of_nothing_are_refused(name: str) -> None:
+    """An empty kind or channel names no bus, and the message says what would."""
+    with pytest.raises(BusError, match='take can0, vcan0, udp_multicast or auto'):
+        open_bus(name)
+
+
+def test_virtual_buses_of_different_names_do_not_meet() -> None:
+    """Two channels in one process are two wires, and one of the same name is one."""
+    name = free_virtual()
+    with open_bus(name) as one, open_bus(name) as two, open_bus(free_virtual()) as apart:
+        one.send(Frame(1))
+        assert len(two.receive(0.0)) == 1
+        assert apart.receive(0.0) == []
+
+
+def test_a_virtual_bus_that_nobody_reads_loses_and_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its queue has an end, so a forgotten bus does not fill the memory."""
+    monkeypatch.setattr('canopen_core.can.bus.QUEUE_FRAMES', 10)
+    name = free_virtual()
+    with open_bus(name) as sender, open_bus(name) as idle:
+        for number in range(15):
+            sender.send(Frame(number))
+        assert idle.counters.lost == 5
+        assert [frame.can_id for frame in idle.receive(0.0)] == list(range(10))
+
+
+def test_opening_a_bus_of_ours_does_not_import_python_can() -> None:
+    """python-can takes longer to import than a slave to start; only its adapters pay."""
+    program = (
+        'import sys; from canopen_core.can import open_bus; open_bus("virtual:x").close(); '
+        'open_bus("udp_multicast:239.127.1.2:20199").close(); sys.exit("can" in sys.modules)'
+    )
+    subprocess.run(
+        [sys.executable, '-c', program],
+        check=True,
+        timeout=60,
+        env={'PYTHONPATH': ':'.join(sys.path)},
+    )
+
+
+pytestmark = pytest.mark.slow
+
+TIMEOUT = 10.0  # [s] deadline for what takes milliseconds
+CALLERS, CALLS = 3, 2000
+
+
+@pytest.mark.parametrize('attempt', range(5))  # what may go wrong does not do so each time
+def test_all_that_is_handed_over_around_the_end_is_answered(
+    attempt: int, request: pytest.FixtureRequest
+) -> None:
+    """Several threads refuse the work that is left, each of them what the others have not."""
+    request.addfinalizer(partial(sys.setswitchinterval, sys.getswitchinterval()))
+    sys.setswitchinterval(1e-6)
+    begun, ending = threading.Event(), threading.Event()
+
+    def serve() -> None:
+        begun.wait(TIMEOUT)
+        thread.do_work()
+        ending.wait(TIMEOUT)
+
+    def hand_over() -> list[Future[None]]:
+        return [thread.call(lambda: None) for _ in range(CALLS)]
+
+    thread = BusThread(VirtualBus('here', VirtualWire()), 'owner', serve, 'the owner')
+    running: Future[None] = thread.run_later(lambda future: begun.set())
+    thread.start()
+    begun.set()
+    with ThreadPoolExecutor(CALLERS) as pool:
+        waiting = [future for _ in range(CALLERS) for future in hand_over()]
+        callers = [pool.submit(hand_over) for _ in range(CALLERS)]
+        ending.set()
+        late = [future for caller in callers for future in caller.result()]
+    thread.stop()
+    for future in (running, *waiting, *late):
+        assert future.exception(TIMEOUT) is None or isinstance(future.exception(), BusError)
+    with pytest.raises(BusError, match='the owner has ended'):
+        running.result(TIMEOUT)
+
+
+def test_the_thread_does_not_wait_for_itself() -> None:
+    """It would stand still for good, with all that it keeps going."""
+
+    def serve() -> None:
+        while not thread.stopping:
+            thread.do_work()
+
+    thread = BusThread(VirtualBus('here', VirtualWire()), 'owner', serve, 'the owner')
+    thread.start()
+    try:
+        waits = thread.call(lambda: thread.call(lambda: None).result(TIMEOUT))
+        with pytest.raises(BusError, match='cannot wait for itself'):
+            waits.result(TIMEOUT)
+    finally:
+        thread.stop()
+
+
+class DefectiveBus(VirtualBus):
+    """A bus whose receiving fails twice."""
+
+    failures = 2
+
+    def receive(self, timeout: float) -> list[Frame]:
+        """Fail, then read."""
+        if self.failures:
+            self.failures -= 1
+            raise ZeroDivisionError
+        return super().receive(timeout)
+
+
+def test_a_defect_in_reading_the_bus_does_not_end_the_thread(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """What its owner does each cycle goes on; it is reported once."""
+    wire = VirtualWire()
+    bus, other = DefectiveBus('here', wire), VirtualBus('there', wire)
+    seen: list[Frame] = []
+
+    def serve() -> None:
+        while not seen:
+            seen.extend(thread.receive(TIMEOUT))
+
+    thread = BusThread(bus, 'owner', serve, 'the owner')
+    other.send(Frame(0x181, b''))
+    thread.start()
+    thread._thread.join(TIMEOUT)
+    assert [frame.can_id for frame in seen] == [0x181]
+    assert [record.message for record in caplog.records] == ['a defect in reading here']

@@ -15,8 +15,7 @@ from time import monotonic, sleep, time_ns
 
 import can
 from can.interfaces.udp_multicast.utils import pack_message
-from can_addresses import free_multicast
-from can_receiving import DEADLINE, receive_count, unstamped
+from can_addresses import DEADLINE, free_multicast, receive_count, unstamped
 from can_strategies import frames
 from hypothesis import example, given
 from hypothesis import strategies as st

@@ -13,7 +13,7 @@ import socket
 import struct
 import subprocess
 
-from can_receiving import receive_count, unstamped
+from can_addresses import receive_count, unstamped
 from can_strategies import frames
 from hypothesis import given
 from hypothesis import strategies as st

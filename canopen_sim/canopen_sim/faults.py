@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Begins and ends the faults of one simulated device."""
+"""The faults of one simulated device: the line that loses and changes frames, and the injector."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Several simulated devices on one bus."""
+"""Several simulated devices on one bus: who gets a frame, their thread, and a whole bus.yml."""
 
 from __future__ import annotations
 

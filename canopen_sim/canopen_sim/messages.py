@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Errors of a device: register 0x1001, history 0x1003 and EMCY messages (CiA 301, 7.2.7)."""
+"""EMCY, SYNC and TIME as a device sends and receives them (CiA 301, 7.2.5 to 7.2.7)."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def register_bits(code: int) -> int:
 
 
 class EmcyProducer:
-    """Keeps the active errors of a device and reports them on the network."""
+    """Keeps the active errors (0x1001) and their history (0x1003), and sends EMCY."""
 
     def __init__(self, store: ObjectStore, send: Callable[[Frame], None]) -> None:
         self._flush_at = self._repeat_at = NEVER

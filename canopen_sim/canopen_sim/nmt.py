@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""NMT state machine of a device (CiA 301, 7.3.2)."""
+"""NMT state machine and error control of a device (CiA 301, 7.2.8 and 7.3.2)."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@
 
 Inside the device an object is bound once, as a :class:`Variable`, and then read and written
 through its ``value``; only SDOs look it up by index. What an SDO may do is checked here, with
-the abort codes of CiA 301, table 22.
+the abort codes of CiA 301, table 22. Parameters are stored as 7.5.2.13 has it.
 """
 
 from __future__ import annotations
@@ -129,12 +129,7 @@ class Scalar(Variable):
 
 
 class Integer(Scalar):
-    """A whole number.
-
-    Attributes:
-        low: Smallest value of its type.
-        high: Largest value of its type.
-    """
+    """A whole number; low and high are the ends of its type."""
 
     __slots__ = ('high', 'low')
     value: int

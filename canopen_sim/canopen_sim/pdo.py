@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Receive PDOs of a device (CiA 301, 7.2.2 and 7.5.2.35)."""
+"""PDOs that a device receives and sends (CiA 301, 7.2.2, 7.5.2.35 and 7.5.2.37)."""
 
 from __future__ import annotations
 

@@ -21,12 +21,7 @@ from .object_store import check_cob_id, NEVER, ObjectStore, refusal, STRING_BYTE
 
 
 class BlockDownload:
-    """A block transfer by which a client writes.
-
-    Attributes:
-        index: Object index.
-        subindex: Sub-index.
-    """
+    """A block transfer by which a client writes."""
 
     def __init__(self, request: bytes) -> None:
         command, self.index, self.subindex, size = struct.unpack('<BHBI', request)
@@ -90,12 +85,7 @@ class BlockDownload:
 
 
 class BlockUpload:
-    """A block transfer by which a client reads.
-
-    Attributes:
-        index: Object index.
-        subindex: Sub-index.
-    """
+    """A block transfer by which a client reads."""
 
     def __init__(self, request: bytes, data: bytes) -> None:
         """Begin with the client's initiation, for the data of the object.
@@ -395,17 +385,6 @@ class SdoServers:
                 variable.check = partial(check_cob_id, variable)
                 variable.listener = self._reconfigure
         self._channels: dict[int, SdoServer] = {}
-        self.configure()
-
-    @property
-    def node_id(self) -> int:
-        """Id of the device."""
-        return self.default.can_id - CobId.SDO_REQUEST
-
-    @node_id.setter
-    def node_id(self, node_id: int) -> None:
-        self.default.can_id = CobId.SDO_REQUEST + node_id
-        self.default.response_id = CobId.SDO_RESPONSE + node_id
         self.configure()
 
     @property

@@ -12,8 +12,7 @@ import subprocess
 import sys
 from typing import TypeAlias
 
-from can_addresses import free_multicast, free_virtual
-from can_receiving import DEADLINE, unstamped
+from can_addresses import DEADLINE, free_multicast, free_virtual, unstamped
 from config_samples import write_bus
 import pytest
 from tool_environment import ENVIRONMENT, Output, REPOSITORY

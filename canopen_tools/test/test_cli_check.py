@@ -5,19 +5,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+import random
 import re
 import shutil
 import signal
 import subprocess
 import sys
+from typing import NamedTuple
 
 from can_addresses import free_multicast
+from config_mutations import mutated
 from config_samples import BUS, write_bus
+from device_rig import Rig
 from eds_samples import DRIVE_ROWS, eds_text, FACTOR_ROWS, Row
 import pytest
 from tool_environment import ENVIRONMENT, Output, REPOSITORY
 
+from arm_canopen.config.resolve.sdo_list import parameter_writes
+from canopen_core import Findings
+from canopen_core.eds import load_eds
+from canopen_core.standard import is_drive
+from canopen_tools import EdsReport, lint_eds
 from canopen_tools.cli.main import main
 
 pytestmark = pytest.mark.slow
@@ -191,3 +201,256 @@ def test_ctrl_c_ends_a_verb(prefix: tuple[str, ...]) -> None:
     output, errors = process.communicate(timeout=DEADLINE)
     assert process.returncode == 130
     assert output == errors == ''
+
+
+OWN_FILES = sorted(
+    path
+    for folder in ('arm_canopen/eds', 'arm_canopen/arm_canopen/config', 'arm_bringup/robots')
+    for path in (REPOSITORY / folder).rglob('*')
+    if path.suffix in ('.eds', '.dcf')
+)
+GOOD = eds_text(
+    replace(row, default='5') if 0x1400 <= row.index < 0x1600 and not row.subindex else row
+    for row in DRIVE_ROWS
+)
+"""The sample, whose RPDOs have one sub-index less than they say."""
+
+
+class Case(NamedTuple):
+    """A damaged file."""
+
+    section: str  # section in which something is replaced
+    old: str  # what
+    new: str  # by what
+    message: str  # pattern of what is said
+    # text of the line that is named, empty for any; None for that of ``new``
+    line: str | None = None
+
+
+WRONG_TYPE = Case('6041', 'DataType=0x0006', 'DataType=0x0007', 'Statusword: .* is UNSIGNED16')
+WRONG_COUNT = Case('1018sub0', 'DefaultValue=4', 'DefaultValue=3', 'the highest sub-index is 4')
+ERRORS = [
+    Case('1001', '[1001]', '[2FFF]', r'0x1001:00 \(error register\) is missing', line=''),
+    Case('1018sub1', '[1018sub1]', '[1018sub9]', r'0x1018:01 \(vendor id\) is missing', line=''),
+    Case('1018sub0', '[1018sub0]', '[1018sub5]', '0x1018 has no sub-index 0', line='[1018sub1]'),
+    WRONG_TYPE,
+    Case('6081', 'DefaultValue=1000', 'DefaultValue=50001', r'50001 .* \(at most 50000\)'),
+    Case('2001', 'PDOMapping=0', 'PDOMapping=1', 'VISIBLE_STRING has no fixed length'),
+    Case('1A00', '[1A00', '[2A00', 'TPDO 1 has no mapping: 0x1A00 is missing', line=''),
+    Case('1405', '[1405', '[2405', r'RPDO 6 has a mapping \(0x1605\), but no', line=''),
+    Case('1800sub1', '[1800sub1]', '[1800sub7]', r'TPDO 1 has no sub-index 1 \(COB-ID\)', line=''),
+    Case('1A00sub0', 'DefaultValue=0', 'DefaultValue=9', 'maps 9 .* 8 entries', line='[1A00sub0]'),
+]
+NONE_500 = ('BaudRate_500=0', 'supports no bit rate')
+WARNINGS = [
+    WRONG_COUNT,
+    Case('1018', 'SubNumber=5', 'SubNumber=4', 'SubNumber is 4, but 5 sub-indices'),
+    Case('MandatoryObjects', 'SupportedObjects=3', 'SupportedObjects=2', 'is 2, but 3 are listed'),
+    Case('ManufacturerObjects', '1=0x2000', '1=0x1008', 'second time, first in .OptionalObjects.'),
+    Case('MandatoryObjects', '2=0x1001', '2=0x6040', '0x6040 does not belong here'),
+    Case('2001', '[2001]', '[2000]', r'section \[2000\] was already opened'),
+    Case('2001', 'PDOMapping=0', 'AccessType=ro', 'AccessType was already given'),
+    Case('6041', 'AccessType=ro', 'AccessType=rw', 'but the object is read-only'),
+    Case('6060', 'AccessType=rww', 'AccessType=ro', 'written by the master'),
+    Case('2000', 'AccessType=rw', 'AccessType=rx', "unknown AccessType 'rx'"),
+    Case('2000', 'AccessType=rw', 'AccessType=rwr', 'but PDOMapping is 0', line='PDOMapping=0'),
+    Case('6040', 'PDOMapping=1', 'PDOMapping=0', r'into a RPDO \(PDOMapping 0, AccessType rww\)'),
+    Case('2002', 'ParameterName=Blob', 'ParameterName=', 'has no ParameterName'),
+    Case(
+        '1400sub1',
+        'DefaultValue=$NODEID+0x200',
+        'DefaultValue=0x201',
+        r'node id \(0x201\)',
+        line='[1400sub1]',
+    ),
+    Case(
+        '1A00sub1',
+        'DefaultValue=0',
+        'DefaultValue=0x55550010',
+        'maps 0x5555:00, which is not',
+        line='[1A00sub1]',
+    ),
+    Case(
+        '1A00sub1',
+        'DefaultValue=0',
+        'DefaultValue=0x60400010',
+        '1 maps 0x6040:00 .* cannot be',
+        line='[1A00sub0]',
+    ),
+    Case('DeviceInfo', 'VendorName=Sample', 'NrOfTXPDO=4', 'NrOfTXPDO is 4, but there are 6'),
+    Case('DeviceInfo', 'VendorName=Sample', 'VendorNumber=0x99', '0x99, but 0x1018:01 has 0x555'),
+    Case('DeviceInfo', 'VendorName=Sample', *NONE_500, line='[DeviceInfo]'),
+    Case('FileInfo', '[FileInfo]', '[Info]', r'no section \[FileInfo\]', line=''),
+    Case('MandatoryObjects', '[MandatoryObjects]', '[M]', r'no section \[Mandatory', line=''),
+]
+
+
+def damaged(case: Case) -> str:
+    """Return the text of a case; a head stands for its sub-sections, too."""
+    start = GOOD.index(f'[{case.section}]')
+    if case.old.endswith(']') or not case.old.startswith('['):
+        end = start + GOOD[start:].index(case.old) + len(case.old)
+        text = GOOD[: end - len(case.old)] + case.new + GOOD[end:]
+    else:
+        text = GOOD.replace(case.old, case.new)
+    if 'default mapping' in case.message or case.section == '1A00sub1':
+        head = text.index('[1A00sub0]')
+        place = text.index('DefaultValue=0', head)
+        text = text[:place] + 'DefaultValue=1' + text[place + len('DefaultValue=0') :]
+    return text
+
+
+def lint(folder: Path, text: str) -> EdsReport:
+    """Check a text."""
+    path = folder / 'drive.eds'
+    path.write_text(text, encoding='utf-8')
+    return lint_eds(path)
+
+
+@pytest.mark.parametrize('case', [*ERRORS, *WARNINGS], ids=lambda case: case.message)
+def test_damage_is_reported(tmp_path: Path, case: Case) -> None:
+    """Each kind of damage is an error or a warning at its line, with a remedy."""
+    text = damaged(case)
+    assert text != GOOD
+    report = lint(tmp_path, text)
+    problems = report.errors if case in ERRORS else report.warnings
+    found = [problem for problem in problems if re.search(case.message, problem.message)]
+    assert found, '\n'.join(map(str, report.errors + report.warnings))
+    assert found[0].remedy
+    line = case.new if case.line is None else case.line
+    assert line in {'', text.splitlines()[found[0].line - 1]}
+
+
+def test_a_good_file_has_nothing_to_report(tmp_path: Path) -> None:
+    """The file that every case starts from is right."""
+    report = lint(tmp_path, GOOD)
+    assert report.errors == report.warnings == ()
+
+
+@pytest.mark.parametrize('path', OWN_FILES, ids=lambda path: path.name)
+def test_our_own_files_are_right(path: Path) -> None:
+    """Every EDS and DCF that the workspace ships passes its own lint."""
+    assert OWN_FILES
+    report = lint_eds(path)
+    assert report.errors == report.warnings == ()
+
+
+def test_the_verb_prints_a_summary(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Several files, each with what it holds; exit code 1 when one has errors."""
+    good, bad = tmp_path / 'good.eds', tmp_path / 'bad.eds'
+    good.write_text(GOOD)
+    bad.write_text(damaged(WRONG_TYPE))
+    assert main(['eds', str(good)]) == 0
+    count = len({row.index for row in DRIVE_ROWS})
+    summary = f'{count} objects, 6 RPDOs, 6 TPDOs; 0 errors, 0 warnings'
+    assert capsys.readouterr().out == f'{good}: {summary}\n'
+    assert main(['eds', str(good), str(bad), str(tmp_path / 'none.eds')]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert re.search(r'bad.eds:\d+: error: \[6041\]: Statusword: the data type', lines[1])
+    assert lines[-1] == f'{tmp_path / "none.eds"}: 1 error, 0 warnings'
+
+
+def test_strict_takes_warnings_for_errors(tmp_path: Path) -> None:
+    """A file with a warning passes, unless it shall be strict."""
+    path = write_bus(tmp_path, eds=damaged(WRONG_COUNT)).with_name('drive.eds')
+    assert main(['eds', str(path)]) == 0
+    assert main(['eds', '--strict', str(path)]) == 1
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_damaged_files_are_read_or_refused(tmp_path: Path, seed: int) -> None:
+    """Whatever a file holds, the lint ends, and every problem has words and a line of the file."""
+    generator = random.Random(seed)
+    snippets = ('[1A00', '[1018sub0]', 'DefaultValue=$NODEID', 'CompactSubObj=300', '=', 'a' * 300)
+    for _ in range(60):
+        text = mutated(GOOD, snippets, generator)
+        report = lint(tmp_path, text)
+        for problem in report.errors + report.warnings:
+            assert problem.message
+            assert problem.remedy
+            assert 0 <= problem.line <= text.count('\n') + 1
+
+
+COMMON_ROWS = tuple(
+    replace(row, default='5') if 0x1400 <= row.index < 0x1600 and not row.subindex else row
+    for row in DRIVE_ROWS
+    if row.index < 0x6000 and row.index != 0x1000
+)
+OTHER_MEANINGS = (  # numbers that CiA 402 has, with types that it does not have
+    Row(0x6040, 0, 'Something else', 7, 'ro', '0'),
+    Row(0x6041, 0, 'Something else', 5, 'rw', '0'),
+    Row(0x6060, 0, 'Something else', 7, 'ro', '0'),
+    Row(0x607A, 0, 'Something else', 7, 'ro', '0'),
+)
+
+
+def text_of(device_type: str, *profile: Row) -> str:
+    """Return the EDS of a device with this 0x1000."""
+    device = Row(0x1000, 0, 'Device type', 7, 'ro', device_type)
+    return eds_text((device, *COMMON_ROWS, *profile))
+
+
+@pytest.mark.parametrize('device_type', ['0x000F0191', '0x00020196', '0x00000195'])
+def test_other_profiles_are_not_judged_by_that_of_drives(tmp_path: Path, device_type: str) -> None:
+    """CiA 401, 406 and one that is not known here."""
+    report = lint(tmp_path, text_of(device_type, *OTHER_MEANINGS))
+    assert report.errors == report.warnings == ()
+
+
+@pytest.mark.parametrize('device_type', ['0x00020192', '0xFFFF0192', ''])
+def test_drives_are_judged_by_theirs(tmp_path: Path, device_type: str) -> None:
+    """Also one with several axes, and one whose EDS does not say what it is."""
+    report = lint(tmp_path, text_of(device_type, *OTHER_MEANINGS))
+    assert len(report.errors) == 4
+
+
+@pytest.mark.parametrize(
+    ('device_type', 'row'),
+    [
+        ('0x000F0191', Row(0x6401, 1, 'Analogue input', 7, 'ro', '0', mappable=True)),
+        ('0x000F0191', Row(0x6200, 1, 'Digital output', 6, 'rww', '0', mappable=True)),
+        ('0x00020196', Row(0x6004, 0, 'Position value', 3, 'ro', '0', mappable=True)),
+    ],
+)
+def test_each_profile_has_its_rules(tmp_path: Path, device_type: str, row: Row) -> None:
+    """A wrong data type is an error there, too; what another profile has at the place is not."""
+    head = [Row(row.index, 0, 'Count', 5, 'const', '1')] if row.subindex else []
+    (error,) = lint(tmp_path, text_of(device_type, *head, row)).errors
+    assert f'{row.index:04X}' in error.key
+    assert lint(tmp_path, text_of('0x00000195', *head, row)).errors == ()
+
+
+def test_no_drive_is_simulated_where_there_is_none(tmp_path: Path) -> None:
+    """fake_slaves makes a plain device of an encoder that has something at 0x6040."""
+    lint(tmp_path, text_of('0x00020196', *OTHER_MEANINGS))
+    dictionary = load_eds(tmp_path / 'drive.eds').dictionary
+    assert not is_drive(dictionary)
+    assert Rig(dictionary).device.drive is None
+
+
+def test_a_value_at_the_place_of_a_command_is_written(tmp_path: Path) -> None:
+    """The ParameterValue of 0x6060 of an I/O module is no command."""
+    row = Row(0x6060, 0, 'Polarity', 5, 'rw', '0')
+    text = text_of('0x000F0191', row)
+    path = tmp_path / 'module.dcf'
+    place = text.index('[6060]')
+    value = text.index('DefaultValue=0', place)
+    path.write_text(f'{text[:value]}ParameterValue=3\n{text[value:]}', encoding='utf-8')
+    findings = Findings()
+    (write,) = parameter_writes(load_eds(path), findings)
+    assert (write.index, write.data) == (0x6060, b'\x03')
+    assert findings.warnings == ()
+
+
+@pytest.mark.parametrize(
+    'encoding', ['latin-1', 'cp1252', 'utf-8-sig', 'utf-16', 'utf-16-le', 'utf-16-be']
+)
+def test_files_in_other_encodings_are_read(tmp_path: Path, encoding: str) -> None:
+    """As editors on Windows save them; names keep their umlauts."""
+    text = eds_text().replace('Sample drive', 'Pr\u00fcfger\u00e4t')
+    path = tmp_path / 'device.eds'
+    path.write_bytes(text.encode(encoding))
+    plain = tmp_path / 'plain.eds'
+    plain.write_text(text, encoding='utf-8')
+    assert list(load_eds(path).dictionary) == list(load_eds(plain).dictionary)
+    assert len(lint_eds(path).errors) == len(lint_eds(plain).errors)

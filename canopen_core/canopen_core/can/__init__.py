@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import Any, TYPE_CHECKING
 
 from .bus import Bus, BusCounters, VirtualBus, VirtualWire, wall_clock_offset
-from .bus_thread import BusThread, FrameRing, RecordedFrame
+from .bus_thread import BusThread
 from .candump_format import format_line, log_channel
 from .frame import (
     BusLoad,
@@ -20,9 +20,11 @@ from .frame import (
     EXTENDED_ID_MAX,
     Frame,
     frame_bits,
+    FrameRing,
     is_unacknowledged,
     LoadFigures,
     PAYLOAD_MAX,
+    RecordedFrame,
     STANDARD_ID_MAX,
     stuff_bits_mean,
     stuff_bits_worst,

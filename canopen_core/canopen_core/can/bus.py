@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The interface to a CAN bus, whatever stands behind it."""
+"""The interface to a CAN bus, the clocks of its time stamps, and a bus inside one process."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ class VirtualWire:
 
 
 class VirtualBus(Bus):
-    """A connection to a wire in this process."""
+    """A connection to a wire in this process: reliable, and in one order for all."""
 
     def __init__(self, name: str, wire: VirtualWire) -> None:
         super().__init__(name)

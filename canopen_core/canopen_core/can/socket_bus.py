@@ -1,6 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a bus on a datagram socket needs: waiting, waking, kernel time stamps and loss counts."""
+"""What a bus on a datagram socket needs: waiting, waking, kernel time stamps and loss counts.
+
+The receive path is compiled: datagrams.c, built by the C compiler of the machine. Without a
+compiler one warning says so, and frames are read in Python, at several times the cost.
+``CANOPEN_CORE_COMPILED=0`` asks for that.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A CAN interface of the Linux kernel (SocketCAN), by a raw socket.
+"""CAN interfaces of the Linux kernel (SocketCAN): which ones there are, and a bus on a raw socket.
 
 Other sockets of this host see the frames that are sent; the sending bus itself does not.
 """

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Splitting an EDS or DCF file into sections and values with their lines (CiA 306-1, 4.2).
+"""The text of EDS and DCF files: sections with their lines, and values (CiA 306-1, 4.2, 4.6.3).
 
-Takes what vendors' files hold: any case, blanks around names, CRLF, UTF-8, UTF-16 or Latin-1 text,
-comments with ``;`` or ``#``. Odd lines are reported and skipped, never fatal.
+Services and command lines write values in the same way. Takes what vendors' files hold: any case,
+blanks around names, CRLF, UTF-8, UTF-16 or Latin-1 text, comments with ``;`` or ``#``. Odd lines
+are reported and skipped, never fatal.
 """
 
 from __future__ import annotations

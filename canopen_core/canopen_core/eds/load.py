@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Reading EDS and DCF files (CiA 306-1), tolerant of what vendors ship."""
+"""Reading EDS and DCF files (CiA 306-1), tolerant of what vendors ship.
+
+The sections of a file become the entries of an object dictionary (CiA 306-1, 4.6).
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ from ..standard.dictionary import (
     ObjectDictionary,
     ObjectEntry,
 )
-from ..standard.nmt import COB_ID_INVALID, CobId, NODE_ID_MAX, NODE_ID_MIN, PREDEFINED_MAX
+from ..standard.messages import COB_ID_INVALID, CobId, NODE_ID_MAX, NODE_ID_MIN, PREDEFINED_MAX
 from ..standard.objects import Index, PDO_COUNT_MAX
 from .ini import decode_text, EdsValue, IniFile, IniSection, parse_integer, parse_value, read_ini
 

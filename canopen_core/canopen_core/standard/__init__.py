@@ -57,7 +57,7 @@ from .drive import (
     statusword_text,
     TARGET_OBJECTS,
 )
-from .nmt import (
+from .messages import (
     ALL_NODES,
     BIT_RATES_KBIT,
     CAN_ID_MASK,

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Data types of CiA 301, 7.4.7 (table 44), and their little-endian encoding (7.1.4)."""
+"""Data types (CiA 301, 7.4.7), their encoding (7.1.4), and the codec of PDOs (7.5.2.36)."""
 
 from __future__ import annotations
 
@@ -206,7 +206,11 @@ def mapped_place(word: int) -> tuple[int, int, int]:
 
 
 class PdoCodec:
-    """Packs and unpacks the payload of one PDO."""
+    """Packs and unpacks the payload of one PDO.
+
+    Byte-aligned mappings of common types become one ``struct.Struct``, all others go through a
+    bit-exact path.
+    """
 
     def __init__(self, objects: Sequence[MappedObject]) -> None:
         """Compile the mapping.

@@ -1,6 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The object dictionary as a description (CiA 301, 7.4): what a device has, not what it holds."""
+"""The object dictionary as a description (CiA 301, 7.4): what a device has, not what it holds.
+
+People name an object by its number or by the names of the EDS:
+
+========================================  =======================================
+``0x6041``, ``6041``                      a VAR, or sub-index 0
+``0x607D:02``, ``0x607D:2``               a sub-index
+``Statusword``                            by name, in upper or lower case
+``Software position limit/Max position``  a sub-index by the names of record and entry,
+                                          which may be shortened as long as they are clear
+========================================  =======================================
+"""
 
 from __future__ import annotations
 
@@ -12,7 +23,7 @@ import re
 
 from ..exceptions import ObjectError
 from .datatypes import DataType, Value
-from .nmt import own_cob_id
+from .messages import own_cob_id
 from .objects import AXES_MAX, AXIS_OFFSET, Index
 
 
@@ -219,7 +230,7 @@ SIMILAR_MAX = 4
 
 
 def find_object(dictionary: ObjectDictionary, path: str) -> ObjectEntry:
-    """Find an object by number or name, as described above.
+    """Find an object by number or name, as the module describes.
 
     Raises:
         ObjectError: There is none, or there are several; the message names the candidates.

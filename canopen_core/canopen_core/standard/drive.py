@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Vocabulary of the drive profile: states, words and modes (CiA 402-2, clauses 6 to 8)."""
+"""Device profiles: states, words and modes of drives (CiA 402-2, clauses 6 to 8), and I/O objects.
+
+I/O modules are those of CiA 401, encoders those of CiA 406 with one channel.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""SDO frames, expedited and segmented (CiA 301, 7.2.4.3), for client and server alike.
+"""SDO frames and abort codes (CiA 301, 7.2.4.3), for client and server alike.
 
 Each message is a value with ``encode()``; ``decode_request`` reads what a client sent,
 ``decode_response`` what a server sent. Both refuse the block protocol (7.2.4.3.9), whose frames

@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a mode of operation is: it moves the axis while the drive is enabled."""
+"""Modes of operation, and those with a profile of the drive's own (CiA 402-2, clauses 9, 10, 12).
+
+A mode moves the axis while the drive is enabled.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Modes in which the master streams positions or velocities (CiA 402-2, clauses 13 and 14).
+"""Modes in which the master streams positions, velocities or torques (CiA 402-2, 13 to 15).
 
 While SYNC comes regularly, a set-point that was written is taken at the next SYNC; otherwise at
 once. It holds until the next one is due: for the period of SYNC when there was one for each
@@ -208,7 +208,12 @@ class InterpolatedPosition(Streamed):
 
 
 class TorqueMode(Mode):
-    """Applies a torque in steps, each of which begins exactly where the one before has ended."""
+    """Applies a torque in steps, each of which begins exactly where the one before has ended.
+
+    The axis makes a motion of it. Torques are in [0.1 % of the rated torque]. Software position
+    limits do not act on a torque; the highest speed does. During halt the axis is ramped down and
+    held in position.
+    """
 
     def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncConsumer) -> None:
         super().__init__(objects, axis, clock)

@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run canopen_sim fake_slaves``: simulated devices for all slaves of a bus.yml."""
+"""``ros2 run canopen_sim fake_slaves``: simulated devices for all slaves of a bus.yml.
+
+Services of the node let them misbehave.
+"""
 
 from __future__ import annotations
 

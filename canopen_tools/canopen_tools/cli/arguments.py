@@ -1,6 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Arguments that several verbs have."""
+"""What several verbs share: arguments, ROS arguments without ROS, and output to the terminal.
+
+Results go to stdout, warnings to stderr. The grammar of ROS arguments is that of ``--ros-args`` up
+to ``--`` or the end (ROS 2 design, "ROS command line arguments"). Parameters are read, everything
+else that ROS knows is taken and means nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``canopen check BUS.yml``: what is wrong with a bus, before it is switched on."""
+"""``canopen check BUS.yml`` and ``canopen eds FILE``: what is wrong with files."""
 
 from __future__ import annotations
 

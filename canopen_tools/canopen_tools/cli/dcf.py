@@ -1,6 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``canopen dcf BUS.yml``: files for Lely's tools, as its dcfgen writes them."""
+"""``canopen dcf BUS.yml``: files for Lely's tools, as its dcfgen writes them.
+
+A concise DCF holds the writes that configure a device (CiA 302-3, 0x1F22): the number of writes as
+UNSIGNED32, and then for each index (UNSIGNED16), sub-index (UNSIGNED8), length of the data in
+[byte] (UNSIGNED32) and the data; all of it little-endian.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``canopen read`` and ``canopen write``: objects of a device by name or number."""
+"""``canopen read``, ``write`` and ``diff``: the objects of a device, and what its files say."""
 
 from __future__ import annotations
 

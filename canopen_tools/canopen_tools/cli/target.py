@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A connection to a bus for as long as a verb runs: one loop, one thread, no background.
+"""A connection to a bus for as long as a verb runs, and the device that the verb is about.
 
-Beside a running master it only listens, unless `--query` is given: a device has one SDO channel
-by default, which belongs to the master (CiA 301, 7.2.4.1).
+One loop, one thread, no background. Beside a running master it only listens, unless `--query` is
+given: a device has one SDO channel by default, which belongs to the master (CiA 301, 7.2.4.1).
 """
 
 from __future__ import annotations

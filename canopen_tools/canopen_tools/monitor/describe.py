@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Describes the frames of a bus, by the names in its bus.yml and EDS files if there are any."""
+"""Describes the frames of a bus, by the names in its bus.yml and EDS files, and filters them."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Follows the SDO transfers of one device, so that segments and answers are shown with the object.
+"""Objects, their values and SDO transfers as a person reads them.
 
-CiA 301, 7.2.4.3. A device has one default SDO channel, so one transfer is on at a time.
+Transfers are followed, so that segments and answers are shown with the object (CiA 301, 7.2.4.3).
+A device has one default SDO channel, so one transfer is on at a time.
 """
 
 from __future__ import annotations

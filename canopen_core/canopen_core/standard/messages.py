@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Network management: commands, states and heartbeats (CiA 301, 7.2.8)."""
+"""NMT, TIME and EMCY messages and the identifiers of all services (CiA 301)."""
 
 from __future__ import annotations
 
