@@ -147,7 +147,7 @@ VCAN = can_interfaces().get('vcan0')
 HAS_VCAN = VCAN is not None and VCAN.is_up
 ROOT = Path(__file__).parents[1]
 IN_GUEST = (
-    'canopen_core/test/test_can_bus_contract.py',
+    'canopen_core/test/test_can_bus.py',
     'canopen_core/test/test_can_socketcan.py',
     'tests/test_real_vcan.py',
 )

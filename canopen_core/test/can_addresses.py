@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Bus names for tests that nobody else on this host uses."""
+"""Buses that nobody else on this host uses, and frames that are waited for with a deadline."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The bus over python-can: names, echoes, odd messages and failing drivers."""
+"""Python-can in both directions: its drivers as our bus, and our buses in its tools."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Laws of the object dictionary and of the pre-defined COB-IDs."""
+"""Laws of the object dictionary, of names of objects, of COB-IDs and of data types."""
 
 from itertools import product
 import math

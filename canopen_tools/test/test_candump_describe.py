@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Frames in words, by table: with a bus.yml and without one."""
+"""Frames in words, by table, and whole SDO conversations as they are on the bus."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``canopen check`` as a person or a CI job starts it."""
+"""``canopen check`` and ``canopen eds`` as a person or a CI job starts them."""
 
 from __future__ import annotations
 

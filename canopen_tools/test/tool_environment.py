@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The environment of a tool that is started as a process: ours from the checkout, and no ROS."""
+"""The environment of a tool that is a process of its own, and a small bus for the monitor."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What every bus promises, checked on every implementation."""
+"""Bus names, what every bus promises, and the end of a thread that owns one."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Laws of the SDO frames (CiA 301, 7.2.4.3), and transcripts of the standard's figures."""
+"""Laws of SDO frames and PDOs (CiA 301, 7.2.4.3, 7.5.2.36), and transcripts of the figures."""
 
 from collections.abc import Sequence
 from contextlib import suppress
