@@ -14,12 +14,11 @@ from fake_programs import FakeRunner, imitate_package
 import pytest
 
 from workspace.build import Builder
+from workspace.cli import carry_out, plan, Target
 from workspace.environment import Environment
-from workspace.errors import WorkspaceError
-from workspace.layout import Layout, this_checkout
+from workspace.layout import Layout, this_checkout, WorkspaceError
 from workspace.link import link_package, PYTHON, read_setup
 from workspace.packages import find_packages, read_package
-from workspace.plan import carry_out, plan, Target
 
 Add = Callable[..., Path]
 Fake = Callable[..., FakeRunner]

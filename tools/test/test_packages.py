@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from workspace.errors import WorkspaceError
-from workspace.layout import Layout, this_checkout
+from workspace.layout import Layout, this_checkout, WorkspaceError
 from workspace.packages import find_packages, needed_packages, read_package, source_fingerprint
 from workspace.underlay import Underlay, UnderlayKind
 

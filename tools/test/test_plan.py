@@ -14,12 +14,17 @@ from fake_programs import FakeRunner
 import pytest
 
 from workspace.build import Builder
+from workspace.cli import carry_out, plan, Target
 from workspace.environment import choose_python, DOCS, Environment, uv_settings
-from workspace.errors import NetworkError, StepFailedError, WorkspaceError
-from workspace.layout import Layout
-from workspace.plan import carry_out, plan, Target
+from workspace.layout import (
+    EnvironmentState,
+    Layout,
+    NetworkError,
+    read_state,
+    StepFailedError,
+    WorkspaceError,
+)
 from workspace.process import Runner
-from workspace.state import EnvironmentState, read_state
 from workspace.system import probe
 from workspace.underlay import Underlay, UnderlayKind
 

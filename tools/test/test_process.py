@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from workspace.errors import NetworkError, StepFailedError
+from workspace.layout import NetworkError, StepFailedError
 from workspace.process import clean_environment, exclusive, Runner
 
 

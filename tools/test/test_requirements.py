@@ -8,8 +8,8 @@ import re
 
 import pytest
 
+from workspace.cli import BASE, pinned_names
 from workspace.layout import this_checkout
-from workspace.pins import BASE, pinned_names
 
 FOLDER = this_checkout().requirements
 PIN = re.compile(r'^([\w.-]+)==([^\s;]+)(?: ; (.*?))? \\$', re.MULTILINE)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from workspace.state import (
+from workspace.layout import (
     EnvironmentState,
     fingerprint,
     fingerprint_files,

@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from workspace.errors import WorkspaceError
+from workspace.layout import WorkspaceError
 from workspace.system import (
     check,
     check_supported,

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from workspace.errors import WorkspaceError
+from workspace.layout import WorkspaceError
 from workspace.wheels import (
     BOOTSTRAP_FILE,
     BOOTSTRAP_LINE,

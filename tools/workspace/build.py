@@ -12,11 +12,9 @@ from pathlib import Path
 import shutil
 
 from . import interfaces, link, shell
-from .errors import StepFailedError
-from .layout import Layout
+from .layout import fingerprint, fingerprint_files, Layout, StepFailedError, write_atomically
 from .packages import Package, source_fingerprint
 from .process import Runner
-from .state import fingerprint, fingerprint_files, write_atomically
 from .underlay import UnderlayKind
 
 PACKAGES_AT_A_TIME = 2

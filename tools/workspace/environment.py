@@ -14,10 +14,18 @@ import subprocess
 from typing import NamedTuple
 
 from . import shell, wheels
-from .errors import NetworkError, StepFailedError, WorkspaceError
-from .layout import Layout
+from .layout import (
+    EnvironmentState,
+    fingerprint,
+    fingerprint_files,
+    Layout,
+    NetworkError,
+    read_state,
+    StepFailedError,
+    WorkspaceError,
+    write_state,
+)
 from .process import Argument, clean_environment, Runner
-from .state import EnvironmentState, fingerprint, fingerprint_files, read_state, write_state
 from .system import check, probe
 from .underlay import Underlay, UnderlayKind
 

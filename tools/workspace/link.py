@@ -18,7 +18,7 @@ from types import ModuleType
 from typing import Any
 from unittest import mock
 
-from .errors import WorkspaceError
+from .layout import WorkspaceError
 from .packages import Package
 
 PYTHON = Path('lib') / 'python'  # folder of an installation that stands in PYTHONPATH

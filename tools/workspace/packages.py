@@ -10,8 +10,7 @@ import os
 from pathlib import Path
 import xml.etree.ElementTree as ET
 
-from .errors import WorkspaceError
-from .state import fingerprint
+from .layout import fingerprint, WorkspaceError
 from .underlay import Underlay
 
 SEARCH_DEPTH = 2  # packages stand in the checkout, or in one folder of it

@@ -15,7 +15,7 @@ import re
 import subprocess
 from typing import TypeAlias
 
-from .errors import NetworkError, StepFailedError
+from .layout import NetworkError, StepFailedError
 
 TAIL_LINES = 25
 _UNREACHABLE = re.compile(

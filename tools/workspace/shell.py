@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from shlex import quote
 
-from .state import write_atomically
+from .layout import write_atomically
 from .underlay import Underlay, UnderlayKind
 
 SHELLS = ('sh', 'bash', 'zsh')

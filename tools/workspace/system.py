@@ -11,8 +11,8 @@ from pathlib import Path
 import shutil
 import subprocess
 
-from .errors import WorkspaceError
 from .interfaces import COMPILERS
+from .layout import WorkspaceError
 from .underlay import PREFIX_VARIABLE, SYSTEM_PREFIX, Underlay, UnderlayKind
 
 _QUESTIONS = """

@@ -8,9 +8,8 @@ import json
 from pathlib import Path
 import re
 
-from .errors import WorkspaceError
+from .layout import WorkspaceError, write_atomically
 from .process import Runner
-from .state import write_atomically
 
 # exported by the wheels' CMake files, and absent on every other machine
 _BUILDER_INCLUDE = re.compile(r'/opt/python/cp[\w.-]+/include/python3\.\d+t?')

@@ -13,7 +13,7 @@ import sys
 
 from rosbag_files import BagError, BagReader, OfferedQos, read_qos
 
-from .cli.errors import FrontendError
+from .cli.commands import FrontendError
 from .names import absolute, is_hidden
 
 Accepts = Callable[[str, str], bool]

@@ -13,7 +13,7 @@ import sys
 
 from message_definitions import nested_type
 
-from .cli.errors import BadTypeError, FrontendError, hint, UnknownNameError
+from .cli.commands import BadTypeError, FrontendError, hint, UnknownNameError
 from .names import InterfaceClass
 
 _RESOURCE = 'rosidl_interfaces'

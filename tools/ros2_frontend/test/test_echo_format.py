@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 from sensor_msgs.msg import JointState
 
-from ros2_frontend.cli.errors import FrontendError
+from ros2_frontend.cli.commands import FrontendError
 from ros2_frontend.verbs.topic_echo import echo, print_lost, printer
 
 INFO = {'source_timestamp': 11, 'received_timestamp': 12, 'publication_sequence_number': 3}

@@ -16,11 +16,17 @@ from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Byte, ByteMultiArray, Float32, Header, Int8, String, UInt8, UInt64
 from std_srvs.srv import SetBool, Trigger
 
-from ros2_frontend.cli.errors import FieldValueError, FrontendError, UnknownNameError
-from ros2_frontend.messages.document import to_document, to_yaml
-from ros2_frontend.messages.fill import dump, Filler, parse_mapping, values_for
+from ros2_frontend.cli.commands import FieldValueError, FrontendError, UnknownNameError
+from ros2_frontend.messages.fill import (
+    dump,
+    Filler,
+    parse_mapping,
+    to_document,
+    to_yaml,
+    values_for,
+)
 from ros2_frontend.names import Message
-from ros2_frontend.ros.parameters import parameter, parse_value
+from ros2_frontend.verbs.param import parameter, parse_value
 
 NUMBERS = st.floats(allow_nan=False)
 TEXTS = st.text(st.characters(codec='utf-8', exclude_characters='\x85\u2028\u2029'), max_size=8)

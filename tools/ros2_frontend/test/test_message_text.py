@@ -17,7 +17,7 @@ from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Byte, ByteMultiArray, Char, Empty, String
 import yaml
 
-from ros2_frontend.messages.document import Abbreviation, to_csv, to_document, to_yaml
+from ros2_frontend.messages.fill import Abbreviation, to_csv, to_document, to_yaml
 from ros2_frontend.names import Message
 
 JOINTS = """\

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The tree of commands, as data, and the parser of one command line.
+"""Verbs as they are declared, the tree of commands as data, and the parser of one command line.
 
 A command names the module and the verb that do it, so that `ros2 --help` imports none of them and
 `ros2 topic list` imports only its own. Summaries are those of ros2cli (Jazzy).
@@ -8,12 +8,127 @@ A command names the module and the verb that do it, so that `ros2 --help` import
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, RawDescriptionHelpFormatter
-from collections.abc import Mapping, Sequence
+from argparse import ArgumentParser, ArgumentTypeError, Namespace, RawDescriptionHelpFormatter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 import importlib
-from typing import TypeAlias
+import math
+from typing import Any, TypeAlias, TypeVar
 
-from .verb import Verb
+_ALIKE = 0.75  # types of two packages are 0.6 alike in their middle parts
+
+
+class FrontendError(RuntimeError):
+    """A failure that ends the command with exit code 1 and this message."""
+
+
+class UnknownNameError(FrontendError, LookupError):
+    """Nothing has the name that was given, e.g. ``topic info /chater``."""
+
+
+class BadTypeError(FrontendError, TypeError):
+    """An interface type that is not installed or not of the wanted kind."""
+
+
+class FieldValueError(FrontendError, ValueError):
+    """A value that a message cannot take, e.g. an unknown field or text for a number."""
+
+
+class NoAnswerError(FrontendError, TimeoutError):
+    """A service that did not appear or did not answer in time."""
+
+
+def hint(name: str, known: Iterable[str]) -> str:
+    """Return a line that asks whether one of up to three near names was meant, if any."""
+    from difflib import get_close_matches
+
+    near = [f"'{each}'" for each in get_close_matches(name, list(known), cutoff=_ALIKE)]
+    return f'\nDid you mean {" or ".join(near)}?' if near else ''
+
+
+Argument = Callable[[Any], object]
+"""Adds one argument, or some that belong together, to a parser of argparse or a group of one."""
+
+Main = Callable[[Namespace], 'int | None']
+"""Does the verb; the exit code, of which None is 0. Raises FrontendError, for the user."""
+
+
+N = TypeVar('N', int, float)
+
+
+def argument(*names: str, **options: object) -> Argument:
+    """Declare an argument as argparse does."""
+    return lambda parser: parser.add_argument(*names, **options)
+
+
+def flag(*names: str, **options: object) -> Argument:
+    """Declare a switch."""
+    return argument(*names, action='store_true', **options)
+
+
+def exclusive(*arguments: Argument) -> Argument:
+    """Allow at most one of several."""
+
+    def add(parser: Any) -> None:  # noqa: ANN401  # as in argparse
+        group = parser.add_mutually_exclusive_group()
+        for each in arguments:
+            each(group)
+
+    return add
+
+
+@dataclass(frozen=True, slots=True)
+class Verb:
+    """A verb of `ros2`: its arguments, in the order of the help page, and what does it."""
+
+    arguments: tuple[Argument, ...]
+    main: Main
+
+
+def verb(*arguments: Argument) -> Callable[[Main], Verb]:
+    """Make a verb of a function."""
+    return lambda main: Verb(arguments, main)
+
+
+def _number(
+    kind: Callable[[str], N], what: str, accepts: Callable[[N], bool]
+) -> Callable[[str], N]:
+    def parse(text: str) -> N:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = kind('-1')
+        if not accepts(value):
+            raise ArgumentTypeError(f'value must be {what}')
+        return value
+
+    return parse
+
+
+unsigned_int = _number(int, 'non-negative integer', lambda value: value >= 0)
+positive_int = _number(int, 'a positive integer', lambda value: value > 0)
+positive_float = _number(float, 'a positive float', lambda value: 0.0 < value < math.inf)
+unsigned_float = _number(float, 'a non-negative float', lambda value: 0.0 <= value < math.inf)
+
+GRAPH_ARGUMENTS = (
+    argument(
+        '--spin-time',
+        type=positive_float,
+        metavar='SPIN_TIME',
+        help='Time [s] to wait for discovery (default: 0.5, or 3.2 where DDS is open to others)',
+    ),
+    flag('-s', '--use-sim-time', help='Enable ROS simulation time'),
+    flag('--no-daemon', help='Accepted and without effect: there is no daemon'),
+)
+"""The options of every verb that looks at the ROS graph."""
+
+
+def content(name: str, help_: str, stdin_help: str) -> Argument:
+    """Declare the values of a message, given as an argument or on standard input."""
+    return exclusive(
+        argument(name, nargs='?', default='{}', help=help_), flag('--stdin', help=stdin_help)
+    )
+
 
 PROGRAM = 'ros2'
 

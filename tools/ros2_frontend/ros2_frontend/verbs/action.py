@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from ..cli.verb import flag
+from ..cli.commands import flag
 from ..names import absolute
 from ..ros.graph import action_names, clients_and_servers, Graph, graph_verb
 from .names import Names

@@ -11,7 +11,7 @@ import time
 from rosbag_files import BagMetadata, repair
 
 from ..bag import bag_errors, open_bag
-from ..cli.verb import argument, flag, verb
+from ..cli.commands import argument, flag, verb
 
 _INDENT = 19
 _NANO = 1_000_000_000

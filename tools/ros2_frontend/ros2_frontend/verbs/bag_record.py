@@ -13,13 +13,10 @@ import time
 from rosbag_files import BagWriter, Preset, WriterOptions
 
 from ..bag import bag_errors, load_overrides, topic_filter
-from ..cli.errors import FrontendError
-from ..cli.interrupts import deferred_interrupts
-from ..cli.keyboard import keys
-from ..cli.verb import argument, flag, unsigned_int, verb
-from ..ros.graph import Graph
+from ..cli.commands import argument, flag, FrontendError, unsigned_int, verb
+from ..cli.interrupts import deferred_interrupts, keys
+from ..ros.graph import Graph, open_session
 from ..ros.recorder import Recorder
-from ..ros.session import open_session
 
 _NANO = 1_000_000_000
 

@@ -12,7 +12,7 @@ import platform
 import re
 import sys
 
-from ..cli.verb import flag
+from ..cli.commands import flag
 from ..names import Handle
 from ..ros.graph import Graph, graph_verb
 

@@ -7,8 +7,7 @@ from __future__ import annotations
 from argparse import Namespace
 import sys
 
-from ..cli.errors import FrontendError
-from ..cli.verb import Argument, argument, exclusive, flag, verb
+from ..cli.commands import Argument, argument, exclusive, flag, FrontendError, verb
 from ..index import (
     all_interfaces,
     class_of,
@@ -72,7 +71,7 @@ def package(args: Namespace) -> None:
 )
 def proto(args: Namespace) -> None:
     """Print the defaults of a message, request or goal as YAML."""
-    from ..messages.document import to_document, to_yaml
+    from ..messages.fill import to_document, to_yaml
 
     kind = Kind(definition_path(args.type).parent.name)
     found = class_of(args.type, kind, 'The passed interface type is invalid')

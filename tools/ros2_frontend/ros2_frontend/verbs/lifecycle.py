@@ -7,8 +7,7 @@ from __future__ import annotations
 from argparse import Namespace
 import sys
 
-from ..cli.errors import FrontendError, NoAnswerError
-from ..cli.verb import argument, flag
+from ..cli.commands import argument, flag, FrontendError, NoAnswerError
 from ..names import Message, NodeName
 from ..ros.graph import call, Graph, graph_verb
 from .node import find_node, LIST_ARGUMENTS, node_verb, OPTIONAL_NODE

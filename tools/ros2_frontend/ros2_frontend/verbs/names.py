@@ -9,8 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import sys
 
-from ..cli.errors import hint, UnknownNameError
-from ..cli.verb import Argument, argument, flag
+from ..cli.commands import Argument, argument, flag, hint, UnknownNameError
 from ..names import absolute, is_hidden, NamesAndTypes
 from ..ros.graph import Graph
 

@@ -8,8 +8,7 @@ from argparse import Namespace
 from collections.abc import Callable
 import sys
 
-from ..cli.errors import hint, UnknownNameError
-from ..cli.verb import Argument, argument, flag, Verb
+from ..cli.commands import Argument, argument, flag, hint, UnknownNameError, Verb
 from ..names import is_hidden, NamesAndTypes, NodeName
 from ..ros.graph import Graph, graph_verb
 

@@ -7,8 +7,7 @@ from __future__ import annotations
 from argparse import Namespace
 from xml.etree import ElementTree as ET
 
-from ..cli.errors import FrontendError, UnknownNameError
-from ..cli.verb import argument, flag, verb
+from ..cli.commands import argument, flag, FrontendError, UnknownNameError, verb
 from ..index import executables, package_prefixes, prefix_of
 
 _NOT_FOUND = 'Package not found'

@@ -16,8 +16,7 @@ import signal
 import sys
 from typing import NoReturn
 
-from ..cli.errors import FrontendError, hint, UnknownNameError
-from ..cli.verb import argument, verb
+from ..cli.commands import argument, FrontendError, hint, UnknownNameError, verb
 from ..index import executables
 
 _MISSING = """\

@@ -7,14 +7,11 @@ from __future__ import annotations
 from argparse import Namespace
 import sys
 
-from ..cli.errors import FrontendError, hint
-from ..cli.verb import argument, content, flag, GRAPH_ARGUMENTS, verb
+from ..cli.commands import argument, content, flag, FrontendError, GRAPH_ARGUMENTS, hint, verb
 from ..index import class_of, Kind
-from ..messages.document import to_document, to_yaml
-from ..messages.fill import filled
+from ..messages.fill import filled, to_document, to_yaml
 from ..names import absolute, Handle, Message
-from ..ros.graph import Graph, offered_actions, open_graph
-from ..ros.session import Session
+from ..ros.graph import Graph, offered_actions, open_graph, Session
 
 _CANCEL_TIMEOUT = 5.0  # [s]
 

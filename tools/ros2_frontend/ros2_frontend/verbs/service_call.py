@@ -9,8 +9,15 @@ import math
 import sys
 import time
 
-from ..cli.errors import hint, NoAnswerError
-from ..cli.verb import argument, content, GRAPH_ARGUMENTS, positive_float, verb
+from ..cli.commands import (
+    argument,
+    content,
+    GRAPH_ARGUMENTS,
+    hint,
+    NoAnswerError,
+    positive_float,
+    verb,
+)
 from ..index import class_of, Kind
 from ..messages.fill import filled
 from ..names import absolute, Handle, is_hidden

@@ -8,8 +8,7 @@ from argparse import Namespace
 from collections.abc import Callable
 import sys
 
-from ..cli.errors import FrontendError, hint, UnknownNameError
-from ..cli.verb import flag
+from ..cli.commands import flag, FrontendError, hint, UnknownNameError
 from ..index import class_of, Kind
 from ..names import absolute, InterfaceClass, is_hidden, NamesAndTypes
 from ..ros.graph import Graph, graph_verb

@@ -10,22 +10,21 @@ import math
 import sys
 import time
 
-from ..cli.errors import NoAnswerError
-from ..cli.verb import (
+from ..cli.commands import (
     argument,
     content,
     exclusive,
     flag,
     GRAPH_ARGUMENTS,
+    NoAnswerError,
     positive_float,
     unsigned_int,
     verb,
 )
 from ..messages.fill import filled, Filler
 from ..names import absolute, Handle
-from ..ros.graph import Graph
+from ..ros.graph import Graph, open_session
 from ..ros.qos import profile_of, PUBLISHER_QOS
-from ..ros.session import open_session
 from .topic import message_class, TOPICS
 
 _REMINDER = 1.0  # [s] between two lines about what is waited for

@@ -10,13 +10,12 @@ from collections.abc import Callable, Collection
 import math
 import time
 
-from ..cli.errors import FrontendError
-from ..cli.verb import Argument, argument, flag, positive_int
+from ..cli.commands import Argument, argument, flag, FrontendError, positive_int
 from ..names import absolute, Message
 from ..ros.graph import Graph, graph_verb
 from ..ros.qos import matching_profile, SUBSCRIPTION_QOS
-from .expression import compile_filter
 from .topic import class_of_topic
+from .topic_echo import compile_filter
 
 NANOSECONDS = 1_000_000_000  # in a second
 _KILO = 1000
