@@ -56,11 +56,6 @@ class Line:
     """A straight line between two poses."""
 
     def __init__(self, start: Pose, end: Pose) -> None:
-        """Draw.
-
-        Args:
-            start: Where it begins, in the root link.
-        """
         self._turning = _Turning(start.rotation, end.rotation)
         self._start, self._way = start.position, end.position - start.position
         self._twist = np.concatenate((self._way, self._turning.vector))
@@ -85,12 +80,7 @@ class Arc:
     """A part of a circle between two poses."""
 
     def __init__(self, start: Pose, end: Pose, center: Array, axis: Array) -> None:
-        """Draw; :func:`arc_through` and :func:`arc_around` find the circle.
-
-        Args:
-            start: Where it begins, in the root link.
-            axis: Vector about which it turns, of any length.
-        """
+        """Draw about an axis of any length; :func:`arc_through` finds the circle, as others do."""
         self._turning = _Turning(start.rotation, end.rotation)
         normal = axis / np.linalg.norm(axis)
         self._center = center
@@ -125,15 +115,7 @@ Curve = Line | Arc  # a way of a link in the root link, by a parameter from 0 to
 
 
 def arc_through(start: Pose, interim: Array, end: Pose) -> Arc:
-    """Return the arc through a point.
-
-    Args:
-        start: Where it begins, in the root link.
-        interim: A point on it in [m].
-
-    Raises:
-        PlanningError: The three are on a line, or two of them are one.
-    """
+    """Return the arc through a point in [m]; refuse one that is on a line with the ends."""
     first, second = interim - start.position, end.position - start.position
     across = np.cross(first, second)
     size = float(np.linalg.norm(across))
@@ -150,14 +132,7 @@ def arc_through(start: Pose, interim: Array, end: Pose) -> Arc:
 
 
 def arc_around(start: Pose, center: Array, end: Pose) -> Arc:
-    """Return the shorter arc about a center.
-
-    Args:
-        start: Where it begins, in the root link.
-
-    Raises:
-        PlanningError: The radii differ, or the three are on a line, as with half a circle.
-    """
+    """Return the arc of less than half a turn about a center in [m]; the radii must be equal."""
     first, last = start.position - center, end.position - center
     radii = float(np.linalg.norm(first)), float(np.linalg.norm(last))
     if abs(radii[0] - radii[1]) > MAX_RADIUS_DIFFERENCE:
@@ -234,9 +209,6 @@ def cartesian_path(
     Args:
         waypoints: Poses of the link in the root link.
         max_step: Greatest way of the link between two places in [m].
-        link: The link; empty for the tip.
-        jumps: What counts as a jump; None does not look.
-        scene: Where the arm must be free of contact; None does not look.
         is_valid: What else must hold at each place, such as path constraints.
 
     Raises:

@@ -100,11 +100,6 @@ class ConstraintCheck:
     """Looks at states and paths of one arm; belongs to one thread."""
 
     def __init__(self, model: RobotModel, *constraints: PathConstraints) -> None:
-        """Prepare.
-
-        Raises:
-            PlanningError: A link is unknown, or no joint moves it.
-        """
         self._joints = tuple(model.joints)
         self._limits = model.limits
         self._reach = max(model.reach, 1.0)
@@ -131,8 +126,7 @@ class ConstraintCheck:
     def projected(self, positions: Array, *, rooms: float = 1.0) -> Array | None:
         """Return a state that heeds the constraints near one that may not; None for none.
 
-        Args:
-            rooms: 1 for states of a path, 0 for one that nothing follows.
+        ``rooms`` is 1 for states of a path, 0 for one that nothing follows.
         """
         state = positions
         for _ in range(MAX_ITERATIONS):
@@ -150,9 +144,7 @@ class ConstraintCheck:
     def path(self, path: Path, *, at_looks: bool = False) -> Violation | None:
         """Return where a path breaks a constraint first; None for nowhere.
 
-        Args:
-            at_looks: Constraints need not hold between two looks, as where one is held exactly
-                by a line.
+        With ``at_looks`` constraints need not hold between two looks, as where a line holds one.
         """
         coarse = np.linspace(0.0, path.duration, COARSE_LOOKS)
         turned = np.abs(np.diff(path.positions(coarse), axis=0)).sum(axis=1)
@@ -165,11 +157,7 @@ class ConstraintCheck:
         return None
 
     def lines(self, places: Array) -> Violation | None:
-        """Return where straight motions break a constraint first; None for nowhere.
-
-        Args:
-            places: Joint positions in [rad] (m, n).
-        """
+        """Return where straight motions break a constraint first; None for nowhere."""
         for begin, end in pairwise(places):
             count = int(np.ceil(np.abs(end - begin).sum() / STEP)) + 1
             for positions in np.linspace(begin, end, count + 1):
@@ -178,14 +166,7 @@ class ConstraintCheck:
         return None
 
     def refuse_narrow(self, positions: Array) -> None:
-        """Refuse constraints that are narrower than what happens between two looks at a path.
-
-        Args:
-            positions: Joint positions of any state in [rad] (n).
-
-        Raises:
-            PlanningError: One is; the message says how wide it must be.
-        """
+        """Refuse constraints that are narrower than what happens between two looks at a path."""
         for rows, words in self._all(positions):
             width, least = 2.0 * float(rows.half.min()), LEAST_ROOMS * rows.room
             if width < 0.0:
@@ -200,11 +181,7 @@ class ConstraintCheck:
                 )
 
     def reason(self, positions: Array) -> str:
-        """Return in words why a state does not heed the constraints.
-
-        Args:
-            positions: Joint positions in [rad] (n) that do not.
-        """
+        """Return in words why a state does not heed the constraints."""
         return self.violated(positions) or 'it comes too near to the bounds of a path constraint'
 
     def _all(self, positions: Array) -> Iterator[tuple[_Rows, Callable[[], str]]]:

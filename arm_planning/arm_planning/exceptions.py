@@ -67,12 +67,7 @@ class PlanningError(ArmError):
 
 @contextmanager
 def coded(code: PlanningCode | None = None, place: str = '') -> Iterator[None]:
-    """Raise refusals as a PlanningError.
-
-    Args:
-        code: Its code; None keeps that of a PlanningError.
-        place: What the message begins with; empty for nothing.
-    """
+    """Raise refusals as a PlanningError; None keeps their code. A place begins the message."""
     try:
         yield
     except ArmError as error:

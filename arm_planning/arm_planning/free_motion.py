@@ -50,11 +50,6 @@ class FreeMotion:
         draw: np.random.Generator,
         constraints: ConstraintCheck | None = None,
     ) -> None:
-        """Prepare.
-
-        Args:
-            check: Has the last word on states and paths, in the scene of the motion.
-        """
         self._limits, self._check, self._draw = limits, check, draw
         self._constraints = constraints
 
@@ -71,9 +66,6 @@ class FreeMotion:
             start: Joint positions in [rad] (n), valid; constraints hold there.
             goals: Alternatives in [rad] (k, n), valid; constraints hold there.
             further: Goals that are looked for while the search runs; None where a try found none.
-
-        Raises:
-            PlanningError: No path was found in time.
         """
         motions = MotionCheck(self._check, (start, *goals), self._constraints)
         goals = sorted(goals, key=lambda goal: float(np.linalg.norm(goal - start)))
@@ -157,11 +149,7 @@ MIN_DURATION = 0.01  # time for a motion between two places at least in [s]
 
 
 def timed_path(places: Array, limits: JointLimits, check: MotionCheck) -> Path | None:
-    """Return a valid path along places; None where none is found.
-
-    Args:
-        places: Joint positions in [rad] (m, n), with straight motions between them.
-    """
+    """Return a valid path along straight motions between places; None where none is found."""
     stops: set[int] = set()
     corners = set(range(1, len(places) - 1))
     while True:
@@ -265,11 +253,7 @@ class GoalStates:
         self._start, self._check, self._constraints = start, check, constraints
 
     def first(self, goals: Sequence[Goal], left: Callable[[], float]) -> list[Array]:
-        """Return states of all goals, or raise what is wrong with the first goal.
-
-        Args:
-            left: Returns the time that is left in [s].
-        """
+        """Return states of all goals, or raise what is wrong with the first; ``left`` in [s]."""
         found: list[Array] = []
         for goal in goals:
             if left() < 0.0:

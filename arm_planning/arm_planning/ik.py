@@ -57,11 +57,7 @@ TURN = 2.0 * math.pi  # a whole turn in [rad]
 
 
 class IkSolver:
-    """Inverse kinematics of one link; for one thread.
-
-    Attributes:
-        closed_form: Geometry of an arm with a spherical wrist; None for others.
-    """
+    """Inverse kinematics of one link; for one thread."""
 
     def __init__(
         self,
@@ -70,15 +66,6 @@ class IkSolver:
         clock: Callable[[], float] = time.monotonic,
         draw: np.random.Generator | None = None,
     ) -> None:
-        """Prepare.
-
-        Args:
-            link: The link to place; empty for the tip.
-            clock: Steady time in [s], for time-outs.
-
-        Raises:
-            PlanningError: There is no such link, or no joint moves it.
-        """
         self.link = LinkKinematics(model, link)
         self.closed_form = ClosedForm.of(self.link)
         self._limits: JointLimits = model.limits
@@ -95,14 +82,12 @@ class IkSolver:
         timeout: float = DEFAULT_TIMEOUT,
         count: int = 1,
     ) -> list[Array]:
-        """Return joint positions for a pose, the nearest to the seed first.
+        """Return joint positions for a pose in the root link, the nearest to the seed first.
 
         An arm with a spherical wrist has all solutions, each in the turn that is nearest to the
         seed. Others have those that random starts lead to within the time.
 
         Args:
-            pose: Where the link is wanted, in the root link.
-            seed: Joint positions in [rad] (n), of which solutions are wanted near.
             scene: Where solutions must be free of contact; None does not check.
             timeout: Time in [s] after which no further start is made.
             count: How many solutions end the search of an arm without closed form.
@@ -172,12 +157,7 @@ class IkSolver:
         raise self._refused(self._why_none(pose, best, starts))
 
     def another(self, pose: Pose, seed: Array) -> Array | None:
-        """Return a solution to which one more random start leads; None for none.
-
-        Args:
-            pose: Where the link is wanted, in the root link.
-            seed: Joint positions in [rad] (n), of which the solution is in the nearest turn.
-        """
+        """Return a solution that one more random start leads to, next to a seed; None for none."""
         end = self._descent(pose, seed)
         return frozen(self._in_nearest_turn(end.positions, seed)) if end.converged else None
 
@@ -234,11 +214,7 @@ class IkSolver:
 
 
 def check_pose(pose: Pose) -> None:
-    """Refuse a pose that is none.
-
-    Raises:
-        PlanningError: The rotation is none, or a number is not finite.
-    """
+    """Refuse a pose that is none."""
     with coded(PlanningCode.INVALID_GOAL_CONSTRAINTS):
         checked(pose.position, 3, 'position of the pose')
         checked(np.ravel(pose.rotation), 9, 'rotation of the pose')
@@ -365,11 +341,7 @@ def _step(jacobian: Array, error: Array, positions: Array, lower: Array, upper: 
 
 
 def random_start(limits: JointLimits, seed: Array, draw: np.random.Generator) -> Array:
-    """Return a start anywhere in the ranges; a joint without end is half a turn off at most.
-
-    Args:
-        seed: Where joints without end are turned from in [rad].
-    """
+    """Return a start anywhere in the ranges; a joint without end is half a turn off at most."""
     lower = np.where(np.isfinite(limits.lower), limits.lower, seed - np.pi)
     upper = np.where(np.isfinite(limits.upper), limits.upper, seed + np.pi)
     start: Array = draw.uniform(lower, upper)

@@ -32,14 +32,7 @@ class LinkKinematics:
     """Where a link is and how the joints move it; for one thread."""
 
     def __init__(self, model: RobotModel, link: str = '') -> None:
-        """Prepare.
-
-        Args:
-            link: The link; empty for the tip.
-
-        Raises:
-            PlanningError: There is no such link, or no joint moves it.
-        """
+        """Prepare; the link is the tip for an empty name. Refuse one that no joint moves."""
         self.link = link or model.tip
         self.kinematics = model.kinematics
         if self.link not in self.kinematics.frames:
@@ -189,13 +182,10 @@ class ClosedForm:
         return cls(points, axes, wrist, link.pose(zero))
 
     def solutions(self, pose: Pose, seed: Array) -> list[list[float]] | WristMiss:
-        """Return all solutions (up to 8), in no order, or why there is none.
+        """Return all solutions (up to 8) of a pose in the root link, or why there is none.
 
-        Positions are in the turn that the arc tangents give; limits do not count.
-
-        Args:
-            pose: Of the link, in the root link.
-            seed: Where joints stay that are free, in [rad].
+        They are in no order, in the turn that the arc tangents give; limits do not count. Joints
+        that are free stay at the seed.
         """
         rotation = self._base @ pose.rotation
         cx, cy, cz = (rotation @ self._wrist + self._base @ pose.position - self._origin).tolist()

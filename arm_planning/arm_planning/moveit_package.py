@@ -55,14 +55,7 @@ class FlatYaml:
 
 
 def read_flat(path: Path, prefix: str = '') -> FlatYaml:
-    """Read a file.
-
-    Args:
-        prefix: Before each name, with its dot.
-
-    Raises:
-        ConfigError: It cannot be read, is no YAML or no table, or has a key twice.
-    """
+    """Read a file, with a prefix before each name; refuse a key that is there twice."""
     try:
         loader = yaml.SafeLoader(path.read_text(encoding='utf-8'))
         root = loader.get_single_node()
@@ -143,10 +136,9 @@ class MoveItPackage:
 
 
 def read_package(folder: Path, xacro_args: Mapping[str, str] | None = None) -> MoveItPackage:
-    """Read a package.
+    """Read a package; its folder, or the folder config in it.
 
     Args:
-        folder: Its folder, or the folder config in it.
         xacro_args: Values for xacro arguments, beside those of the package.
 
     Raises:

@@ -122,14 +122,9 @@ def at(name: str, places: Mapping[str, Place]) -> str:
 
 
 def check(values: Mapping[str, object], places: Mapping[str, Place]) -> None:
-    """Refuse a value of the wrong kind, and misspelt names of limits.
+    """Refuse a value of the wrong kind, and misspelt names of limits, with place and name.
 
-    Args:
-        values: Parameters by name; others than MoveIt's are passed over.
-        places: Where they come from, of those that come from a file.
-
-    Raises:
-        ConfigError: There is one; the message has its place, its name and what it must be.
+    Parameters of other names than MoveIt's are passed over.
     """
     for name, value in values.items():
         kind = known_of(name)
@@ -158,11 +153,7 @@ def _meant(name: str) -> str:
 
 
 def misspelt(names: Sequence[str], places: Mapping[str, Place]) -> list[str]:
-    """Return a line for each parameter without effect that resembles one that has some.
-
-    Args:
-        places: Where they come from, of those that come from a file.
-    """
+    """Return a line for each parameter without effect that resembles one that has some."""
     meant = {name: _meant(name) for name in names if known_of(name) is None}
     return [
         f'{at(name, places)}: without effect; did you mean {key!r}?'
@@ -197,11 +188,7 @@ class PlannerConfigs:
         ]
 
     def name(self, planner_id: str, group: str) -> str:
-        """Return the name of a configuration.
-
-        Args:
-            planner_id: What a request has: the name, ``group[name]``, the group, or nothing.
-        """
+        """Return the name of a configuration: by itself, ``group[name]``, the group, nothing."""
         name = planner_id.removeprefix(f'{group}[').removesuffix(']')
         return self.defaults.get(group, '') if name in {'', group} else name
 
@@ -233,15 +220,7 @@ class MoveItSettings:
 def read_settings(
     values: Mapping[str, object], places: Mapping[str, Place] | None = None
 ) -> MoveItSettings:
-    """Return what parameters say.
-
-    Args:
-        values: Parameters by name, all that were given.
-        places: Where they come from, of those that come from a file.
-
-    Raises:
-        ConfigError: A value is refused, or names something unknown.
-    """
+    """Return what parameters say; refuse a value, or what names something unknown."""
     places = places or {}
     check(values, places)
     defaults = _below(values, PLANNING.rstrip('.'))
@@ -275,9 +254,6 @@ def of_nothing(
     """Return a line for each table of an unknown group, joint or controller.
 
     MoveIt reads none of them, and does not say so.
-
-    Args:
-        places: Where they come from, of those that come from a file.
     """
     lines = []
     for above, kind, known in (

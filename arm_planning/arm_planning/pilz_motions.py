@@ -69,11 +69,7 @@ class CartesianLimits:
 
     @classmethod
     def of_table(cls, table: Mapping[str, Any]) -> CartesianLimits:
-        """Return the limits of a table ``cartesian_limits``; other keys are left to others.
-
-        Raises:
-            PlanningError: A value is no number of the right sign.
-        """
+        """Return the limits of a table ``cartesian_limits``; other keys are left to others."""
         try:
             values = {
                 each.name: float(table[each.name]) for each in fields(cls) if each.name in table
@@ -123,14 +119,7 @@ def curve_path(
     factors: tuple[float, float],
     name: str,
 ) -> FullSpeedPath:
-    """Return the path of the joints at full speed along a curve.
-
-    Args:
-        curve: The curve; it begins where the link is.
-
-    Raises:
-        PlanningError: The curve cannot be followed; the message says where.
-    """
+    """Return the path of the joints at full speed along a curve that begins where the link is."""
     length = max(curve.length, curve.angle * limits.radius)
     if length < MIN_LENGTH:
         return standstill(start)
@@ -253,8 +242,7 @@ class _Tracer:
     def _pieces(self, places: Sequence[_Place]) -> tuple[Array, Array]:
         """Return the polynomials from place to place: of the joints and, last, of the share.
 
-        Returns:
-            How long each lasts in [s] (k), and their coefficients (k, 6, n + 1).
+        They are how long each lasts in [s] (k), and their coefficients (k, 6, n + 1).
         """
         q, first, second = (np.array([getattr(each, name) for each in places]) for name in _FIELDS)
         shares = np.array([each.share for each in places])

@@ -57,21 +57,11 @@ class PilzPlanner:
         limits: CartesianLimits | None,
         solver: Callable[[str], IkSolver],
     ) -> None:
-        """Prepare.
-
-        Args:
-            limits: Limits of a link's motion; None has the defaults.
-            solver: Returns the inverse kinematics of a link; of the tip for an empty name.
-        """
         self._model, self._solver = model, solver
         self._limits = CartesianLimits() if limits is None else limits
 
     def plan(self, request: MotionRequest, check: ValidityCheck) -> MotionPlan:
-        """Return the motion of a request to the first of its goals that can be reached.
-
-        Raises:
-            PlanningError: There is none; the message says why and where.
-        """
+        """Return the motion of a request to the first of its goals that can be reached."""
         start = check.start(request.start)
         problems: list[PlanningError] = []
         for goal in request.goals:
@@ -100,14 +90,8 @@ class PilzPlanner:
         """Return one motion through a sequence, with stops where a blend radius is 0.
 
         In a blended group the least factors of velocity and acceleration limit all joints, and
-        the path constraints of each motion hold in all of them.
-
-        Args:
-            items: The motions; each has one goal, and begins where the one before ends.
-            first: Number of the first item, for messages.
-
-        Raises:
-            PlanningError: A motion is refused, or a blend; the message names the item.
+        the path constraints of each motion hold in all of them. Each item has one goal; ``first``
+        is the number of the first one, for messages.
         """
         check_radii([item.blend_radius for item in items])
         start: Array | None = None
@@ -157,11 +141,7 @@ class PilzPlanner:
     def _full(
         self, request: MotionRequest, start: Array, goal: Goal, check: ValidityCheck
     ) -> tuple[FullSpeedPath, LinkKinematics]:
-        """Return the path at full speed to a goal, and the link that it moves.
-
-        Raises:
-            PlanningError: The goal is out of reach, or the way there cannot be followed.
-        """
+        """Return the path at full speed to a goal, and the link that it moves."""
         name = request.planner_id
         if name not in PLANNER_IDS:
             raise PlanningError(
@@ -305,22 +285,14 @@ class SequenceItem:
     blend_radius: float = 0.0
 
     def at(self, start: Array | None) -> MotionRequest:
-        """Return the motion.
-
-        Args:
-            start: Where it begins in [rad] (n); None for the first one.
-        """
+        """Return the motion that begins somewhere in [rad] (n); None for the first one."""
         if isinstance(self.request, MotionRequest):
             return self.request
         return self.request(start)
 
 
 def check_radii(radii: Sequence[float]) -> None:
-    """Refuse what are no blend radii of a sequence, by the rules of Pilz' planner.
-
-    Raises:
-        PlanningError: There is none, one is negative or not finite, or the last is not 0.
-    """
+    """Refuse what are no blend radii of a sequence, by the rules of Pilz' planner."""
     if not radii:
         raise _refused('no items')
     for number, radius in enumerate(radii):
@@ -333,11 +305,7 @@ def check_radii(radii: Sequence[float]) -> None:
 
 
 def check_overlap(radii: Sequence[float], corners: Sequence[Array], first: int) -> None:
-    """Refuse blends that overlap.
-
-    Raises:
-        PlanningError: The spheres of two neighbours overlap.
-    """
+    """Refuse blends of which the spheres of two neighbours overlap."""
     pairs = zip(pairwise(radii), pairwise(corners), strict=True)
     for number, ((radius, following), (corner, other)) in enumerate(pairs, first):
         distance = float(np.linalg.norm(other - corner))
@@ -351,14 +319,7 @@ def check_overlap(radii: Sequence[float], corners: Sequence[Array], first: int) 
 def joined(
     parts: Sequence[FullSpeedPath], radii: Sequence[float], link: LinkKinematics, first: int
 ) -> FullSpeedPath:
-    """Return one path at full speed of motions that follow without a stop.
-
-    Args:
-        parts: The motions, two or more; each begins where the one before ends.
-
-    Raises:
-        PlanningError: A motion is shorter than the radius, or a blend does not stay in its sphere.
-    """
+    """Return one path at full speed of two or more motions that follow without a stop."""
     blends = [
         _Blend.between(before.path, after.path, radius, link, first + number)
         for number, ((before, after), radius) in enumerate(

@@ -127,14 +127,7 @@ class MotionPlan:
 
 
 def check_scaling(request: MotionRequest, least: float = 0.0) -> None:
-    """Refuse factors of velocity and acceleration that are out of range.
-
-    Args:
-        least: Least factor; 0 for any above it.
-
-    Raises:
-        PlanningError: One is.
-    """
+    """Refuse factors of velocity and acceleration that are below a least one, or above 1."""
     for name in ('velocity_scaling', 'acceleration_scaling'):
         value = getattr(request, name)
         if not (0.0 < value <= 1.0 and value >= least):

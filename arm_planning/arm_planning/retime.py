@@ -180,12 +180,9 @@ def _evaluated(
 
 
 def timed_rows(rows: Array, limits: JointLimits) -> Path:
-    """Return a jerk-limited path from rest to rest through joint positions.
+    """Return a jerk-limited path from rest to rest through joint positions in [rad] (k, n).
 
     It is smooth, so that it leaves the lines at their corners, by a quarter of a step at most.
-
-    Args:
-        rows: Joint positions in [rad] (k, n), as dense as the path is to be close to the lines.
     """
     steps = np.diff(rows, axis=0)
     lasts = (np.abs(steps) / limits.velocity).max(axis=1)
@@ -212,14 +209,7 @@ def speed_limited(
 ) -> tuple[Path, tuple[str, ...]]:
     """Return a path whose link is not too fast, and a note if that makes it slower.
 
-    The places of the path stay the same.
-
-    Args:
-        most: Greatest speed of the link in [m/s]; 0 for no limit.
-        solver: Returns the inverse kinematics of a link; of the tip for an empty name.
-
-    Raises:
-        PlanningError: The speed is negative, or no finite number; or there is no such link.
+    The places of the path stay the same. ``most`` is in [m/s]; 0 for no limit.
     """
     if not most:
         return path, ()

@@ -40,39 +40,21 @@ class MotionCheck:
         ends: Sequence[Array],
         constraints: ConstraintCheck | None = None,
     ) -> None:
-        """Prepare.
-
-        Args:
-            ends: Starts and goals: on the way a pair may be as near as it is there.
-            constraints: What holds everywhere; None for nothing.
-        """
         self.constraints, self._check = constraints, check
         self.required, self.compiled = check.required(*ends), check.compiled
 
     def admits(self, goal: Array) -> bool:
-        """Whether a state that was no end when the search began may be one.
-
-        Args:
-            goal: Joint positions in [rad] (n), valid.
-        """
+        """Whether a valid state that was no end when the search began may be one."""
         return bool((self._check.required(goal) >= self.required).all())
 
     def clear(self, begin: Array, end: Array) -> bool:
-        """Whether a straight motion is free everywhere.
-
-        Args:
-            begin: Joint positions in [rad] (n), known to be free.
-        """
+        """Whether a straight motion from a free state is free everywhere."""
         if self.constraints is not None and not _heeded(self.constraints, begin, end - begin):
             return False
         return self._check.near(begin, end, self.required) is None
 
     def waypoints(self, places: Array) -> Violation | None:
-        """Return what is wrong with the straight lines between places; None for nothing.
-
-        Args:
-            places: Joint positions in [rad] (m, n).
-        """
+        """Return what is wrong with the straight lines between places; None for nothing."""
         violation = self._check.waypoints(places)
         if violation is None and self.constraints is not None:
             return self.constraints.lines(places)
@@ -86,12 +68,7 @@ class MotionCheck:
         return violation
 
     def towards(self, begin: Array, target: Array) -> Array | None:
-        """Return the next state on a motion that heeds the constraints; None where it ends.
-
-        Args:
-            begin: Joint positions in [rad] (n), which heed the constraints.
-            target: Joint positions in [rad] (n) that are nearer with each state.
-        """
+        """Return the next state on a motion that heeds the constraints; None where it ends."""
         way = target - begin
         length = float(np.linalg.norm(way))
         wanted = target if length <= STRIDE else begin + way * (STRIDE / length)
@@ -276,11 +253,7 @@ def _connect(tree: _Tree, target: Array, check: MotionCheck) -> int | None:
 def shortened(
     places: Array, draw: np.random.Generator, check: MotionCheck, expired: Callable[[], bool]
 ) -> Array:
-    """Return a path of the same ends that is no longer, as far as the check can see.
-
-    Args:
-        places: Joint positions in [rad] (m, n) with straight motions between them.
-    """
+    """Return straight motions of the same ends that are no longer, as far as the check can see."""
     places = _without_needless(places, check, expired)
     failures = 0
     for _ in range(MAX_TRIALS):

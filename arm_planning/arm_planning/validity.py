@@ -79,10 +79,9 @@ class ValidityCheck:
         return required
 
     def near(self, begin: Array, end: Array, required: Array) -> Array | None:
-        """Return a place of a straight motion at which a pair is nearer than it may be, or None.
+        """Return a place of a straight motion at which a pair is nearer than required, or None.
 
-        Args:
-            required: Distance that each pair keeps in [m] (k).
+        ``required`` is the distance that each pair keeps in [m] (k).
         """
         way = end - begin
         if self.compiled is not None:
@@ -106,11 +105,7 @@ class ValidityCheck:
         return None
 
     def waypoints(self, places: Array) -> Violation | None:
-        """Return what is wrong with the straight lines between places; None for nothing.
-
-        Args:
-            places: Joint positions in [rad] (m, n).
-        """
+        """Return what is wrong with the straight lines between places; None for nothing."""
         lower, upper = places.min(axis=0), places.max(axis=0)
         if (beyond := self._beyond(lower, upper)) is not None:
             return beyond
@@ -136,12 +131,7 @@ class ValidityCheck:
         return None if found is None else self._near(path.at(found).position, found)
 
     def start(self, positions: Sequence[float] | Array) -> Array:
-        """Return where a motion may begin.
-
-        Raises:
-            PlanningError: They are not finite numbers, a joint is beyond its limits, or something
-                is in contact.
-        """
+        """Return where a motion may begin, or raise a PlanningError with reason and remedy."""
         with coded(PlanningCode.INVALID_ROBOT_STATE):
             start = checked(positions, len(self._limits), 'start')
         violation = self.state(start)
@@ -203,8 +193,7 @@ class ValidityCheck:
     ) -> dict[int, float] | None:
         """Return the pairs that may come near within a part, and their distances there in [m].
 
-        Returns:
-            The pairs; None where one is too near already.
+        It is None where one is too near already.
         """
         left, found = {}, self._clearances.measure(place, pairs)
         for pair in pairs:

@@ -17,6 +17,9 @@ Times are those of the processor: other programs do not count. Lengths are by th
 of minutes (``--long-run``), which writes ``best_lengths.json``; where it finds no way, the number
 is null, and the problem does not count. A path is invalid where a sampler that looks at it every
 milliradian, and asks nothing but pinocchio, finds a contact.
+
+``--crowded`` surrounds the obstacles of the table with a thousand boxes and an octomap of 20,000
+cells; a scene is taken over once, as by move_group, and planned in after that.
 """
 
 from __future__ import annotations
@@ -40,7 +43,20 @@ from planning_problems import KINDS, panda, Problem, problem, PROBLEMS
 
 from arm_bringup.description import expand_xacro
 from arm_bringup.robots import installed_robots_folder
-from arm_model import Array, Box, PlanningScene, RobotModel
+from arm_model import (
+    Array,
+    Box,
+    Cells,
+    Clearances,
+    CollisionObject,
+    frozen,
+    OCTOMAP_NAME,
+    ORIGIN,
+    PlacedShape,
+    PlanningScene,
+    Pose,
+    RobotModel,
+)
 from arm_planning import JointGoal, MotionRequest, Planner, PlanningError, ValidityCheck
 from arm_planning.rrt_connect import MotionCheck, rrt_connect, shortened
 
@@ -65,6 +81,9 @@ LONGEST = 30.0  # time for one problem of a long run in [s]
 
 RESOLUTION = 0.01
 """Of OMPL's motion check, as a share of the space: MoveIt's longest_valid_segment_fraction."""
+
+BOXES, EDGE, CELLS, BLOCK = 1000, 0.02, 142, 256  # edge of a cell [m], cells along the floor
+CLEARANCE = 0.02  # of what is added at start and goal [m]
 
 BEST_LENGTHS = Path(__file__).with_name('best_lengths.json')
 
@@ -238,6 +257,58 @@ def long_run(count: int) -> None:
         print(kind, lengths.count(None), 'not solved', flush=True)
 
 
+def crowded(asked: Problem) -> PlanningScene:
+    """Return the scene of a problem with boxes all around that leave room at start and goal."""
+    draw, objects = np.random.default_rng(asked.seed), dict(asked.scene.objects)
+    for number in range(BOXES):
+        radius, angle, height = draw.uniform((0.75, -np.pi, 0.0), (1.4, np.pi, 1.2)).tolist()
+        place = frozen([radius * np.cos(angle), radius * np.sin(angle), height])
+        box = Box(*draw.uniform(0.01, 0.04, 3).tolist())
+        name = f'box_{number}'
+        objects[name] = CollisionObject(name, box, pose=Pose(ORIGIN.rotation, place))
+    scene = asked.scene.with_contents(objects=objects)
+    clearances = Clearances(scene)
+    for state in (asked.start, asked.goal):
+        for pair in (clearances.least(state, CLEARANCE) < CLEARANCE).nonzero()[0].tolist():
+            for name in scene.pairs[pair]:
+                if name.startswith('box_'):
+                    objects.pop(name, None)
+    return scene.with_contents(objects=objects)
+
+
+def with_floor(scene: PlanningScene) -> PlanningScene:
+    """Return a scene with an octomap below."""
+    along = (np.arange(CELLS) - CELLS // 2 + 0.5) * EDGE
+    middles = np.array([(x, y, -0.11) for x in along for y in along])
+    shapes = [
+        PlacedShape(Cells(middles[begin : begin + BLOCK], EDGE))
+        for begin in range(0, len(middles), BLOCK)
+    ]
+    return scene.with_object(CollisionObject(OCTOMAP_NAME, *shapes))
+
+
+def crowded_scenes() -> None:
+    """Print the medians in scenes that are more and more crowded."""
+    model = panda()
+    asked = [problem(model, 'table', seed) for seed in range(FEW)]
+    first = 0.0
+    for label in ('obstacles alone', 'and 1,000 boxes', 'and 20,000 cells'):
+        took = []
+        for each in asked:
+            scene = each.scene if label == 'obstacles alone' else crowded(each)
+            scene = with_floor(scene) if label == 'and 20,000 cells' else scene
+            planner = Planner(model, seed=each.seed)
+            planner.is_valid(each.start, scene)  # takes it over
+            began = time.process_time()
+            planner.plan(MotionRequest(each.start, [JointGoal(each.goal)], timeout=60.0), scene)
+            took.append(1e3 * (time.process_time() - began))
+        p50, p95 = np.percentile(took, (50, 95)).tolist()
+        first = first or p50
+        print(
+            f'{label:17}: p50 {p50:6.1f} ms, p95 {p95:6.1f} ms, p50 by the first {p50 / first:.1f}'
+        )
+
+
 PLANNERS: dict[str, Callable[[RobotModel, Problem], Planning]] = {
     'ours': ours,
     'OMPL': plain_ompl,
@@ -298,11 +369,15 @@ def main() -> None:
     parser.add_argument('--problems', type=int, default=FEW, help='problems of each scene')
     parser.add_argument('--wheels', type=Path, help='where OMPL and roboplan are installed')
     parser.add_argument('--long-run', action='store_true', help='write best_lengths.json')
+    parser.add_argument('--crowded', action='store_true', help='among 1,000 boxes, 20,000 cells')
     parser.add_argument('--planner', choices=PLANNERS, help=argparse.SUPPRESS)
     options = parser.parse_args()
     count = PROBLEMS if options.all else options.problems
     if options.long_run:
         long_run(PROBLEMS)
+        return
+    if options.crowded:
+        crowded_scenes()
         return
     if options.planner is not None:
         measured(options.planner, count)

@@ -88,14 +88,7 @@ class MoveGroup(Node):
 
     @destroyed_when_refused
     def __init__(self, package: MoveItPackage | None = None) -> None:
-        """Read the robot and offer everything.
-
-        Args:
-            package: Of MoveIt's Setup Assistant; gives what the parameters leave out.
-
-        Raises:
-            ArmError: The robot, or a parameter, is refused.
-        """
+        """Read the robot and offer everything; a package gives what the parameters leave out."""
         super().__init__(NAME)
         given = declare_parameters(self, package)
         description, settings = given.description, given.settings
@@ -239,10 +232,7 @@ def contact_ahead(
 ) -> str:
     """Return what the rest of a trajectory would touch, in words; empty for nothing.
 
-    Args:
-        trajectory: A trajectory_msgs/JointTrajectory that was checked, with the way to its
-            first point.
-        scene: What may collide; all joints of the robot move in it.
+    The trajectory was checked, and has the way to its first point; all joints move in the scene.
     """
     joints = list(scene.kinematics.joints)
     moved = [name for name in trajectory.joint_names if name in joints]

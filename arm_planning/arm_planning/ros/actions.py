@@ -111,11 +111,7 @@ class MotionKind:
 
 
 def single_motion(planning: PlanningThreads, warn: Callable[[str], object]) -> MotionKind:
-    """Return move_action: a motion of MoveGroupInterface::plan and ::move.
-
-    Args:
-        warn: Logs a warning.
-    """
+    """Return move_action: a motion of MoveGroupInterface::plan and ::move."""
 
     def prepare(
         asked: Any,  # noqa: ANN401

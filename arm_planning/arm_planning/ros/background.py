@@ -55,12 +55,7 @@ class Background:
     def submit(
         self, work: Callable[[], Any], then: Callable[[Future[Any]], None], lane: str = ''
     ) -> Future[Any]:
-        """Run work in a thread, and what follows from it in the executor of the node.
-
-        Args:
-            then: Gets the future of the work when that is done or cancelled.
-            lane: Work of other lanes is not waited for.
-        """
+        """Run work in a lane, and what follows with its future in the executor of the node."""
         future = self._lane(lane).submit(work)
 
         def hand_over(done: Future[Any]) -> None:
@@ -79,11 +74,9 @@ class Background:
         refuse: Callable[[Any, PlanningError], None],
         lane: Callable[[Any], str] = lambda _: '',
     ) -> None:
-        """Offer a service whose answers are made in the thread.
+        """Offer a service whose answers are made in the thread of a lane.
 
-        Args:
-            begin: Called in the executor with the request; returns what makes the response.
-            lane: Returns the lane of a request that was begun.
+        ``begin`` gets the request in the executor, and returns what makes the response.
         """
 
         def respond(response: Any, outcome: Future[Any]) -> Any:  # noqa: ANN401

@@ -94,7 +94,6 @@ class TrajectoryExecution:
             received: Returns where joints are in [rad], by joint; raises PlanningError where
                 that is not known.
             followers: Joints that follow others, which no controller takes.
-            continuous: Joints of which whole turns do not count.
         """
         self._followers, self._continuous = frozenset(followers), frozenset(continuous)
         self._node, self._controllers, self._received = node, controllers, received
@@ -139,12 +138,7 @@ class TrajectoryExecution:
         self._find_out = find_out
 
     def explain(self, execution: Execution, change: str) -> None:
-        """Store why a controller gave up.
-
-        Args:
-            change: How the scene has changed that it had to; empty where its own words alone
-                count.
-        """
+        """Store why a controller gave up: a change of the scene, or its own words for none."""
         if not execution.in_doubt:
             return  # a client canceled it, or it took too long
         execution.in_doubt = False

@@ -75,11 +75,7 @@ class RequestReader:
         self.start = frozen(np.where(np.abs(start - within) <= START_BOUNDS_ERROR, within, start))
 
     def request(self, message: Any) -> MotionRequest:  # noqa: ANN401  # messages have no type
-        """Return a moveit_msgs/MotionPlanRequest; its start state is where the robot is.
-
-        Raises:
-            PlanningError: It has no goal, or a part of it is refused.
-        """
+        """Return a moveit_msgs/MotionPlanRequest; its start state is where the robot is."""
         if message.pipeline_id not in {'', *PIPELINES}:
             known = ', '.join(PIPELINES)
             raise PlanningError(
@@ -126,11 +122,7 @@ class RequestReader:
         return DEFAULT_PLANNER
 
     def goal(self, message: Any) -> Goal:  # noqa: ANN401
-        """Return a moveit_msgs/Constraints as a goal.
-
-        Raises:
-            PlanningError: It is empty, mixes joints and poses, or contradicts itself.
-        """
+        """Return a moveit_msgs/Constraints as a goal."""
         if message.visibility_constraints:
             raise _bad_goal('visibility constraints are not supported')
         positions, turns = message.position_constraints, message.orientation_constraints
@@ -146,11 +138,7 @@ class RequestReader:
         return self._pose_goal(positions, turns)
 
     def constraints(self, message: Any) -> PathConstraints | None:  # noqa: ANN401
-        """Return a moveit_msgs/Constraints of a path; None where it is empty.
-
-        Raises:
-            PlanningError: A joint or link is unknown, or a region or rotation is no such thing.
-        """
+        """Return a moveit_msgs/Constraints of a path; None where it is empty."""
         if message.visibility_constraints:
             raise _bad_goal('visibility constraints are not supported')
         joints = self._joint_ranges(message.joint_constraints)
@@ -161,25 +149,13 @@ class RequestReader:
         return PathConstraints(joints, turns, places)
 
     def pose(self, message: Any, frame: str, what: str) -> Pose:  # noqa: ANN401
-        """Return a geometry_msgs/Pose of a frame in the root link.
-
-        Raises:
-            PlanningError: The frame is unknown, or a number is none.
-        """
+        """Return a geometry_msgs/Pose of a frame in the root link."""
         with coded(BAD_GOAL):
             place = pose_of(message.position, message.orientation, what)
         return combined(self._snapshot.frame(frame, self._positions), place)
 
     def on_link(self, pose: Pose, frame: str) -> tuple[str, Pose]:
-        """Return the link that carries a frame, and its pose when the frame has a pose.
-
-        Args:
-            pose: Pose of the frame in the root link.
-            frame: A link, an attached body or a subframe of one; empty for the tip.
-
-        Raises:
-            PlanningError: There is no such frame.
-        """
+        """Return the link that carries a frame (empty: the tip), and its pose for the frame's."""
         link, place = self._link_of(frame)
         return link, combined(pose, inverse(place))
 
@@ -333,11 +309,7 @@ class RequestReader:
 
 
 def planning_time(given: float) -> float:
-    """Return the time for planning in [s]; 0 and less is one that was not given, as in MoveIt.
-
-    Raises:
-        PlanningError: It is not finite.
-    """
+    """Return the time for planning in [s]; 0 and less is one that was not given, as in MoveIt."""
     if not math.isfinite(given):
         raise PlanningError(
             PlanningCode.FAILURE, f'allowed_planning_time is {given:g} s; it must be finite'
@@ -346,11 +318,7 @@ def planning_time(given: float) -> float:
 
 
 def scaling_factor(what: str, value: float, default: float = 1.0) -> float:
-    """Return a scaling factor; 0 is one that was not given.
-
-    Raises:
-        PlanningError: It is negative, or above 1.
-    """
+    """Return a scaling factor; 0 is one that was not given."""
     if not 0.0 <= value <= 1.0:
         raise PlanningError(
             PlanningCode.FAILURE,

@@ -137,11 +137,7 @@ class MoveGroupParameters:
 
 
 def declare_parameters(node: Node, package: MoveItPackage | None = None) -> MoveGroupParameters:
-    """Declare what describes the robot, read what is for its planners, log what has no effect.
-
-    Raises:
-        ArmError: A parameter is missing or refused.
-    """
+    """Declare what describes the robot, read what is for its planners, log what has no effect."""
     given = given_values(node)
     places: dict[str, Place] = {}
     if package is not None:
@@ -171,11 +167,7 @@ def declare_parameters(node: Node, package: MoveItPackage | None = None) -> Move
 
 
 def declare_others(node: Node, names: Sequence[str]) -> None:
-    """Declare what was given and not declared, so that tools list it; log it once.
-
-    Raises:
-        ParameterError: A name that is not known looks like one that is.
-    """
+    """Declare what was given and not declared, so that tools list it; log it once."""
     read = [name for name in names if known_of(name) is not None]
     declare_given(node, read, "MoveIt's, read at the start")
     in_tables = {name for name in names if '.' in name}  # keys of tables are looked at by name
@@ -189,11 +181,7 @@ def declare_others(node: Node, names: Sequence[str]) -> None:
 def _complete(
     node: Node, urdf: str, limits: Mapping[str, Mapping[str, object]], places: Mapping[str, Place]
 ) -> Mapping[str, Mapping[str, object]]:
-    """Return limits of all joints: one without a table has those of the description.
-
-    Raises:
-        ConfigError: Limits of a joint are refused; the message has their place.
-    """
+    """Return limits of all joints: one without a table has those of the description."""
     tree = read_urdf(urdf)
     joints = [joint.name for joint in tree.movable() if joint.independent]
     table = {name: limits.get(name, {}) for name in joints}
@@ -217,11 +205,7 @@ def _complete(
 
 
 def declare_execution_limits(node: Node) -> ExecutionLimits:
-    """Declare ``trajectory_execution.*``.
-
-    Raises:
-        ParameterError: A value is refused.
-    """
+    """Declare ``trajectory_execution.*``."""
     read = ParameterReader(node, 'trajectory_execution.')
     return ExecutionLimits(
         read.number(
@@ -259,13 +243,6 @@ def declare_controllers(
     """Declare the controllers; by default those of bring-up, one for each group.
 
     Those that are default come first: they get the joints that several move.
-
-    Args:
-        places: Where parameters come from, of those that come from a file.
-
-    Raises:
-        ParameterError: A value is refused.
-        ConfigError: A controller has no joints, or one that the robot does not have.
     """
     defaults = {f'{group}_controller': list(each) for group, each in robot.group_joints().items()}
     names = ParameterReader(node, f'{MANAGER}.').texts(

@@ -72,14 +72,7 @@ class GroupPlanners:
         self._planners: dict[str, tuple[RobotModel, Planner]] = {}
 
     def at(self, group: str, positions: Array) -> tuple[RobotModel, Planner]:
-        """Return model and planner of a group, with the joints beside it where they are.
-
-        Args:
-            positions: Positions of all joints of the robot in [rad].
-
-        Raises:
-            PlanningError: There is no such group, or it cannot be moved.
-        """
+        """Return model and planner of a group, with the joints beside it at positions in [rad]."""
         model = self._robot.model_at(group, positions)
         known = self._planners.get(group)
         if known is None or known[0] is not model:
@@ -134,9 +127,6 @@ class PlanningThreads:
         Args:
             scene_diff: A moveit_msgs/PlanningScene that counts for this plan only.
             is_canceled: Whether the plan is canceled, which ends a search at once.
-
-        Raises:
-            PlanningError: The request is refused.
         """
         if not message.group_name:
             known = ', '.join(self._monitor.robot.names)
@@ -155,15 +145,7 @@ class PlanningThreads:
         scene_diff: Any = None,  # noqa: ANN401
         is_canceled: Callable[[], bool] = lambda: False,
     ) -> Callable[[], PlannedMotion]:
-        """Return what plans a sequence, as :meth:`prepare`; without items it is one of no motion.
-
-        Args:
-            items: The moveit_msgs/MotionSequenceItem.
-            scene_diff: A moveit_msgs/PlanningScene that counts for this plan only.
-
-        Raises:
-            PlanningError: The sequence is refused.
-        """
+        """Return what plans a sequence, as :meth:`prepare`; without items nothing moves."""
         if not items:
             return lambda: PlannedMotion(StateMessage(), [], 0.0, ['no items: nothing moves'])
         runs = _group_runs(items)
@@ -357,12 +339,7 @@ def _refuse(response: Any, error: PlanningError) -> None:  # noqa: ANN401
 
 
 def _group_runs(items: Sequence[Any]) -> list[_GroupRun]:
-    """Return the items of a moveit_msgs/MotionSequenceRequest by group, in their order.
-
-    Raises:
-        PlanningError: An item has no group, a radius is none or blends two groups, or an item that
-            is not the first of its group has a start state.
-    """
+    """Return the items of a moveit_msgs/MotionSequenceRequest by group, in their order."""
     radii = [item.blend_radius for item in items]
     check_radii(radii)
     groups = [item.req.group_name for item in items]

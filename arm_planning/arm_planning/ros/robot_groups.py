@@ -49,11 +49,6 @@ class RobotGroups:
     def __init__(
         self, urdf: str, srdf: str, limits: Mapping[str, Any], folder: Path | None = None
     ) -> None:
-        """Read the robot.
-
-        Raises:
-            ModelError: They do not make a robot, or the SRDF has no group.
-        """
         self._texts, self._limits, self._folder = (urdf, srdf), limits, folder
         try:
             tree, semantic = read_urdf(urdf), parse_srdf(srdf)
@@ -100,11 +95,7 @@ class RobotGroups:
         return self._joints
 
     def model(self, group: str) -> RobotModel:
-        """Return the model of a group.
-
-        Raises:
-            PlanningError: There is no such group, or it cannot be moved.
-        """
+        """Return the model of a group, or refuse one that is unknown or cannot be moved."""
         if group not in self.names:
             raise PlanningError(
                 PlanningCode.INVALID_GROUP_NAME,
@@ -124,15 +115,9 @@ class RobotGroups:
             return self._models[group]
 
     def model_at(self, group: str, positions: Array) -> RobotModel:
-        """Return the model of a group with the joints beside it where they are.
+        """Return the model of a group with the joints beside it where they are in [rad].
 
         It is the same one for a thread for as long as these stay.
-
-        Args:
-            positions: Positions of all joints of the robot in [rad].
-
-        Raises:
-            PlanningError: There is no such group, or it cannot be moved.
         """
         placed = self._thread.models
         before = placed.get(group) or self.model(group)
@@ -141,11 +126,7 @@ class RobotGroups:
         return placed[group]
 
     def positions(self, by_joint: Mapping[str, float]) -> Array:
-        """Return the positions of all joints; those that are not given stand at 0 or nearby.
-
-        Args:
-            by_joint: Positions in [rad]; other names than those of joints count nothing.
-        """
+        """Return the positions of all joints; those that are not given stand at 0 or nearby."""
         positions = np.array(self._standing)
         for place, name in enumerate(self.joints):
             positions[place] = by_joint.get(name, positions[place])

@@ -116,12 +116,8 @@ class SceneSnapshot:
     def link_of(self, frame: str) -> tuple[str, Pose]:
         """Return the link that carries a frame, and where the frame is in it.
 
-        Args:
-            frame: A link, an object or attached body, a subframe of one as ``object/subframe``,
-                or a frame that was named; empty for the root link.
-
-        Raises:
-            PlanningError: It is unknown.
+        It is a link, an object or attached body, a subframe of one as ``object/subframe``, or a
+        frame that was named; empty for the root link. Others are refused.
         """
         name = frame.removeprefix('/')
         if name in self.scene.kinematics.frames:
@@ -142,15 +138,7 @@ class SceneSnapshot:
         return link, combined(pose, self.details[thing].subframes[subframe]) if separator else pose
 
     def frame(self, frame: str, positions: Array) -> Pose:
-        """Return where a frame is in the root link.
-
-        Args:
-            frame: As of :meth:`link_of`, or a frame of others.
-            positions: Positions of all joints of the robot in [rad].
-
-        Raises:
-            PlanningError: It is unknown.
-        """
+        """Return where a frame of :meth:`link_of`, or one of others, is in the root link."""
         try:
             link, pose = self.link_of(frame)
         except PlanningError:
@@ -189,9 +177,7 @@ def scene_message(
 ) -> SceneMessage:
     """Return a scene as a moveit_msgs/PlanningScene, whole or the parts that are asked for.
 
-    Args:
-        state: Where the joints are; attached bodies are added here.
-        components: Bits of moveit_msgs/PlanningSceneComponents.
+    Attached bodies are added to the state; the parts are bits of PlanningSceneComponents.
     """
     has = PlanningSceneComponents
     objects = {name: each for name, each in snapshot.scene.objects.items() if name != OCTOMAP_NAME}

@@ -45,14 +45,7 @@ MIN_THICKNESS = 1e-6  # least extent of a mesh along its thinnest axis in [m] th
 
 
 def apply_scene(snapshot: SceneSnapshot, message: Any, positions: Array) -> SceneSnapshot:  # noqa: ANN401
-    """Return a scene after a moveit_msgs/PlanningScene: a change, or a whole scene.
-
-    Args:
-        positions: Positions of all joints of the robot in [rad].
-
-    Raises:
-        PlanningError: A part of it is refused.
-    """
+    """Return a scene after a moveit_msgs/PlanningScene: a change, or a whole scene."""
     before = snapshot
     if not message.is_diff:  # what a whole scene replaces besides its objects
         before = replace(before, colors={}, fixed_frames={}, octomap=None)
@@ -84,9 +77,8 @@ def apply_scene(snapshot: SceneSnapshot, message: Any, positions: Array) -> Scen
 def scene_for(snapshot: SceneSnapshot, robot_alone: PlanningScene) -> PlanningScene:
     """Return the scene as a group of the robot moves in it.
 
-    Args:
-        robot_alone: The first scene of the group's model: pairs that it allows stay allowed where
-            the matrix of the scene has neither an entry of them nor a default of a name.
+    Pairs that the first scene of the group's model allows stay allowed where the matrix of the
+    scene has neither an entry of them nor a default of a name.
     """
     whole, alone = snapshot.scene, robot_alone.allowed.entries
     defaults = whole.allowed.defaults.keys()
@@ -188,11 +180,7 @@ def _fixed(
 
 
 def _check_mesh(message: Any, what: str) -> None:  # noqa: ANN401
-    """Make sure that a shape_msgs/Mesh is a body.
-
-    Raises:
-        PlanningError: It has no triangle or no volume, or names an unknown corner.
-    """
+    """Make sure that a shape_msgs/Mesh is a body."""
     problem = _problem(*_arrays(message))
     if problem:
         raise PlanningError(PlanningCode.FAILURE, f'{what}: {problem}')

@@ -59,11 +59,7 @@ class SceneMonitor:
     """
 
     def __init__(self, node: Node, robot: RobotGroups, frame_prefix: str = '') -> None:
-        """Offer topics and services.
-
-        Args:
-            frame_prefix: Before the names of its links in TF.
-        """
+        """Offer topics and services; the prefix stands before the names of its links in TF."""
         self.robot = robot
         self._tf = TfListener(node, robot.kinematics, frame_prefix, on_demand=True)
         self.snapshot = SceneSnapshot(
@@ -100,11 +96,7 @@ class SceneMonitor:
         self._listeners.append(listener)
 
     def received(self, joints: Sequence[str]) -> Mapping[str, float]:
-        """Return where joints are in [rad], by joint.
-
-        Raises:
-            PlanningError: The robot lacks one, or it was never received, or is too old.
-        """
+        """Return where joints are in [rad], by joint; refuse those that are unknown or too old."""
         for joint in joints:
             if joint not in self.robot.all_joints:
                 known = ', '.join(self.robot.all_joints)
@@ -127,27 +119,15 @@ class SceneMonitor:
         )
 
     def positions(self, message: Any = None) -> Array:  # noqa: ANN401  # messages have no type
-        """Return the positions of all joints of the robot in [rad].
-
-        Args:
-            message: A moveit_msgs/RobotState; the joints that it leaves out are where they are.
-
-        Raises:
-            PlanningError: It is refused.
-        """
+        """Return the positions of all joints in [rad]: those of a moveit_msgs/RobotState first."""
         given = {} if message is None else joints_of(message, self.robot.all_joints)
         return self.robot.positions({**self._places(), **given})
 
     def start(self, state: Any, group: str = '') -> tuple[SceneSnapshot, Array]:  # noqa: ANN401
         """Return the scene in which a request begins, and the positions of all joints in [rad].
 
-        Args:
-            state: A moveit_msgs/RobotState; the joints that it leaves out are where they are, and
-                its attached bodies come to those of the scene.
-            group: Group whose joints must be known; empty for none.
-
-        Raises:
-            PlanningError: The state or a body is refused, or a joint is unknown or too old.
+        Joints that the moveit_msgs/RobotState leaves out are where they are; those of a group
+        must be known then. Its attached bodies come to those of the scene.
         """
         positions = self.positions(state)
         if group:

@@ -163,14 +163,7 @@ class RobotServices:
         return stamped
 
     def _ik(self, request: Any, snapshot: SceneSnapshot, positions: Array) -> tuple[Any, Any]:  # noqa: ANN401
-        """Return the GetPositionIK.Response to a moveit_msgs/PositionIKRequest, and its state.
-
-        Args:
-            positions: Positions of all joints of the robot in [rad], of which it begins.
-
-        Raises:
-            PlanningError: There is no solution, or the request is refused.
-        """
+        """Return the GetPositionIK.Response to a moveit_msgs/PositionIKRequest, and its state."""
         model = self._robot.model_at(request.group_name, positions)
         reader = RequestReader(model, snapshot, positions)
         name, stamped = _one_pose(request)
@@ -206,12 +199,6 @@ class RobotServices:
         """Return the GetCartesianPath.Response to a request, and its start state.
 
         A path that ends early has the code SUCCESS, its fraction, and the reason as message.
-
-        Args:
-            positions: Positions of all joints of the robot in [rad], where it begins.
-
-        Raises:
-            PlanningError: The request is refused.
         """
         model = self._robot.model_at(request.group_name, positions)
         reader = RequestReader(model, snapshot, positions)
@@ -259,15 +246,9 @@ class RobotServices:
         rows: Array,
         scene: PlanningScene | None,
     ) -> tuple[Path, int, str]:
-        """Return the path through joint positions as fast as a request allows.
+        """Return the path through joint positions, through how many of them, and why no more.
 
-        It ends in front of what is not valid between two of them.
-
-        Returns:
-            The path, how many of the positions it leads through, and why no more.
-
-        Raises:
-            PlanningError: A factor or speed is refused.
+        It is as fast as the request allows, and ends in front of what is not valid between two.
         """
         limits = model.limits.scaled(
             scaling_factor(

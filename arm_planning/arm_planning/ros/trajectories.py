@@ -33,15 +33,7 @@ MAX_SPLITS = 5000
 
 
 def joints_of(message: Any, known: Sequence[str]) -> Mapping[str, float]:  # noqa: ANN401
-    """Return the positions in [rad] that a moveit_msgs/RobotState has, by joint.
-
-    Args:
-        known: Joints of the robot, mimic joints too.
-
-    Raises:
-        PlanningError: A joint is unknown, a position is missing or not finite, or there are joints
-            of several degrees of freedom.
-    """
+    """Return the positions in [rad] that a moveit_msgs/RobotState has, by joint, or refuse it."""
     state = message.joint_state
     if message.multi_dof_joint_state.joint_names:
         raise _invalid('multi_dof_joint_state: the robot stands still, it has no such joint')
@@ -104,12 +96,7 @@ def _point(path: Path, time: float) -> JointTrajectoryPoint:
 
 
 def check_trajectory(trajectory: Any) -> None:  # noqa: ANN401  # messages have no type
-    """Refuse a trajectory that no controller can follow.
-
-    Raises:
-        PlanningError: It has no points, names a joint twice, a row is too long or too short, a
-            number is not finite, or its times do not increase.
-    """
+    """Refuse a trajectory that no controller can follow: its points, rows, numbers or times."""
     names = list(trajectory.joint_names)
     if not trajectory.points:
         raise _no_trajectory('the trajectory has no points')
@@ -173,11 +160,7 @@ def _no_trajectory(reason: str) -> PlanningError:
 
 
 def path_of(trajectory: Any) -> Path:  # noqa: ANN401
-    """Return a trajectory as joint_trajectory_controller interpolates it.
-
-    Args:
-        trajectory: A trajectory_msgs/JointTrajectory of two points or more.
-    """
+    """Return a trajectory of two points or more as joint_trajectory_controller interpolates it."""
     times = np.array([seconds(each.time_from_start) for each in trajectory.points])
     lasts = np.diff(times)
     rows = [[getattr(each, kind) for each in trajectory.points] for kind in ROWS]
