@@ -8,8 +8,8 @@ import math
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+from model_robots import forward, numbers, transform
 import pytest
-from urdf_kinematics import forward, numbers, transform
 
 from arm_bringup.description import expand_xacro, joint_limits
 from arm_bringup.exceptions import DescriptionError

@@ -8,8 +8,8 @@ import math
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+from model_robots import forward
 import pytest
-from urdf_kinematics import forward
 
 from arm_bringup.description import expand_xacro, joint_limits
 

@@ -13,6 +13,7 @@ import math
 from typing import Any
 from xml.etree import ElementTree as ET
 
+from model_robots import forward
 from move_group_rig import (
     action_goal,
     HAND,
@@ -36,7 +37,6 @@ from numpy.typing import NDArray
 from planning_messages import pose_at
 import pytest
 from shape_msgs.msg import SolidPrimitive
-from urdf_kinematics import forward
 from urdf_reader import expand_xacro
 
 from arm_model.ros import seconds

@@ -1,12 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Scenes of moveit_msgs: what they add, attach, move, remove and allow, and what is refused."""
+"""Frames of TF; scenes of moveit_msgs: what they add, attach, move, remove, allow and refuse."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+import math
+from types import SimpleNamespace
+from typing import Any, cast, TYPE_CHECKING
 
-from geometry_msgs.msg import Point, Point32, Polygon, Pose
+from geometry_msgs.msg import Point, Point32, Polygon, TransformStamped
+from geometry_msgs.msg import Pose as PoseMessage
+from hypothesis import given
+from hypothesis import strategies as st
 from model_robots import chain, ready, robot
 from moveit_msgs.msg import (
     AllowedCollisionEntry,
@@ -18,14 +24,132 @@ from moveit_msgs.msg import (
     RobotState,
 )
 import numpy as np
+import pinocchio as pin
 import pytest
 from shape_msgs.msg import Mesh as MeshMessage
 from shape_msgs.msg import Plane as PlaneMessage
 from shape_msgs.msg import SolidPrimitive
+from tf2_msgs.msg import TFMessage
 
-from arm_model import Array, Box, Cone, Cylinder, Mesh, Plane, SceneError, Shape, Sphere
+from arm_model import (
+    Array,
+    Box,
+    combined,
+    CommandError,
+    Cone,
+    Cylinder,
+    inverse,
+    Mesh,
+    Plane,
+    Pose,
+    rotation_of,
+    SceneError,
+    Shape,
+    Sphere,
+)
 from arm_model import PlanningScene as Scene
-from arm_model.ros import apply_planning_scene, FrameOf, scene_change
+from arm_model.ros import apply_planning_scene, FrameOf, FrameTree, scene_change, TfListener
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
+
+ANGLES = st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6)
+
+
+def pose(numbers: list[float]) -> Pose:
+    """Return the pose with a rotation vector and a position."""
+    return Pose(pin.exp3(np.array(numbers[:3])), np.array(numbers[3:]))
+
+
+@given(ANGLES, ANGLES, ANGLES)
+def test_a_frame_is_found_up_and_down_the_tree(
+    table: list[float], base: list[float], tool: list[float]
+) -> None:
+    """The pose of a frame on another branch is that through the common ancestor."""
+    tree = FrameTree()
+    tree.learn('table', 'world', pose(table), math.inf)
+    tree.learn('base', 'world', pose(base), math.inf)
+    tree.learn('cup', 'table', pose(tool), 5.0)
+    found = tree.pose('cup', 'base', 5.5)
+    assert found is not None
+    wanted = combined(inverse(pose(base)), combined(pose(table), pose(tool)))
+    assert found.position == pytest.approx(wanted.position, abs=1e-9)
+    assert found.rotation == pytest.approx(wanted.rotation, abs=1e-9)
+
+
+def test_what_is_old_or_not_connected_is_not_found() -> None:
+    """A transform that is not renewed, another tree and a loop lead nowhere."""
+    tree = FrameTree()
+    still = pose([0.0] * 6)
+    tree.learn('cup', 'base', still, 5.0)
+    assert tree.pose('cup', 'base', 5.5) is not None
+    assert tree.pose('cup', 'base', 7.0) is None
+    tree.learn('a', 'b', still, math.inf)
+    tree.learn('b', 'a', still, math.inf)
+    assert tree.pose('a', 'base', 5.5) is None
+
+
+@pytest.mark.parametrize(
+    'numbers', [[0.0] * 4, [1.0, 1.0, 0.0, 0.0], [math.nan, 0.0, 0.0, 1.0], [math.inf] * 4]
+)
+def test_a_quaternion_that_is_none_is_refused(numbers: list[float]) -> None:
+    """The message has its length."""
+    with pytest.raises(CommandError, match='length'):
+        rotation_of(numbers)
+
+
+class TfNode:
+    """What a TfListener needs of a node, with a clock of its own."""
+
+    def __init__(self) -> None:
+        self.subscribed: dict[str, Any] = {}
+
+    def create_subscription(self, _kind: object, topic: str, take: object, _qos: object) -> None:
+        """Remember it."""
+        self.subscribed[topic] = take
+
+    def get_clock(self) -> Any:
+        """Return a clock that stands at 100 s."""
+        return SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=100_000_000_000))
+
+    def publish(self, sec: int, x: float) -> None:
+        """Publish where the cup is."""
+        transform = TransformStamped(child_frame_id='cup')
+        transform.header.frame_id = 'base_link'
+        transform.header.stamp.sec = sec
+        transform.transform.translation.x = x
+        self.subscribed['/tf'](TFMessage(transforms=[transform]))
+
+
+def test_transforms_that_come_late_or_are_no_numbers_do_not_count() -> None:
+    """A frame is where a fresh message says; the stamp counts, not the arrival."""
+    node = TfNode()
+    frames = TfListener(cast('Node', node), robot('gp110').kinematics, base='base_link')
+    with pytest.raises(CommandError, match="Unknown frame: 'cup'"):
+        frames.pose('cup')
+    node.publish(90, 0.1)
+    with pytest.raises(CommandError, match=r"'cup' to frame 'base_link': .* 10\.0 s old"):
+        frames.pose('cup')
+    node.publish(100, 0.2)
+    node.publish(100, math.nan)
+    assert frames.pose('cup').position.tolist() == [0.2, 0.0, 0.0]
+    node.publish(101, 0.3)  # of a clock a little ahead
+    assert frames.pose('cup').position.tolist() == [0.3, 0.0, 0.0]
+
+
+def test_a_world_that_tf_has_placed_is_no_other_name_of_the_root() -> None:
+    """Also while its publisher pauses: the arm does not jump to another frame."""
+    node, model = TfNode(), robot('gp110')
+    frames = TfListener(
+        cast('Node', node), model.kinematics, base='base_link', world_frames=['cup']
+    )
+    assert frames.link('cup') == model.kinematics.root
+    node.publish(90, 0.1)
+    assert frames.link('cup') is None
+    with pytest.raises(CommandError, match=r'10\.0 s old'):
+        frames.pose('cup')
+
 
 MODEL = chain('zyyp')
 AT = np.array([0.4, -0.3, 0.5, 0.1])
@@ -44,7 +168,7 @@ def thing(
     shape = primitive or SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.1, 0.2, 0.3])
     message = CollisionObject(id=name, operation=operation)
     message.header.frame_id = frame
-    message.pose = Pose(position=Point(x=x, y=y, z=z))
+    message.pose = PoseMessage(position=Point(x=x, y=y, z=z))
     if operation in {CollisionObject.ADD, CollisionObject.APPEND}:
         message.primitives = [shape]
     return message
@@ -141,7 +265,7 @@ def test_an_object_is_moved_extended_and_removed() -> None:
 def test_the_pose_of_the_only_shape_is_that_of_the_object() -> None:
     """As in MoveIt, where the object's own is left out: MOVE, frames and clients count on it."""
     alone = thing(place=(0.0, 0.0, 0.0))
-    alone.primitive_poses = [Pose(position=Point(x=0.5, y=0.1, z=0.3))]
+    alone.primitive_poses = [PoseMessage(position=Point(x=0.5, y=0.1, z=0.3))]
     scene = changed(MODEL.scene, alone, AT)
     (shape,) = scene.objects['box'].shapes
     assert scene.objects['box'].pose.position.tolist() == [0.5, 0.1, 0.3]

@@ -1,0 +1,354 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes, states and paths as messages and back: nothing is lost; what viewers get, and when.
+
+Refusals: test_planning_bad_input.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+from types import SimpleNamespace
+from typing import Any
+
+from geometry_msgs.msg import Point32
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from moveit_msgs.msg import (
+    AttachedCollisionObject,
+    Constraints,
+    JointConstraint,
+    LinkPadding,
+    LinkScale,
+    ObjectColor,
+    PlanningScene,
+    RobotState,
+)
+from moveit_msgs.msg import CollisionObject as ObjectMessage
+import numpy as np
+from planning_messages import (
+    box,
+    numbers_of,
+    objects,
+    panda,
+    pose_at,
+    poses,
+    QuietNode,
+    tetrahedron,
+    texts_of,
+)
+import pytest
+from sensor_msgs.msg import JointState
+from shape_msgs.msg import SolidPrimitive
+
+from arm_model import AllowedCollisionMatrix, Clearances, ModelError
+from arm_model.ros import allowed_collisions, apply_planning_scene, scene_change, seconds
+from arm_planning import JointGoal
+from arm_planning.ros.motion_request import RequestReader
+from arm_planning.ros.robot_groups import RobotGroups
+from arm_planning.ros.scene import (
+    collision_message,
+    matrix_message,
+    object_message,
+    scene_message,
+    SceneSnapshot,
+)
+from arm_planning.ros.scene_changes import apply_scene
+from arm_planning.ros.scene_monitor import SceneMonitor
+from arm_planning.ros.trajectories import check_trajectory, path_of, trajectory_message
+from arm_trajectory import lines, Path
+
+JOINTS = panda().joints
+
+
+def test_a_goal_has_the_tolerance_of_the_nearer_side() -> None:
+    """The joints that it leaves out stay."""
+    model = panda().model('panda_arm')
+    ready = np.array([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785])
+    places = panda().positions(dict(zip(model.joints, ready.tolist(), strict=True)))
+    message = JointConstraint(joint_name=model.joints[0], position=0.5)
+    message.tolerance_above, message.tolerance_below = 0.3, 0.01
+    reader = RequestReader(model, SceneSnapshot(panda().scene), places)
+    goal = reader.goal(Constraints(joint_constraints=[message]))
+    assert isinstance(goal, JointGoal)
+    assert list(goal.positions) == pytest.approx([0.5, *ready[1:]])
+    assert goal.tolerance[0] == pytest.approx(0.01)
+
+
+def test_joints_that_are_not_given_stand_in_their_range() -> None:
+    """Joint 4 of the Panda has no zero."""
+    positions = panda().positions({JOINTS[0]: 0.5})
+    assert positions[0] == 0.5
+    model = panda().model('panda_arm')
+    inside = np.array([positions[JOINTS.index(name)] for name in model.joints])
+    assert (inside >= model.limits.lower).all()
+    assert (inside <= model.limits.upper).all()
+
+
+@given(st.lists(st.one_of(st.floats(1e-12, 1e-8), st.floats(1e-4, 2.0)), min_size=1, max_size=8))
+def test_points_of_a_path_have_times_that_increase(durations: list[float]) -> None:
+    """A phase of a motion may be shorter than a nanosecond; the ends are where they are."""
+    rates = np.random.default_rng(len(durations)).uniform(-1.0, 1.0, (len(durations), 2))
+    lasts = np.array(durations)
+    ways = np.cumsum(rates * lasts[:, None], axis=0)
+    path = Path(lasts, lines(lasts, np.concatenate((np.zeros((1, 2)), ways))))
+    trajectory = trajectory_message(['a', 'b'], path, 'base').joint_trajectory
+    check_trajectory(trajectory)
+    first, last = trajectory.points[0], trajectory.points[-1]
+    assert first.positions == pytest.approx([0.0, 0.0], abs=1e-8)
+    assert last.positions.tolist() == path.end.position.tolist()
+    assert seconds(last.time_from_start) == pytest.approx(path.duration, abs=1e-9)
+
+
+def test_points_of_a_path_are_near_to_each_other_and_make_it() -> None:
+    """Viewers show one after the other; what interpolates them with quintics has the path."""
+    random = np.random.default_rng(0)
+    for duration in (0.05, 0.73, 2.0):
+        path = Path(np.array([duration]), random.uniform(-1.0, 1.0, (1, 6, 3)))
+        trajectory = trajectory_message(['a', 'b', 'c'], path, 'base').joint_trajectory
+        times = [seconds(point.time_from_start) for point in trajectory.points]
+        assert np.diff(times).max() <= 0.1 + 1e-9
+        again = path_of(trajectory)
+        looks = np.linspace(0.0, path.duration, 500)
+        assert again.positions(looks) == pytest.approx(path.positions(looks), abs=1e-6)
+
+
+def test_a_robot_without_groups_is_refused() -> None:
+    """Nothing could be planned."""
+    with pytest.raises(ModelError, match='no group'):
+        RobotGroups('<robot name="r"><link name="base"/></robot>', '<robot name="r"/>', {})
+
+
+JOINT = 'panda_joint1'
+
+
+class TickingNode(QuietNode):
+    """A node whose topics and timers are in the hands of the test."""
+
+    def __init__(self) -> None:
+        self.published: list[PlanningScene] = []
+        self.warnings: list[str] = []
+        self.receive: dict[str, Callable[[Any], None]] = {}
+        self.tick: Callable[[], None] = lambda: None
+
+    def create_publisher(self, _kind: Any, topic: str, _qos: Any) -> Any:
+        """Keep what is published for viewers."""
+        is_shown = topic == 'monitored_planning_scene'
+        return SimpleNamespace(publish=self.published.append if is_shown else lambda _: None)
+
+    def create_subscription(
+        self, _kind: Any, topic: str, callback: Any, _depth: Any, **_: Any
+    ) -> None:
+        """Keep who listens."""
+        self.receive[topic] = callback
+
+    def create_timer(self, _period: float, callback: Callable[[], None]) -> None:
+        """Keep the timer."""
+        self.tick = callback
+
+    def get_clock(self) -> Any:
+        """Return a clock that stands."""
+        stamp = PlanningScene().robot_state.joint_state.header.stamp
+        return SimpleNamespace(now=lambda: SimpleNamespace(to_msg=lambda: stamp))
+
+    def get_logger(self) -> Any:
+        """Return a logger whose warnings are kept."""
+        return SimpleNamespace(warning=self.warnings.append)
+
+    def at(self, position: float) -> None:
+        """Have the first joint somewhere, and look."""
+        self.receive['joint_states'](JointState(name=[JOINT], position=[position]))
+        self.tick()
+
+
+def test_a_robot_that_has_come_to_rest_is_shown_there_once() -> None:
+    """Not on its way, and not again where it stays; noise is no motion."""
+    node = TickingNode()
+    SceneMonitor(node, panda())  # type: ignore[arg-type]
+    assert len(node.published) == 1
+    for position in (0.1, 0.2, 0.3):
+        node.at(position)
+    assert len(node.published) == 1
+    for position in (0.3001, 0.3, 0.2999):
+        node.at(position)
+    assert len(node.published) == 2
+    scene = node.published[-1]
+    state = scene.robot_state.joint_state
+    assert dict(zip(state.name, state.position, strict=True))[JOINT] == 0.3001
+    assert not scene.is_diff
+
+
+def test_an_arm_that_coasts_moves_until_it_stands(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Noise is no motion, and neither is what is not known yet."""
+    node, now = TickingNode(), [100.0]
+    monkeypatch.setattr('arm_planning.ros.scene_monitor.time.monotonic', lambda: now[0])
+    monitor = SceneMonitor(node, panda())  # type: ignore[arg-type]
+    moves: list[tuple[float, bool]] = []
+    for step in (0.0, 0.0005, 0.01, 0.005, 0.0005, -0.0005, 0.0):
+        now[0] += 0.06
+        node.at(step + sum(each for each, _ in moves))
+        moves.append((step, monitor.is_moving('panda_arm')))
+    assert [moving for _, moving in moves] == [False, False, True, True, False, False, False]
+    assert not monitor.is_moving('no group')
+
+
+def test_a_joint_of_which_nothing_comes_any_more_does_not_move(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its last speed is old; a position that is no number is none."""
+    node, now = TickingNode(), [100.0]
+    monkeypatch.setattr('arm_planning.ros.scene_monitor.time.monotonic', lambda: now[0])
+    monitor = SceneMonitor(node, panda())  # type: ignore[arg-type]
+    for place in (0.0, math.inf, 0.1, 0.2):
+        now[0] += 0.06
+        node.at(place)
+    assert monitor.is_moving('panda_arm')
+    assert monitor.received([JOINT]) == {JOINT: 0.2}
+    now[0] += 2.0
+    node.receive['joint_states'](JointState(name=['panda_joint2'], position=[0.0]))
+    assert not monitor.is_moving('panda_arm')
+
+
+def test_whatever_a_scene_raises_refuses_that_scene_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An executor would end the program."""
+    node = TickingNode()
+    monitor = SceneMonitor(node, panda())  # type: ignore[arg-type]
+    before = monitor.snapshot
+    monkeypatch.setattr('arm_planning.ros.scene_monitor.apply_scene', lambda *_: 1 // 0)
+    node.receive['planning_scene'](PlanningScene())
+    assert monitor.snapshot is before
+    assert 'planning_scene refused: CRASH: ZeroDivisionError' in node.warnings[0]
+
+
+READY = panda().positions(
+    dict(zip(panda().joints, [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785], strict=False))
+)
+EMPTY = SceneSnapshot(panda().scene)
+NAMES = ['table', 'cup', 'panda_link1', 'panda_link5', 'tool']
+TIP = 'panda_link8'
+
+
+def edited(message: PlanningScene, snapshot: SceneSnapshot = EMPTY) -> SceneSnapshot:
+    """Return a scene after a message."""
+    return apply_scene(snapshot, message, READY)
+
+
+def with_objects(*messages: Any, snapshot: SceneSnapshot = EMPTY) -> SceneSnapshot:
+    """Return a scene after messages of objects."""
+    for message in messages:
+        snapshot = apply_scene(snapshot, scene_change(message), READY)
+    return snapshot
+
+
+@settings(deadline=None, max_examples=40)
+@given(message=objects())
+def test_an_object_comes_back_as_it_was(message: ObjectMessage) -> None:
+    """Shapes, poses, planes, meshes with their triangles, subframes and type."""
+    snapshot = with_objects(message)
+    back = object_message(
+        snapshot.scene.objects['thing'], snapshot.details['thing'], snapshot.root
+    )
+    assert numbers_of(back) == pytest.approx(numbers_of(message), abs=1e-9)
+    assert texts_of(back) == texts_of(message)
+
+
+def test_a_mesh_beside_a_prism_comes_back_as_it_was() -> None:
+    """A prism, which counts as its hull, does not take its place."""
+    message = box('thing', 0.5, 0.0, 0.2)
+    corners = [Point32(x=x, y=y) for x, y in ((0.0, 0.0), (0.1, 0.0), (0.0, 0.1))]
+    prism = SolidPrimitive(type=SolidPrimitive.PRISM, dimensions=[0.2])
+    prism.polygon.points = corners
+    message.primitives.append(prism)
+    message.primitive_poses.append(pose_at(0.3))
+    message.meshes, message.mesh_poses = [tetrahedron(0.1)], [pose_at(0.6)]
+    snapshot = with_objects(message)
+    back = object_message(
+        snapshot.scene.objects['thing'], snapshot.details['thing'], snapshot.root
+    )
+    assert [len(each.vertices) for each in back.meshes] == [6, 4]
+    assert back.meshes[1] == message.meshes[0]
+    assert back.mesh_poses[1] == message.mesh_poses[0]
+
+
+@pytest.mark.slow
+@settings(deadline=None, max_examples=20)
+@given(first=objects('table'), second=objects('cup'), held=objects('tool'), data=st.data())
+def test_a_whole_scene_comes_back_as_it_was(
+    first: ObjectMessage, second: ObjectMessage, held: ObjectMessage, data: st.DataObject
+) -> None:
+    """What get_planning_scene answers makes the same scene elsewhere."""
+    message = PlanningScene(name='lab', link_padding=[LinkPadding(link_name=TIP, padding=0.0)])
+    message.link_padding.append(LinkPadding(link_name='panda_link5', padding=0.01))
+    message.link_scale = [LinkScale(link_name='panda_link5', scale=1.1)]
+    message.world.collision_objects = [first, second]
+    message.object_colors = [ObjectColor(id='cup')]
+    message.object_colors[0].color.r = 0.5
+    held.pose = data.draw(poses())
+    message.robot_state.attached_collision_objects = [
+        AttachedCollisionObject(link_name=TIP, object=held, touch_links=['panda_hand'], weight=0.5)
+    ]
+    once = edited(message)
+    sent = scene_message(once, panda().name, RobotState())
+    assert not sent.is_diff
+    twice = edited(sent)
+    back = scene_message(twice, panda().name, RobotState())
+    assert numbers_of(back) == pytest.approx(numbers_of(sent), abs=1e-9)
+    assert texts_of(back) == texts_of(sent)
+    assert list(twice.scene.pairs) == list(once.scene.pairs)
+
+
+@settings(deadline=None, max_examples=20)
+@given(thing=objects('thing'), held=objects('held'))
+def test_controllers_make_the_scene_that_the_planner_has(
+    thing: ObjectMessage, held: ObjectMessage
+) -> None:
+    """Of what is published for them; objects with meshes, attached ones too."""
+    message = PlanningScene(link_padding=[LinkPadding(link_name=TIP, padding=0.01)])
+    message.world.collision_objects = [thing]
+    message.robot_state.attached_collision_objects = [
+        AttachedCollisionObject(link_name=TIP, object=held)
+    ]
+    planned = edited(message)
+    sent = collision_message(planned, panda().name)
+    assert not any(mesh.triangles for each in sent.world.collision_objects for mesh in each.meshes)
+    made = apply_planning_scene(panda().scene, sent, READY)
+    assert made.pairs == planned.scene.pairs
+    one, other = (Clearances(each).least(READY, math.inf) for each in (planned.scene, made))
+    apart = one > 1e-3  # of shapes deep in each other, two ways out may be found
+    assert one[apart] == pytest.approx(other[apart], abs=1e-4)
+
+
+@given(
+    entries=st.dictionaries(
+        st.lists(st.sampled_from(NAMES), min_size=2, max_size=2, unique=True).map(frozenset),
+        st.booleans(),
+    ),
+    defaults=st.dictionaries(st.sampled_from(NAMES), st.booleans()),
+)
+def test_a_matrix_allows_the_same_after_a_message(
+    entries: dict[frozenset[str], bool], defaults: dict[str, bool]
+) -> None:
+    """For every pair of its names, and for those with a name that it does not have."""
+    matrix = AllowedCollisionMatrix(entries, defaults)
+    back = allowed_collisions(matrix_message(matrix))
+    for first in NAMES:
+        for second in (*NAMES, 'new'):
+            assert back.allows(first, second) == matrix.allows(first, second)
+    assert back.defaults == matrix.defaults
+    assert not any(back.entries[pair] for pair in back.entries.keys() - entries.keys())
+    assert allowed_collisions(matrix_message(back)) == back
+
+
+def test_poses_are_in_the_frame_of_the_header() -> None:
+    """A link, another object, or a subframe of one, of the same message too."""
+    table = box('table', 0.5, 0.0, 0.2)
+    table.subframe_names, table.subframe_poses = ['corner'], [pose_at(0.1, 0.2, 0.3)]
+    on_corner, on_tip = box('cup', 0.0, 0.0, 0.1), box('cap', 0.0, 0.0, 0.2)
+    on_corner.header.frame_id, on_tip.header.frame_id = 'table/corner', TIP
+    snapshot = with_objects(box('none', 0.0, 0.9, 0.0), table)
+    snapshot = with_objects(on_corner, on_tip, snapshot=snapshot)
+    assert snapshot.frame('cup', READY).position == pytest.approx([0.6, 0.2, 0.6])
+    tip = panda().kinematics.link_pose(TIP, READY)
+    above = tip.position + 0.2 * tip.rotation[:, 2]
+    assert snapshot.frame('cap', READY).position == pytest.approx(above)
