@@ -62,11 +62,7 @@ class CommandError(ArmError, ValueError):
 
 @contextmanager
 def description_refused(place: str = '') -> Iterator[None]:
-    """Raise a ModelError where URDF or SRDF cannot be used.
-
-    Args:
-        place: File or parameter that the message names.
-    """
+    """Raise a ModelError where URDF or SRDF cannot be used; the message names the place."""
     try:
         yield
     except DescriptionError as error:

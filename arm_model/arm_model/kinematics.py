@@ -54,11 +54,7 @@ class Kinematics:
     """
 
     def __init__(self, tree: KinematicTree, group: Sequence[str]) -> None:
-        """Build.
-
-        Args:
-            group: Joints that move; the others stand at 0, or at the limit next to it, until
-                :meth:`with_others` says where.
+        """Build; other joints than the group stand at 0, or at the limit next to it.
 
         Raises:
             ModelError: The description makes no kinematic tree.

@@ -93,11 +93,7 @@ class JointLimits:
         return len(self.names)
 
     def error(self, wanted: Array, actual: Array) -> Array:
-        """Return wanted less actual; of continuous joints half a turn at most.
-
-        Args:
-            actual: Positions in [rad]; whole turns of continuous joints do not count.
-        """
+        """Return wanted less actual positions; of continuous joints half a turn at most."""
         error: Array = wanted - actual
         turns = np.where(self.continuous, TURN * np.round(error / TURN), 0.0)
         return error - turns

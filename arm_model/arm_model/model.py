@@ -237,18 +237,15 @@ class RobotModel:
     def clearance(self, positions: Array, within: float = math.inf) -> float:
         """Return the least distance between two shapes in [m]; infinity when none are checked.
 
-        Args:
-            within: Distance of interest in [m]; where it is more, a lower bound is good enough.
+        Beyond a distance of interest a lower bound is good enough.
         """
         distances = self._clearances.least(positions, within)
         return float(distances.min(initial=math.inf))
 
     def least_clearance(self, places: Array, within: float) -> LeastClearance:
-        """Return the two links that come nearest to each other at any of some places.
+        """Return the two links that come nearest to each other at any of some places (m, n).
 
-        Args:
-            places: Joint positions in [rad] (m, n).
-            within: Distance of interest in [m]; where it is more, a lower bound is good enough.
+        Distances beyond the one of interest may be lower bounds.
         """
         least = LeastClearance(within)
         clearances = self._clearances
@@ -277,34 +274,19 @@ class RobotModel:
         self.scene, self._thread.clearances = clearances.scene, clearances
 
     def check_scene(self, scene: PlanningScene) -> None:
-        """Make sure that a scene is of this group.
-
-        Raises:
-            SceneError: It is of another group or robot.
-        """
+        """Refuse a scene of another group or robot with a SceneError."""
         if scene.kinematics.joints != self.joints:
             joints = ', '.join(scene.kinematics.joints)
             raise SceneError(f'the scene is not that of {self.group}: its joints are {joints}')
 
     def check_link(self, link: str | None) -> None:
-        """Make sure that a link can be asked for.
-
-        Args:
-            link: Its name; None is the tip.
-
-        Raises:
-            CommandError: There is no such link.
-        """
+        """Refuse an unknown link with a CommandError; None is the tip."""
         if link is not None and link not in self.kinematics.frames:
             known = ', '.join(self.frames)
             raise CommandError(f'there is no link {link!r} in {self.name}; links: {known}')
 
     def index(self, joint: str) -> int:
-        """Return the place of a joint.
-
-        Raises:
-            CommandError: The arm has no such joint.
-        """
+        """Return the place of a joint, or raise a CommandError."""
         if joint not in self.limits.names:
             known = ', '.join(self.limits.names)
             raise CommandError(f'there is no joint {joint!r} in {self.group}; joints: {known}')

@@ -63,8 +63,7 @@ def start_pose(model: RobotModel) -> Array:
 def pose_quality(model: RobotModel, positions: Array, least: float = 0.0) -> float:
     """Return how good a pose is to start from: 0 for a singular, colliding or extreme one.
 
-    Args:
-        least: Quality of interest: where it cannot be more, distances are not measured.
+    Where it cannot be more than the least of interest, distances are not measured.
     """
     quality = _room(model, positions) * _dexterity(model, positions)
     quality *= BELOW if model.lowest(positions) < 0.0 else 1.0

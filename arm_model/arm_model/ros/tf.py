@@ -77,12 +77,7 @@ class FrameTree:
         self._links: dict[str, tuple[str, Pose, float]] = {}  # parent, pose in it, time
 
     def learn(self, child: str, parent: str, pose: Pose, time: float) -> None:
-        """Store a transform.
-
-        Args:
-            parent: Name of the frame in which its pose is given.
-            time: Steady time of its arrival in [s]; infinity for a static one.
-        """
+        """Store a transform, with the steady time of its arrival; infinity for a static one."""
         self._links[child] = parent, pose, time
 
     def age(self, frame: str, now: float) -> float:

@@ -89,11 +89,7 @@ class Clearances:
         return self._scene.distance_rate_bounds
 
     def least(self, positions: Array, within: float) -> Array:
-        """Return distances: exact ones below a distance of interest, else least ones.
-
-        Returns:
-            Distance of each pair in [m].
-        """
+        """Return the distance of each pair in [m]: exact below one of interest, else a bound."""
         turned = np.abs(positions - self._places)
         rates = self._scene.distance_rate_bounds
         bounds: Array = self._distances - np.einsum('kn,kn->k', turned, rates)
@@ -134,14 +130,10 @@ class Clearances:
         pin.updateGeometryPlacements(native, self._data, geometry, self._results, expanded)
 
     def measure(self, positions: Array, pairs: Sequence[int]) -> Sequence[Native]:
-        """Measure some pairs, regardless of what is known of them.
+        """Measure some pairs, by their numbers, regardless of what is known of them.
 
-        Args:
-            pairs: Numbers of the pairs.
-
-        Returns:
-            The results of coal for all pairs, by their numbers. Only those of the pairs asked for
-            are current; the next measurement overwrites them.
+        The results of coal are those for all pairs, by their numbers. Only those of the pairs
+        asked for are current; the next measurement overwrites them.
         """
         geometry, results, found = self._scene.geometry, self._results, self._found
         self._place(positions)
@@ -154,11 +146,7 @@ class Clearances:
         return found
 
     def provably_clear(self, positions: Array, within: float) -> int:
-        """Count the leading rows at which nothing is as near, as far as is known unmeasured.
-
-        Args:
-            positions: Joint positions in [rad] (m, n).
-        """
+        """Count the leading rows at which nothing is as near, as far as is known unmeasured."""
         turned = np.abs(positions[:, None, :] - self._places)
         rates = self._scene.distance_rate_bounds
         bounds = self._distances - np.einsum('mkn,kn->mk', turned, rates)
@@ -172,11 +160,7 @@ class Clearances:
         return not (bounds < within).any()
 
     def nearest(self, positions: Array, within: float, count: int) -> list[Proximity]:
-        """Return the nearest pairs with the gradients of their distances.
-
-        Returns:
-            The pairs, the nearest first.
-        """
+        """Return the nearest pairs, the nearest first, with the gradients of their distances."""
         distances = self.least(positions, within)
         (places,) = (distances < within).nonzero()
         near = sorted(zip(distances[places].tolist(), places.tolist(), strict=True))[:count]

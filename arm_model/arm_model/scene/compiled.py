@@ -89,8 +89,7 @@ class CompiledScene:
     def edge(self, begin: Array, end: Array, required: Array) -> float | None:
         """Return the share of a straight motion at which a pair is nearer than it may be, or None.
 
-        Args:
-            required: Distance that each pair keeps in [m] (k).
+        ``required`` is the distance that each pair keeps in [m] (k).
         """
         begin, end = _row(begin), _row(end)
         return self._answer(

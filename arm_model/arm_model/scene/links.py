@@ -68,14 +68,7 @@ class LinkShapes:
 
 
 def link_shapes(tree: KinematicTree, folder: Path | None = None) -> LinkShapes:
-    """Return the collision shapes of a description.
-
-    Args:
-        folder: Its folder, where names of mesh files are relative.
-
-    Raises:
-        DescriptionError: A shape lacks a number, or has one that is not usable.
-    """
+    """Return the collision shapes of a description; mesh files are relative to its folder."""
     found: dict[str, list[PlacedShape]] = {}
     unusable: dict[str, list[str]] = {}  # links by reason
     loose: dict[str, float] = {}  # fullness by link
@@ -247,11 +240,7 @@ def adjacent_links(tree: KinematicTree, scene: PlanningScene) -> frozenset[Pair]
 
 
 def always_in_contact(scene: PlanningScene, lower: Array, upper: Array) -> frozenset[Pair]:
-    """Return pairs of links that touch in nearly all poses.
-
-    Args:
-        lower: Least positions of its joints; minus infinity for one that turns without end.
-    """
+    """Return pairs of links that touch in nearly all poses."""
     clearances, apart = Clearances(scene), Counter[Pair]()
     candidates = set(map(frozenset, scene.pairs))
     for positions in drawn_poses(*one_turn(lower, upper), SAMPLES):
@@ -313,11 +302,7 @@ class LinkPairs:
 
 @description_refused()
 def sample_link_pairs(urdf: str, samples: int, folder: Path | None = None) -> LinkPairs:
-    """Find out which links of a robot touch always, at times and never.
-
-    Raises:
-        ModelError: The description makes no robot.
-    """
+    """Find out which links of a robot touch always, at times and never."""
     tree = read_urdf(urdf)
     kinematics = Kinematics(tree, [each.name for each in tree.joints if each.independent])
     shapes = link_shapes(tree, folder)

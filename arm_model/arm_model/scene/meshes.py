@@ -64,11 +64,7 @@ class Hull:
 
 
 def load_hulls(path: Path) -> Sequence[Hull]:
-    """Return the convex hulls of the bodies of a mesh file, from the cache if they are there.
-
-    Raises:
-        MeshError: The file cannot be read, or is no mesh.
-    """
+    """Return the convex hulls of the bodies of a mesh file, from the cache if they are there."""
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -115,11 +111,7 @@ def _stored(path: Path) -> Sequence[Hull]:
 
 
 def hulls_of_file(path: Path) -> Sequence[Hull]:
-    """Read a mesh file and make the convex hulls of its bodies.
-
-    Raises:
-        MeshError: The file is no mesh.
-    """
+    """Read a mesh file and make the convex hulls of its bodies."""
     try:
         mesh = coal.MeshLoader().load(str(path), np.full(3, mesh_unit(path)))
     except ValueError as error:  # the last line is assimp's
@@ -144,9 +136,6 @@ def _of_parts(triangles: Places, corners: int) -> Places:
 
     coal numbers the corners of each material of a mesh from 0 on. The first triangle of a material
     has the corners 0, 1 and 2, and others only such as were named before, or the next one.
-
-    Args:
-        corners: Number of corners of the mesh.
     """
     if len(np.unique(triangles)) == corners:
         return triangles
@@ -243,15 +232,9 @@ def _bodies(points: Array, triangles: Places) -> Sequence[Places]:
 
 
 def convex(points: Array, most: int | None = None) -> Native:
-    """Return the convex hull of points as a shape of coal.
+    """Return the convex hull of points in [m] (m, 3) as a shape of coal; flat ones get thick.
 
-    Args:
-        points: The points in [m] (m, 3); flat ones are made a little thick.
-        most: Corners of the hull at most; one with more gets a hull around it that has as many.
-            None for any number.
-
-    Raises:
-        MeshError: There is no point, or one is not finite.
+    One with more corners than wanted gets a hull around it that has as many.
     """
     if not len(points) or not np.isfinite(points).all():
         raise MeshError('a mesh needs corners, and finite ones')

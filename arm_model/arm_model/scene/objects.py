@@ -149,11 +149,7 @@ class PlacedShape:
 
 
 def native(shape: Shape) -> Native:
-    """Return a shape of coal.
-
-    Raises:
-        SceneError: A length is not positive and finite, or a normal has no direction.
-    """
+    """Return a shape of coal."""
     if isinstance(shape, Mesh):
         return shape.hull
     if isinstance(shape, Cells):
@@ -179,15 +175,7 @@ def _primitive(shape: Box | Sphere | Cylinder | Capsule | Cone) -> Native:
 
 @lru_cache(maxsize=1024)
 def padded(shape: Shape, padding: float, scale: float = 1.0) -> Native:
-    """Return a shape of coal that is scaled about its middle, then padded in every direction.
-
-    Args:
-        padding: How far it reaches beyond its surface in [m].
-        scale: Factor of its lengths; a plane has none.
-
-    Raises:
-        SceneError: The shape is not usable.
-    """
+    """Return a shape of coal that is scaled about its middle, then padded by a length in [m]."""
     solid = native(_scaled(shape, scale))
     solid.setSweptSphereRadius(padding)
     solid.computeLocalAABB()

@@ -65,14 +65,11 @@ _watch = Stopwatch()
 def cut(corners: Array, triangles: Places) -> Sequence[Array]:
     """Return the corners of each piece; nothing for a body that is open or too intricate.
 
-    The log says once that it begins.
+    The log says once that it begins. A TimeoutError says that the next start may do it.
 
     Args:
         corners: Those of the body (n, 3), each once.
         triangles: Indices of their corners (m, 3).
-
-    Raises:
-        TimeoutError: `TIME_LIMIT` is over; the next start may do it.
     """
     if not _closed(triangles):
         return ()
@@ -127,11 +124,7 @@ def cache_file(kind: str, digest: str) -> Path | None:
 
 
 def write_whole(path: Path, *arrays: Array, **named: object) -> None:
-    """Write a file of the cache whole or not at all: several programs start at once.
-
-    Raises:
-        OSError: There is no room, or no access.
-    """
+    """Write a file of the cache whole or not at all: several programs start at once."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with NamedTemporaryFile(dir=path.parent, suffix='.tmp', delete=False) as file:
         unfinished = Path(file.name)

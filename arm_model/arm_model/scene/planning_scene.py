@@ -157,11 +157,7 @@ class PlanningScene:
         return self.with_contents(objects={**self.objects, thing.name: thing})
 
     def without(self, name: str) -> PlanningScene:
-        """Return the scene without an object or an attached body.
-
-        Raises:
-            SceneError: There is none of this name.
-        """
+        """Return the scene without an object or attached body; SceneError for an unknown one."""
         self._thing(name)
         return self.with_contents(
             objects={each: thing for each, thing in self.objects.items() if each != name},
@@ -215,11 +211,7 @@ class PlanningScene:
         return self.with_contents(objects={**self.objects, name: thing}, attached_bodies=bodies)
 
     def pose(self, name: str, positions: Array) -> Pose:
-        """Return where an object or an attached body is, in the root link.
-
-        Raises:
-            SceneError: There is none of this name.
-        """
+        """Return where an object or attached body is, in the root link; SceneError for no such."""
         thing = self._thing(name)
         if name in self.objects:
             return thing.pose
@@ -259,11 +251,7 @@ class PlanningScene:
         )
 
     def with_others(self, kinematics: Kinematics) -> PlanningScene:
-        """Return the scene with joints beside the group elsewhere; what they carry goes along.
-
-        Args:
-            kinematics: Of :meth:`Kinematics.with_others`.
-        """
+        """Return the scene with joints beside the group elsewhere; what they carry goes along."""
         if kinematics is self.kinematics:
             return self
         moved = copy.copy(self)
@@ -296,11 +284,7 @@ class PlanningScene:
         )
 
     def with_allowed(self, allowed: AllowedCollisionMatrix) -> PlanningScene:
-        """Return the scene with another matrix of what may touch.
-
-        Args:
-            allowed: The matrix; names in it may be unknown.
-        """
+        """Return the scene with another matrix of what may touch; its names may be unknown."""
         return self.with_contents(allowed=allowed)
 
     def allowing(self, first: str, second: str, allowed: bool = True) -> PlanningScene:
