@@ -1,23 +1,87 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The thread of the network: nothing that one caller or one frame does harms the others."""
+"""The thread of the network: no caller or frame harms another; its figures and send queue."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import Future
 from pathlib import Path
+import socket
 import threading
 import time
 
+from drive_samples import bus_config, drive_config
+from hypothesis import given
+from hypothesis import strategies as st
 import pytest
 
-from arm_canopen import BusConfig, BusError, Promise
+from arm_canopen import BusConfig, BusError, CanopenMaster, open_bus, Promise
 from arm_canopen.config import MasterConfig
 from arm_canopen.master.network import Network
-from arm_canopen.master.runner import Clock, NetworkThread
-from canopen_core.can import Frame, VirtualBus, VirtualWire
+from arm_canopen.master.runner import Clock, CycleStatistics, NetworkThread
+from canopen_core.can import Bus, Frame, VirtualBus, VirtualWire
 from canopen_core.standard import CobId
+
+LATE = st.lists(st.floats(-0.001, 0.1), min_size=1, max_size=60)
+
+
+@given(LATE, st.integers(1, 50))
+def test_percentiles_are_those_of_the_window(late: list[float], window: int) -> None:
+    """At least half (99 %) of the last cycles were not later than p50 (p99), and p99 occurred."""
+    statistics = CycleStatistics(0.01, window)
+    for value in late:
+        statistics.record(value, 0)
+    figures = statistics.figures()
+    last = late[-window:]
+    assert figures.jitter_max == max(last)
+    assert figures.jitter_p50 <= figures.jitter_p99 <= figures.jitter_max
+    for percentile, share in ((figures.jitter_p50, 0.5), (figures.jitter_p99, 0.99)):
+        assert percentile in last
+        below = sum(value <= percentile for value in last)
+        above = sum(value >= percentile for value in last)
+        assert below >= share * len(last) - 1
+        assert above >= (1.0 - share) * len(last) - 1
+
+
+@given(st.lists(st.integers(0, 5), max_size=100))
+def test_cycles_and_overruns_count_from_the_start(skipped: list[int]) -> None:
+    """Counts do not forget what the window has forgotten."""
+    statistics = CycleStatistics(0.01, 10)
+    for count in skipped:
+        statistics.record(0.0, count)
+    figures = statistics.figures()
+    assert (figures.cycles, figures.overruns) == (len(skipped), sum(skipped))
+    assert figures.period == 0.01
+
+
+def test_no_cycle_has_no_jitter() -> None:
+    """Before the first cycle all figures are 0."""
+    figures = CycleStatistics(0.01).figures()
+    assert (figures.cycles, figures.jitter_p50, figures.jitter_p99, figures.jitter_max) == (0,) * 4
+
+
+def send_for_ever(bus: Bus) -> None:
+    """Send until the bus refuses."""
+    while True:
+        bus.send(Frame(1))
+
+
+def test_two_cycles_of_a_master_wait_for_a_bus_that_takes_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Nobody wants the set-points of half a second ago when the cable is plugged in again."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    ours.setblocking(False)
+    monkeypatch.setattr('canopen_core.can.socketcan._open_socket', lambda name: ours)
+    config = bus_config(*(drive_config(f'joint{number}', number) for number in range(2, 9)))
+    with theirs, open_bus('can0') as bus:
+        CanopenMaster(config, bus)
+        with pytest.raises(BusError, match='transmit queue of can0 is full'):
+            send_for_ever(bus)
+        cycle = 1 + 7 * 3  # SYNC and RPDOs
+        assert 2 * cycle <= bus.counters.sent <= 4 * cycle
+
 
 TIMEOUT = 10.0  # [s] deadline for what takes milliseconds
 

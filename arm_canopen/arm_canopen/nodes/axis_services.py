@@ -11,7 +11,7 @@ from functools import partial
 import math
 from pathlib import Path
 import time
-from typing import Any, TYPE_CHECKING, TypeVar
+from typing import Any, TypeVar
 
 from canopen_interfaces.srv import COTargetDouble
 from std_msgs.msg import Float64
@@ -33,10 +33,6 @@ from ..master.scheduler import Promise
 from .device_node import DeviceNode
 from .joint_state_publisher import DriveJointStates
 from .output_thread import OutputThread
-
-if TYPE_CHECKING:
-    pass
-
 
 T = TypeVar('T')
 

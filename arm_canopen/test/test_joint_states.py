@@ -1,0 +1,407 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Joint states of drives, channels and the robot; a drive that is lost is warned of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+import time
+from typing import cast
+
+from hypothesis import given
+from hypothesis import strategies as st
+from isolation import Isolation
+import pytest
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.time import Time
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from urdf_reader import Mimic
+
+from arm_canopen import CanopenError
+from arm_canopen.cia402.state import AxisState
+from arm_canopen.joints import (
+    JointAggregator,
+    Joints,
+    JointSample,
+    JointSet,
+    movable_joints,
+    SilenceWatch,
+    STALE_AFTER,
+    START_TIMEOUT,
+)
+from arm_canopen.nodes.joint_state_publisher import BusJointStates, DriveJointStates
+from arm_canopen.nodes.output_thread import OutputThread
+
+DEADLINE = 10.0  # [s] for what takes milliseconds
+URDF = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
+<joint name="elbow" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="shoulder" type="continuous"><parent link="b"/><child link="c"/>
+<axis xyz="0 0 1"/></joint>
+<joint name="finger" type="prismatic"><parent link="c"/><child link="d"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/>
+<mimic joint="elbow" multiplier="2"/></joint></robot>"""
+
+
+@dataclass
+class Axis:
+    """What is needed of the state of an axis."""
+
+    name: str
+    position: float
+    velocity: float = 0.0
+    effort: float = 0.0
+    fresh: bool = True
+
+
+class Scene:
+    """A node with the joint states of one drive of two channels, and who listens to them."""
+
+    def __init__(self, node: Node) -> None:
+        """Make them."""
+        self.node = node
+        self.axes = [Axis('shoulder', 0.1, 0.2, 0.3), Axis('elbow', 0.4, 0.5, 0.6)]
+        self.drive = DriveJointStates(node, cast('list[AxisState]', self.axes))
+        self.output = OutputThread(node.get_logger())  # type: ignore[no-untyped-call]
+        self.bus = BusJointStates(node, [self.drive], self.output)
+        self.received: dict[str, JointState] = {}
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(node)
+        self.output.start()
+
+    def listen(self, topic: str) -> None:
+        """Receive a topic."""
+        self.node.create_subscription(
+            JointState, topic, partial(self.received.__setitem__, topic), 10
+        )
+
+    def cycle(self, until: Callable[[], bool], sync_age: float = 0.0) -> None:
+        """Run cycles until something holds."""
+        deadline = time.monotonic() + DEADLINE
+        while not until():
+            self.bus.update_listeners()
+            self.bus.feedback(time.monotonic() - sync_age)
+            self._executor.spin_once(timeout_sec=0.02)
+            assert time.monotonic() < deadline
+
+
+@pytest.fixture
+def scene(isolation: Isolation) -> Iterator[Scene]:
+    """A scene in a ROS domain of its own."""
+    rclpy.init(domain_id=isolation.domain_id)
+    scene = Scene(Node('joint1'))
+    yield scene
+    scene.output.stop()
+    scene.node.destroy_node()  # type: ignore[no-untyped-call]
+    rclpy.shutdown()
+
+
+@pytest.mark.slow
+def test_each_channel_has_the_joint_states_of_a_drive(scene: Scene) -> None:
+    """Under its own name, which is that of a joint, beside those of the whole device."""
+    for topic in ('joint1', 'shoulder', 'elbow'):
+        scene.listen(f'/{topic}/joint_states')
+    scene.cycle(lambda: len(scene.received) == 3)
+    whole, elbow, shoulder = (
+        scene.received[f'/{topic}/joint_states'] for topic in ('joint1', 'elbow', 'shoulder')
+    )
+    assert [*whole.name] == ['shoulder', 'elbow']
+    assert [*whole.position] == [0.1, 0.4]
+    assert [*elbow.name] == ['elbow']
+    assert [elbow.position[0], elbow.velocity[0]] == [0.4, 0.5]
+    assert [*shoulder.effort] == [0.3]
+    assert not scene.node.get_publishers_info_by_topic('/joint_states')  # by default
+
+
+@pytest.mark.slow
+def test_the_joints_of_the_robot_have_the_stamp_of_the_sync(scene: Scene) -> None:
+    """All in one message, in the order of bus.yml as long as no URDF is known."""
+    scene.bus.publish_robot('')
+    scene.listen('/joint_states')
+    scene.cycle(lambda: bool(scene.received), sync_age=5.0)
+    message = scene.received['/joint_states']
+    assert [*message.name] == ['shoulder', 'elbow']
+    assert [*message.position] == [0.1, 0.4]
+    age = scene.node.get_clock().now() - Time.from_msg(message.header.stamp)
+    assert age.nanoseconds >= 5_000_000_000
+
+
+@pytest.mark.slow
+def test_the_urdf_gives_the_order_and_joints_that_mimic(scene: Scene) -> None:
+    """From the topic of robot_state_publisher."""
+    latched = QoSProfile(  # type: ignore[no-untyped-call]
+        depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL
+    )
+    scene.bus.publish_robot('')
+    scene.listen('/joint_states')
+    scene.node.create_publisher(String, 'robot_description', latched).publish(String(data=URDF))
+    names = ['elbow', 'shoulder', 'finger']
+    scene.cycle(lambda: bool(scene.received) and [*scene.received['/joint_states'].name] == names)
+    assert [*scene.received['/joint_states'].position] == [0.4, 0.1, 0.8]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ('first', 'published'),
+    [('lid', ['lid', 'tool', 'left', 'right']), ('elbow', ['elbow', 'finger'])],
+)
+def test_drives_that_the_urdf_lacks_are_named_once(
+    first: str, published: list[str], scene: Scene, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """They keep their own topics; where it lacks all of them, that of the robot, too."""
+    names = [(first, 'tool'), ('left', 'right')]
+    drives = [
+        DriveJointStates(scene.node, cast('list[AxisState]', [Axis(axis, 0.7) for axis in axes]))
+        for axes in names
+    ]
+    scene.bus = BusJointStates(scene.node, drives, scene.output)
+    scene.bus.publish_robot(URDF)
+    topics = ['/joint_states', *(f'/{axis}/joint_states' for axes in names for axis in axes)]
+    for topic in topics:
+        scene.listen(topic)
+    scene.cycle(lambda: len(scene.received) == len(topics))
+    assert [*scene.received['/joint_states'].name] == published
+    (line,) = [line for line in capfd.readouterr().err.splitlines() if 'tool' in line]
+    assert ('elbow, shoulder, finger' in line) == (first == 'lid')
+
+
+@pytest.mark.slow
+def test_a_drive_that_is_not_fresh_is_left_out_after_a_while(scene: Scene) -> None:
+    """What is not known is not invented; the drive comes back with its TPDOs."""
+    other = Axis('wrist', 0.7)
+    drives = [scene.drive, DriveJointStates(scene.node, cast('list[AxisState]', [other]))]
+    scene.bus = BusJointStates(scene.node, drives, scene.output)
+    scene.bus.publish_robot('')
+    scene.listen('/joint_states')
+
+    def published() -> list[str]:
+        return [*scene.received['/joint_states'].name] if scene.received else []
+
+    scene.cycle(lambda: published() == ['shoulder', 'elbow', 'wrist'])
+    other.fresh = False
+    scene.cycle(lambda: published() == ['shoulder', 'elbow'])
+    other.fresh = True
+    scene.cycle(lambda: published() == ['shoulder', 'elbow', 'wrist'])
+
+
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [('<robot>', 'no XML'), ('<robot name="r"><link name="a"/></robot>', 'no revolute')],
+)
+def test_a_text_that_is_no_robot_is_refused(scene: Scene, text: str, words: str) -> None:
+    """The parameter robot_description, before anything runs."""
+    with pytest.raises(CanopenError, match=words):
+        scene.bus.publish_robot(text)
+
+
+PERIOD_NS = 10_000_000
+NAMES = ['elbow', 'wrist', 'base']  # URDF order, which is no alphabetical one
+
+
+def sample(value: float) -> JointSample:
+    """Return a state that can be distinguished from others."""
+    return JointSample(value, -value, 2 * value)
+
+
+class Publisher:
+    """Feeds an aggregator and keeps what it publishes."""
+
+    def __init__(self, joints: Joints | None = None) -> None:
+        self.aggregator = JointAggregator(joints or dict.fromkeys(NAMES))
+        self.sets: list[JointSet] = []
+
+    def receive(self, name: str, cycle: int, value: float = 0.0) -> None:
+        """Receive the state of a joint at a cycle of 10 ms."""
+        stamp, now = cycle * PERIOD_NS, cycle * PERIOD_NS * 1e-9
+        self.sets += self.aggregator.update(name, stamp, sample(value), now)
+
+    def settle(self) -> None:
+        """Run two cycles, in which it learns which joints take part."""
+        for cycle in (1, 2):
+            for name in NAMES:
+                self.receive(name, cycle)
+        self.sets.clear()
+
+
+@given(st.lists(st.permutations(NAMES), min_size=1, max_size=20))
+def test_one_set_for_each_cycle_in_urdf_order(orders: list[list[str]]) -> None:
+    """Whatever the order in which drives answer, each cycle gives one set, with its own values."""
+    publisher = Publisher()
+    publisher.settle()
+    for cycle, order in enumerate(orders, start=3):
+        for name in order:
+            publisher.receive(name, cycle, cycle + NAMES.index(name) / 10)
+    assert [state.stamp for state in publisher.sets] == [
+        cycle * PERIOD_NS for cycle in range(3, 3 + len(orders))
+    ]
+    for cycle, state in enumerate(publisher.sets, start=3):
+        assert [*state.samples] == NAMES
+        assert [*state.samples.values()] == [sample(cycle + place / 10) for place in range(3)]
+
+
+def test_the_set_leaves_with_the_last_joint() -> None:
+    """Not before, and not at the next cycle."""
+    publisher = Publisher()
+    publisher.settle()
+    publisher.receive('base', 3)
+    publisher.receive('elbow', 3)
+    assert publisher.sets == []
+    publisher.receive('wrist', 3)
+    assert len(publisher.sets) == 1
+
+
+def test_a_joint_that_is_lost_delays_one_cycle_only() -> None:
+    """The next cycle ends the incomplete round; after that nobody waits for the lost one."""
+    publisher = Publisher()
+    publisher.settle()
+    for cycle in (3, 4, 5):
+        publisher.receive('elbow', cycle)
+        publisher.receive('base', cycle)
+    assert [state.stamp // PERIOD_NS for state in publisher.sets] == [3, 4, 5]
+
+
+def test_a_lost_joint_is_left_out_after_a_while_and_named() -> None:
+    """Its last state is repeated for a moment, never for longer; then it counts as silent."""
+    publisher = Publisher()
+    publisher.settle()
+    last = 2 + round(STALE_AFTER * 1e9 / PERIOD_NS)
+    for cycle in range(3, last + 3):
+        publisher.receive('elbow', cycle)
+        publisher.receive('base', cycle)
+    with_wrist = [state.stamp // PERIOD_NS for state in publisher.sets if 'wrist' in state.samples]
+    assert max(with_wrist) in (last - 1, last)
+    assert [*publisher.sets[-1].samples] == ['elbow', 'base']
+    now = (last + 2) * PERIOD_NS * 1e-9
+    assert publisher.aggregator.silent(now) == ['wrist']
+
+
+def test_a_joint_that_comes_back_takes_part_again() -> None:
+    """From its second cycle on it is waited for."""
+    publisher = Publisher()
+    publisher.settle()
+    for cycle in range(3, 90):
+        publisher.receive('elbow', cycle)
+    for cycle in (90, 91, 92):
+        for name in NAMES:
+            publisher.receive(name, cycle)
+    assert [len(state.samples) for state in publisher.sets[-2:]] == [3, 3]
+    assert publisher.aggregator.silent(0.93) == []
+
+
+def test_joints_that_never_come_are_silent_from_the_start() -> None:
+    """In URDF order, without those that follow others."""
+    publisher = Publisher({'a': None, 'b': Mimic('a'), 'c': None})
+    assert publisher.aggregator.silent(0.0) == ['a', 'c']
+    waited = round(STALE_AFTER * 1e9 / PERIOD_NS) + 1
+    for cycle in range(1, waited + 1):
+        publisher.receive('c', cycle)
+    assert publisher.sets == []
+    publisher.receive('c', waited + 1)
+    assert [*publisher.sets[-1].samples] == ['c']
+    assert publisher.aggregator.silent(waited * 0.01) == ['a']
+
+
+def test_nobody_sees_half_a_robot_at_the_start() -> None:
+    """The first set that is published has every joint that has a drive."""
+    publisher = Publisher()
+    publisher.receive('elbow', 1)
+    publisher.receive('elbow', 2)
+    publisher.receive('wrist', 2)
+    publisher.receive('base', 2)
+    assert [[*state.samples] for state in publisher.sets] == [NAMES]
+
+
+def test_a_mimic_joint_follows_by_its_law_unless_it_is_received_itself() -> None:
+    """It is multiplier * leader + offset; a drive of its own beats the law."""
+    publisher = Publisher({'a': None, 'b': Mimic('a', -2.0, 0.5)})
+    publisher.receive('a', 1, 3.0)
+    state = publisher.sets[-1]
+    assert [*state.samples] == ['a', 'b']
+    assert state.samples['b'] == JointSample(-5.5, 6.0, 0.0)
+    publisher.receive('a', 2, 3.0)
+    publisher.receive('b', 2, 1.0)
+    for name, value in (('a', 3.0), ('b', 1.0)):
+        publisher.receive(name, 3, value)
+    assert publisher.sets[-1].samples == {'a': sample(3.0), 'b': sample(1.0)}
+
+
+def test_a_clock_that_is_set_back_does_not_stop_the_sets() -> None:
+    """Joints that report again begin a new round, whatever their stamp."""
+    publisher = Publisher()
+    for cycle in (1000, 1001):
+        for name in NAMES:
+            publisher.receive(name, cycle)
+    publisher.sets.clear()
+    for cycle in (10, 11, 12):
+        for name in NAMES:
+            publisher.receive(name, cycle)
+    assert [state.stamp // PERIOD_NS for state in publisher.sets] == [10, 11, 12]
+
+
+def test_joints_with_one_variable_in_the_order_of_the_urdf() -> None:
+    """Fixed ones have no state here."""
+    kinds = {'z': 'revolute', 'flange': 'fixed', 'a': 'continuous'}
+    links = ''.join(f'<link name="{name}"/>' for name in ('base', *(f'{each}1' for each in kinds)))
+    parts = ''.join(
+        f'<joint name="{name}" type="{kind}"><parent link="base"/><child link="{name}1"/></joint>'
+        for name, kind in kinds.items()
+    )
+    assert [*movable_joints(f'<robot name="r">{links}{parts}</robot>')] == ['z', 'a']
+
+
+PERIOD = 2.0  # [s] between two looks
+JOINTS = ['base', 'elbow']
+
+
+def all_there() -> SilenceWatch:
+    """Return the watch of a robot that has started."""
+    watch = SilenceWatch(JOINTS, 0.0)
+    for joint in JOINTS:
+        watch.note(joint)
+    return watch
+
+
+def test_a_slow_start_is_no_loss() -> None:
+    """Neither before the master is there, nor while its drives boot."""
+    watch = SilenceWatch(JOINTS, 0.0)
+    assert watch.look(JOINTS, [], 2.0) == []
+    assert watch.look(JOINTS, JOINTS, 15.0) == []
+    assert watch.look(['elbow'], JOINTS, START_TIMEOUT) == []
+    watch.note('elbow')
+    assert watch.look([], [], START_TIMEOUT + PERIOD) == []
+
+
+def test_a_joint_that_never_comes_is_missing() -> None:
+    """Such as one that bus.yml calls otherwise."""
+    watch = SilenceWatch(JOINTS, 0.0)
+    watch.note('base')
+    watch.look(['elbow'], [], PERIOD)
+    assert watch.look(['elbow'], [], START_TIMEOUT + PERIOD) == ['elbow']
+
+
+def test_a_drive_that_is_lost_is_missing_until_it_is_back() -> None:
+    """Its publisher is there, and silent in two looks."""
+    watch = all_there()
+    watch.look([], [], PERIOD)
+    assert watch.look(['elbow'], ['elbow'], 2 * PERIOD) == []
+    assert watch.look(['elbow'], ['elbow'], 3 * PERIOD) == ['elbow']
+    assert watch.look(['elbow'], ['elbow'], 4 * PERIOD) == ['elbow']
+    assert watch.look([], [], 5 * PERIOD) == []
+    assert watch.look(['elbow'], ['elbow'], 6 * PERIOD) == []
+    assert watch.look(['elbow'], ['elbow'], 7 * PERIOD) == ['elbow']
+
+
+def test_a_master_that_ends_takes_its_publishers_along() -> None:
+    """Its states end a moment before; another one may start later, as slowly as the first."""
+    watch = all_there()
+    watch.look([], [], PERIOD)
+    assert watch.look(JOINTS, JOINTS, 2 * PERIOD) == []
+    assert watch.look(JOINTS, [], 3 * PERIOD) == []
+    assert watch.look(JOINTS, JOINTS, 3 * PERIOD + START_TIMEOUT) == []
+    assert watch.look(JOINTS, JOINTS, 4 * PERIOD + START_TIMEOUT) == JOINTS
