@@ -155,23 +155,19 @@ class ReplayedAxis:
     """An axis of a drive: its view, and what the recorded master commands to it."""
 
     def __init__(self, view: AxisState) -> None:
-        """Bind to the view."""
         self.view = view  # its state
         # position last commanded in user units, NaN while no RPDO has carried one;
         # following_error: set-point that was sent before the position was measured, minus that
         self.setpoint = self.following_error = math.nan
-        self._commanded = self._faulted = False
-
-    def note_command(self) -> None:
-        """Store the target of an RPDO."""
-        self._commanded = True
+        self.commanded = False  # an RPDO has carried a target
+        self._faulted = False
 
     def forget(self) -> None:
         """Know nothing, as at the beginning."""
         self.view.lose_sight()
         self.view.error = ''
         self.setpoint = self.following_error = math.nan
-        self._commanded = self._faulted = False
+        self.commanded = self._faulted = False
 
     def observe(self, report: Callable[[Severity, str], None]) -> None:
         """Read state and position of this cycle; report a new fault."""
@@ -186,15 +182,12 @@ class ReplayedAxis:
             report(Severity.ERROR, f'FAULT: {view.describe()}')
         elif not self._faulted:
             view.error = ''
-        if self._commanded:
-            self.setpoint = self._target()
-
-    def _target(self) -> float:
-        interpolated = self.view.mode == OperationMode.INTERPOLATED_POSITION
-        target = self.view.held_target(
-            OperationMode.INTERPOLATED_POSITION if interpolated else OperationMode.CYCLIC_POSITION
-        )
-        return math.nan if target is None else self.view.units.position.commanded(target)
+        if self.commanded:
+            mode = OperationMode.INTERPOLATED_POSITION
+            if view.mode != mode:
+                mode = OperationMode.CYCLIC_POSITION
+            target = view.held_target(mode)
+            self.setpoint = math.nan if target is None else view.units.position.commanded(target)
 
     def status(self) -> DriveStatus:
         """Return a snapshot at the time of the log."""
@@ -211,7 +204,7 @@ class BusReplay:
 
     def __init__(self, config: BusConfig, report: Report) -> None:
         # the network; nothing that it sends goes anywhere
-        self.network = network = Network(config, _send_nothing, report, beside_master=True)
+        self.network = network = Network(config, lambda frame: None, report, beside_master=True)
         self.load = BusLoad(config.master.bitrate, 0.0)  # how busy the bus was
         self.counters = BusCounters()  # frames so far
         self._report = report
@@ -334,7 +327,7 @@ class BusReplay:
             node.report(EventKind.PDO, Severity.WARNING, f'odd RPDO: {error}')
             return
         for axis in self.axes.get(node.name, ()):
-            axis.note_command()
+            axis.commanded = True
 
     def _note_answer(self, node: RemoteNode, frame: Frame) -> None:
         """Store what an SDO has read, where it is part of the state."""
@@ -373,10 +366,6 @@ def _restart(node: RemoteNode) -> None:
 def _report_axis(node: RemoteNode, name: str, severity: Severity, text: str) -> None:
     about = text if name == node.name else f'{name}: {text}'
     node.report(EventKind.DRIVE, severity, about)
-
-
-def _send_nothing(frame: Frame) -> None:
-    """A replay sends on no bus."""
 
 
 def unknown_scales(config: BusConfig) -> list[str]:

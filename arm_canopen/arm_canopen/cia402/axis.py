@@ -74,56 +74,41 @@ class Axis:
     no rest                 halt, or no power     :class:`.StopSequence`: quick stop, then no power
     no life sign            anything              goal none, mode none, :class:`.StopSequence`
     ======================  ====================  =================================================
-
-    Attributes:
-        node: The device.
-        config: Settings of the axis.
-        name: Its name: that of the device, of its channel for one with several axes.
-        view: Its state.
-        phase: How much of it is known.
-        goal: State that the cycle leads to, None before the first command.
-        modes: The modes that this bus.yml makes possible.
-        mode: The mode that is commanded.
-        halt: What keeps it halted.
-        stop: Takes it out of operation; while that runs, nothing else leads it.
-        failure: Why the master stopped it, until it is enabled again; else empty.
-        resetting: Send fault resets while the drive is faulted.
-        following_error: Set-point that was sent before the last position was measured, minus that
-            position, in user units.
-        period: Length of the last cycle in [s].
-        motions: How many motions were begun: by targets, moves and motion sources.
-        interrupted: Mode in which it was enabled when its device was lost, None otherwise.
-        feed_forward: The offsets of a motion source.
-        released: Called with the cause when a motion source loses the drive.
-        on_ready: Called when state and parameters are known after each boot.
     """
 
     def __init__(
         self, node: RemoteNode, scheduler: Scheduler, config: DriveConfig | None = None
     ) -> None:
         """Bind the axis to its device; the first one unless ``config`` is another."""
-        self.node = node
-        self.config = config or node.config.drive
-        self.view = AxisState(node, scheduler, self.config, self.warn)
+        self.node = node  # the device
+        self.config = config or node.config.drive  # settings of the axis
+        self.view = AxisState(node, scheduler, self.config, self.warn)  # its state
+        # that of the device, of its channel for one with several axes
         self.name, at = self.view.name, self.view.at
+        # called with the cause when a motion source loses the drive
         self.released: Callable[[Refusal], None] = lambda refusal: None
+        # called when state and parameters are known after each boot
         self.on_ready: Callable[[], None] = lambda: None
-        self.phase = Phase.OFFLINE
-        self.goal: DriveState | None = None
-        self.modes = build_modes(self.view, self.warn)
-        self.mode = self.modes[OperationMode.NO_MODE]
-        self.halt = Halt()
+        self.phase = Phase.OFFLINE  # how much of it is known
+        self.goal: DriveState | None = None  # that the cycle leads to; None before a command
+        self.modes = build_modes(self.view, self.warn)  # those that this bus.yml makes possible
+        self.mode = self.modes[OperationMode.NO_MODE]  # that is commanded
+        self.halt = Halt()  # what keeps it halted
         self.controlword = ControlwordOutput(node, at(Index.CONTROLWORD))
+        # takes it out of operation; while that runs, nothing else leads it
         self.stop = StopSequence(
             self.view, self.controlword, scheduler, self.report, lambda: self.halt_bits
         )
-        self.failure = ''
-        self.resetting = False
-        self.motions = 0
-        self.following_error = self.period = 0.0
+        self.failure = ''  # why the master stopped it, until it is enabled again
+        self.resetting = False  # send fault resets while the drive is faulted
+        self.motions = 0  # that were begun by targets, moves and motion sources
+        self.period = 0.0  # length of the last cycle in [s]
+        # set-point that was sent before the last position was measured, minus that position
+        self.following_error = 0.0
+        # mode in which it was enabled when its device was lost
         self.interrupted: OperationMode | None = None
         image = node.image
-        self.feed_forward = FeedForward(
+        self.feed_forward = FeedForward(  # the offsets of a motion source
             image.writer(at(Index.VELOCITY_OFFSET)),
             image.writer(at(Index.TORQUE_OFFSET)),
             self.view.units,

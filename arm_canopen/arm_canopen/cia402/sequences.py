@@ -206,7 +206,9 @@ async def home(
     if not (isinstance(homing, Homing) and supported):
         raise steps.refused('has no homing (mode 6 is not in 0x6502)')
     stored = await _stored_method(steps)
-    method = _choice(steps, method, stored)
+    if method is None and not stored:
+        raise steps.refused('has no homing method (0x6098 is 0); name one')
+    method = stored if method is None else method
     try:
         if method != stored:
             await _choose(steps, method)
@@ -278,13 +280,6 @@ def _put_back(steps: AxisSteps, method: int) -> None:
             axis.warn(f'the homing method {method} was not put back into 0x6098: {written.error}')
 
     axis.node.objects.write_object(axis.view.at(Index.HOMING_METHOD), 0, method).when_done(check)
-
-
-def _choice(steps: AxisSteps, method: int | None, stored: int) -> int:
-    """Return the method to home by."""
-    if method is None and not stored:
-        raise steps.refused('has no homing method (0x6098 is 0); name one')
-    return stored if method is None else method
 
 
 async def _choose(steps: AxisSteps, method: int) -> None:

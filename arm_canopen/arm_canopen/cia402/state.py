@@ -140,24 +140,6 @@ class AxisState:
 
     :meth:`observe` makes it once a cycle. Positions, velocities and efforts are in user units; a
     name with ``_inc`` or ``_dev`` is in device units.
-
-    Attributes:
-        node: The device.
-        config: Settings of the axis.
-        name: Its name: that of the device, of its channel for one with several axes.
-        units: Its units.
-        cache: Reads its parameters.
-        state: State of the power drive system.
-        statusword: 0x6041, the last one that shows a state.
-        undecoded: 0x6041 where it shows no state (no row of CiA 402-2, table 31), else None.
-            State and statusword stay the last known ones; soon they are no longer fresh.
-        mode: Mode of operation that the drive displays (0x6061); 0 while unknown.
-        fresh: The TPDOs with all of this are young enough to act on.
-        position: Actual position; the last one of a lost drive, NaN before the first.
-        position_inc: The same (0x6064).
-        velocity_dev: 0x606C; None where no PDO carries it, or it is unknown.
-        error: 0x603F in words when it was faulted last, else empty.
-        held_torque: 0x6077 in device units, while a torque takes over that no TPDO brings.
     """
 
     def __init__(
@@ -168,20 +150,24 @@ class AxisState:
         warn: Callable[[str], None],
     ) -> None:
         """Bind each object to its PDO; what the drive has but no PDO carries is read by SDO."""
-        self.node = node
-        self.config = config
-        self.name = config.name or node.name
+        self.node = node  # the device
+        self.config = config  # settings of the axis
+        self.name = config.name or node.name  # of its channel for a device with several axes
         self.units = Units(config)
         self.cache = ParameterCache(node, config, self.units, scheduler, warn)
-        self.state = DriveState.UNKNOWN
-        self.statusword = self.mode = 0
+        self.state = DriveState.UNKNOWN  # of the power drive system
+        self.statusword = 0  # 0x6041, the last one that shows a state
+        self.mode = 0  # that the drive displays (0x6061); 0 while unknown
+        # 0x6041 where it shows no state (no row of CiA 402-2, table 31); state and statusword
+        # stay the last known ones, and are soon no longer fresh
         self.undecoded: int | None = None
         self._decoded_at = -math.inf
-        self.fresh = False
+        self.fresh = False  # the TPDOs with all of this are young enough to act on
+        # actual position, and 0x6064; the last ones of a lost drive, NaN before the first
         self.position = self.position_inc = math.nan
-        self.velocity_dev: float | None = None
-        self.error = ''
-        self.held_torque = 0
+        self.velocity_dev: float | None = None  # 0x606C; None without a PDO, or while unknown
+        self.error = ''  # 0x603F in words when it was faulted last
+        self.held_torque = 0  # 0x6077, while a torque takes over that no TPDO brings
         self._scheduler = scheduler
         self._looked: tuple[int, float] | None = None  # statusword and position, by SDO
         self._looked_at = -math.inf

@@ -93,15 +93,10 @@ def fault_reset(state: DriveState, elapsed: float) -> int:
 
 
 class ControlwordOutput:
-    """The controlword of one axis, and the RPDOs that carry it.
-
-    Attributes:
-        writer: Writes it into the process image, or by SDO where no RPDO carries it.
-        outputs: The RPDOs that carry it.
-    """
+    """The controlword of one axis, and the RPDOs that carry it."""
 
     def __init__(self, node: RemoteNode, index: int) -> None:
-        self.writer = node.objects.writer(index)
+        self.writer = node.objects.writer(index)  # by SDO where no RPDO carries it
         self.outputs: list[SentRpdo] = [
             output
             for output in node.image.rpdos

@@ -35,17 +35,12 @@ SETTLE_CYCLES = 3  # of SYNC after which an answer shows what a command has done
 
 
 class AxisSteps:
-    """Steps of commands to one axis.
-
-    Attributes:
-        axis: The axis.
-        quirks: Where it deviates from the standard.
-        needs_mode: Whether it refuses mode 0, or Operation enabled in that.
-    """
+    """Steps of commands to one axis."""
 
     def __init__(self, axis: Axis, scheduler: Scheduler) -> None:
         self.axis = axis
         self.quirks = quirks_of(axis.config.quirks)
+        # it refuses mode 0, or Operation enabled in that
         self.needs_mode = self.quirks.no_mode_zero
         self._scheduler = scheduler
         self._keeps_mode_under_halt = False

@@ -167,7 +167,9 @@ class BootProcess:
         if node.life.silent and not node.config.uses_node_guarding:
             await self._await_heartbeat(configured_at)
         await read_outputs(node, self._sdo_timeout)
-        started = await self._admitted()
+        if not self._startup.complete:
+            self._enter(BootPhase.HELD, self._startup.missing_text())
+        started = await self._startup.admit(node)
         self._enter(BootPhase.STARTING)
         if self._start and not started:
             await self._command(NmtCommand.START)
@@ -183,11 +185,6 @@ class BootProcess:
             await sent
         finally:
             sent.abandon()
-
-    async def _admitted(self) -> bool:
-        if not self._startup.complete:
-            self._enter(BootPhase.HELD, self._startup.missing_text())
-        return await self._startup.admit(self._node)
 
     async def _restore(self, subindex: int) -> None:
         """Restore the defaults, which are valid after a reset (CiA 301, 7.5.2.14)."""

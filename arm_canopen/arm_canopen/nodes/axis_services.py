@@ -69,7 +69,12 @@ class AxisServices:
             self._offer(name, partial(commands.request, name))
         for name, mode in MODE_SERVICES.items():
             self._offer_mode(name, mode)
-        node.offer(COTargetDouble, f'{place}/target', self._set_target, self._answer_target)
+        node.offer(
+            COTargetDouble,
+            f'{place}/target',
+            lambda request: self._deliver(lambda: commands.set_target(request.target)),
+            self._answer_target,
+        )
         node.offer(MoveService, f'{place}/move', self._move, self._answer_move)
         node.create_subscription(Float64, f'{place}/target', self._stream, 10)
         self._home = HomeAction(node, commands, f'{place}/home', thread, node.output)
@@ -90,9 +95,6 @@ class AxisServices:
             return command()
 
         return run
-
-    def _set_target(self, request: COTargetDouble.Request) -> Future[str]:
-        return self._deliver(lambda: self._commands.set_target(request.target))
 
     def _answer_target(
         self, response: COTargetDouble.Response, future: Future[str]
@@ -279,12 +281,13 @@ class UnitsService:
     def __init__(
         self, node: DeviceNode, drive: Axis, place: str, thread: NetworkThread, file: BusFile
     ) -> None:
-        self._node, self._drive = node, drive
-        self._thread, self._file = thread, file
-        node.offer(ReadUnits, f'{place}/read_units', self._read, self._answer)
-
-    def _read(self, _request: ReadUnits.Request) -> Future[FactorGroup]:
-        return self._thread.run_coroutine(self._drive.view.cache.factor_group)
+        self._drive, self._file = drive, file
+        node.offer(
+            ReadUnits,
+            f'{place}/read_units',
+            lambda request: thread.run_coroutine(drive.view.cache.factor_group),
+            self._answer,
+        )
 
     def _answer(
         self, response: ReadUnits.Response, future: Future[FactorGroup]

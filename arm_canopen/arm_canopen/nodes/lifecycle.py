@@ -36,7 +36,7 @@ from ..master.lifecycle import (
 )
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
-from .device_node import DeviceNode
+from .device_node import answer_write, DeviceNode
 from .output_thread import OutputThread
 
 BOOT_ATTEMPTS = 3  # boot time-outs that an activation waits, as ros2_canopen does
@@ -112,7 +112,12 @@ class LifecycleServices:
         self._events = node.create_publisher(TransitionEvent, '~/transition_event', 10)
         managed.on_change = self._changed
         create_deferred_service(
-            node, ChangeState, '~/change_state', self._change, self._answer, post=output.post
+            node,
+            ChangeState,
+            '~/change_state',
+            self._change,
+            partial(answer_write, node),
+            post=output.post,
         )
         node.create_service(GetState, '~/get_state', self._get_state)
         node.create_service(GetAvailableStates, '~/get_available_states', self._get_states)
@@ -129,15 +134,6 @@ class LifecycleServices:
             await self._managed.change(self._managed.find(wanted.id, wanted.label))
 
         return self._thread.run_coroutine(change)
-
-    def _answer(
-        self, response: ChangeState.Response, future: Future[None]
-    ) -> ChangeState.Response:
-        error = future.exception()
-        response.success = error is None
-        if error is not None:
-            self._node.get_logger().warning(str(error))
-        return response
 
     def _changed(
         self, transition: Transition, before: LifecycleState, after: LifecycleState, ended: bool

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -18,7 +18,7 @@ from rclpy.node import Node
 
 from black_box import LogPlayer, PlaybackError
 from canopen_core import CanopenError
-from canopen_core.can import Frame, read_log
+from canopen_core.can import read_log
 from node_runner import (
     discover_other_nodes,
     log_as,
@@ -98,7 +98,10 @@ class ReplayProcess:
         self._bus = bus = BusReplay(config, self._report)
         self._player = LogPlayer(
             bus,
-            partial(_timed_frames, parameters.log, parameters.interface),
+            lambda: (
+                (frame.timestamp, frame)
+                for frame in read_log(parameters.log, parameters.interface)
+            ),
             name=str(parameters.log),
             rate=parameters.rate,
             start=parameters.start,
@@ -155,14 +158,12 @@ class ReplayProcess:
     def _report(self, event: Event) -> None:
         self._output.post_stream((event.kind, event.node), partial(self._take_event, event))
         if not self._player.seeking:
-            self._output.post_stream(('log', event.kind, event.node), partial(self._log, event))
+            log = partial(log_bus_event, self._node, event)
+            self._output.post_stream(('log', event.kind, event.node), log)
 
     def _take_event(self, event: Event) -> None:
         if event.node in self._topics:
             self._topics[event.node].take_event(event)
-
-    def _log(self, event: Event) -> None:
-        log_bus_event(self._node, event)
 
     def _feedback(self, sync_time: float) -> None:
         if not self._player.seeking:
@@ -193,11 +194,6 @@ class ReplayProcess:
         self._joint_states.update_listeners()
         for topics in self._topics.values():
             topics.update_listeners()
-
-
-def _timed_frames(path: Path, interface: str) -> Iterator[tuple[float, Frame]]:
-    for frame in read_log(path, interface):
-        yield frame.timestamp, frame
 
 
 def _serve(stop: threading.Event) -> None:

@@ -62,21 +62,13 @@ class OffsetTarget:
 
 
 class Mode(ABC):
-    """One operation mode of one drive.
+    """One operation mode of one drive."""
 
-    Attributes:
-        number: Its value in 0x6060.
-        halts_by_bit: Bit 8 of the controlword stops it; else the master brakes its set-points.
-        cyclic: Its target acts on the drive in each cycle.
-        by_sdo: Its target goes by SDO, because no RPDO carries it.
-        setpoint: Position commanded last in user units, None in a mode that commands none.
-    """
-
-    number: OperationMode
-    halts_by_bit = True
-    cyclic = False
-    by_sdo = False
-    setpoint: float | None = None
+    number: OperationMode  # its value in 0x6060
+    halts_by_bit = True  # bit 8 of the controlword stops it; else the master brakes its set-points
+    cyclic = False  # its target acts on the drive in each cycle
+    by_sdo = False  # its target goes by SDO, because no RPDO carries it
+    setpoint: float | None = None  # position commanded last; None in a mode that commands none
 
     @abstractmethod
     def preload(self, actual: Actual) -> Promise[None]:

@@ -367,7 +367,11 @@ def estimate_load(config: BusConfig, bitrate: int | None = None) -> LoadEstimate
         traffic += _periodic(
             node.name, 'heartbeat', CobId.HEARTBEAT + node.node_id, 1, node.heartbeat_producer
         )
-        traffic += [_pdo_traffic(subject, direction, pdo) for direction, pdo in subject.pdos()]
+        for direction, pdo in subject.pdos():
+            size = min((sum(mapped.bits for mapped in pdo.mapping) + 7) // 8, PAYLOAD_MAX)
+            rate, reason = _rate(subject, direction, pdo)
+            service = f'{direction.title} {pdo.number}'
+            traffic.append(Traffic(node.name, service, pdo.cob_id, size, rate, reason))
         traffic += _guarding(node)
         traffic += _polling(subject)
     return LoadEstimate(bitrate or config.master.bitrate, tuple(traffic))
@@ -414,13 +418,6 @@ def _polling(subject: Subject) -> Iterator[Traffic]:
             yield Traffic(node.name, service, cob_id + node.node_id, PAYLOAD_MAX, rate, reason)
 
 
-def _pdo_traffic(subject: Subject, direction: Direction, pdo: PdoConfig) -> Traffic:
-    size = min((sum(mapped.bits for mapped in pdo.mapping) + 7) // 8, PAYLOAD_MAX)
-    rate, reason = _rate(subject, direction, pdo)
-    service = f'{direction.title} {pdo.number}'
-    return Traffic(subject.node.name, service, pdo.cob_id, size, rate, reason)
-
-
 def _rate(subject: Subject, direction: Direction, pdo: PdoConfig) -> tuple[float, str]:
     """Return how often a PDO is sent in [1/s], and why."""
     master = subject.bus.master
@@ -438,13 +435,9 @@ def _rate(subject: Subject, direction: Direction, pdo: PdoConfig) -> tuple[float
         )
     if pdo.transmission < 254:
         return 0.0, 'on remote frames, which the master does not send'
-    return _event_rate(subject, pdo)
-
-
-def _event_rate(subject: Subject, pdo: PdoConfig) -> tuple[float, str]:
-    """On change is taken as once a cycle, as far as the inhibit time allows."""
+    # on change is taken as once a cycle, as far as the inhibit time allows
     inhibit, timer = subject.inhibit_time(pdo), subject.event_time(pdo)
-    on_change = max(subject.bus.master.cycle_period, inhibit)
+    on_change = max(master.cycle_period, inhibit)
     if timer and timer <= on_change:
         return 1 / timer, f'event timer {timer * 1e3:g} ms'
     return 1 / on_change, f'on change, taken as every {on_change * 1e3:g} ms'
