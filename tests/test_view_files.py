@@ -30,7 +30,7 @@ from node_runner import LATCHED
 from quad_controller import MODES as QUAD_MODES
 from quad_controller.states.modes import MOVING_STATES
 from quad_description import movable_joints, robot_urdf
-from quad_teleop.key_map import MOVES
+from quad_teleop.mappings import MOVES
 from robot_viewer.page.jog_panel import TWISTS
 from robot_viewer.page.robot_page import GAITS, MODES, WALKS
 from robot_viewer.robot_state import (

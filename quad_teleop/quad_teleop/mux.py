@@ -24,19 +24,12 @@ NEVER = -math.inf
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """A topic with velocities, or one with a lock.
+    """A topic with velocities, or one with a lock."""
 
-    Attributes:
-        name: Name among the parameters.
-        topic: Name of the topic.
-        timeout: Silence after which it is stale; 0 for never.
-        priority: 0 to 255; of those that publish, the highest is active.
-    """
-
-    name: str
-    topic: str
-    timeout: float
-    priority: int
+    name: str  # name among the parameters
+    topic: str  # name of the topic
+    timeout: float  # silence after which it is stale; 0 for never
+    priority: int  # 0 to 255; of those that publish, the highest is active
 
     def is_stale(self, received: float, now: float) -> bool:
         """Return whether it has been silent for too long since it was received last."""

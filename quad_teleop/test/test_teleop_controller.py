@@ -16,8 +16,7 @@ from teleop_robot import TEST_TIMEOUT
 from quad_msgs.srv import SetMode
 from quad_teleop import Mode
 from quad_teleop.motion import RobotRequest
-from quad_teleop.nodes import robot_link
-from quad_teleop.nodes.robot_link import RobotLink
+from quad_teleop.nodes.teleop import RobotLink
 
 pytestmark = pytest.mark.scenario
 
@@ -27,7 +26,7 @@ def test_each_stop_is_sent_and_ends_what_was_requested_before(
 ) -> None:
     """A mode that still waits for its service is not sent later; answers are shown once."""
     clock = SimpleNamespace(monotonic=lambda: 0.0)
-    monkeypatch.setattr(robot_link, 'time', clock)
+    monkeypatch.setattr('quad_teleop.nodes.teleop.time', clock)
     shown: list[str] = []
     handled: list[str] = []
 

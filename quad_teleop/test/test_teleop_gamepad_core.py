@@ -12,7 +12,7 @@ import pytest
 from operator_input import CommandStream
 from operator_input.gamepad import AT_REST, Axis, Button, Deadman, GamepadState
 from quad_teleop import BodyPose, Mode, Speeds, Velocity
-from quad_teleop.gamepad_teleop import GamepadTeleop, MODE_BUTTONS
+from quad_teleop.mappings import GamepadTeleop, MODE_BUTTONS
 from quad_teleop.motion import NEUTRAL, PoseSteps, rest_of, RobotRequest, ZERO
 
 pytestmark = pytest.mark.slow

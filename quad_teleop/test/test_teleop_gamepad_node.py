@@ -13,7 +13,7 @@ from ros_client import RosClient
 from teleop_robot import Robot, TEST_TIMEOUT
 
 from operator_input.ros import serve_teleop
-from quad_teleop.nodes.teleop_gamepad import TeleopGamepad
+from quad_teleop.nodes.teleop import TeleopGamepad
 
 pytestmark = pytest.mark.scenario
 ABS_Y, ABS_HAT0Y = 1, 0x11

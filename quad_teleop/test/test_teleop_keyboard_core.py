@@ -19,8 +19,9 @@ from operator_input import (
     ProgramRequest,
 )
 from quad_teleop import BodyPose, SettingError, Speeds, Velocity
-from quad_teleop.key_map import (
+from quad_teleop.mappings import (
     HELP,
+    KeyboardTeleop,
     MODES,
     MOVES,
     NEUTRAL_KEYS,
@@ -29,7 +30,6 @@ from quad_teleop.key_map import (
     SPEEDS,
     STOP_KEYS,
 )
-from quad_teleop.keyboard_teleop import KeyboardTeleop
 from quad_teleop.motion import NEUTRAL, PoseSteps, rest_of, RobotRequest, ZERO
 
 NO_ROBOT: Any = None

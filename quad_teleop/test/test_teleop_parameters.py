@@ -14,8 +14,7 @@ from rclpy.node import Node
 from node_runner import ParameterError
 from operator_input import OperatorInputError
 from quad_teleop import TeleopError
-from quad_teleop.nodes.teleop_gamepad import TeleopGamepad
-from quad_teleop.nodes.teleop_keyboard import TeleopKeyboard
+from quad_teleop.nodes.teleop import TeleopGamepad, TeleopKeyboard
 from quad_teleop.nodes.twist_mux import TwistMux
 
 

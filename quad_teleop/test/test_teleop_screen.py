@@ -12,9 +12,8 @@ import pytest
 
 from operator_input import CommandStream, HeldKeys, KeyAction, KeyEvent, status_text
 from quad_teleop import Mode, Speeds
-from quad_teleop.keyboard_teleop import KeyboardTeleop
-from quad_teleop.motion import PoseSteps, rest_of
-from quad_teleop.status import ControllerReport, read_report
+from quad_teleop.mappings import KeyboardTeleop
+from quad_teleop.motion import ControllerReport, PoseSteps, read_report, rest_of
 
 
 @dataclass

@@ -2,15 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a person moves a robot with: keys, with their release, from any terminal; and gamepads."""
 
-from .command_stream import CommandStream, RESTS
 from .exceptions import DeviceError, OperatorInputError, PresetError, SettingError, TerminalError
-from .held_keys import AutoRepeat, HeldKeys
 from .keyboard import Keyboard, ReleaseSource
-from .keys import all_released, KeyAction, KeyEvent
-from .mapping import DeadmanMapping, KeyMapping, ProgramRequest, Robot, TeleopMapping
-from .program import TeleopProgram
-from .status import status_text, StatusLine, StatusPart, Style
-from .terminal import TerminalKeyboard
+from .keys import all_released, AutoRepeat, HeldKeys, KeyAction, KeyEvent
+from .program import (
+    CommandStream,
+    DeadmanMapping,
+    KeyMapping,
+    ProgramRequest,
+    RESTS,
+    Robot,
+    TeleopMapping,
+    TeleopProgram,
+)
+from .terminal import status_text, StatusLine, StatusPart, Style, TerminalKeyboard
 
 __all__ = [
     'RESTS',

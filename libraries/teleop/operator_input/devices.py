@@ -45,18 +45,13 @@ class AxisRange(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class DeviceInfo:
-    """What a device is: its file, what it calls itself, its USB or Bluetooth vendor.
-
-    Attributes:
-        keys: Codes of its keys and buttons.
-        axes: Its axes by code.
-    """
+    """What a device is: its file, what it calls itself, its USB or Bluetooth vendor."""
 
     path: str
     name: str
     vendor: int
-    keys: frozenset[int]
-    axes: Mapping[int, AxisRange]
+    keys: frozenset[int]  # codes of its keys and buttons
+    axes: Mapping[int, AxisRange]  # its axes by code
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,11 +63,7 @@ class DeviceState:
 
 
 class InputDevice:
-    """An open file of /dev/input.
-
-    Attributes:
-        info: What it is.
-    """
+    """An open file of /dev/input."""
 
     def __init__(self, path: str) -> None:
         """Open it.
@@ -91,6 +82,7 @@ class InputDevice:
         except OSError as error:
             raise DeviceError(f'{path}: {error.strerror}; {PERMISSION}') from None
         axes: list[Any] = capabilities.get(EV_ABS, [])  # its types do not know of absinfo
+        # what it is
         self.info = DeviceInfo(
             path=path,
             name=self._device.name,

@@ -94,13 +94,11 @@ class KeyDecoder:
     """Turns bytes into key events, of every encoding that terminals use. Times are in [s].
 
     Bytes may be cut anywhere. Pasted text is dropped.
-
-    Attributes:
-        reports_releases: Whether the terminal has confirmed to report releases; then a key is
-            PRESSED, otherwise TYPED.
     """
 
     def __init__(self) -> None:
+        # whether the terminal has confirmed to report releases; then a key is PRESSED, otherwise
+        # TYPED
         self.reports_releases = False
         self._characters = codecs.getincrementaldecoder('utf-8')('replace')
         self._rest = ''  # begin of a sequence

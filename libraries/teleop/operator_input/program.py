@@ -1,20 +1,246 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The loop of a program with which a person moves a robot: reads, publishes, and ends at rest."""
+"""A program with which a person moves a robot: what keys and sticks mean, and the loop.
+
+A mapping returns commands, which move the robot as long as they are wanted, and requests, which
+are made once: a text is shown to the person, a :class:`ProgramRequest` concerns the program, and
+all others are the robot's. Mappings are pure: times are handed in, on a monotonic clock [s].
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from enum import auto, Enum
+import math
 import os
 import signal
 import threading
 import time
+from typing import Any, Generic, Protocol, TypeVar
 
-from .command_stream import RESTS
-from .gamepad import Gamepad
+from .gamepad import AT_REST, Deadman, Gamepad, GamepadState, Grip, Timeout
 from .keyboard import Keyboard, ReleaseSource
-from .mapping import ProgramRequest, TeleopMapping
-from .status import status_text, Style
+from .keys import HeldKeys
+from .terminal import status_text, StatusPart, Style
+
+T = TypeVar('T')
+
+RESTS = 3  # commands to rest at the end of a motion: one might be lost, more would be a stream
+
+
+class CommandStream(Generic[T]):
+    """Turns what is wanted now into messages; pure, times are in [s].
+
+    A change is published at once, an unchanged command once a period. A source that is idle is
+    silent, so that it does not overrule others.
+    """
+
+    def __init__(self, period: float, rest: Callable[[T | None], T]) -> None:
+        """Start idle.
+
+        Args:
+            period: Time between two messages of the same command.
+            rest: Gives the command that ends a motion; it gets the last command of the motion, or
+                None when there was none.
+
+        Raises:
+            ValueError: The period is not positive.
+        """
+        if not 0.0 < period < math.inf:
+            raise ValueError(f'period is {period} s: it must be above 0')
+        self._period = period
+        self._rest = rest
+        self._wanted: T | None = None
+        self._moved: T | None = None
+        self._rests = 0  # still to be published
+        self._due = -math.inf  # time of the next message
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether there is nothing to publish until a command is wanted."""
+        return self._wanted is None and self._rests == 0
+
+    def is_rest(self, command: T) -> bool:
+        """Return whether a command moves nothing."""
+        return command == self._rest(command)
+
+    def due(self) -> float:
+        """Return when step() has to be called at the latest; infinite when idle."""
+        return math.inf if self.is_idle else self._due
+
+    def stop(self) -> None:
+        """Publish rests even if nothing moves: a person requested a stop."""
+        self._wanted, self._rests, self._due = None, RESTS, -math.inf
+
+    def end(self) -> None:
+        """Publish rests at the end of the program, if it ever moved anything."""
+        if self._moved is not None:
+            self.stop()
+
+    def step(self, wanted: T | None, now: float) -> T | None:
+        """Return what to publish now, None for nothing; None is wanted by an inactive source."""
+        if wanted != self._wanted:
+            if wanted is None:
+                self._rests = RESTS
+            self._wanted, self._due = wanted, now
+        if self.is_idle or now < self._due:
+            return None
+        self._due = now + self._period
+        if wanted is not None:
+            self._rests, self._moved = 0, wanted
+            return wanted
+        self._rests -= 1
+        return self._rest(self._moved)
+
+
+class ProgramRequest(Enum):
+    """What a person requests of any program."""
+
+    QUIT = auto()
+    SUSPEND = auto()
+    """Give the terminal back to the shell for a while."""
+
+
+class Robot(Protocol):
+    """Who is commanded. Nothing of it waits, but flush()."""
+
+    say: Callable[[str], None]  # shows the person a message; the program sets it to its screen
+
+    def publish(self, command: Any) -> None:  # noqa: ANN401  # what its mappings want
+        """Publish a command."""
+
+    def handle(self, request: Any, now: float) -> None:  # noqa: ANN401
+        """Send a request of a mapping."""
+
+    def serve(self, now: float) -> None:
+        """Process answers, and send what is due."""
+
+    def flush(self) -> None:
+        """Wait until what was published has arrived, for a while at most."""
+
+
+class TeleopMapping(ABC):
+    """What the events of a source mean to a robot."""
+
+    introduction = ''  # what a person at a terminal reads first
+
+    def __init__(self, robot: Robot, stream: CommandStream[Any]) -> None:
+        self.robot = robot  # who is commanded
+        self._stream = stream
+
+    @abstractmethod
+    def feed(self, event: Any) -> Sequence[object]:  # noqa: ANN401  # of its source
+        """Map an event of the source to the person's requests."""
+
+    @abstractmethod
+    def wanted(self, now: float) -> object | None:
+        """Return the command that is wanted; None when nothing asks for one."""
+
+    def status(self, now: float) -> list[StatusPart]:  # of a program at a terminal
+        """Return what the status line shows, what matters most first."""
+        return []
+
+    def step(self, now: float) -> object | None:
+        """Return what to publish now; call it after every event and when it is due."""
+        return self._stream.step(self.wanted(now), now)
+
+    def due(self, now: float) -> float:
+        """Return when step() has to be called at the latest; may be infinite."""
+        return self._stream.due()
+
+    def end(self) -> None:
+        """Release everything at the end of the program."""
+        self._stream.end()
+
+
+class KeyMapping(TeleopMapping):
+    """What keys mean: a command as long as a key is held."""
+
+    def __init__(self, robot: Robot, held: HeldKeys, stream: CommandStream[Any]) -> None:
+        super().__init__(robot, stream)
+        self._held = held
+
+    def due(self, now: float) -> float:
+        """Return when step() has to be called at the latest; may be infinite."""
+        return min(self._held.deadline(now), super().due(now))
+
+    def end(self) -> None:
+        """Release everything at the end of the program."""
+        self._held.clear()
+        super().end()
+
+
+class DeadmanMapping(TeleopMapping):
+    """What a gamepad means: a command as long as its deadman is held.
+
+    A motion ends when the gamepad has not changed for longer than a hand holds it so still; the
+    deadman has to be released and pressed anew then.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        deadman: Deadman,
+        stream: CommandStream[Any],
+        warn: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        """Start idle; a motion that ends because the gamepad does not change is warned of."""
+        super().__init__(robot, stream)
+        self.state = AT_REST  # last state of the gamepad
+        # whether a motion has ended so, and the deadman was not released since
+        self.expired = False
+        self._deadman = deadman
+        self._warn = warn
+        self._is_alive = True  # the gamepad has changed since the last step
+        self._changed_at = 0.0
+
+    @property
+    def grip(self) -> Grip:
+        """What the person allows at the moment."""
+        return Grip.RELEASED if self.expired else self._deadman.grip(self.state)
+
+    def take(self, state: GamepadState) -> GamepadState:
+        """Store a state of the gamepad, at rest when there is none; return the previous one."""
+        before, self.state = self.state, state
+        changed = state != before or state.changes != before.changes
+        self._is_alive |= changed
+        released = self._deadman.grip(state) is Grip.RELEASED
+        if released or (changed and self._deadman.enable is None):
+            self.expired = False
+        return before
+
+    def step(self, now: float) -> object | None:
+        """Return what to publish now; call it after every state and when it is due."""
+        if self._is_alive or not self._moves(now):
+            self._is_alive, self._changed_at = False, now
+        elif now - self._changed_at >= self._timeout.duration:
+            self.expired = True
+            self._warn(
+                f'the gamepad has not changed for {self._timeout.duration:g} s '
+                f'({self._timeout.parameter}), so the motion ended; is it on, and in reach? '
+                'Release and press the deadman'
+            )
+        return super().step(now)
+
+    def due(self, now: float) -> float:
+        """Return when step() has to be called at the latest; may be infinite."""
+        expires = self._changed_at + self._timeout.duration if self._moves(now) else math.inf
+        return min(super().due(now), expires)
+
+    def end(self) -> None:
+        """Release everything at the end of the program."""
+        self.state = AT_REST
+        super().end()
+
+    @property
+    def _timeout(self) -> Timeout:
+        return self._deadman.timeout_at(self.state)
+
+    def _moves(self, now: float) -> bool:
+        command = self.wanted(now)
+        return command is not None and not self._stream.is_rest(command)
+
 
 LONGEST_WAIT = 0.1  # [s] for which answers of the robot and a signal may wait
 RELEASE_WORDS = {
@@ -28,11 +254,9 @@ class TeleopProgram:
     """One person and one robot, in one thread; whatever ends it, the robot gets commands to rest.
 
     At a terminal it has a status line, and Ctrl-Z.
-
-    Attributes:
-        spin: Serves the node of the program without waiting, in each turn of the loop.
     """
 
+    # serves the node of the program without waiting, in each turn of the loop
     spin: Callable[[], object] = staticmethod(lambda: None)
 
     def __init__(

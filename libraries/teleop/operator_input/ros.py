@@ -16,24 +16,18 @@ from node_runner import ParameterReader, run_program
 from .devices import InputDevices
 from .exceptions import OperatorInputError
 from .gamepad import AUTO, Deadman, DEADMAN_BUTTONS, Gamepad
-from .held_keys import AutoRepeat, HeldKeys
 from .keyboard import Keyboard
-from .mapping import TeleopMapping
-from .program import TeleopProgram
+from .keys import AutoRepeat, HeldKeys
+from .program import TeleopMapping, TeleopProgram
 
 MAX_DEADMAN_TIMEOUT = 3600.0  # [s]
 
 
 class TeleopNode(Node):
-    """The node of a program with which a person moves a robot.
+    """The node of a program with which a person moves a robot."""
 
-    Attributes:
-        source: What the person's input is read from.
-        mapping: What it means to the robot.
-    """
-
-    source: Keyboard | Gamepad
-    mapping: TeleopMapping
+    source: Keyboard | Gamepad  # what the person's input is read from
+    mapping: TeleopMapping  # what it means to the robot
 
 
 def declare_keyboard(node: Node) -> tuple[Keyboard, HeldKeys]:

@@ -12,8 +12,8 @@ import time
 
 from .exceptions import PresetError, TerminalError
 from .gamepad import AUTO, Gamepad, GamepadState
-from .held_keys import HeldKeys
 from .keyboard import Keyboard, ReleaseSource
+from .keys import HeldKeys
 
 EXPLANATIONS = {
     ReleaseSource.TERMINAL: 'the terminal (Kitty protocol)',

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Keys of a terminal, with their releases where the terminal reports them.
+"""Keys of a terminal, with their releases where the terminal reports them; and a line of status.
 
 A terminal with the Kitty keyboard protocol answers ``CSI ? u``; every terminal answers ``CSI c``.
 If the second answer comes without the first, there is no such protocol. Nothing waits for either:
@@ -12,14 +12,16 @@ the report never comes; so the terminal is probed as long as a key is held.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 import contextlib
 from enum import Enum
 import os
+import re
 import select
 import termios
 import time
-from typing import Any, TYPE_CHECKING
+from typing import Any, Protocol, TYPE_CHECKING
+import unicodedata
 
 from .exceptions import TerminalError
 from .key_decoder import KeyDecoder, Kitty, Report, ReportKind
@@ -28,8 +30,8 @@ from .keys import all_released, KeyEvent
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-CONTROLLING_TERMINAL = '/dev/tty'
 
+CONTROLLING_TERMINAL = '/dev/tty'
 QUERY = '\x1b[?u\x1b[c'
 WANTED = (
     Kitty.DISAMBIGUATE | Kitty.EVENT_TYPES | Kitty.ALTERNATE_KEYS | Kitty.ALL_KEYS | Kitty.TEXT
@@ -42,7 +44,6 @@ PROBE_PERIOD = 0.25  # [s] between two probes
 PROBE_TIMEOUT = 1.0  # [s] without any sign
 ESCAPE_TIMEOUT = 0.05  # [s] after which an escape is the key, not the begin of a sequence
 DRAIN_TIMEOUT = 0.3  # [s] at the end for answers that would otherwise appear in the shell
-
 _MODES = '?1004', '?2004'  # focus reports and bracketed paste (xterm)
 _MODES_ON = ''.join(f'\x1b[{mode}h' for mode in _MODES)
 _MODES_OFF = ''.join(f'\x1b[{mode}l' for mode in _MODES)
@@ -60,14 +61,10 @@ class Stage(Enum):
 
 
 class TerminalDialogue:
-    """What the terminal was asked; pure: takes reports, returns what to write. Times are in [s].
-
-    Attributes:
-        stage: How far its promise to report releases has got.
-    """
+    """What the terminal was asked; pure: takes reports, returns what to write."""
 
     def __init__(self) -> None:
-        self.stage = Stage.IDLE
+        self.stage = Stage.IDLE  # how far its promise to report releases has got
         self._attributes_due = 0  # answers to CSI c
         self._probed = 0.0
         self._unanswered_since: float | None = None  # first probe without any sign since
@@ -302,3 +299,89 @@ class TerminalKeyboard:
         if probe := self._dialogue.probe(now):
             self.write(probe)
         return []
+
+
+_CONTROL = re.compile('\x1b\\[[0-9;]*m')
+
+RESET, CLEAR_LINE = '\x1b[0m', '\r\x1b[K'
+
+
+class Style(Enum):
+    """How a part looks, as a control sequence of ECMA-48 (SGR)."""
+
+    PLAIN = ''
+    BOLD = '\x1b[1m'
+    DIM = '\x1b[2m'
+    GREEN = '\x1b[32m'
+    YELLOW = '\x1b[33m'
+    RED = '\x1b[1;31m'
+
+
+StatusPart = tuple[str, Style]
+
+
+def status_text(parts: Iterable[StatusPart], *, colour: bool) -> str:
+    """Join the parts of a status line, what matters most first: a narrow window cuts the rest."""
+    return ' | '.join(
+        f'{style.value}{text}{RESET}' if colour and style.value else text for text, style in parts
+    )
+
+
+class Output(Protocol):
+    """What a status line needs of a terminal."""
+
+    def write(self, text: str) -> None:
+        """Write characters and control sequences."""
+
+    def width(self) -> int:
+        """Return the width [characters]."""
+
+
+class StatusLine:
+    """Shows a line in place; never wider than the window, so that it never wraps.
+
+    Texts may contain colours.
+    """
+
+    def __init__(self, output: Output) -> None:
+        self._output = output
+        self._shown = ''
+
+    def show(self, text: str) -> None:
+        """Show a line, if it is not there yet."""
+        line = fitted(text, self._output.width() - 1)
+        if line != self._shown:
+            self._output.write(CLEAR_LINE + line)
+            self._shown = line
+
+    def message(self, text: str) -> None:
+        """Write lines above it, which stay."""
+        self._output.write(f'{CLEAR_LINE}{text}\n{self._shown}')
+
+    def end(self) -> None:
+        """Move below the line, which stays as it is."""
+        if self._shown:
+            self._output.write('\n')
+        self._shown = ''
+
+
+def fitted(text: str, width: int) -> str:
+    """Cut a line to some columns; colours are kept, and switched off where it is cut."""
+    result: list[str] = []
+    left, position = width, 0
+    while position < len(text):
+        control = _CONTROL.match(text, position)
+        piece = control[0] if control else text[position]
+        columns = 0 if control else _columns(piece)
+        if columns > left:
+            return ''.join(result) + (RESET if '\x1b' in text else '')
+        result.append(piece)
+        left -= columns
+        position += len(piece)
+    return ''.join(result)
+
+
+def _columns(character: str) -> int:
+    if unicodedata.combining(character):
+        return 0
+    return 2 if unicodedata.east_asian_width(character) in {'W', 'F'} else 1

@@ -12,17 +12,6 @@ import pytest
 from operator_input import PresetError, SettingError
 from operator_input.devices import AxisRange
 from operator_input.gamepad import (
-    AT_REST,
-    Axis,
-    Button,
-    Deadman,
-    Gamepad,
-    GamepadState,
-    Grip,
-    Timeout,
-)
-from operator_input.gamepad.gamepad import position
-from operator_input.gamepad.presets import (
     ABS_BRAKE,
     ABS_GAS,
     ABS_HAT0X,
@@ -33,6 +22,15 @@ from operator_input.gamepad.presets import (
     ABS_X,
     ABS_Y,
     ABS_Z,
+    AT_REST,
+    Axis,
+    Button,
+    Deadman,
+    Gamepad,
+    GamepadState,
+    Grip,
+    position,
+    Timeout,
 )
 
 BTN_SOUTH, BTN_NORTH, BTN_TL = 0x130, 0x133, 0x136

@@ -14,7 +14,7 @@ import pytest
 from operator_input import DeviceError
 from operator_input.devices import InputDevices
 from operator_input.gamepad import AT_REST, Axis, Button, Gamepad, GamepadState
-from operator_input.releases import Keyboards, ReleaseMatcher
+from operator_input.keyboard import Keyboards, ReleaseMatcher
 
 UINPUT = Path('/dev/uinput')
 BTN_SOUTH, EV_KEY, EV_ABS, ABS_X, ABS_Y = 0x130, 1, 3, 0, 1

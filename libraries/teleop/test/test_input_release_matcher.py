@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 import pytest
 
 from operator_input import all_released, HeldKeys, KeyAction, KeyEvent
-from operator_input.releases import is_local, OVERTAKEN, ReleaseMatcher, WINDOW
+from operator_input.keyboard import is_local, OVERTAKEN, ReleaseMatcher, WINDOW
 
 KEY_I, KEY_L, KEY_LEFTSHIFT = 23, 38, 42
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from operator_input import status_text, StatusLine, Style
-from operator_input.status import fitted
+from operator_input.terminal import fitted
 
 
 class Paper:

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The robot as teleop programs command it: topics, requests to the controller, its reports.
+"""``ros2 run quad_teleop teleop_keyboard`` and ``teleop_gamepad``: drive with keys, or a gamepad.
 
-Parameters that keyboard and gamepad have in common are declared here. Values of another kind or
-out of their range raise ParameterError, those that make no sense together SettingError.
+What both have in common stands first: parameters, topics, requests to the controller and its
+reports. Values of another kind or out of their range raise ParameterError, those that make no
+sense together SettingError.
 """
 
 from __future__ import annotations
@@ -22,22 +23,26 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from node_runner import ParameterReader
+from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt
 from operator_input import CommandStream
+from operator_input.devices import InputDevices
+from operator_input.ros import declare_gamepad, declare_keyboard, run_teleop, TeleopNode
 from quad_msgs.srv import SetMode
 
-from ..exceptions import SettingError
+from ..exceptions import SettingError, TeleopError
+from ..mappings import GamepadTeleop, KeyboardTeleop
 from ..motion import (
     BodyPose,
+    ControllerReport,
     MIN_SPEED,
     Mode,
     PoseSteps,
+    read_report,
     rest_of,
     RobotRequest,
     Speeds,
     Velocity,
 )
-from ..status import ControllerReport, read_report
 
 FLUSH_TIMEOUT = Duration(nanoseconds=300_000_000)
 ANSWER_TIMEOUT = 3.0  # [s]
@@ -187,10 +192,6 @@ class RobotLink:
     """Publishes velocities as Twist, TwistStamped or both, and poses of the body.
 
     Client of ``set_mode``, ``stop`` and ``controller_node/clear_fault``; reads /diagnostics.
-
-    Attributes:
-        say: Shows the person answers, and why there is none.
-        mode: The mode that was granted last; None before.
     """
 
     def __init__(self, node: Node, say: Callable[[str], None]) -> None:
@@ -205,8 +206,8 @@ class RobotLink:
         stamped = read.flag('stamped', 'publish cmd_vel_stamped (TwistStamped)', default=False)
         if not (twist or stamped):
             raise SettingError('twist and stamped are both false: nothing would be published')
-        self.say = say
-        self.mode: Mode | None = None
+        self.say = say  # shows the person answers, and why there is none
+        self.mode: Mode | None = None  # the mode that was granted last; None before
         self._node = node
         self._frame = read.text('frame_id', 'base_link', 'frame of TwistStamped')
         self._pose = node.create_publisher(Pose, 'body_pose', 1)
@@ -296,3 +297,67 @@ class RobotLink:
             level = int.from_bytes(status.level, 'little')
             report = read_report(status.name, level, status.message, values, time.monotonic())
             self._report = report or self._report
+
+
+class TeleopKeyboard(TeleopNode):
+    """Publishes velocities and body poses, and requests modes."""
+
+    @destroyed_when_refused
+    def __init__(self) -> None:
+        """Declare the parameters and advertise the topics.
+
+        Raises:
+            ParameterError: A parameter is misspelt, of another kind or out of its range.
+            SettingError: Parameters make no sense together.
+        """
+        super().__init__('teleop_keyboard')
+        self.source, held = declare_keyboard(self)
+        robot = RobotLink(self, self.get_logger().info)
+        (speeds,) = declare_speeds(self, {'': Speeds()})
+        steps = declare_steps(self)
+        self.mapping = KeyboardTeleop(robot, held, declare_stream(self), speeds, steps)
+        refuse_misspelt(self)
+
+
+GAMEPAD_SPEEDS = {'': Speeds(0.15, 0.6), 'turbo_': Speeds(0.3, 1.2)}
+
+
+class TeleopGamepad(TeleopNode):
+    """Publishes velocities and body poses, and requests modes."""
+
+    @destroyed_when_refused
+    def __init__(self, devices: InputDevices | None = None) -> None:
+        """Declare the parameters and advertise the topics.
+
+        Args:
+            devices: Where gamepads are; those of this machine when it is None.
+
+        Raises:
+            ParameterError: A parameter is misspelt, of another kind or out of its range.
+            SettingError: Parameters make no sense together.
+            PresetError: There is no preset of that name.
+        """
+        super().__init__('teleop_gamepad')
+        self.source, deadman = declare_gamepad(self, devices)
+        self.robot = RobotLink(self, self.get_logger().info)  # what it publishes to
+        normal, turbo = declare_speeds(self, GAMEPAD_SPEEDS)
+        self.mapping = GamepadTeleop(
+            self.robot,
+            deadman,
+            declare_stream(self),
+            normal,
+            turbo,
+            steps=declare_steps(self),
+            warn=self.get_logger().warning,
+        )
+        refuse_misspelt(self)
+
+
+def teleop_keyboard() -> int:
+    """``ros2 run quad_teleop teleop_keyboard``: run until Ctrl-C; return the exit code."""
+    return run_teleop('teleop_keyboard', TeleopKeyboard, TeleopError, patient=True)
+
+
+def teleop_gamepad() -> int:
+    """``ros2 run quad_teleop teleop_gamepad``: run until Ctrl-C; return the exit code."""
+    return run_teleop('teleop_gamepad', TeleopGamepad, TeleopError, patient=False)
