@@ -12,7 +12,7 @@ runpy.run_path(str(SHARED))['setup_package'](
     },
     programs=[
         'bringup = quad_bringup.bringup:main',
-        'demo = quad_bringup.examples.walk:main',
+        'demo = quad_bringup.walk:main',
     ],
     folders=['launch', 'view'],
 )

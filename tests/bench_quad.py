@@ -26,7 +26,7 @@ import psutil
 from rclpy.qos import qos_profile_sensor_data
 from simulated_quad import AHEAD, SimulatedQuad
 
-from quad_bringup.examples.walk import Track, velocity_text
+from quad_bringup.walk import Track, velocity_text
 from quad_controller import Velocity
 from quad_description.rotations import tilt_of
 

@@ -35,8 +35,8 @@ from std_msgs.msg import String
 
 from node_runner import LATCHED
 from process_supervisor import find_executable, write_parameters
-from quad_bringup.examples.walk import GROUND_TRUTH
-from quad_bringup.stack import quad_processes, Stack
+from quad_bringup.bringup import quad_processes, Stack
+from quad_bringup.walk import GROUND_TRUTH
 from quad_controller import Velocity
 from quad_description import movable_joints, robot_urdf
 from quad_description.rotations import tilt_of

@@ -23,7 +23,7 @@ from std_srvs.srv import SetBool
 from tf2_msgs.msg import TFMessage
 
 from node_runner import LATCHED
-from quad_bringup.examples.walk import GROUND_TRUTH
+from quad_bringup.walk import GROUND_TRUTH
 from quad_description import LEGS, Pose, pose_positions, quadruped, raised_feet, robot_urdf
 from quad_msgs.msg import JointCommand
 from quad_msgs.srv import SetMode

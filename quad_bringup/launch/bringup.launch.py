@@ -11,7 +11,7 @@ from __future__ import annotations
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction, Shutdown
 
-from quad_bringup.launching import argv, LAUNCH_ARGUMENTS, STOP_TIMEOUT
+from quad_bringup.bringup import argv, LAUNCH_ARGUMENTS, STOP_TIMEOUT
 
 
 def _bringup(context: LaunchContext) -> list[ExecuteProcess]:

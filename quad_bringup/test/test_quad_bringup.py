@@ -26,8 +26,10 @@ LINES = {
 LIES = """
 import sys
 from types import SimpleNamespace
+sys.modules['quad_msgs.srv'] = SimpleNamespace(SetMode=None)
+from quad_bringup import mode_client
 robot = SimpleNamespace(state='lie', wait_until=lambda *_: None, close=lambda: None)
-sys.modules['quad_bringup.mode_client'] = SimpleNamespace(ModeClient=lambda *_: robot)
+mode_client.ModeClient = lambda *_: robot
 """
 """The small controller is in no ROS graph."""
 

@@ -9,9 +9,7 @@ import re
 
 import pytest
 
-from quad_bringup.bringup import parse
-from quad_bringup.exceptions import ArgumentError
-from quad_bringup.launching import argv, LAUNCH_ARGUMENTS
+from quad_bringup.bringup import ArgumentError, argv, LAUNCH_ARGUMENTS, parse
 from quad_hardware.calibration.odometry import BRING_UP
 from quad_hardware.doctor.graph import check_graph, Observation
 

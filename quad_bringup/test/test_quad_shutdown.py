@@ -9,8 +9,7 @@ from collections.abc import Callable
 import pytest
 
 from process_supervisor import CallError, GivenUpError
-from quad_bringup import mode_client
-from quad_bringup.shutdown import leave
+from quad_bringup.mode_client import leave
 
 
 class Controller:
@@ -60,7 +59,7 @@ def make_leaves(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
             controller.given_up = asked
             return controller
 
-        monkeypatch.setattr(mode_client, 'ModeClient', join)
+        monkeypatch.setattr('quad_bringup.mode_client.ModeClient', join)
         leave(reports.append, lambda: given_up, namespace='', hold=hold)
         assert controller.closed
         return reports

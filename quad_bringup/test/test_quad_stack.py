@@ -14,11 +14,11 @@ from rclpy.context import Context
 from rclpy.node import Node
 
 from process_supervisor import ProcessSpec, StartError, write_parameters
-from quad_bringup.stack import quad_processes, Stack
+from quad_bringup.bringup import quad_processes, Stack
 from quad_controller.nodes.parameters import declare_parameters as controller_parameters
 from quad_controller.nodes.parameters import NodeSettings as ControllerSettings
 from quad_description import movable_joints, robot_urdf
-from quad_hardware.calibration.parameter_file import write_parameters as write_calibration
+from quad_hardware.calibration.main import write_parameters as write_calibration
 from quad_hardware.nodes.parameters import declare_parameters as hardware_parameters
 from quad_hardware.nodes.parameters import NodeSettings as HardwareSettings
 from quad_hardware.protocol import Code, Frame, Kind, Register, ROBOT_KINDS, StreamParser, V2

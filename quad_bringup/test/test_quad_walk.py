@@ -16,15 +16,8 @@ import pytest
 from rich.console import Console
 
 from process_supervisor import RosOptions
-from quad_bringup.examples.walk import (
-    PARTS,
-    Segment,
-    STANDSTILL,
-    Track,
-    Walk,
-    wrong_speed,
-)
-from quad_bringup.stack import Session
+from quad_bringup.bringup import Session
+from quad_bringup.walk import PARTS, Segment, STANDSTILL, Track, Walk, wrong_speed
 from quad_controller import Velocity
 from quad_description import LEGS
 

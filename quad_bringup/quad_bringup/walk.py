@@ -33,9 +33,8 @@ from quad_description import LEGS
 from quad_description.rotations import tilt_of, yaw_of
 from quad_msgs.msg import JointCommand
 
-from ..exceptions import BringupError
-from ..mode_client import ModeClient
-from ..stack import add_arguments, Session, session
+from .bringup import add_arguments, BringupError, Session, session
+from .mode_client import ModeClient
 
 GROUND_TRUTH = 'fake_xgo/ground_truth'
 """Topic on which the simulated robot publishes where its body is."""
@@ -80,13 +79,12 @@ class Track:
     Attributes:
         way: What it has covered since the first pose.
         stamp: ROS time of the latest pose in [s]; NaN before there is one.
-        tilt: Angle between the body's z axis and the vertical then in [rad].
-        height: Height of the body then in [m].
     """
 
     def __init__(self) -> None:
         self.way, self.stamp = Velocity(), math.nan
-        self.tilt = self.height = math.nan
+        # angle between the body's z axis and the vertical then in [rad]
+        self.tilt = self.height = math.nan  # height of the body then in [m]
         self._pose = (0.0, 0.0, 0.0)  # x, y, yaw
         self._recent: deque[tuple[float, Velocity]] = deque()
 
