@@ -28,9 +28,12 @@ from quad_controller.gait.parameters import AS_TUNED, LOW_AND_WIDE
 from quad_description import quadruped, robot_urdf, RobotState, Targets
 from quad_description.rotations import about_z, multiply, roll_pitch_yaw
 from quad_gait_physics import FIRM, firm, MODEL, PERIOD, PhysicsRig
-from quad_hardware.estimation import ImuMounting, OdometrySettings
-from quad_hardware.estimation.imu_mounting import UNCHECKED_DEVIATION
-from quad_hardware.estimation.odometry import LegOdometry
+from quad_hardware.estimation import (
+    ImuMounting,
+    LegOdometry,
+    OdometrySettings,
+    UNCHECKED_DEVIATION,
+)
 from quad_sim import ServoModel as ServoModels
 from quad_sim import Terrain
 from quad_sim.physics import PhysicsBackend, Robot

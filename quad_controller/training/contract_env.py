@@ -26,7 +26,8 @@ from quad_controller.policy.runner import PolicyRunner
 from quad_controller.states.motion import StepLimiter
 from quad_description import ImuSample, quadruped, robot_urdf
 from quad_hardware.backend import JointBytes
-from quad_hardware.estimation import AttitudeRate, EstimatorSettings
+from quad_hardware.estimation import EstimatorSettings
+from quad_hardware.filters import AttitudeRate
 from quad_sim import ServoModel, Terrain
 from quad_sim.env import Randomization, WalkingEnv
 

@@ -13,21 +13,13 @@ import time
 from black_box import BlackBox, BlackBoxSettings
 from quad_description import preset_of, RobotState
 
+from .commander import JointCommander, LossReaction
 from .estimation import Estimator, EstimatorSettings
 from .exceptions import CommandError
-from .joints import JointCommander, JointMap, LimiterSettings, LossReaction
-from .joints.command import NOMINAL_PERIOD
+from .joints import JointMap, LimiterSettings, NOMINAL_PERIOD
 from .link import Driver, LinkOptions, LinkState, LinkStatus, Session, STALE_TIME
-from .recording import (
-    FaultWatch,
-    LossWatch,
-    Opened,
-    SerialLogFile,
-    SerialMemory,
-    StateEntered,
-)
-from .report import Report
-from .torque_off import check_torque_off, TorqueOffResult
+from .recording import FaultWatch, LossWatch, Opened, SerialLogFile, SerialMemory, StateEntered
+from .report import check_torque_off, Report, TorqueOffResult
 
 LINK, ROBOT, COMMANDS = 'serial link', 'robot', 'joint commands'
 """What a fault is of; diagnostics have the same names."""
@@ -60,13 +52,7 @@ class RobotSettings:
 
 
 class ObservedRobot:
-    """A robot whose reports become states; on a serial line, or in the log of one.
-
-    Attributes:
-        on_state: Called with each report as a state in SI units.
-        on_change: Called with the state of the link when it changes, and its detail.
-        on_refusal: Called with the reason why a report cannot be.
-    """
+    """A robot whose reports become states; on a serial line, or in the log of one."""
 
     def __init__(self, settings: RobotSettings) -> None:
         """Begin without a report.
@@ -77,8 +63,11 @@ class ObservedRobot:
         self.names = settings.joints.names  # joints in the order of the URDF
         # the newest state, None while the link does not run
         self.latest: RobotState | None = None
+        # called with each report as a state in SI units
         self.on_state: Callable[[RobotState], None] = lambda _: None
+        # called with the state of the link when it changes, and its detail
         self.on_change: Callable[[LinkState, str], None] = lambda *_: None
+        # called with the reason why a report cannot be
         self.on_refusal: Callable[[str], None] = lambda _: None
         self._settings = settings
         self._begin()
@@ -115,9 +104,6 @@ class SerialRobot(ObservedRobot):
 
     The callbacks are called in the thread of the driver, except ``on_warning``; everything else
     may be called in one other thread. Times are on the monotonic clock [s].
-
-    Attributes:
-        on_warning: Called with what is wrong with a command.
     """
 
     def __init__(self, settings: RobotSettings) -> None:
@@ -128,6 +114,7 @@ class SerialRobot(ObservedRobot):
             RecordingError: The serial log cannot be written.
         """
         super().__init__(settings)
+        # called with what is wrong with a command
         self.on_warning: Callable[[str], None] = lambda _: None
         self._arrived_at = -math.inf  # [s] when the latest report did
         self._joints = settings.joints

@@ -30,11 +30,10 @@ from quad_description.rotations import (
 )
 from quad_hardware import CommandError
 from quad_hardware.calibration.imu import find_mounting, Stance
-from quad_hardware.calibration.main import run_calibrate
-from quad_hardware.calibration.parameter_file import imu_parameters, read_parameters
-from quad_hardware.calibration.robot import ImuReading, mean_attitude
+from quad_hardware.calibration.main import imu_parameters, read_parameters, run_calibrate
+from quad_hardware.calibration.wizard import ImuReading, mean_attitude
 from quad_hardware.estimation import Estimator, EstimatorSettings, ImuMounting
-from quad_hardware.estimation.filters import STANDARD_GRAVITY
+from quad_hardware.filters import STANDARD_GRAVITY
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.protocol import LEG_MOTORS, Protocol, V1, V2
 from quad_hardware.report import Report

@@ -16,9 +16,7 @@ import yaml
 
 from quad_calibration_script import Script
 from quad_hardware import CommandError
-from quad_hardware.calibration import robot
-from quad_hardware.calibration.main import run_calibrate
-from quad_hardware.calibration.parameter_file import read_parameters, write_parameters
+from quad_hardware.calibration.main import read_parameters, run_calibrate, write_parameters
 from quad_hardware.calibration.wizard import (
     MIN_TURN,
     moved_motor,
@@ -166,7 +164,7 @@ def test_a_preset_of_another_robot_is_refused(tmp_path: Path, protocol: Protocol
 
 def test_no_robot_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With the remedy, and nothing is written."""
-    monkeypatch.setattr(robot, 'REPORT_TIMEOUT', 0.5)
+    monkeypatch.setattr('quad_hardware.calibration.wizard.REPORT_TIMEOUT', 0.5)
     script = Script('')
     command = ['joints', '--port', str(tmp_path / 'none'), '--output', str(tmp_path / 'x')]
     assert run_calibrate(command, script) == 1

@@ -25,9 +25,8 @@ from rclpy.node import Node
 
 from quad_calibration_script import Script
 from quad_hardware.calibration import odometry
-from quad_hardware.calibration.main import run_calibrate
+from quad_hardware.calibration.main import read_parameters, run_calibrate
 from quad_hardware.calibration.odometry import Place, way
-from quad_hardware.calibration.parameter_file import read_parameters
 
 PERIOD = 0.01  # [s]
 pytestmark = pytest.mark.scenario

@@ -16,7 +16,7 @@ import pytest
 from quad_description import movable_joints, robot_urdf
 from quad_hardware.doctor import Finding, Severity
 from quad_hardware.doctor.graph import check_graph, links_without_place, Observation
-from quad_hardware.doctor.machine_checks import (
+from quad_hardware.doctor.main import (
     check_environment,
     check_latency,
     check_memory,

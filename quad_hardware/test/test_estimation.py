@@ -27,14 +27,8 @@ from quad_description.rotations import (
     rotate,
     Vector,
 )
-from quad_hardware.estimation import (
-    BoardWatch,
-    Estimator,
-    EstimatorSettings,
-    ImuMounting,
-    RateSource,
-)
-from quad_hardware.estimation.filters import (
+from quad_hardware.estimation import Estimator, EstimatorSettings, ImuMounting, RateSource
+from quad_hardware.filters import (
     AttitudeRate,
     CHARGE_REPORTS,
     FULL,
@@ -43,21 +37,22 @@ from quad_hardware.estimation.filters import (
     JointRate,
     MedianFilter,
 )
-from quad_hardware.estimation.plausibility import (
+from quad_hardware.joints import JointMap, servo_of
+from quad_hardware.protocol import Fault, LEG_MOTORS
+from quad_hardware.report import (
+    BoardWatch,
     CONFIRMATIONS,
+    DEVICE_TIME_WRAP,
     FAULT_TEXTS,
     MAX_REFUSALS,
     Plausibility,
+    Report,
     SampleClock,
     ServoWatch,
 )
-from quad_hardware.joints import JointMap, servo_of
-from quad_hardware.protocol import Fault, LEG_MOTORS
-from quad_hardware.report import DEVICE_TIME_WRAP, Report
 
 ANGLES = st.floats(-3.1, 3.1)
 ROTATIONS = st.builds(from_rpy, ANGLES, st.floats(-1.5, 1.5), ANGLES)
-VECTORS = st.tuples(*[st.floats(-10, 10)] * 3)
 STATE = Report(
     arrival=0.0,
     wire_time=0.00127,

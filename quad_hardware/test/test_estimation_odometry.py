@@ -23,8 +23,13 @@ from quad_description import (
 )
 from quad_description.rotations import from_rpy, IDENTITY, Quaternion, yaw_of
 from quad_hardware import CommandError
-from quad_hardware.estimation import Estimator, EstimatorSettings, OdometrySettings
-from quad_hardware.estimation.odometry import ground_normal, LegOdometry
+from quad_hardware.estimation import (
+    Estimator,
+    EstimatorSettings,
+    ground_normal,
+    LegOdometry,
+    OdometrySettings,
+)
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.protocol import LEG_MOTORS
 from quad_hardware.report import Report

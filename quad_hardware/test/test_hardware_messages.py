@@ -41,16 +41,12 @@ from quad_description.rotations import (
     yaw_of,
 )
 from quad_description.rotations import Quaternion as Rotation
-from quad_hardware.estimation import Estimator, EstimatorSettings
-from quad_hardware.estimation.imu_mounting import UNCHECKED_DEVIATION
-from quad_hardware.joints import CommandCounters, JointMap, servo_of
+from quad_hardware.commander import CommandCounters
+from quad_hardware.estimation import Estimator, EstimatorSettings, UNCHECKED_DEVIATION
+from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.link import LinkState, LinkStatus
 from quad_hardware.nodes import messages, robot_topics
-from quad_hardware.nodes.diagnostics import (
-    command_diagnostic,
-    LinkDiagnostic,
-    robot_diagnostic,
-)
+from quad_hardware.nodes.messages import command_diagnostic, LinkDiagnostic, robot_diagnostic
 from quad_hardware.nodes.parameters import Deviations, Frames
 from quad_hardware.protocol import Fault, LEG_MOTORS, ParserCounters
 from quad_hardware.report import Report

@@ -22,8 +22,7 @@ from std_srvs.srv import SetBool
 
 from node_runner import LATCHED
 from quad_description import FEET, movable_joints, Pose, pose_positions, robot_urdf
-from quad_hardware.joints import LimiterSettings
-from quad_hardware.joints.command import MAX_PERIOD
+from quad_hardware.joints import LimiterSettings, MAX_PERIOD
 from quad_hardware.nodes.hardware_node import HardwareNode
 from quad_hardware.protocol import BULK_READ_ORDER, MOTOR_ORDER, Protocol, V1, V2
 from quad_msgs.msg import FootContacts

@@ -21,9 +21,14 @@ from quad_description import (
     raised_feet,
     robot_urdf,
 )
-from quad_hardware.joints import JointCommander, JointMap, LimiterSettings, servo_of
-from quad_hardware.joints.command import MAX_PERIOD
-from quad_hardware.joints.commander import CommandLoss, LossReaction, REPORT_TIMEOUT, SPEED
+from quad_hardware.commander import (
+    CommandLoss,
+    JointCommander,
+    LossReaction,
+    REPORT_TIMEOUT,
+    SPEED,
+)
+from quad_hardware.joints import JointMap, LimiterSettings, MAX_PERIOD, servo_of
 
 JOINTS = JointMap(servo_of(joint) for joint in movable_joints(robot_urdf('lite')))
 NAMES = JOINTS.names

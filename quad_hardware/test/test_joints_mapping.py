@@ -14,8 +14,7 @@ import pytest
 from quad_description import movable_joints, robot_urdf
 from quad_hardware import CommandError
 from quad_hardware.joints import JointMap, JointServo, servo_of
-from quad_hardware.link.v1_dialect import V1Dialect
-from quad_hardware.link.v2_dialect import V2Dialect
+from quad_hardware.link.dialects import V1Dialect, V2Dialect
 from quad_hardware.protocol import LEG_MOTORS, Model
 
 ARM = movable_joints(robot_urdf('lite', arm=True))

@@ -13,8 +13,14 @@ from hypothesis import strategies as st
 import pytest
 
 from quad_hardware.link import Dialect
-from quad_hardware.link.v1_dialect import HOST_GAP, MIN_RATE, UnseenServo, V1Dialect
-from quad_hardware.link.v2_dialect import REQUEST_PERIOD, V2Dialect
+from quad_hardware.link.dialects import (
+    HOST_GAP,
+    MIN_RATE,
+    REQUEST_PERIOD,
+    UnseenServo,
+    V1Dialect,
+    V2Dialect,
+)
 from quad_hardware.protocol import (
     ANGLE_SPANS,
     BULK_READ_ORDER,

@@ -16,8 +16,7 @@ import serial
 
 from quad_hardware import LinkError
 from quad_hardware.link import Dialect, Driver, LinkOptions, LinkState, SerialPort
-from quad_hardware.link.v1_dialect import V1Dialect
-from quad_hardware.link.v2_dialect import V2Dialect
+from quad_hardware.link.dialects import V1Dialect, V2Dialect
 from quad_hardware.protocol import LEG_MOTORS, Protocol, V1, V2
 from quad_hardware.report import Report
 from quad_pty_peer import PtyPeer

@@ -23,6 +23,9 @@ from quad_hardware.protocol import Fault, Model
 from quad_hardware.recording import (
     Entry,
     FaultWatch,
+    format_event,
+    format_transfer,
+    HEADER,
     LossWatch,
     Opened,
     read_serial_log,
@@ -31,7 +34,6 @@ from quad_hardware.recording import (
     StateEntered,
     Transfer,
 )
-from quad_hardware.recording.serial_log import format_event, format_transfer, HEADER
 from quad_hardware.report import Report
 
 times = st.integers(0, 2**31 * 10**6).map(lambda micro: micro / 1e6)

@@ -15,13 +15,12 @@ import pytest
 
 from quad_description import ContactSource, movable_joints, robot_urdf, RobotState
 from quad_hardware import RecordingError
-from quad_hardware.backend import recorded_in
+from quad_hardware.backend import recorded_in, ReplayedRobot
 from quad_hardware.estimation import EstimatorSettings, ImuMounting
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.link import LinkOptions, LinkState
 from quad_hardware.protocol import Protocol, V1, V2
 from quad_hardware.recording import read_serial_log
-from quad_hardware.replayed_robot import ReplayedRobot
 from quad_hardware.serial_robot import RobotSettings, SerialRobot
 from quad_pty_peer import PtyPeer
 

@@ -15,8 +15,7 @@ import pytest
 from quad_description import movable_joints, Pose, pose_positions, robot_urdf
 from quad_hardware import CommandError, NoAnswerError
 from quad_hardware.backend import SerialBackend
-from quad_hardware.joints import JointMap, LimiterSettings, servo_of
-from quad_hardware.joints.command import MAX_PERIOD
+from quad_hardware.joints import JointMap, LimiterSettings, MAX_PERIOD, servo_of
 from quad_hardware.link import LinkOptions
 from quad_hardware.protocol import LEG_MOTORS, Protocol, V1, V2
 from quad_hardware.serial_robot import RobotSettings, SerialRobot

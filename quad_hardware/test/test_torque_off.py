@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 import pytest
 
 from quad_hardware.protocol import LEG_MOTORS
-from quad_hardware.report import Report
-from quad_hardware.torque_off import check_torque_off, DELAY, NO_LOAD, TIMEOUT, TorqueOffResult
+from quad_hardware.report import check_torque_off, DELAY, NO_LOAD, Report, TIMEOUT, TorqueOffResult
 
 ASKED, SENT = 10.0, 10.01  # [s]
 LATE = ASKED + TIMEOUT

@@ -6,8 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from quad_hardware.link.v1_dialect import V1Dialect
-from quad_hardware.link.v2_dialect import V2Dialect
+from quad_hardware.link.dialects import V1Dialect, V2Dialect
 from quad_hardware.protocol import (
     Frame,
     LEG_MOTORS,

@@ -14,8 +14,7 @@ from sim_virtual import Line
 
 from quad_description import movable_joints, robot_urdf
 from quad_hardware import CommandError
-from quad_hardware.calibration.servo_fit import ServoFit
-from quad_hardware.calibration.servos import calibrate_servos
+from quad_hardware.calibration.servos import calibrate_servos, ServoFit
 from quad_hardware.calibration.wizard import Console
 from quad_hardware.joints import servo_of
 from quad_hardware.protocol import Protocol, V1, V2

@@ -21,8 +21,7 @@ from quad_description import (
     robot_urdf,
 )
 from quad_description.rotations import from_rpy, rotate
-from quad_hardware.estimation import OdometrySettings
-from quad_hardware.estimation.odometry import LegOdometry
+from quad_hardware.estimation import LegOdometry, OdometrySettings
 from quad_sim import ServoModel, Terrain
 from quad_sim.physics import Robot
 from quad_sim.state import FLAT

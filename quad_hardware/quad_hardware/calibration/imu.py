@@ -24,12 +24,11 @@ from quad_description.rotations import (
     yaw_of,
 )
 
-from ..estimation.filters import STANDARD_GRAVITY
-from ..estimation.imu_mounting import ImuMounting
+from ..estimation import ImuMounting
 from ..exceptions import CommandError
+from ..filters import STANDARD_GRAVITY
 from ..report import Report
-from .robot import ImuReading, LimpRobot
-from .wizard import Console
+from .wizard import Console, ImuReading, LimpRobot
 
 MIN_TILT = math.radians(8.0)  # [rad] that distinguishes a direction from a shaking hand
 MIN_TURN = math.radians(20.0)  # [rad]

@@ -23,7 +23,7 @@ from process_supervisor.graph_client import GraphClient
 from quad_description import movable_joints
 from quad_msgs.msg import JointCommand
 
-from .finding import error, Finding, good, note, warning
+from . import error, Finding, good, note, warning
 
 ROOT = 'odom'
 

@@ -37,10 +37,6 @@ class Driver:
 
     ``command`` and ``torque`` are for one other thread. An order that was accepted is sent,
     replaced by a newer one of its kind, or the change of the link's state says that it was not.
-
-    Attributes:
-        released_at: When the last order to let go was given to the line [s], None before.
-        commanded_at: When the last command had left, its bytes considered [s].
     """
 
     def __init__(
@@ -70,7 +66,9 @@ class Driver:
         self._torque_unsent: bool | None = None  # taken over, and not written yet
         self._released = False  # by the last change of torque that was accepted
         self._limp = False  # from the first byte of an order to let go to the last of one to hold
+        # when the last order to let go was given to the line [s], None before
         self.released_at: float | None = None
+        # when the last command had left, its bytes considered [s]
         self.commanded_at = -float('inf')
         self._status = LinkStatus(detail='not started')
         self._session: Session | None = None

@@ -28,9 +28,8 @@ from ..protocol import (
     V2,
 )
 from .dialect import Dialect
+from .dialects import V1Dialect, V2Dialect
 from .port import SerialPort
-from .v1_dialect import V1Dialect
-from .v2_dialect import V2Dialect
 from .vendor import VendorDialect, VendorParser, VendorPort
 
 PSEUDO_TERMINALS = Path('/dev/pts')  # behind which a simulated robot is

@@ -23,8 +23,8 @@ from ..exceptions import LinkError
 from ..protocol import MOTOR_ORDER, ParserCounters, Protocol, V2
 from ..report import Report
 from .dialect import Dialect, Step, vector
+from .dialects import REQUEST_PERIOD, STATE_WIRE_TIME
 from .port import SerialPort
-from .v2_dialect import REQUEST_PERIOD, STATE_WIRE_TIME
 
 WriteAngle = Callable[[int, float], object]
 

@@ -30,10 +30,10 @@ from node_runner import (
 from quad_msgs.msg import JointCommand
 
 from ..exceptions import CommandError, HardwareError
-from ..joints.command import NOMINAL_PERIOD
+from ..joints import NOMINAL_PERIOD
 from ..link import LinkState
 from ..serial_robot import LINK, SerialRobot
-from .diagnostics import command_diagnostic
+from .messages import command_diagnostic
 from .parameters import declare_parameters
 from .robot_topics import log_link, RobotTopics, WARN_PERIOD
 

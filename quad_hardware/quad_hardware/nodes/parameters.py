@@ -18,9 +18,10 @@ from node_runner import (
 from quad_description import DescriptionError, Joint, movable_joints, PRESETS, robot_urdf
 from quad_description.rotations import from_rpy, Vector
 
+from ..commander import LossReaction
 from ..estimation import EstimatorSettings, ImuMounting, OdometrySettings, RateSource, SCALES
 from ..exceptions import CommandError
-from ..joints import JointMap, JointServo, LimiterSettings, LossReaction, servo_of
+from ..joints import JointMap, JointServo, LimiterSettings, servo_of
 from ..link import AUTO, DEFAULT_PORT, LinkOptions, MODEL_CHOICES, PROTOCOL_CHOICES
 from ..link.vendor import is_installed, VENDOR
 from ..protocol import Protocol, PROTOCOLS

@@ -28,11 +28,11 @@ from node_runner import (
 )
 from quad_description import RobotState
 
-from ..calibration.parameter_file import read_parameters
+from ..backend import ReplayedRobot
+from ..calibration.main import read_parameters
 from ..exceptions import HardwareError, RecordingError
 from ..link import LinkOptions, LinkState
 from ..recording import Entry, read_serial_log
-from ..replayed_robot import ReplayedRobot
 from .parameters import declare_deviations, declare_frames, declare_robot
 from .robot_topics import log_link, RobotTopics, WARN_PERIOD
 

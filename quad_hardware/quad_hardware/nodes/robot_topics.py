@@ -22,7 +22,7 @@ from quad_msgs.msg import FootContacts
 from ..link import LinkState
 from ..serial_robot import ObservedRobot, ROBOT
 from . import messages
-from .diagnostics import LinkDiagnostic, robot_diagnostic
+from .messages import LinkDiagnostic, robot_diagnostic
 from .parameters import Deviations, Frames
 
 SENSOR_DEPTH = 10  # reliable, which best-effort subscribers can receive as well

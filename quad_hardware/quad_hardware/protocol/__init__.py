@@ -10,38 +10,44 @@ The driver, the simulated robot, ``xgo_lib2`` and the protocol page all read the
             port.write(Frame(Kind.REPLY, frame.address, b'\x55').encode(V1))
 """
 
-from .frame import checksum, Frame, ParserCounters, StreamParser
-from .function_table import ALL_MOTORS, Code, Fault, Refusal, STATE, V2
-from .motors import (
-    ANGLE_SPANS,
-    ARM_MOTORS,
-    BULK_READ_ORDER,
-    LEG_MOTORS,
-    MOTOR_OF_JOINT,
-    MOTOR_ORDER,
-    slot_of,
-)
-from .register_table import (
-    ACTION_RESET,
-    model_of_firmware,
-    MOTOR_OF_REGISTER,
-    Register,
-    REGISTER_OF_MOTOR,
-    scatter,
-    Torque,
-    V1,
-)
-from .schema import (
+from .frame import (
     Access,
+    checksum,
     Field,
+    Frame,
     Function,
     HOST_KINDS,
     Kind,
     Model,
+    ParserCounters,
     Protocol,
     ROBOT_KINDS,
     Scalar,
     Span,
+    StreamParser,
+)
+from .tables import (
+    ACTION_RESET,
+    ALL_MOTORS,
+    ANGLE_SPANS,
+    ARM_MOTORS,
+    BULK_READ_ORDER,
+    Code,
+    Fault,
+    LEG_MOTORS,
+    model_of_firmware,
+    MOTOR_OF_JOINT,
+    MOTOR_OF_REGISTER,
+    MOTOR_ORDER,
+    Refusal,
+    Register,
+    REGISTER_OF_MOTOR,
+    scatter,
+    slot_of,
+    STATE,
+    Torque,
+    V1,
+    V2,
 )
 
 PROTOCOLS = (V1, V2)  # in the order of probing: what is documented before what is assumed

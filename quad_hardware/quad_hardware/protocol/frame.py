@@ -1,14 +1,250 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Frames of both protocols: as values, as bytes, and found in a stream that may hold anything."""
+"""What tables of serial protocols are made of, and frames: as values, as bytes, found in a stream.
+
+Encoder, decoder, simulated robot and the protocol page all read the same table, so that a change
+of the layout is a change of one row. A stream may hold anything.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from enum import auto, Enum
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import auto, Enum, Flag, IntEnum
+from itertools import chain
+import math
+import struct
 
 from ..exceptions import CodecError
-from .schema import Kind, Protocol
+
+
+class Kind(IntEnum):
+    """What a frame is for: its TYPE byte."""
+
+    WRITE = 0x00  # host to robot, not answered
+    READ = 0x02  # host to robot
+    REPLY = 0x12  # robot to host, answers READ
+    NACK = 0x1F  # robot to host, refuses a frame (v2 only)
+    PUSH = 0x20  # robot to host, unasked (v2 only)
+
+
+HOST_KINDS = frozenset({Kind.WRITE, Kind.READ})  # what a host sends
+ROBOT_KINDS = frozenset({Kind.REPLY, Kind.NACK, Kind.PUSH})  # what a robot sends
+
+
+class Scalar(Enum):
+    """Number formats on the wire, as :mod:`struct` writes them."""
+
+    U8 = '<B'
+    U16 = '<H'
+    U32 = '<I'
+    I16 = '<h'
+    F32 = '<f'
+    U16_BE = '>H'
+    I16_BE = '>h'
+
+    @property
+    def size(self) -> int:
+        """Size [B]."""
+        return struct.calcsize(self.value)
+
+
+class Access(Flag):
+    """Which kinds of frame may carry a function."""
+
+    READ = 1
+    WRITE = 2
+    PUSH = 4
+
+
+class Model(Enum):
+    """Kinds of robot, which differ in the ranges that scale their bytes."""
+
+    MINI = 'mini'
+    LITE = 'lite'
+    WHEELED = 'wheeled'  # mini2SW and mini3W
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Range of a quantity that a byte 0 to 255 spreads over."""
+
+    low: float  # value of byte 0
+    high: float  # value of byte 255
+
+    def encode(self, value: float) -> int:
+        """Return the nearest byte; values outside are taken to the nearer end.
+
+        Raises:
+            CodecError: The value is not finite.
+        """
+        if math.isnan(value):
+            raise CodecError('NaN has no byte; send a number')
+        share = (min(max(value, self.low), self.high) - self.low) / (self.high - self.low)
+        return math.floor(share * 255 + 0.5)
+
+    def decode(self, byte: int) -> float:
+        """Return the value of a byte."""
+        return byte / 255 * (self.high - self.low) + self.low
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A run of equal numbers in a payload."""
+
+    name: str  # key in what :meth:`Function.unpack` returns
+    scalar: Scalar  # number format
+    offset: int = 0  # first byte in the payload [B]
+    count: int = 1  # how many numbers
+    scale: float = 1.0  # unit of one step on the wire, for integers
+    unit: str = ''  # unit of the value
+    meaning: str = ''  # for the protocol page
+
+    @property
+    def size(self) -> int:
+        """Size of the whole run [B]."""
+        return self.scalar.size * self.count
+
+    def steps(self, values: Iterable[float]) -> tuple[float, ...]:
+        """Return values of one run or more as the numbers on the wire.
+
+        Raises:
+            CodecError: A wrong number of values.
+        """
+        numbers = tuple(values)
+        if not numbers or len(numbers) % self.count:
+            raise CodecError(f'{self.name}: {len(numbers)} values given, {self.count} needed')
+        if self.scalar is Scalar.F32:
+            return numbers
+        return tuple(round(value / self.scale) for value in numbers)
+
+    def scaled(self, numbers: tuple[float, ...]) -> tuple[float, ...]:
+        """Return numbers of the wire in the unit of the value."""
+        return numbers if self.scale == 1.0 else tuple(n * self.scale for n in numbers)
+
+
+@dataclass(frozen=True, slots=True)
+class Function:
+    """A row of a protocol table."""
+
+    address: int  # what stands in the frame
+    name: str  # short name, unique in the table
+    access: Access  # which kinds of frame carry it
+    fields: tuple[Field, ...]  # payload, in the order of offsets
+    meaning: str  # for the protocol page
+    # the fields describe one group of several; a payload holds one group or more
+    repeated: bool = False
+    # length of the payload [B] where it is longer than its fields (filled with zeros)
+    size: int = 0
+    # what a byte 0 to 255 spreads over, for functions of one byte
+    spans: Mapping[Model, Span] = field(default_factory=dict)
+    unit: str = ''  # unit of the spans
+    variable: bool = False  # payloads may also be shorter
+    length: int = field(init=False)  # length of a payload, or of one group of it [B]
+    order: str = field(init=False)  # byte order of the numbers for :mod:`struct`
+    # format of the whole payload, or of one group of it, without the order
+    layout: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Add up the length and the format once: states come and targets go 50 times a second."""
+        layout, end = '', 0
+        for part in self.fields:
+            if part.offset < end:
+                raise ValueError(f'{self.name}: {part.name} begins inside the field before it')
+            layout += f'{part.offset - end}x{part.count}{part.scalar.value[1:]}'
+            end = part.offset + part.size
+        (order,) = {part.scalar.value[0] for part in self.fields}  # all numbers have one
+        length = max(self.size, end)
+        object.__setattr__(self, 'length', length)
+        object.__setattr__(self, 'order', order)
+        object.__setattr__(self, 'layout', f'{layout}{length - end}x')
+
+    def accepts(self, length: int) -> bool:
+        """Return whether a payload may have a length [B]."""
+        if self.repeated:
+            return length > 0 and length % self.length == 0
+        return 0 < length <= self.length if self.variable else length == self.length
+
+    def pack(self, **values: Iterable[float]) -> bytes:
+        """Encode a payload; of repeated fields, each has the values of all groups.
+
+        Raises:
+            CodecError: A field is missing or unknown, or its values do not fit.
+        """
+        if wrong := values.keys() ^ {part.name for part in self.fields}:
+            raise CodecError(f'{self.name}: {", ".join(sorted(wrong))} missing or unknown')
+        given = {part.name: tuple(values[part.name]) for part in self.fields}
+        try:
+            runs = [(part.count, part.steps(given[part.name])) for part in self.fields]
+            groups = {len(steps) // count for count, steps in runs}
+            if len(groups) > 1 or (groups != {1} and not self.repeated):
+                raise CodecError(f'{self.name}: {given} are not as many as its fields')
+            numbers = [
+                number
+                for group in range(*groups)
+                for count, steps in runs
+                for number in steps[group * count : (group + 1) * count]
+            ]
+            return struct.pack(self.order + self.layout * groups.pop(), *numbers)
+        except (struct.error, ValueError, OverflowError) as error:
+            if isinstance(error, CodecError):
+                raise
+            raise CodecError(f'{self.name}: {given} do not fit its fields') from error
+
+    def unpack(self, payload: bytes) -> dict[str, tuple[float, ...]]:
+        """Decode a payload; repeated fields are run together over all groups.
+
+        Raises:
+            CodecError: The payload has a length that the function does not have.
+        """
+        if not self.accepts(len(payload)) or len(payload) % self.length:
+            raise CodecError(f'{self.name}: payload of {len(payload)} bytes, not {self.length}')
+        groups = list(struct.iter_unpack(self.order + self.layout, payload))
+        values, at = {}, 0
+        for part in self.fields:
+            runs = (group[at : at + part.count] for group in groups)
+            values[part.name] = part.scaled(tuple(chain.from_iterable(runs)))
+            at += part.count
+        return values
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Protocol:
+    """A serial protocol: its envelope and its table.
+
+    Every frame is ``55 00 | LEN | TYPE | address | payload | CHK | 00 AA``; LEN counts the whole
+    frame, CHK is 255 minus the sum of everything from LEN to the payload, modulo 256.
+    """
+
+    name: str  # name for people, and of the parameter that chooses it
+    origin: str  # where the layout is from
+    baud: int  # speed of the line [bit/s], 8N1
+    address_size: int  # bytes of an address, the most significant first [B]
+    kinds: frozenset[Kind]  # kinds of frame that there are
+    functions: Mapping[int, Function]  # the table, by address
+    max_length: int = 255  # longest frame [B]
+
+    @property
+    def overhead(self) -> int:
+        """Bytes of a frame without payload [B]."""
+        return 7 + self.address_size
+
+    def wire_time(self, length: int) -> float:
+        """Return how long that many bytes take on the line [s]: ten bits each in 8N1."""
+        return length * 10 / self.baud
+
+
+def table(*rows: Function) -> dict[int, Function]:
+    """Return rows by address.
+
+    Raises:
+        ValueError: Two rows have the same address or name.
+    """
+    result = {row.address: row for row in rows}
+    if len(result) != len(rows) or len({row.name for row in rows}) != len(rows):
+        raise ValueError('a protocol table names an address or a name twice')
+    return result
+
 
 HEADER = b'\x55\x00'
 TAIL = b'\x00\xaa'

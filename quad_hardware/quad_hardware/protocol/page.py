@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import sys
 
 from . import V1, V2
-from .motors import MOTOR_ORDER
-from .schema import Access, Field, Function, Kind, Protocol
+from .frame import Access, Field, Function, Kind, Protocol
+from .tables import MOTOR_ORDER
 
 _ACCESS = {Access.READ: 'R', Access.WRITE: 'W', Access.PUSH: 'push'}
 

@@ -1,20 +1,222 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The table of protocol v1: one-byte registers at 115200 baud.
+"""The servos, and the tables of both protocols.
 
-Public: the vendor's serial protocol page and its Python libraries (XGO-PythonLib 1.0.0, xgolib
-1.1.5). A register is a function code and no memory cell: 0x62 answers four bytes, 0x63 four
-others. Writes of several bytes do run through consecutive codes. Numbers of several bytes are
-little-endian in 0x62 to 0x65 and big-endian elsewhere.
+The id of a servo is ``10 * leg + joint``: legs count 1 left front, 2 right front, 3 right rear,
+4 left rear; joints 1 calf, 2 thigh, 3 hip, which is the reverse of the order in a URDF. 51 is the
+gripper, 52 to 54 are the arm from the elbow to its yaw. Sources: the vendor's Luwu-OS
+(robot_tools), its Python library and the limits in its micro:bit library.
+
+v1, one-byte registers at 115200 baud, is public: the vendor's serial protocol page and its Python
+libraries (XGO-PythonLib 1.0.0, xgolib 1.1.5). A register is a function code and no memory cell:
+0x62 answers four bytes, 0x63 four others. Writes of several bytes do run through consecutive
+codes. Numbers of several bytes are little-endian in 0x62 to 0x65 and big-endian elsewhere.
+
+v2, main and sub codes and states pushed at 50 Hz, at 2 Mbaud, is OUR ASSUMPTION. The vendor has
+not published this layout. What is stated about it: header and tail, a checksum, main and sub
+codes, a state frame of 254 bytes about 50 times a second, the valid attitude ``euler2`` at offsets
+20 to 31, 16 joint angles [deg] and 16 joint velocities [deg/s], battery, acceleration of about 9.8
+at rest, no raw gyro and no gravity. Everything else here is chosen so that all of that holds; when
+the vendor's table is known, this file is what changes. Numbers are little-endian.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from enum import IntEnum
+from enum import IntEnum, IntFlag
+from types import MappingProxyType
 
-from .motors import ANGLE_SPANS, LEG_MOTORS
-from .schema import Access, Field, Function, Kind, Model, Protocol, Scalar, Span, table
+from .frame import Access, Field, Function, Kind, Model, Protocol, Scalar, Span, table
+
+LEG_MOTORS = (11, 12, 13, 21, 22, 23, 31, 32, 33, 41, 42, 43)
+ARM_MOTORS = (51, 52, 53, 54)
+MOTOR_ORDER = LEG_MOTORS + ARM_MOTORS  # slots of the feedback frame
+BULK_READ_ORDER = MOTOR_ORDER[:15]  # what reading 15 bytes at 0x50 answers (v1)
+
+_SLOT = {motor: slot for slot, motor in enumerate(MOTOR_ORDER)}
+
+MOTOR_OF_JOINT: Mapping[str, int] = MappingProxyType(
+    {
+        f'{leg}_{joint}_joint': 10 * number + digit
+        for leg, number in (('fl', 1), ('fr', 2), ('bl', 4), ('br', 3))
+        for joint, digit in (('hip', 3), ('thigh', 2), ('calf', 1))
+    }
+    | {'arm_yaw_joint': 54, 'arm_thigh_joint': 53, 'arm_calf_joint': 52, 'hand_right_joint': 51}
+)
+
+_HIP, _CLAW = Span(-30, 30), Span(-65, 65)
+
+
+def _angles(calf: Span, thigh: Span, hip: Span, arm: Mapping[int, Span]) -> dict[int, Span]:
+    legs = {motor: (calf, thigh, hip)[motor % 10 - 1] for motor in LEG_MOTORS}
+    return legs | {51: _CLAW} | dict(arm)
+
+
+# What the byte of a servo angle spreads over [deg] (quad.md 1.3); 54 moves on mini2SW and mini3W.
+ANGLE_SPANS: Mapping[Model, Mapping[int, Span]] = MappingProxyType(
+    {
+        Model.MINI: _angles(
+            Span(-73, 57),
+            Span(-66, 93),
+            Span(-31, 31),
+            {52: Span(-85, 50), 53: Span(-75, 90), 54: Span(-175, 175)},
+        ),
+        Model.LITE: _angles(
+            Span(-70, 50),
+            Span(-70, 90),
+            _HIP,
+            {52: Span(-115, 70), 53: Span(-85, 100), 54: Span(-175, 175)},
+        ),
+        Model.WHEELED: _angles(
+            Span(-70, 50),
+            Span(-70, 90),
+            _HIP,
+            {52: Span(-50, 83), 53: Span(-90, 90), 54: Span(-175, 175)},
+        ),
+    }
+)
+
+
+def slot_of(motor: int) -> int:
+    """Return where a motor stands in :data:`MOTOR_ORDER`.
+
+    Raises:
+        ValueError: There is no such motor; the message names those that there are.
+    """
+    try:
+        return _SLOT[motor]
+    except KeyError:
+        known = ', '.join(map(str, MOTOR_ORDER))
+        raise ValueError(f'no motor has id {motor}; there are {known}') from None
+
+
+SLOTS = len(MOTOR_ORDER)
+ALL_MOTORS = 0xFF
+
+
+class Code(IntEnum):
+    """Addresses, ``main << 8 | sub``."""
+
+    VERSION = 0x0101
+    BATTERY = 0x0102
+    FEEDBACK = 0x0103
+    FEEDBACK_RATE = 0x0104
+    STATE = 0x0110
+    SERVO = 0x0201
+    SERVOS = 0x0202
+    TORQUE = 0x0203
+    SPEED = 0x0204
+
+
+class Refusal(IntEnum):
+    """Reasons in the payload of a NACK."""
+
+    UNKNOWN_FUNCTION = 1
+    WRONG_LENGTH = 2
+    WRONG_VALUE = 3
+    WRONG_ACCESS = 4
+
+
+class Fault(IntFlag):
+    """Fault bits of the state frame."""
+
+    LOW_BATTERY = 1
+    OVERLOAD = 2
+    OVERHEATED = 4
+    SERVO_SILENT = 8
+    IMU = 16
+
+
+STATE = Function(
+    Code.STATE,
+    'state',
+    Access.PUSH,
+    (
+        Field('battery', Scalar.U8, 0, unit='%'),
+        Field('mode', Scalar.U8, 1),
+        Field(
+            'faults', Scalar.U16, 2, meaning='1 low battery, 2 overload, 4 hot, 8 servo, 16 IMU'
+        ),
+        Field('device_time', Scalar.U32, 4, unit='ms'),
+        Field('euler1', Scalar.F32, 8, 3, unit='deg', meaning='not fused: to be ignored'),
+        Field('euler2', Scalar.F32, 20, 3, unit='deg', meaning='roll, pitch, yaw; the valid one'),
+        Field('acceleration', Scalar.F32, 32, 3, unit='m/s²', meaning='specific force, +g up'),
+        Field('position', Scalar.F32, 44, SLOTS, unit='deg', meaning='in the order of motors'),
+        Field('velocity', Scalar.F32, 108, SLOTS, unit='deg/s', meaning='in the order of motors'),
+        Field('load', Scalar.I16, 172, SLOTS, 0.1, '%', 'in the order of motors'),
+        Field('temperature', Scalar.U8, 204, SLOTS, unit='°C', meaning='in the order of motors'),
+        Field('battery_voltage', Scalar.U16, 220, scale=0.001, unit='V'),
+        Field('sequence', Scalar.U16, 222, meaning='counts frames, to notice lost ones'),
+    ),
+    'the state of the robot',
+    size=245,
+)
+
+V2 = Protocol(
+    name='v2',
+    origin='our assumption; the vendor’s layout is not public',
+    baud=2_000_000,
+    address_size=2,
+    kinds=frozenset(Kind),
+    max_length=254,
+    functions=table(
+        Function(
+            Code.VERSION,
+            'version',
+            Access.READ,
+            (Field('text', Scalar.U8, count=10),),
+            'firmware, ASCII padded with NUL',
+        ),
+        Function(
+            Code.BATTERY,
+            'battery',
+            Access.READ,
+            (Field('value', Scalar.U8, unit='%'),),
+            '0 to 100',
+        ),
+        Function(
+            Code.FEEDBACK, 'feedback', Access.WRITE, (Field('on', Scalar.U8),), '1 pushes states'
+        ),
+        Function(
+            Code.FEEDBACK_RATE,
+            'feedback_rate',
+            Access.WRITE,
+            (Field('rate', Scalar.U8, unit='Hz'),),
+            'rate of the states',
+        ),
+        STATE,
+        Function(
+            Code.SERVO,
+            'servo',
+            Access.WRITE,
+            (Field('motor', Scalar.U8), Field('angle', Scalar.F32, 1, unit='deg')),
+            'angle of one servo',
+        ),
+        Function(
+            Code.SERVOS,
+            'servos',
+            Access.WRITE,
+            (Field('motor', Scalar.U8), Field('angle', Scalar.I16, 1, scale=0.01, unit='deg')),
+            'angles of several servos, three bytes each',
+            repeated=True,
+        ),
+        Function(
+            Code.TORQUE,
+            'torque',
+            Access.WRITE,
+            (Field('motor', Scalar.U8, meaning='FF all'), Field('on', Scalar.U8, 1)),
+            '1 holds, 0 lets go',
+        ),
+        Function(
+            Code.SPEED,
+            'speed',
+            Access.WRITE,
+            (Field('motor', Scalar.U8, meaning='FF all'), Field('speed', Scalar.U8, 1)),
+            '1 to 255',
+        ),
+    ),
+)
+
 
 R, W, RW = Access.READ, Access.WRITE, Access.READ | Access.WRITE
 

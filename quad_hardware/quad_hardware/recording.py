@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The log of a serial session, and what writes it: at once, or from memory after a fault.
+"""What went over a serial line: kept in memory, written as a log, read again; for which faults.
 
-Lines of text, each with its time on the wall clock in [s]::
+A log is written at once, or from memory after a fault. It has lines of text, each with its time on
+the wall clock in [s]::
 
     # serial log of quad_hardware, version 1: < is from the robot, > to it
     (1764144123.000102) open {"port": "/dev/ttyAMA0", "baud": 2000000, "protocol": "v2", ...}
@@ -23,6 +24,7 @@ from heapq import merge
 from itertools import islice
 import json
 import logging
+import math
 from operator import itemgetter
 from pathlib import Path
 from queue import SimpleQueue
@@ -32,10 +34,12 @@ import time
 from typing import TypeAlias, TypeVar
 
 from black_box import Pause
+from quad_description import MAX_TILT, RobotState
 
-from ..exceptions import RecordingError
-from ..link import LinkState
-from ..protocol import Model
+from .exceptions import RecordingError
+from .link import LinkState
+from .protocol import Fault, Model
+from .report import BoardWatch, Confirmed, FAULT_TEXTS, Report
 
 CLOSE_TIMEOUT = 10.0  # [s] for what is still to be written when the program ends
 LOG = 'serial.log'
@@ -304,3 +308,51 @@ def _since(events: tuple[Event, ...], begin: float) -> list[tuple[float, Event]]
 
 def _last(events: tuple[Event, ...], kind: type[Kind]) -> Kind | None:
     return next((event for event in reversed(events) if isinstance(event, kind)), None)
+
+
+UPRIGHT = 0.8 * MAX_TILT  # [rad] below which a body that fell stands again
+_LOST = {LinkState.STALE, LinkState.REFUSED, LinkState.FAILED}
+_FOUND = {LinkState.WAITING, LinkState.RUNNING}
+
+
+class FaultWatch:
+    """Finds what begins to be wrong from one report to the next."""
+
+    def __init__(self) -> None:
+        self._boards = BoardWatch()
+        self._bits = Confirmed[Fault]()
+        self._imu_problem = ''
+        self._fallen = False
+
+    def check(self, report: Report, state: RobotState) -> list[str]:
+        """Return what has begun, in words; empty as a rule."""
+        begun: list[str] = []
+        # without its clock a restart is a silence, which is a fault already
+        if self._boards.restarted(report) and report.device_time is not None:
+            begun.append('the board has begun anew; is the battery empty, or a plug loose?')
+        before = self._bits.problems
+        new = self._bits.take({bit for bit in Fault if bit & report.faults}) - before
+        begun += [f'the robot reports {FAULT_TEXTS[bit]}' for bit in Fault if bit in new]
+        if state.imu_problem and not self._imu_problem:
+            begun.append(state.imu_problem)
+        self._imu_problem = state.imu_problem
+        if state.imu is not None:
+            tilt = state.imu.tilt
+            if tilt > MAX_TILT and not self._fallen:
+                begun.append(f'the robot fell: its body is tilted by {math.degrees(tilt):.0f} deg')
+            self._fallen = tilt > (UPRIGHT if self._fallen else MAX_TILT)
+        return begun
+
+
+class LossWatch:
+    """Distinguishes the loss of a robot that was there from the search for one."""
+
+    def __init__(self) -> None:
+        self._found = False
+
+    def is_lost(self, state: LinkState) -> bool:
+        """Note the state that a link has entered; return whether that is a fault."""
+        was_found = self._found
+        if state in _FOUND or state in {LinkState.CONNECTING, LinkState.STOPPED}:
+            self._found = state in _FOUND
+        return state in _LOST or (was_found and state is LinkState.CONNECTING)

@@ -11,9 +11,8 @@ import math
 
 from quad_description import MAX_TILT, Pose, pose_positions, STREAM_TIMEOUT
 
-from ..exceptions import CommandError
-from .command import Command, CommandLimiter, LimiterSettings, MAX_PERIOD
-from .mapping import JointMap
+from .exceptions import CommandError
+from .joints import Command, CommandLimiter, JointMap, LimiterSettings, MAX_PERIOD
 
 START_BAND = 0.3  # [rad] between leg and target; a controller that is relaxed keeps to 0.25
 MIN_STREAM = 0.5  # [s] a person who tries out a servo sends no stream

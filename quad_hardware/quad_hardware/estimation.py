@@ -1,0 +1,444 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""From a report of the robot, in the units of the wire, to its state in SI units.
+
+Heading is from the attitude; where the body has walked to, from the legs that stand. There are no
+contact switches. A foot is taken to stand where its *commanded* height was the lowest, a servo's
+lag ago; without commands, where its measured height is. Heights are those above the ground that
+the feet were sent to, which may slope. The body moves opposite to the feet that stood at both ends
+of a period; without any the last velocity is held. The feet are balls that roll on the ground
+while the leg swings over them: their centres go a little way along, which is more than a tenth of
+the way (radius over height of the hip).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+import math
+from operator import itemgetter
+
+from quad_description import (
+    ContactSource,
+    DescriptionError,
+    FootPose,
+    ImuSample,
+    JointSample,
+    MAX_TILT,
+    OdometryState,
+    Pose,
+    pose_positions,
+    quadruped,
+    raised_feet,
+    RobotState,
+)
+from quad_description.rotations import (
+    about_z,
+    conjugate,
+    from_rpy,
+    IDENTITY,
+    multiply,
+    Quaternion,
+    rotate,
+    tilt_of,
+    Vector,
+    yaw_of,
+)
+
+from .exceptions import CommandError
+from .filters import AttitudeRate, FULL, GravityCheck, JointRate, low_pass_share, MedianFilter
+from .joints import JointMap
+from .report import BoardWatch, Plausibility, Report, SampleClock, ServoWatch
+
+UNCHECKED_DEVIATION = math.pi / 2  # [rad] of an attitude whose signs were not checked
+POSITIVE: Vector = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class ImuMounting:
+    """From what the IMU reports to base_link."""
+
+    rotation: Quaternion = IDENTITY  # of the IMU's axes in base_link, (x, y, z, w)
+    # of roll, pitch and yaw as they are reported, against REP 103
+    attitude_signs: Vector = POSITIVE
+    # of the specific force along x, y and z; +9.8 upwards at rest
+    acceleration_signs: Vector = POSITIVE
+    rate_signs: Vector = POSITIVE  # of the angular velocity about x, y and z
+    checked: bool = False  # it was compared with gravity on this robot
+    # the signs of the gyro were compared with turning it by hand
+    rates_checked: bool = False
+
+    def attitude(self, reported: Vector) -> Quaternion:
+        """Return the attitude of base_link for reported roll, pitch and yaw [deg]."""
+        roll, pitch, yaw = map(math.radians, _signed(self.attitude_signs, reported))
+        return multiply(from_rpy(roll, pitch, yaw), conjugate(self.rotation))
+
+    def acceleration(self, reported: Vector) -> Vector:
+        """Return a specific force in base_link [m/s²]."""
+        return rotate(self.rotation, _signed(self.acceleration_signs, reported))
+
+    def rate(self, reported: Vector) -> Vector:
+        """Return an angular velocity in base_link [rad/s] for a reported one [deg/s]."""
+        x, y, z = map(math.radians, _signed(self.rate_signs, reported))
+        return rotate(self.rotation, (x, y, z))
+
+
+def _signed(signs: Vector, values: Vector) -> Vector:
+    x, y, z = (sign * value for sign, value in zip(signs, values, strict=True))
+    return x, y, z
+
+
+Flags = tuple[bool, ...]
+
+MAX_GAP = 0.2  # [s] more than that cannot be bridged: the body may have been carried
+KEPT_COMMANDS = 32
+GROUND_TIME = 1.0  # [s] in which every foot stands, whatever the gait
+MIN_DEVIATION = 0.01  # [m] of the position, however short the way was
+DRIFT = 0.07  # share of the way that is the standard deviation of the position
+GAP_SPEED = 0.3  # [m/s] at which a robot that is not seen may have gone on
+FALL_DEVIATION = 0.1  # [m] by which a body that falls or rolls may have gone
+YAW_DRIFT = 1.5e-4  # [rad/s] half a degree a minute; ours: no page says how the IMU drifts
+REST = (0.0, 0.0)
+_Z = itemgetter(2)
+
+
+SCALES = (0.1, 10.0)
+"""What a scale of odometry may be; beyond, a way was given in another unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class OdometrySettings:
+    """How the legs are read."""
+
+    # by which the servos follow their commands [s]: 0.02 until they have them, 0.04 of lag
+    delay: float = 0.06
+    # height above the lowest foot up to which a foot is taken to stand [m]
+    tolerance: float = 0.002
+    margin: float = 0.02  # before and after a swing in which a foot does not count [s]
+    cutoff: float = 5.0  # of the low-pass of the velocity that is published [Hz]
+    command_age: float = 0.3  # commands older than that are not looked at [s]
+    scale_x: float = 1.0  # what the way forward is multiplied by
+    scale_y: float = 1.0  # what the way sideways is multiplied by
+
+
+class LegOdometry:
+    """Adds up what the standing legs say."""
+
+    def __init__(
+        self, settings: OdometrySettings, foot_radius: float, lying_height: float = 0.0
+    ) -> None:
+        """Begin at the origin.
+
+        Args:
+            lying_height: Of base_link above the feet [m], up to which the belly carries it.
+        """
+        self._settings, self._lying_height = settings, lying_height
+        self._radius = foot_radius
+        # replaced as a whole: commands come from another thread than measurements
+        self._commands: tuple[tuple[float, Sequence[Vector]], ...] = ()
+        self._ground: Vector | None = None  # its normal in the body, where that is known
+        self._last: tuple[float, Sequence[FootPose], Flags] | None = None
+        self._yaw0: float | None = None
+        self._heading = 0.0  # [rad] of the last update
+        self._keeps_heading = False
+        self._place = self._held = self._smooth = REST  # the velocities in the body turned level
+        self._distance = self._gaps = 0.0  # way [m], variance by gaps [m²]
+        self._began_at: float | None = None
+        self._fallen = False
+        self._stepped_at = -math.inf  # when a foot was last in the air [s]
+
+    def command(self, time: float, feet: Sequence[Vector]) -> None:
+        """Note where the feet were sent.
+
+        Args:
+            time: When [s].
+            feet: Their centres in base_link [m].
+        """
+        self._commands = (*self._commands, (time, feet))[-KEPT_COMMANDS:]
+        lately = [places for t, places in self._commands if time - t <= GROUND_TIME]
+        self._ground = ground_normal(lately, self._settings.tolerance)
+
+    def keep_heading(self) -> None:
+        """Go on with the last heading: the next attitude counts its yaw from elsewhere."""
+        self._keeps_heading = True
+
+    def update(self, time: float, feet: Sequence[FootPose], attitude: Quaternion) -> OdometryState:
+        """Add a measurement.
+
+        Args:
+            time: When [s].
+        """
+        yaw = yaw_of(attitude)
+        if self._yaw0 is None or self._keeps_heading:
+            self._yaw0 = yaw - self._heading
+            self._keeps_heading = False
+        self._heading = yaw - self._yaw0
+        rotation = multiply(about_z(-self._yaw0), attitude)
+        standing, source = self._standing(time, feet, rotation)
+        if self._began_at is None:
+            self._began_at = time
+        if not all(standing):
+            self._stepped_at = time
+        turned = [
+            FootPose(rotate(rotation, foot.position), multiply(rotation, foot.rotation))
+            for foot in feet
+        ]
+        height = self._height(turned, standing)
+        fallen = tilt_of(rotation) > MAX_TILT
+        if fallen and not self._fallen:
+            self._gaps += FALL_DEVIATION**2
+        self._fallen = fallen
+        elapsed = 0.0 if self._last is None else time - self._last[0]
+        if elapsed > MAX_GAP:  # lying or not, it may have been carried, or have gone on
+            self._gaps += (GAP_SPEED * elapsed) ** 2
+        if fallen or height <= self._lying_height or not 0.0 < elapsed <= MAX_GAP:
+            self._held = self._smooth = REST  # the feet may move, and carry nothing
+        else:
+            self._integrate(time, elapsed, turned, standing)
+        self._last = time, turned, standing
+        return OdometryState(
+            *self._place,
+            height,
+            rotation,
+            *self._smooth,
+            self._distance,
+            standing,
+            source,
+            MIN_DEVIATION**2 + (DRIFT * self._distance) ** 2 + self._gaps,
+            (YAW_DRIFT * (time - self._began_at)) ** 2,
+        )
+
+    def _standing(
+        self, time: float, feet: Sequence[FootPose], rotation: Quaternion
+    ) -> tuple[Flags, ContactSource]:
+        source = ContactSource.COMMANDED_HEIGHT
+        settings, commands, ground = self._settings, self._commands, self._ground
+        at = time - settings.delay
+        recent = [places for t, places in commands if abs(t - at) <= settings.margin]
+        if not recent:
+            recent = [p for t, p in commands if at - settings.command_age <= t <= at][-1:]
+        if not recent:
+            recent, ground = [[foot.position for foot in feet]], None
+            source = ContactSource.MEASURED_HEIGHT
+        x, y, z = ground or rotate(conjugate(rotation), (0.0, 0.0, 1.0))
+        standing = (True,) * len(feet)
+        for places in recent:
+            heights = [x * px + y * py + z * pz for px, py, pz in places]
+            highest = min(heights) + settings.tolerance
+            standing = tuple(
+                stands and height <= highest
+                for stands, height in zip(standing, heights, strict=True)
+            )
+        return standing, source
+
+    def _integrate(
+        self, time: float, elapsed: float, feet: Sequence[FootPose], standing: Flags
+    ) -> None:
+        if self._last is None:
+            return
+        _, last_feet, stood = self._last
+        cosine, sine = math.cos(self._heading), math.sin(self._heading)
+        pairs = zip(last_feet, feet, standing, stood, strict=True)
+        ways = [self._way(last, foot) for last, foot, *both in pairs if all(both)]
+        if ways:
+            x, y = (sum(way) / len(ways) / elapsed for way in zip(*ways, strict=True))
+            self._held = (
+                (cosine * x + sine * y) * self._settings.scale_x,
+                (cosine * y - sine * x) * self._settings.scale_y,
+            )
+        ahead, left = self._held[0] * elapsed, self._held[1] * elapsed
+        self._place = (
+            self._place[0] + cosine * ahead - sine * left,
+            self._place[1] + sine * ahead + cosine * left,
+        )
+        # a body over feet that stay comes back: it goes nowhere, and noise is no way
+        if time - self._stepped_at <= GROUND_TIME:
+            self._distance += math.hypot(ahead, left)
+        share = low_pass_share(self._settings.cutoff, elapsed)
+        (x, y), (held_x, held_y) = self._smooth, self._held
+        self._smooth = x + share * (held_x - x), y + share * (held_y - y)
+
+    def _way(self, before: FootPose, after: FootPose) -> tuple[float, float]:
+        """Return how far the body has gone over a foot that stands [m]."""
+        x, y, _, w = multiply(after.rotation, conjugate(before.rotation))
+        # the foot has rolled by the angular step times the vector from the ground to its centre
+        rolled = 2.0 * w * self._radius
+        return (
+            rolled * y - after.position[0] + before.position[0],
+            -rolled * x - after.position[1] + before.position[1],
+        )
+
+    def _height(self, feet: Sequence[FootPose], standing: Flags) -> float:
+        heights = [foot.position[2] for foot, stands in zip(feet, standing, strict=True) if stands]
+        heights = heights or [foot.position[2] for foot in feet]
+        return self._radius - sum(heights) / len(heights)
+
+
+def ground_normal(commands: Sequence[Sequence[Vector]], tolerance: float) -> Vector | None:
+    """Return the unit normal of the ground in the body, from where the feet were sent lately.
+
+    None when their lowest places are not in a plane: a foot was in the air all the time.
+
+    Args:
+        commands: Feet in base_link, in the order of the legs [m]; one at least.
+        tolerance: How far from a plane they may be [m].
+    """
+    fl, fr, bl, br = (min(places, key=_Z) for places in zip(*commands, strict=True))
+    # across both diagonals
+    ax, ay, az = fl[0] - br[0], fl[1] - br[1], fl[2] - br[2]
+    bx, by, bz = fr[0] - bl[0], fr[1] - bl[1], fr[2] - bl[2]
+    x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    length = math.copysign(math.sqrt(x * x + y * y + z * z), z)
+    if length == 0.0:
+        return None
+    x, y, z = x / length, y / length, z / length
+    between = x * (fl[0] - fr[0]) + y * (fl[1] - fr[1]) + z * (fl[2] - fr[2])
+    return (x, y, z) if abs(between) <= tolerance else None
+
+
+LYING_MARGIN = 0.002  # [m] above the height of a robot that lies
+
+
+class RateSource(Enum):
+    """Where the angular velocity is from."""
+
+    AUTO = 'auto'  # the gyro where it is reported
+    DIFFERENTIATED = 'differentiated'  # always from the attitude
+    NONE = 'none'  # not published
+
+
+@dataclass(frozen=True, slots=True)
+class EstimatorSettings:
+    """How reports are read."""
+
+    rate_source: RateSource = RateSource.AUTO  # where the angular velocity is from
+    rate_cutoff: float = 12.0  # of the low-pass of differentiated angular velocities [Hz]
+    joint_cutoff: float = 25.0  # of the low-pass of differentiated joint velocities [Hz]
+    odometry: OdometrySettings = field(default_factory=OdometrySettings)  # how the legs are read
+    mounting: ImuMounting = field(default_factory=ImuMounting)  # how the IMU sits on the body
+
+
+class Estimator:
+    """Turns reports into states of the robot."""
+
+    def __init__(self, urdf: str, joints: JointMap, settings: EstimatorSettings) -> None:
+        """Begin without a report.
+
+        Raises:
+            CommandError: The legs of the URDF cannot be read.
+        """
+        self.refusal = ''  # why the last report that was refused could not be
+        self._joints = joints
+        self._sent: dict[str, float] = {}  # targets that were sent last
+        self._settings = settings
+        try:
+            self._robot = quadruped(urdf)
+        except DescriptionError as error:
+            raise CommandError(f'robot_description: {error}') from error
+        self._clock = SampleClock()
+        self._boards = BoardWatch()
+        motors = [servo.motor for servo in joints.servos]
+        self._plausibility, self._servos = Plausibility(motors), ServoWatch(motors)
+        self._rate = AttitudeRate(settings.rate_cutoff)
+        self._joint_rate = JointRate(settings.joint_cutoff)
+        self._charge, self._voltage = MedianFilter(), MedianFilter()
+        self._gravity = GravityCheck()
+        pose, radius = pose_positions(Pose.LIE), self._robot.foot_radius
+        legs = [pose.get(name) for name in joints.names[: joints.leg_count]]
+        # of another robot's belly nothing is known
+        folded = None if None in legs else self._robot.feet([q or 0.0 for q in legs])
+        lying = 0.0 if folded is None else LYING_MARGIN + radius - min(z for *_, z in folded)
+        self._odometry = LegOdometry(settings.odometry, radius, lying)
+
+    def command(self, time: float, targets: Sequence[float]) -> None:
+        """Note what was sent to the legs: it shows which feet stand and which swing.
+
+        Args:
+            time: When, on the monotonic clock [s].
+            targets: Positions of the first joints, in their order [rad].
+        """
+        self._sent = {**self._sent, **dict(zip(self._joints.names, targets, strict=False))}
+        self._odometry.command(time, self._robot.feet(targets))
+
+    def raised_feet(self, targets: Sequence[float]) -> tuple[str, ...]:
+        """Return the feet that are in the air at targets of the first joints [rad]."""
+        return raised_feet(self._robot.feet(targets))
+
+    def step(self, report: Report) -> RobotState | None:
+        """Return the state that a report shows; None when the report cannot be."""
+        if reason := self._plausibility.check(report):
+            self.refusal = reason
+            return None
+        time = self._clock.time(report)
+        joints = self._joint_sample(report, time - report.joints_age)
+        problem = self._plausibility.imu_problem
+        imu = None if problem else self._imu_sample(report, time)
+        # the heading is unknown without an attitude
+        odometry = None if imu is None else self._locate(joints, imu)
+        charge = self._charge.take(report.battery, FULL)
+        return RobotState(
+            joints,
+            imu,
+            None if charge is None else charge / 100.0,
+            position=None if odometry is None else (odometry.x, odometry.y, odometry.height),
+            linear_velocity=None if odometry is None else odometry.velocity_in_base,
+            foot_contacts=None if odometry is None else odometry.standing,
+            time=time,
+            odometry=odometry,
+            imu_problem=problem,
+            voltage=self._voltage.take(report.voltage),
+            faults=report.faults,
+            servo_problem=self._servos.check(report),
+            temperatures=report.temperatures or {},
+        )
+
+    @property
+    def gravity_error(self) -> float | None:
+        """Angle between accelerometer and attitude [rad].
+
+        None while the body accelerates or the IMU is of no use, and without an accelerometer.
+        """
+        return None if self._plausibility.imu_problem else self._gravity.error
+
+    def _locate(self, joints: JointSample, imu: ImuSample) -> OdometryState:
+        feet = self._robot.foot_poses(joints.positions)
+        return self._odometry.update(joints.time, feet, imu.orientation)
+
+    def _joint_sample(self, report: Report, time: float) -> JointSample:
+        positions = self._joints.positions(report.positions)
+        velocities, error = self._joints.velocities(report.velocities), 0.0
+        if not velocities:
+            velocities = self._joint_rate.update(time, positions)
+            error = self._joint_rate.error
+        names = self._joints.names
+        if len(positions) == len(velocities) == len(names):  # all of them, in their order
+            values = tuple(positions.values()), tuple(velocities.values())
+            return JointSample(*values, time, velocity_error=error)
+        known = {**self._sent, **positions}
+        return JointSample(
+            tuple(known.get(name, 0.0) for name in names),
+            tuple(velocities.get(name, 0.0) for name in names),
+            time,
+            tuple(place for place, name in enumerate(names) if name not in positions),
+            error,
+        )
+
+    def _imu_sample(self, report: Report, time: float) -> ImuSample:
+        if self._boards.restarted(report):
+            self._odometry.keep_heading()
+        mounting, felt = self._settings.mounting, report.acceleration
+        orientation = mounting.attitude(report.attitude)
+        acceleration = None if felt is None else mounting.acceleration(felt)
+        self._gravity.take(orientation, acceleration)
+        source, differentiated = self._settings.rate_source, self._rate.update(time, orientation)
+        gyro = report.rates if source is RateSource.AUTO else None
+        rate = differentiated if gyro is None else mounting.rate(gyro)
+        checked = mounting.checked and (mounting.rates_checked or gyro is None)
+        return ImuSample(
+            orientation,
+            None if source is RateSource.NONE else rate,
+            acceleration,
+            0.0 if checked else UNCHECKED_DEVIATION,
+            rate_differentiated=gyro is None,
+        )
