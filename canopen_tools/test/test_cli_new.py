@@ -370,7 +370,7 @@ def test_a_person_is_asked_for_what_the_eds_does_not_say(
     given = iter(answers)
     monkeypatch.setattr('builtins.input', lambda asked: next(given) if 'arm' in asked else '')
     assert main(['new', 'arm=drive.eds@2', *options]) == 0
-    asked_again = re.findall("give a number .* such as .*, not '(.*)'", capsys.readouterr().out)
+    asked_again = re.findall("give .*a number .* such as .*, not '(.*)'", capsys.readouterr().out)
     assert asked_again == answers[:-1]
     (node,) = load_bus(tmp_path / 'bus.yml').nodes
     assert getattr(node.drive, f'scale_{scale}_to_dev') == pytest.approx(value)

@@ -5,14 +5,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 import math
 from pathlib import Path
 import re
 import shutil
 import sys
-from typing import TypeVar
 
 from canopen_core.eds import load_eds
 from canopen_core.standard import OperationMode
@@ -21,11 +20,11 @@ from ..new_bus import bus_text, contradiction, NewDevice, POSITION_MODES, said_u
 from .arguments import node_id, print_line, SubParsers, UsageError
 from .check import show_check
 
-T = TypeVar('T')
 DEVICE = re.compile('(?P<name>[A-Za-z][A-Za-z0-9_]*)=(?P<file>.+)@(?P<node>[^@]+)')
 PERIOD_MS = 10  # time between two SYNC in [ms]
+# what a person writes for a turn or a metre of the joint, and for its gear
 INCREMENTS = 'a number of increments other than 0, such as 360000, -36000.5 or 2000*50'
-"""What a person writes for a turn or a metre."""
+TURNS = 'turns of the motor for one of the joint, a number above 0 such as 100'
 
 
 def add_new(parsers: SubParsers) -> None:
@@ -93,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
     if output.exists() and not options.force:
         raise UsageError(f'{output} is there already; choose another --output, or --force')
     devices = _with_choices(options, [_device(text) for text in options.devices])
-    devices = [_asked_turns(_asked(each)) for each in devices]
+    devices = [_asked(each) for each in devices]
     _write(devices, bus_text(devices, options.period), output)
     print_line(f'{output} is written; what it says and why is in it')
     for device in devices:
@@ -132,20 +131,17 @@ def _with_choices(options: argparse.Namespace, devices: Sequence[NewDevice]) -> 
     """Return the devices with the units and modes of the command line."""
     drives = [device.name for device in devices if device.is_drive]
     units = {
-        name: read(name, value)
-        for option, read in (('turn', _turn), ('metre', _metre))
+        name: _units(option, _number(option, name, value))
+        for option in ('turn', 'metre')
         for name, value in _pairs(option, getattr(options, option), drives)
     }
-    turns = {name: _turns(name, value) for name, value in _pairs('rpm', options.rpm, drives)}
-    modes = {name: _mode(name, value) for name, value in _pairs('mode', options.mode, drives)}
+    rpm = {n: _number('rpm', n, value) for n, value in _pairs('rpm', options.rpm, drives)}
+    modes = {n: _mode(n, value) for n, value in _pairs('mode', options.mode, drives)}
     return [
         replace(
-            device,
-            units=units.get(device.name),
-            rpm=turns.get(device.name),
-            mode=modes.get(device.name),
+            each, units=units.get(each.name), rpm=rpm.get(each.name), mode=modes.get(each.name)
         )
-        for device in devices
+        for each in devices
     ]
 
 
@@ -163,38 +159,22 @@ def _pairs(option: str, texts: Iterable[str], drives: Sequence[str]) -> Iterator
         yield name, value
 
 
-def _turn(name: str, text: str) -> Units:
-    number = _increments('turn', name, text)
-    return Units(number / TURN, f'{number:g} increments a turn, as said; per rad')
-
-
-def _metre(name: str, text: str) -> Units:
-    number = _increments('metre', name, text)
-    return Units(number, f'{number:g} increments per m, as said', slides=True)
-
-
-def _turns(name: str, text: str) -> float:
-    number = _number(text)
-    if not math.isfinite(number) or number <= 0.0:
-        raise UsageError(
-            f'--rpm {name}={text}: give turns of the motor for one of the joint, such'
-            ' as 100; the sign is that of the increments'
-        )
-    return number
-
-
-def _increments(option: str, name: str, text: str) -> float:
-    number = _number(text)
-    if not math.isfinite(number) or number == 0.0:
-        raise UsageError(f'--{option} {name}={text}: give {INCREMENTS}, not {text!r}')
-    return number
-
-
-def _number(text: str) -> float:
+def _number(option: str, name: str, text: str) -> float:
+    """Read increments (--turn, --metre) or turns (--rpm, whose sign is that of the increments)."""
     try:
-        return math.prod(float(factor) for factor in text.split('*'))
+        number = math.prod(float(factor) for factor in text.split('*'))
     except ValueError:
-        return math.nan
+        number = math.nan
+    if not math.isfinite(number) or number == 0.0 or (option == 'rpm' and number < 0.0):
+        wanted = TURNS if option == 'rpm' else INCREMENTS
+        raise UsageError(f'--{option} {name}={text}: give {wanted}, not {text!r}')
+    return number
+
+
+def _units(option: str, number: float) -> Units:
+    if option == 'turn':
+        return Units(number / TURN, f'{number:g} increments a turn, as said; per rad')
+    return Units(number, f'{number:g} increments per m, as said', slides=True)
 
 
 def _mode(name: str, text: str) -> OperationMode:
@@ -206,45 +186,38 @@ def _mode(name: str, text: str) -> OperationMode:
 
 
 def _asked(device: NewDevice) -> NewDevice:
-    """Ask the person at the terminal for the units of a drive; a script learns what to give."""
-    if not device.has_open_units or not sys.stdin.isatty():
+    """Ask at the terminal for what nothing says of a drive; a script learns what to give."""
+    if not sys.stdin.isatty():
         return device
-    question = (
-        f'{device.name}: increments of the encoder for one turn of the joint, gear included'
-        ' (negative where it turns the other way; Ctrl-D where it slides: --metre): '
-    )
-    options = f'--turn or --metre {device.name}=INCREMENTS'
-    units = _answered(_turn, device.name, question, options, INCREMENTS)
-    return replace(device, units=units)
-
-
-def _asked_turns(device: NewDevice) -> NewDevice:
-    """Ask for what the velocities of a drive are of, where its EDS leaves that open."""
+    if device.has_open_units:
+        question = (
+            'increments of the encoder for one turn of the joint, gear included (negative where '
+            'it turns the other way; Ctrl-D where it slides: --metre)'
+        )
+        number = _answer('turn', device, question, '--turn or --metre')
+        device = replace(device, units=_units('turn', number))
     named = device.velocity_unit
-    if not device.open_velocity or named is None or named.slides or not sys.stdin.isatty():
-        return device
-    question = (
-        f'{device.name}: its velocities are in {named.text} by 0x60A9: turns of the motor for one'
-        ' turn (or 1 m) of the joint, 1 where the drive knows the gear: '
-    )
-    option = f'--rpm {device.name}=TURNS'
-    turns = _answered(_turns, device.name, question, option, 'a number above 0, such as 100')
-    return replace(device, rpm=turns)
+    if device.open_velocity and named is not None and not named.slides:
+        question = (
+            f'its velocities are in {named.text} by 0x60A9: turns of the motor for one turn (or '
+            '1 m) of the joint, 1 where the drive knows the gear'
+        )
+        device = replace(device, rpm=_answer('rpm', device, question, '--rpm'))
+    return device
 
 
-def _answered(
-    read: Callable[[str, str], T], name: str, question: str, option: str, wanted: str
-) -> T:
-    """Ask until the answer is one; else say what is wanted."""
+def _answer(option: str, device: NewDevice, question: str, options: str) -> float:
+    """Ask until the answer is a number that the option takes."""
     while True:
         try:
-            answer = input(question).strip()
+            answer = input(f'{device.name}: {question}: ').strip()
         except EOFError as error:
-            raise UsageError(f'give {option}') from error
+            value = 'TURNS' if option == 'rpm' else 'INCREMENTS'
+            raise UsageError(f'give {options} {device.name}={value}') from error
         try:
-            return read(name, answer)
-        except UsageError:
-            print_line(f'give {wanted}, not {answer!r}')
+            return _number(option, device.name, answer)
+        except UsageError as error:
+            print_line(str(error))
 
 
 def _period(text: str) -> int:
