@@ -331,8 +331,6 @@ def test_an_adapter_may_be_closed_while_it_is_gone() -> None:
         bus.receive(0.0)
 
 
-pytestmark = pytest.mark.slow
-
 PACKAGE = Path(__file__).parents[1]
 
 
@@ -401,6 +399,7 @@ def test_what_cannot_be_is_refused_in_python_cans_words(name: str, theirs: can.B
         ArmCanopenBus('udp_multicast:nowhere')
 
 
+@pytest.mark.slow
 def test_python_canopen_runs_on_it(ours: Bus, theirs: can.BusABC) -> None:
     """python-canopen's network sends NMT over our bus and follows a heartbeat from it."""
     network = canopen.Network(theirs)
@@ -415,6 +414,7 @@ def test_python_canopen_runs_on_it(ours: Bus, theirs: can.BusABC) -> None:
         network.disconnect()
 
 
+@pytest.mark.slow
 def test_the_tools_of_python_can_find_it_by_its_entry_point(tmp_path: Path) -> None:
     """`python -m can.logger -i arm_canopen` works once the package is installed."""
     metadata = [sys.executable, 'setup.py', '-q', 'egg_info', '--egg-base', str(tmp_path)]

@@ -403,12 +403,11 @@ def test_opening_a_bus_of_ours_does_not_import_python_can() -> None:
     )
 
 
-pytestmark = pytest.mark.slow
-
 TIMEOUT = 10.0  # [s] deadline for what takes milliseconds
 CALLERS, CALLS = 3, 2000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('attempt', range(5))  # what may go wrong does not do so each time
 def test_all_that_is_handed_over_around_the_end_is_answered(
     attempt: int, request: pytest.FixtureRequest

@@ -35,8 +35,6 @@ from canopen_core.standard import (
     Value,
 )
 
-pytestmark = pytest.mark.slow
-
 ENTRIES = st.lists(
     st.builds(
         ObjectEntry,
@@ -52,6 +50,7 @@ ENTRIES = st.lists(
 NODE_IDS = st.integers(NODE_ID_MIN, NODE_ID_MAX)
 
 
+@pytest.mark.slow
 @given(entries=ENTRIES)
 def test_entries_are_ascending_and_the_later_counts(entries: list[ObjectEntry]) -> None:
     """Iteration is by index and sub-index; of two with one address the last one given is kept."""
@@ -62,6 +61,7 @@ def test_entries_are_ascending_and_the_later_counts(entries: list[ObjectEntry]) 
     assert all(dictionary.get(*address) is latest[address] for address in addresses)
 
 
+@pytest.mark.slow
 @given(entries=ENTRIES)
 def test_all_ways_to_look_up_agree(entries: list[ObjectEntry]) -> None:
     """``in``, ``get``, ``has_index``, ``subindices`` and ``len`` say the same."""
@@ -76,6 +76,7 @@ def test_all_ways_to_look_up_agree(entries: list[ObjectEntry]) -> None:
             assert (entry in parts) == (entry is not None)
 
 
+@pytest.mark.slow
 @given(entries=ENTRIES, node_id=NODE_IDS)
 def test_node_relative_defaults_are_resolved_once(
     entries: list[ObjectEntry], node_id: int
@@ -254,6 +255,7 @@ def in_range(data_type: DataType) -> st.SearchStrategy[int]:
     return st.integers(low, high) | st.sampled_from((low, high, 0))
 
 
+@pytest.mark.slow
 @settings(max_examples=400)
 @given(data_type=st.sampled_from(INTEGERS), data=st.data())
 def test_an_integer_survives_the_round_trip(data_type: DataType, data: st.DataObject) -> None:
@@ -266,6 +268,7 @@ def test_an_integer_survives_the_round_trip(data_type: DataType, data: st.DataOb
         assert encoded == struct.pack(CTYPES_FORMATS[data_type], value)
 
 
+@pytest.mark.slow
 @settings(max_examples=400)
 @given(data_type=st.sampled_from(INTEGERS), data=st.data())
 def test_every_pattern_of_an_integer_is_a_value(data_type: DataType, data: st.DataObject) -> None:
@@ -275,6 +278,7 @@ def test_every_pattern_of_an_integer_is_a_value(data_type: DataType, data: st.Da
     assert encode(data_type, decode(data_type, pattern)) == pattern
 
 
+@pytest.mark.slow
 @settings(max_examples=400)
 @given(data_type=st.sampled_from(INTEGERS), excess=st.integers(1, 1 << 70))
 def test_an_integer_out_of_range_is_refused(data_type: DataType, excess: int) -> None:
@@ -300,6 +304,7 @@ def test_a_number_too_large_for_a_real_is_refused() -> None:
             encode(data_type, value)
 
 
+@pytest.mark.slow
 @given(
     latin=st.text(st.characters(max_codepoint=0xFF)),
     text=st.text(st.characters(codec='utf-16')),

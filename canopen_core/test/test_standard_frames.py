@@ -172,8 +172,6 @@ def test_every_abort_code_has_a_text_of_its_own() -> None:
     assert 'unknown' in abort_text(0x1234_5678)
 
 
-pytestmark = pytest.mark.slow
-
 MAPPABLE = sorted(FIXED_BITS)
 
 
@@ -214,6 +212,7 @@ def bytes_of(bits: str) -> bytes:
     return bytes(int(padded[i : i + 8][::-1], 2) for i in range(0, len(padded), 8))
 
 
+@pytest.mark.slow
 @given(mapping=mappings(), data=st.data())
 def test_the_payload_is_the_bits_one_behind_the_other(
     mapping: Sequence[MappedObject], data: st.DataObject
@@ -227,6 +226,7 @@ def test_the_payload_is_the_bits_one_behind_the_other(
     assert payload == bytes_of(bits)
 
 
+@pytest.mark.slow
 @given(mapping=mappings(), data=st.data())
 def test_values_survive_the_round_trip(
     mapping: Sequence[MappedObject], data: st.DataObject
@@ -240,6 +240,7 @@ def test_values_survive_the_round_trip(
     assert codec.unpack(payload + surplus) == values
 
 
+@pytest.mark.slow
 @given(mapping=mappings(), data=st.data())
 def test_a_payload_is_long_enough_or_refused(
     mapping: Sequence[MappedObject], data: st.DataObject
@@ -256,6 +257,7 @@ def test_a_payload_is_long_enough_or_refused(
         assert limits is None or limits[0] <= value <= limits[1]
 
 
+@pytest.mark.slow
 @given(mapping=mappings(), data=st.data())
 def test_a_value_out_of_range_is_refused(
     mapping: Sequence[MappedObject], data: st.DataObject
