@@ -15,12 +15,15 @@ from rclpy.client import Client
 from rclpy.context import Context
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 
 from node_runner import ServerMatch
 
 if TYPE_CHECKING:
     from typing_extensions import Self
+
+LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class RosClient:

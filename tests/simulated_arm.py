@@ -23,10 +23,12 @@ import json
 from typing import Any, TYPE_CHECKING
 
 from action_msgs.msg import GoalStatus
+from canopen_interfaces.srv import COTargetDouble
 from control_msgs.action import FollowJointTrajectory
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_bringup.description import expand_xacro
+from arm_msgs.srv import InjectFault
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -86,6 +88,17 @@ class SimulatedArm:
     def run(self, *command: str) -> RunningProcess:
         """Start any command in the environment of the arm, as from a second terminal."""
         return self._stack.enter_context(RunningProcess(command, self._isolation.env))
+
+    def inject(self, joint: str, fault: str) -> None:
+        """Inject a fault into a simulated drive; ``none`` ends them."""
+        request = InjectFault.Request(fault=fault)
+        answer = self.client.call(InjectFault, f'/fake_slaves/{joint}/fault', request)
+        assert answer.success, answer.message
+
+    def send_target(self, joint: str, target: float) -> COTargetDouble.Response:
+        """Command a single target."""
+        request = COTargetDouble.Request(target=target)
+        return self.client.call(COTargetDouble, f'/{joint}/target', request)
 
     def init_all(self) -> float:
         """Initialise all joints at the same time; return how long that took in [s]."""

@@ -40,15 +40,7 @@ from quad_bringup.walk import GROUND_TRUTH
 from quad_controller import Velocity
 from quad_description import movable_joints, robot_urdf
 from quad_description.rotations import tilt_of
-from quad_hardware.protocol import (
-    Code,
-    Frame,
-    HOST_KINDS,
-    Kind,
-    ROBOT_KINDS,
-    StreamParser,
-    V2,
-)
+from quad_hardware.protocol import Code, Frame, HOST_KINDS, Kind, ROBOT_KINDS, StreamParser, V2
 from quad_msgs.srv import SetMode
 
 if TYPE_CHECKING:

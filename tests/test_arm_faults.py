@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from action_msgs.msg import GoalStatus
 from bus_watch import BusRecorder, is_enabled, read_position
-from canopen_interfaces.srv import COTargetDouble
 from control_msgs.action import FollowJointTrajectory
 from control_msgs.msg import JointJog, JointTrajectoryControllerState
 from moveit_msgs.msg import ServoStatus
@@ -19,7 +18,6 @@ import pytest
 from simulated_arm import CONTROLLER, goal_to, JOINTS, MovingArm, READY, SimulatedArm
 from std_srvs.srv import SetBool
 
-from arm_msgs.srv import InjectFault
 from canopen_core.can import open_bus
 from canopen_core.standard import CobId
 
@@ -49,12 +47,7 @@ def test_an_arm_survives_its_processes(isolation: Isolation) -> None:
 def _start_all(arm: SimulatedArm, target: float) -> None:
     for joint in JOINTS:
         assert arm.client.trigger(f'/{joint}/position_mode').success
-        assert _send(arm, joint, target).success
-
-
-def _send(arm: SimulatedArm, joint: str, target: float) -> COTargetDouble.Response:
-    request = COTargetDouble.Request(target=target)
-    return arm.client.call(COTargetDouble, f'/{joint}/target', request)
+        assert arm.send_target(joint, target).success
 
 
 def _leaves_the_bus_to_the_first_master(arm: SimulatedArm, recorder: BusRecorder) -> None:
@@ -78,7 +71,7 @@ def _boots_drives_again_that_were_killed(arm: SimulatedArm) -> None:
     arm.slaves.wait()
     for joint in JOINTS:
         arm.master.wait_for(f'{joint}: heartbeat lost', 10.0)
-    assert not _send(arm, 'panda_joint1', 0.0).success
+    assert not arm.send_target('panda_joint1', 0.0).success
     arm.master.wait_for('panda_joint1 takes no target.*offline')
     refused = arm.client.trigger('/panda_joint1/enable')
     assert not refused.success
@@ -103,12 +96,6 @@ def test_an_arm_survives_its_drives(isolation: Isolation, tmp_path: Path) -> Non
         _aborts_a_goal_when_the_master_ends(arm)
 
 
-def _inject(arm: MovingArm, joint: str, fault: str) -> None:
-    request = InjectFault.Request(fault=fault)
-    answer = arm.client.call(InjectFault, f'/fake_slaves/{joint}/fault', request)
-    assert answer.success, answer.message
-
-
 def _stops_on_the_path_when_one_drive_fails(arm: MovingArm) -> None:
     states = arm.client.listen(JointTrajectoryControllerState, f'{CONTROLLER}/controller_state')
     to = [at + 0.4 for at in READY]
@@ -116,7 +103,7 @@ def _stops_on_the_path_when_one_drive_fails(arm: MovingArm) -> None:
     arm.client.spin_until(
         lambda: any(f.desired.positions[0] > 0.1 for f in run.feedback), 10.0, 'motion'
     )
-    _inject(arm, 'panda_joint4', 'over_current')
+    arm.inject('panda_joint4', 'over_current')
     status, result = run.wait()
     assert status == GoalStatus.STATUS_ABORTED
     assert result.error_code == Result.INVALID_GOAL
@@ -150,7 +137,7 @@ def _refuses_while_a_drive_is_faulted(arm: MovingArm) -> None:
 
 
 def _recovers(arm: MovingArm) -> None:
-    _inject(arm, 'panda_joint4', 'none')
+    arm.inject('panda_joint4', 'none')
     answer = arm.client.trigger('/panda_joint4/recover')
     assert answer.success, answer.message
     if not arm.client.trigger('/panda_joint4/enable').success:
@@ -162,8 +149,7 @@ def _recovers(arm: MovingArm) -> None:
 def _leaves_a_target_of_another_client_alone(arm: MovingArm) -> None:
     run = arm.send(goal_to([0.5, *READY[1:]], 4.0))
     arm.client.spin_until(lambda: len(run.feedback) > 5, 10.0, 'motion')
-    request = COTargetDouble.Request(target=READY[6] + 0.1)
-    assert arm.client.call(COTargetDouble, '/panda_joint7/target', request).success
+    assert arm.send_target('panda_joint7', READY[6] + 0.1).success
     result = run.wait()[1]
     assert 'panda_joint7 ' in result.error_string
     arm.reach(READY, 2.0)  # it takes the drive back, when its target is reached

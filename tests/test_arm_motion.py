@@ -35,8 +35,13 @@ pytestmark = pytest.mark.scenario
 Result = FollowJointTrajectory.Result
 
 
-def test_an_arm_follows_goals_and_says_why_not(isolation: Isolation, tmp_path: Path) -> None:
-    """Refusals before and after init, a goal to its end, a cancel on the path, a drive lost."""
+def test_an_arm_follows_goals_and_is_jogged_and_says_why_not(
+    isolation: Isolation, tmp_path: Path
+) -> None:
+    """Refusals before and after init, a goal to its end, a cancel on the path, a drive lost.
+
+    And twists in links and TF frames, joints, displacements, poses; pause, time-out.
+    """
     with MovingArm(isolation, tmp_path) as arm:
         states = arm.client.listen(
             JointTrajectoryControllerState, f'{CONTROLLER}/controller_state'
@@ -46,6 +51,13 @@ def test_an_arm_follows_goals_and_says_why_not(isolation: Isolation, tmp_path: P
         arm.follow()
         _refuses_what_is_wrong(arm)
         _reaches_a_goal(arm)
+        jogger = Jogger(arm)
+        arm.client.spin_until(lambda: bool(jogger.words and jogger.states), 10.0, 'status')
+        _jogs(jogger)
+        _refuses_wrong_commands(jogger)
+        _is_switched_and_paused(jogger)
+        _takes_over_from_a_trajectory(jogger)
+        arm.reach(READY, 3.0)
         _is_listed_and_switched(arm)
         _takes_a_goal_from_the_command_line(arm)
         _cancels_on_the_path(arm)
@@ -287,19 +299,6 @@ def twist(frame: str, **linear: float) -> TwistStamped:
     for axis, value in linear.items():
         setattr(message.twist.linear, axis, value)
     return message
-
-
-def test_an_arm_is_jogged_in_every_way(isolation: Isolation, tmp_path: Path) -> None:
-    """Twists in links and TF frames, joints, displacements, poses; refusals, pause, time-out."""
-    with MovingArm(isolation, tmp_path) as arm:
-        arm.follow()
-        arm.reach(READY, 2.0)
-        jogger = Jogger(arm)
-        arm.client.spin_until(lambda: bool(jogger.words and jogger.states), 10.0, 'status')
-        _jogs(jogger)
-        _refuses_wrong_commands(jogger)
-        _is_switched_and_paused(jogger)
-        _takes_over_from_a_trajectory(jogger)
 
 
 def _jogs(jogger: Jogger) -> None:

@@ -24,12 +24,7 @@ from moveit_msgs.msg import (
     PositionConstraint,
     RobotTrajectory,
 )
-from moveit_msgs.srv import (
-    ApplyPlanningScene,
-    GetMotionSequence,
-    GetPlanningScene,
-    GetPositionFK,
-)
+from moveit_msgs.srv import ApplyPlanningScene, GetMotionSequence, GetPositionFK
 from planning_messages import panda
 from planning_scenes import distances
 from processes import executable
@@ -43,7 +38,6 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_model import frozen
 from arm_model.ros import apply_planning_scene, scene_change, seconds
-from arm_msgs.srv import InjectFault
 from node_runner import LATCHED
 
 if TYPE_CHECKING:
@@ -164,11 +158,6 @@ def _box(name: str, x: float, y: float, z: float) -> CollisionObject:
     place.position.x, place.position.y, place.position.z = x, y, z
     thing.primitive_poses = [place]
     return thing
-
-
-def _scene(arm: MovingArm) -> PlanningScene:
-    request = GetPlanningScene.Request()
-    return arm.client.call(GetPlanningScene, '/get_planning_scene', request).scene
 
 
 def _moves_by_the_command_of_the_readme(arm: MovingArm) -> None:
@@ -441,9 +430,7 @@ def _names_the_drive_that_fails(arm: MovingArm) -> None:
         return len(states) > begin and states[-1].position[0] > states[begin].position[0] + 0.05
 
     arm.client.spin_until(turned, 10.0, 'motion')
-    fault = InjectFault.Request(fault='over_current')
-    answer = arm.client.call(InjectFault, '/fake_slaves/panda_joint4/fault', fault)
-    assert answer.success, answer.message
+    arm.inject('panda_joint4', 'over_current')
     status, result = run.wait()
     assert status == GoalStatus.STATUS_ABORTED
     assert result.error_code.val == MoveItErrorCodes.CONTROL_FAILED, result.error_code

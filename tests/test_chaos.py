@@ -27,10 +27,7 @@ SEED = 30
 
 @pytest.mark.parametrize(('robot', 'events'), [(ArmVictim, 5), (QuadVictim, 4)])
 def test_nothing_moves_unasked_and_all_recovers(
-    isolation: Isolation,
-    tmp_path: Path,
-    robot: type[ArmVictim | QuadVictim],
-    events: int,
+    isolation: Isolation, tmp_path: Path, robot: type[ArmVictim | QuadVictim], events: int
 ) -> None:
     """No set-point leaves limits, every stop is named, and it works again."""
     with robot(isolation, tmp_path, SEED) as victim:

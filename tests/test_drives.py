@@ -11,23 +11,22 @@ import time
 from typing import Any
 
 from action_msgs.msg import GoalStatus
-from canopen_interfaces.srv import CONmtID, COTargetDouble
+from canopen_interfaces.srv import CONmtID
 from isolation import reserve
 import numpy as np
 import pytest
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from ros_client import LATCHED
 from sensor_msgs.msg import JointState
 from simulated_arm import JOINTS, panda_bus, SimulatedArm
 from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
 from arm_msgs.action import Home
-from arm_msgs.srv import InjectFault, Move, ReadObject, ReadUnits, WriteObject
+from arm_msgs.srv import Move, ReadObject, ReadUnits, WriteObject
 
 pytestmark = pytest.mark.scenario
 JOINT = '/panda_joint4'
 FAILING = 'panda_joint5'
-LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 @pytest.fixture(scope='module')
@@ -45,16 +44,10 @@ def arm(started: SimulatedArm) -> Iterator[SimulatedArm]:
     """Give a test the arm without faults, operational, with the drive without power."""
     yield started
     for joint in (JOINT[1:], FAILING):
-        _inject(started, joint, 'none')
+        started.inject(joint, 'none')
         _expect_nmt(started, f'/{joint}', 'START')
         answer = started.client.trigger(f'/{joint}/shutdown')
         assert answer.success, answer.message
-
-
-def _inject(arm: SimulatedArm, joint: str, fault: str) -> None:
-    request = InjectFault.Request(fault=fault)
-    answer = arm.client.call(InjectFault, f'/fake_slaves/{joint}/fault', request)
-    assert answer.success, answer.message
 
 
 def _expect_nmt(arm: SimulatedArm, joint: str, state: str) -> None:
@@ -71,11 +64,6 @@ def _write(
 ) -> WriteObject.Response:
     request = WriteObject.Request(object=path, value=value, data=data)
     return arm.client.call(WriteObject, f'{JOINT}/write_object', request)
-
-
-def _send_target(arm: SimulatedArm, target: float) -> COTargetDouble.Response:
-    request = COTargetDouble.Request(target=target)
-    return arm.client.call(COTargetDouble, f'{JOINT}/target', request)
 
 
 class HomingRun:
@@ -175,7 +163,7 @@ def test_halt_quick_stop_moves_and_streams(arm: SimulatedArm) -> None:
     refused = arm.client.trigger(f'{JOINT}/cyclic_torque_mode')
     assert not refused.success
     assert 'in no RPDO' in refused.message
-    assert _send_target(arm, 3.0).success
+    assert arm.send_target(JOINT[1:], 3.0).success
     halted = arm.client.trigger(f'{JOINT}/halt')
     assert halted.success, halted.message
     assert 'Operation enabled' in halted.message
@@ -213,7 +201,7 @@ def test_stop_names_what_stands_and_what_is_not_known_to(arm: SimulatedArm) -> N
     assert arm.client.trigger(f'{JOINT}/init').success
     assert arm.client.trigger(f'{JOINT}/position_mode').success
     events = arm.client.listen(String, '/trajectory_execution_event')
-    assert _send_target(arm, 3.0).success
+    assert arm.send_target(JOINT[1:], 3.0).success
     answer = arm.client.trigger('/stop')
     assert answer.success, answer.message
     others = ', '.join(name for name in arm.joints if name != JOINT[1:])
@@ -223,7 +211,7 @@ def test_stop_names_what_stands_and_what_is_not_known_to(arm: SimulatedArm) -> N
     arm.client.spin_until(lambda: [each.data for each in events] == ['stop'], 10.0, 'the event')
     lost = f'{FAILING}: heartbeat lost'
     count = len([line for line in arm.master.lines if lost in line])
-    _inject(arm, FAILING, 'power_off')
+    arm.inject(FAILING, 'power_off')
     arm.master.wait_for(lost, count=count + 1)
     answer = arm.client.trigger('/stop')
     assert not answer.success
@@ -300,6 +288,6 @@ def test_the_master_publishes_the_joints_of_its_bus(arm: SimulatedArm) -> None:
     assert min(periods) > 0
     assert np.median(periods) == pytest.approx(10e6, rel=0.05)  # [ns] of SYNC
     assert time.time_ns() - stamps[-1] < 60 * 10**9  # on the clock of ROS
-    _inject(arm, FAILING, 'disconnect')
+    arm.inject(FAILING, 'disconnect')
     others = [joint for joint in JOINTS if joint != FAILING]
     arm.client.spin_until(lambda: published(others), 20.0, 'the other joints')

@@ -14,7 +14,7 @@ from canopen_interfaces.srv import COTargetDouble
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from isolation import reserve
 import pytest
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from ros_client import LATCHED
 from sensor_msgs.msg import JointState
 from simulated_arm import SimulatedArm
 from std_msgs.msg import Float64MultiArray, String, UInt8MultiArray
@@ -23,7 +23,6 @@ from arm_msgs.srv import InjectFault, WriteObject
 
 pytestmark = pytest.mark.scenario
 BUS_YML = Path(__file__).parents[1] / 'arm_canopen' / 'eds' / 'io_bus.yml'
-LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 TIMEOUT = 30.0  # [s]
 
 

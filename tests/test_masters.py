@@ -70,8 +70,7 @@ def test_the_manager_brings_up_and_deactivation_disables(
         arm.init_all()
         for joint in JOINTS:
             assert arm.client.trigger(f'/{joint}/position_mode').success
-            request = COTargetDouble.Request(target=5.0)
-            assert arm.client.call(COTargetDouble, f'/{joint}/target', request).success
+            assert arm.send_target(joint, 5.0).success
 
         assert change(arm, 'panda_joint2', 'deactivate')
         off = 'Switch on disabled'
@@ -141,9 +140,7 @@ def test_each_bus_has_its_master_in_one_process(isolation: Isolation, tmp_path: 
         assert client.call(COTargetDouble, '/left/joint1/target', request).success
         target = 0x202, (500).to_bytes(4, 'little'), 3  # behind controlword and mode
         client.spin_until(
-            lambda: left.first_after(0.0, *target) is not None,
-            5.0,
-            'the target on the left bus',
+            lambda: left.first_after(0.0, *target) is not None, 5.0, 'the target on the left bus'
         )
         assert right.first_after(0.0, *target) is None
         assert master.stop() == 0, master.output

@@ -216,8 +216,7 @@ def check_reach(page: Page, size: str) -> None:
         )
         assert (
             page.evaluate(
-                '([x, y]) => document.elementFromPoint(x, y).tagName',
-                [x + seen / 2, y + tall / 2],
+                '([x, y]) => document.elementFromPoint(x, y).tagName', [x + seen / 2, y + tall / 2]
             )
             == 'CANVAS'
         )

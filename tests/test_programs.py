@@ -189,10 +189,7 @@ def libraries(program: str, *arguments: str) -> set[str]:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ('entry', 'unwanted'),
-    [
-        ('arm_canopen.nodes.master', FOREIGN | MODEL),
-        ('arm_servo.ros.canopen_backend', FOREIGN),
-    ],
+    [('arm_canopen.nodes.master', FOREIGN | MODEL), ('arm_servo.ros.canopen_backend', FOREIGN)],
 )
 def test_a_master_loads_nothing_that_it_does_not_use(entry: str, unwanted: set[str]) -> None:
     """NumPy is there, since rclpy.action and sensor_msgs import it for arrays in messages."""

@@ -136,9 +136,7 @@ def test_a_controller_killed_in_mid_trot_leaves_no_leg_in_the_air(quad: Simulate
     check_upright(quad)
 
 
-def test_a_controller_that_was_frozen_moves_nothing_until_it_is_asked(
-    quad: SimulatedQuad,
-) -> None:
+def test_a_controller_that_was_frozen_moves_nothing_until_it_is_asked(quad: SimulatedQuad) -> None:
     """It wakes when the bridge has folded the legs: the robot stays down, a fault says why."""
     freeze_in_mid_trot(quad)
     wait_until_lying(quad)

@@ -14,7 +14,6 @@ import time
 
 from bus_watch import BusRecorder
 import can
-from canopen_interfaces.srv import COTargetDouble
 from diagnostic_msgs.msg import DiagnosticArray
 from frontend_cli import PROGRAM, with_frontend
 from isolation import Isolation
@@ -28,7 +27,6 @@ from sensor_msgs.msg import JointState
 from simulated_arm import JOINTS, panda_bus, SimulatedArm
 from simulated_quad import SimulatedQuad
 
-from arm_msgs.srv import InjectFault
 from canopen_core.can import read_log
 from canopen_core.standard import CobId
 
@@ -60,62 +58,6 @@ def _writes_at_its_end_what_it_saw_last(arm: SimulatedArm, folder: Path) -> None
     assert 'heartbeat lost' in arm.master.wait_for(r'black box: .*can\.log', count=2)
     (path,) = set(folder.glob('*/can.log')) - before
     assert any(frame.can_id == CobId.SYNC for frame in read_log(path))
-
-
-def test_a_fault_is_written_with_what_came_before_and_after(
-    isolation: Isolation, tmp_path: Path
-) -> None:
-    """Log and /diagnostics have the path; what was on the bus is in the file, in its order."""
-    folder = tmp_path / 'boxes'
-    arguments = ('-p', f'black_box_folder:={folder}')
-    with (
-        BusRecorder(isolation.bus) as recorder,
-        SimulatedArm(isolation, master_arguments=arguments) as arm,
-    ):
-        messages = arm.client.listen(DiagnosticArray, '/diagnostics')
-        arm.init_all()
-        fault_at = time.monotonic()
-        fault = InjectFault.Request(fault='over_temperature')
-        assert arm.client.call(InjectFault, '/fake_slaves/panda_joint3/fault', fault).success
-        line = arm.master.wait_for(r'black box: .*can\.log')
-        found = re.search(r'black box: (\S+)', line)
-        assert found is not None
-        path = Path(found[1])
-        assert path.parent.parent == folder
-        expected = {'master: bus': str(path), 'panda_joint3: drive': str(path)}
-        arm.client.spin_until(
-            lambda: {k: v for k, v in diagnosed(messages).items() if v} == expected,
-            20.0,
-            'path of the black box in /diagnostics',
-        )
-        recorder.pause()
-        _writes_at_its_end_what_it_saw_last(arm, folder)
-
-    ours = list(read_log(path))
-    emergency = CobId.EMCY + FAULTY
-    (raised,) = [
-        number
-        for number, frame in enumerate(ours)
-        if frame.can_id == emergency and frame.data[:2] == TOO_HOT.to_bytes(2, 'little')
-    ]
-    before, after = ours[:raised], ours[raised:]
-    assert after[-1].timestamp - after[0].timestamp > 2.0
-    assert {frame.can_id for frame in before} >= {CobId.NMT, CobId.SYNC, 0x182, 0x202, 0x602}
-    theirs = [(each.arbitration_id, bytes(each.data)) for each in can.LogReader(path)]
-    assert theirs == [(frame.can_id, frame.data) for frame in ours]
-    for can_id in (0x204, 0x584):  # commands of the master, answers of the drive
-        of_box = iter([frame.data for frame in ours if frame.can_id == can_id])
-        seen = [
-            frame.data
-            for frame in recorder.frames
-            if frame.can_id == can_id and frame.timestamp < fault_at
-        ]
-        # a bystander that is too slow loses some; all that it saw are there, in their order
-        assert seen
-        assert all(data in of_box for data in seen)
-    report = (path.parent / 'report.txt').read_text('utf-8')
-    assert re.search(r'panda_joint3: .*0x4310', report), report
-    assert 'panda_joint3 (4)' in report
 
 
 MOVED = 'panda_joint3'
@@ -162,30 +104,79 @@ def replay(path: Path, *arguments: str) -> list[str]:
     return [executable('arm_canopen', 'replay'), '--ros-args', *words, *arguments]
 
 
-def test_a_recorded_fault_is_seen_as_when_it_happened(
+def test_a_fault_is_written_and_seen_again_as_when_it_happened(
     isolation: Isolation, tmp_path: Path
 ) -> None:
-    """Joint states and diagnostics of the replay are those of the master; beside it, none."""
-    arguments = ['robot_joint_states:=true', f'black_box_folder:={tmp_path}']
+    """What was on the bus is in the black box, before and after; its replay shows the same.
+
+    Log and /diagnostics have its path. Beside a master, there is no replay.
+    """
+    folder = tmp_path / 'boxes'
+    arguments = ['robot_joint_states:=true', f'black_box_folder:={folder}']
     words = [word for each in arguments for word in ('-p', each)]
-    with SimulatedArm(isolation, master_arguments=words) as arm:
+    with (
+        BusRecorder(isolation.bus) as recorder,
+        SimulatedArm(isolation, master_arguments=words) as arm,
+    ):
         live = Received.by(arm.client)
         arm.init_all()
         assert arm.client.trigger(f'/{MOVED}/position_mode').success
-        request = COTargetDouble.Request(target=1.0)
-        assert arm.client.call(COTargetDouble, f'/{MOVED}/target', request).success
+        assert arm.send_target(MOVED, 1.0).success
         arm.client.spin_until(lambda: len(live.positions) > 50, 30.0, 'motion')
-        fault = InjectFault.Request(fault='over_temperature')
-        assert arm.client.call(InjectFault, f'/fake_slaves/{MOVED}/fault', fault).success
+        fault_at = time.monotonic()
+        arm.inject(MOVED, 'over_temperature')
+        line = arm.master.wait_for(r'black box: .*can\.log')
+        found = re.search(r'black box: (\S+)', line)
+        assert found is not None
+        path = Path(found[1])
+        assert path.parent.parent == folder
+        expected = {'master: bus': str(path), f'{MOVED}: drive': str(path)}
+        arm.client.spin_until(
+            lambda: {k: v for k, v in diagnosed(live.diagnostics).items() if v} == expected,
+            20.0,
+            'path of the black box in /diagnostics',
+        )
         arm.client.spin_until(lambda: bool(live.faulted()), 30.0, 'fault in /diagnostics')
-        path = Path(re.search(r'black box: (\S+)', arm.master.wait_for('black box: '))[1])  # type: ignore[index]
-
+        recorder.pause()
         refused = arm.run(*replay(path))
         assert refused.wait(60.0) == 1, refused.output
         refused.wait_for('runs already.*__ns:=/replay')
-        assert arm.master.stop() == 0
-        assert arm.slaves.stop() == 0
+        _writes_at_its_end_what_it_saw_last(arm, folder)
+    check_log(path, recorder, fault_at)
+    check_replay(path, isolation, live)
 
+
+def check_log(path: Path, recorder: BusRecorder, fault_at: float) -> None:
+    """Compare a log with what a bystander saw, and with how others read it."""
+    ours = list(read_log(path))
+    emergency = CobId.EMCY + FAULTY
+    (raised,) = [
+        number
+        for number, frame in enumerate(ours)
+        if frame.can_id == emergency and frame.data[:2] == TOO_HOT.to_bytes(2, 'little')
+    ]
+    before, after = ours[:raised], ours[raised:]
+    assert after[-1].timestamp - after[0].timestamp > 2.0
+    assert {frame.can_id for frame in before} >= {CobId.NMT, CobId.SYNC, 0x182, 0x202, 0x602}
+    theirs = [(each.arbitration_id, bytes(each.data)) for each in can.LogReader(path)]
+    assert theirs == [(frame.can_id, frame.data) for frame in ours]
+    for can_id in (0x204, 0x584):  # commands of the master, answers of the drive
+        of_box = iter([frame.data for frame in ours if frame.can_id == can_id])
+        seen = [
+            frame.data
+            for frame in recorder.frames
+            if frame.can_id == can_id and frame.timestamp < fault_at
+        ]
+        # a bystander that is too slow loses some; all that it saw are there, in their order
+        assert seen
+        assert all(data in of_box for data in seen)
+    report = (path.parent / 'report.txt').read_text('utf-8')
+    assert re.search(r'panda_joint3: .*0x4310', report), report
+    assert 'panda_joint3 (4)' in report
+
+
+def check_replay(path: Path, isolation: Isolation, live: Received) -> None:
+    """Compare a replay with what was received live."""
     frames = [frame for frame in read_log(path) if frame.can_id == POSITION]
     recorded = {struct.unpack_from('<i', frame.data)[0] * 0.001 for frame in frames}
     looped = replay(path, '-p', 'robot_joint_states:=true', '-p', 'loop:=true')

@@ -14,15 +14,10 @@ from isolation import Isolation
 from processes import RunningProcess
 import pytest
 from rcl_interfaces.msg import Log
-from rclpy.qos import DurabilityPolicy, QoSProfile
-from ros_client import RosClient
+from ros_client import LATCHED, RosClient
 from simulated_arm import panda_bus
 
 TIMEOUT = 60.0  # [s]
-# what the master logs at its start is received although the node is found later
-LATCHED = QoSProfile(  # type: ignore[no-untyped-call]
-    depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL
-)
 
 
 @pytest.mark.scenario
@@ -42,6 +37,7 @@ def test_a_bus_that_goes_down_is_a_message_of_the_master_on_rosout(isolation: Is
         RosClient(isolation.domain_id) as client,
         RunningProcess(command, isolation.env) as master,
     ):
+        # what the master logs at its start is received although the node is found later
         received: list[Log] = client.listen(Log, '/rosout', LATCHED)
 
         def of_master(level: int) -> list[str]:

@@ -54,13 +54,7 @@ CURVES = [*(ROBOTS / name / 'plotjuggler.xml' for name in ARMS), DOG / 'plotjugg
 STARTING = 120.0
 """Longest time in [s] until all is ready on a busy machine."""
 
-PANELS = {
-    '3D',
-    'DiagnosticSummary',
-    'Plot',
-    'RosOut',
-    'StateTransitions',
-}
+PANELS = {'3D', 'DiagnosticSummary', 'Plot', 'RosOut', 'StateTransitions'}
 """Of Foxglove and Lichtblick alike: packages/suite-base/src/panels of the latter."""
 CLASSES = {
     # rviz_common, src/rviz_common/visualization_frame.cpp and panel_factory.cpp

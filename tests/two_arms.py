@@ -9,10 +9,7 @@ import shutil
 
 from ament_index_python import get_package_share_path
 
-ARMS = {
-    'left': ('left_turn', 'left_lift', 'left_roll'),
-    'right': ('right_turn', 'right_slide'),
-}
+ARMS = {'left': ('left_turn', 'left_lift', 'left_roll'), 'right': ('right_turn', 'right_slide')}
 """Joints of each arm: of each kind that URDF knows."""
 GRIPPER, FOLLOWER = 'left_finger', 'left_other_finger'
 DRIVES = (*ARMS['left'], *ARMS['right'], GRIPPER, 'neck')

@@ -20,13 +20,7 @@ from device_rig import drive_dictionary, NODE_ID, with_defaults
 import pytest
 
 from arm_canopen import BusError, CanopenError
-from canopen_core.can import (
-    Bus,
-    Frame,
-    open_bus,
-    VirtualBus,
-    VirtualWire,
-)
+from canopen_core.can import Bus, Frame, open_bus, VirtualBus, VirtualWire
 from canopen_core.standard import CobId, nmt_frame, NmtCommand, NmtState, sdo, tpdo_default
 from canopen_sim import DeviceHost, DeviceRunner, host, simulated_devices
 from canopen_sim.host import newest_process_data, NodeIdCheck
@@ -288,11 +282,7 @@ def test_a_device_that_stood_still_does_not_live_through_what_it_missed(
 
 @pytest.mark.parametrize(
     ('stalls', 'heartbeat'),
-    [
-        ([WATCHED + 0.2], math.inf),
-        ([WATCHED + 0.2], 0.05),
-        ([WATCHED + 0.15] * 3, math.inf),
-    ],
+    [([WATCHED + 0.2], math.inf), ([WATCHED + 0.2], 0.05), ([WATCHED + 0.15] * 3, math.inf)],
     ids=['longer', 'with a heartbeat', 'several'],
 )
 def test_a_device_that_stood_still_reports_no_silence(

@@ -345,30 +345,37 @@ class VirtualNetwork:
         commands = self.commands[name]
         return commands.run('home', commands.home(method))
 
-    def keep_mode(self, mode: int) -> None:
-        """Make the first drive keep a mode of operation, whatever 0x6060 says."""
-        word, before = 0x200 + self._config.nodes[0].node_id, self.wire.alters
+    def lose(self, *cob_ids: int) -> None:
+        """Lose all frames of these identifiers from now on; by none, no more."""
+        self.wire.loses = lambda sender, frame: frame.can_id in cob_ids
+
+    def alter(self, cob_id: int, change: Callable[[bytes], bytes]) -> None:
+        """Change the data of all frames of an identifier from now on."""
+        before = self.wire.alters
 
         def alters(sender: str, frame: Frame) -> Frame:
             frame = before(sender, frame)
-            kept = frame.data[:2] + bytes((mode,))
-            return frame._replace(data=kept) if frame.can_id == word else frame
+            return frame._replace(data=change(frame.data)) if frame.can_id == cob_id else frame
 
         self.wire.alters = alters
+
+    def keep_mode(self, mode: int) -> None:
+        """Make the first drive keep a mode of operation, whatever 0x6060 says."""
+        word = 0x200 + self._config.nodes[0].node_id
+        self.alter(word, lambda data: data[:2] + bytes((mode,)))
 
     def droop(self, increments: int) -> None:
         """Make the first drive hang so far below its set-points in [inc] while it has power."""
-        name = self._config.nodes[0].name
-        position = 0x280 + self._config.nodes[0].node_id
+        node = self._config.nodes[0]
+        self.wire.alters = lambda sender, frame: frame
         powered = {DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE}
 
-        def alters(sender: str, frame: Frame) -> Frame:
-            if frame.can_id != position or self.simulated(name).state not in powered:
-                return frame
-            shown, velocity = struct.unpack('<ii', frame.data)
-            return frame._replace(data=struct.pack('<ii', shown - increments, velocity))
+        def shown(data: bytes) -> bytes:
+            position, velocity = struct.unpack('<ii', data)
+            hangs = self.simulated(node.name).state in powered
+            return struct.pack('<ii', position - increments * hangs, velocity)
 
-        self.wire.alters = alters
+        self.alter(0x280 + node.node_id, shown)
 
     def begin(self, name: str, verb: str, *, preempt: bool = False) -> Promise[str]:
         """Begin a command of a drive by the name of its coroutine, without waiting."""

@@ -9,13 +9,7 @@ import math
 import struct
 from typing import Any
 
-from bus_rig import (
-    booted,
-    JOINT,
-    Leader,
-    TORQUE_MODES,
-    VirtualNetwork,
-)
+from bus_rig import booted, JOINT, Leader, TORQUE_MODES, VirtualNetwork
 from drive_samples import (
     bus_config,
     drive_config,
@@ -29,14 +23,7 @@ from drive_samples import (
 )
 import pytest
 
-from arm_canopen import (
-    DriveError,
-    DriveState,
-    NodeConfig,
-    OperationMode,
-    Promise,
-    Severity,
-)
+from arm_canopen import DriveError, DriveState, NodeConfig, OperationMode, Severity
 from arm_canopen.cia402.modes.profile_position import Move, QUEUE_MAX
 from arm_canopen.cia402.sequences import HomingProgress
 from arm_canopen.config import DriveConfig, RecoveryPolicy
@@ -702,37 +689,14 @@ def test_bits_of_an_earlier_homing_do_not_count() -> None:
         net.result(net.home(99))
 
 
-LAG = 0.05  # [s] of a motor that comes after its set-points
-
-
-class Client:
-    """Callers that wait for motions of one drive."""
-
-    def __init__(self, mode: OperationMode, servo: ServoModel | None = None) -> None:
-        """Enable the drive in a mode."""
-        self.net = VirtualNetwork(bus_config(drive_config(JOINT, 2)), servo=servo)
-        self.net.boot()
-        self.net.enable(mode)
-        self.mode = mode
-
-    def move_to(self, position: float, timeout: float = 20.0) -> Promise[str]:
-        """Begin to wait for a motion."""
-        commands = self.net.commands[JOINT]
-
-        def give() -> str:
-            if self.mode is OperationMode.PROFILE_POSITION:
-                return commands.move(Move(position))
-            return commands.set_target(position)
-
-        return self.net.network.scheduler.spawn(commands.arrive(give, timeout))
-
-
 def test_a_motion_source_that_takes_the_drive_replaces_a_motion() -> None:
     """Right after its profile has ended, when the motor is not there yet."""
-    client = Client(OperationMode.CYCLIC_POSITION, ServoModel(lag=LAG))
-    motion = client.move_to(0.3)
-    drive = client.net.drives[JOINT]
-    client.net.run_until(lambda: drive.stream_refusal is None)
-    client.net.master.attach(Leader(speed=0.3))
+    net = VirtualNetwork(bus_config(drive_config(JOINT, 2)), servo=ServoModel(lag=0.05))
+    net.boot()
+    net.enable(OperationMode.CYCLIC_POSITION)
+    commands, drive = net.commands[JOINT], net.drives[JOINT]
+    motion = net.network.scheduler.spawn(commands.arrive(lambda: commands.set_target(0.3), 20.0))
+    net.run_until(lambda: drive.stream_refusal is None)
+    net.master.attach(Leader(speed=0.3))
     with pytest.raises(DriveError, match='got another target'):
-        client.net.result(motion)
+        net.result(motion)

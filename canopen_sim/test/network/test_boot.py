@@ -129,9 +129,7 @@ class Scene:
         self.net = VirtualNetwork(bus, absent=[config.name for config in configs])
         self.devices = {
             config.name: ScriptedDevice(
-                config.node_id,
-                partial(self.net.send_as, config.name),
-                object_bytes(DEVICE_VALUES),
+                config.node_id, partial(self.net.send_as, config.name), object_bytes(DEVICE_VALUES)
             )
             for config in configs
         }

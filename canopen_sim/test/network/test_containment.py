@@ -29,7 +29,6 @@ from arm_canopen import (
 from arm_canopen.cia402.modes import Move
 from arm_canopen.cia402.units import Units
 from arm_canopen.config import DriveConfig
-from canopen_core.can import Frame
 from canopen_core.standard import DataType
 
 pytestmark = pytest.mark.slow
@@ -198,17 +197,11 @@ def pair(mode: OperationMode, **scales: float) -> VirtualNetwork:
 def report_actual(net: VirtualNetwork, position: int | None, velocity: int | None) -> None:
     """Make the second drive report another position or velocity than it has, in device units."""
 
-    def alters(sender: str, frame: Frame) -> Frame:
-        if frame.can_id != 0x280 + NODE_IDS[ODD]:
-            return frame
-        reported = struct.unpack('<ii', frame.data)
-        reported = (
-            reported[0] if position is None else position,
-            reported[1] if velocity is None else velocity,
-        )
-        return frame._replace(data=struct.pack('<ii', *reported))
+    def reported(data: bytes) -> bytes:
+        actual = zip((position, velocity), struct.unpack('<ii', data), strict=True)
+        return struct.pack('<ii', *(true if other is None else other for other, true in actual))
 
-    net.wire.alters = alters
+    net.alter(0x280 + NODE_IDS[ODD], reported)
 
 
 def assert_served(net: VirtualNetwork) -> None:

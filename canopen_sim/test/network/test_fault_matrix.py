@@ -15,14 +15,7 @@ import itertools
 import re
 from typing import Any
 
-from bus_rig import (
-    MODES,
-    POSITION_MODES,
-    TORQUE_MODES,
-    VELOCITY_MODES,
-    VirtualNetwork,
-    with_modes,
-)
+from bus_rig import MODES, POSITION_MODES, TORQUE_MODES, VELOCITY_MODES, VirtualNetwork, with_modes
 from diagnostic_msgs.msg import DiagnosticStatus
 from drive_samples import (
     bus_config,
@@ -174,10 +167,6 @@ class Arm:
         for name in names:
             assert self.net.motor(name) == pytest.approx(before[name], abs=CREEP), self.net.story()
 
-    def lose(self, *cob_ids: int) -> None:
-        """Lose all frames of some identifiers."""
-        self.net.wire.loses = lambda sender, frame: frame.can_id in cob_ids
-
 
 def kill(arm: Arm) -> None:
     """Cut the supply of the whole device."""
@@ -209,7 +198,7 @@ def cut_bus(arm: Arm) -> None:
 
 def restore_bus(arm: Arm) -> None:
     """Everything reaches everybody."""
-    arm.net.wire.loses = lambda sender, frame: False
+    arm.net.lose()
     arm.net.wire.refuses = ''
 
 
@@ -235,13 +224,13 @@ def following_error(arm: Arm) -> None:
 
 def stop_heartbeat(arm: Arm) -> None:
     """Lose the heartbeats of the device, and nothing else, until it is given up."""
-    arm.lose(0x700 + NODE_ID)
+    arm.net.lose(0x700 + NODE_ID)
     arm.net.run(SETTLING)
 
 
 def stop_sdo(arm: Arm) -> None:
     """Lose the SDO answers of the device, and nothing else."""
-    arm.lose(0x580 + NODE_ID)
+    arm.net.lose(0x580 + NODE_ID)
 
 
 def nothing(arm: Arm) -> None:
@@ -573,7 +562,7 @@ def test_lost_pdos_in_motion(
     arm = Arm()
     arm.move(mode)
     silent, deaf = set(TPDOS) <= set(lost), set(RPDOS) <= set(lost)
-    arm.lose(
+    arm.net.lose(
         *(base + arm.net.network.nodes[name].config.node_id for name in names for base in lost)
     )
     for name in {FAULTY, WITNESS} - set(names):
@@ -707,7 +696,7 @@ def test_an_nmt_command_says_which_axis_was_not_seen_to_stand() -> None:
     arm = slow_heartbeat(0.1)
     move_far(arm, OperationMode.PROFILE_VELOCITY)
     node_id = arm.net.network.nodes[FAULTY].config.node_id
-    arm.net.wire.loses = lambda _, frame: frame.can_id in {0x200 + node_id, 0x600 + node_id}
+    arm.net.lose(0x200 + node_id, 0x600 + node_id)
     sent = arm.net.network.command_nmt(NmtCommand.RESET_NODE, node_id)
     said = arm.net.result(arm.net.network.scheduler.spawn(sent), 30.0)
     assert said == f'NMT RESET_NODE sent to node {node_id}; not seen to stand before: {FAULTY}'
@@ -744,8 +733,7 @@ def test_a_disabled_axis_whose_tpdos_do_not_come_is_seen_to_stand_by_sdo() -> No
     """It is not named as one that may move."""
     net = VirtualNetwork(bus_config(every_mode(drive_config(FAULTY, NODE_ID))))
     net.boot()
-    tpdos = {0x180 + NODE_ID, 0x280 + NODE_ID}
-    net.wire.loses = lambda _, frame: frame.can_id in tpdos
+    net.lose(0x180 + NODE_ID, 0x280 + NODE_ID)
     net.run(1.0)
     assert not net.drives[FAULTY].view.fresh
     answer = f'NMT ENTER_PRE_OPERATIONAL sent to node {NODE_ID}'

@@ -6,16 +6,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from itertools import cycle
 import math
 import struct
 
-from bus_rig import (
-    booted,
-    JOINT,
-    SetPointKind,
-    SetPoints,
-    VirtualNetwork,
-)
+from bus_rig import booted, JOINT, SetPointKind, SetPoints, VirtualNetwork
 from drive_samples import (
     bus_config,
     drive_config,
@@ -36,7 +31,6 @@ from arm_canopen.cia402.modes import Move
 from arm_canopen.cia402.state import VelocityEstimate, WINDOW
 from arm_canopen.cia402.stop import UNDER_HALT_TIME
 from arm_canopen.config import RecoveryPolicy
-from canopen_core.can import Frame
 from canopen_core.standard import ObjectDictionary, Statusword
 
 pytestmark = pytest.mark.slow
@@ -549,16 +543,13 @@ def test_noise_is_standstill() -> None:
     """A slow profile and an encoder that flickers: a halt ends, and the mode can be switched."""
     net = booted(with_profile_velocity(500))
     net.enable(OperationMode.PROFILE_POSITION)
-    noise = [10]
+    noise = cycle((-10, 10))
 
-    def alters(sender: str, frame: Frame) -> Frame:
-        if frame.can_id != 0x280 + NODE_ID:
-            return frame
-        noise[0] = -noise[0]
-        position, velocity = struct.unpack('<ii', frame.data)
-        return frame._replace(data=struct.pack('<ii', position, velocity + noise[0]))
+    def flickers(data: bytes) -> bytes:
+        position, velocity = struct.unpack('<ii', data)
+        return struct.pack('<ii', position, velocity + next(noise))
 
-    net.wire.alters = alters
+    net.alter(0x280 + NODE_ID, flickers)
     net.do(JOINT, 'halt', preempt=True)
     net.select(JOINT, OperationMode.PROFILE_VELOCITY)
 

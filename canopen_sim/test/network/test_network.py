@@ -74,7 +74,10 @@ def events(net: VirtualNetwork, kind: EventKind, node: str = '') -> list[str]:
 
 
 def test_a_lost_heartbeat_is_reported_within_the_consumer_time() -> None:
-    """Each device by its name, not before its time and at the next look after it."""
+    """Each device by its name, not before its time and at the next look after it.
+
+    The age of a heartbeat grows while nothing comes.
+    """
     net = network('a', 'b', 'c')
     net.boot()
     net.run(0.5)
@@ -100,6 +103,10 @@ def test_a_lost_heartbeat_is_reported_within_the_consumer_time() -> None:
     status = node_status(net.network.nodes['a'], net.now)
     assert not status.online
     assert status.nmt_state is None
+    age, later = (node_status(net.network.nodes['b'], net.now + t).heartbeat_age for t in (0, 0.2))
+    assert age is not None
+    assert 0.0 <= age <= 0.1 + PERIOD
+    assert later == pytest.approx(age + 0.2)
 
 
 def test_a_device_without_heartbeat_is_not_watched() -> None:
@@ -110,19 +117,6 @@ def test_a_device_without_heartbeat_is_not_watched() -> None:
     net.run(10.0)
     assert net.network.nodes['a'].online
     assert node_status(net.network.nodes['a'], net.now).heartbeat_age is None
-
-
-def test_the_status_has_the_age_of_the_heartbeat() -> None:
-    """It grows while nothing comes, and is small when one came."""
-    net = network()
-    net.boot()
-    net.run(1.0)
-    node = net.network.nodes['a']
-    age = node_status(node, net.now).heartbeat_age
-    assert age is not None
-    assert 0.0 <= age <= 0.1 + PERIOD
-    later = node_status(node, net.now + 0.2).heartbeat_age
-    assert later == pytest.approx(age + 0.2)
 
 
 def test_a_device_gets_another_identifier_of_time() -> None:
@@ -139,7 +133,7 @@ def test_a_device_gets_another_identifier_of_time() -> None:
 
 
 def test_emergencies_are_reported_in_words_until_they_end() -> None:
-    """The last one is kept until the device takes it back, or restarts."""
+    """The last one is kept until the device takes it back, or restarts; odd ones are reported."""
     net = network()
     net.boot()
     node = net.network.nodes['a']
@@ -149,6 +143,9 @@ def test_emergencies_are_reported_in_words_until_they_end() -> None:
     reported = events(net, EventKind.EMERGENCY, 'a')
     assert '0x8210 PDO not processed, length error' in reported[0]
     assert '0x4320 too low drive temperature' in reported[1]
+    net.send_as('a', Frame(EMCY + 2, b'\x10'))
+    net.run(0.01)
+    assert 'odd EMCY' in events(net, EventKind.EMERGENCY, 'a')[2]
     assert node.emergencies.last is not None
     assert node.emergencies.last.code == 0x4320
     net.send_as('a', Frame(EMCY + 2, bytes(8)))
@@ -160,15 +157,6 @@ def test_emergencies_are_reported_in_words_until_they_end() -> None:
     net.power_on('a')
     net.run(0.2)
     assert node.emergencies.last is None
-
-
-def test_an_odd_emergency_is_reported_as_such() -> None:
-    """Too short a frame is no EMCY, but no reason to be silent."""
-    net = network()
-    net.boot()
-    net.send_as('a', Frame(EMCY + 2, b'\x10'))
-    net.run(0.01)
-    assert 'odd EMCY' in events(net, EventKind.EMERGENCY, 'a')[0]
 
 
 @pytest.mark.parametrize('data', [b'', b'\x05\x00', b'\x33'])
@@ -292,9 +280,9 @@ def test_missed_pdos_are_counted_and_hold_nothing_up() -> None:
     net.run(0.1)
     assert net.network.missed_pdos == 0
     net.feedback_times.clear()
-    net.wire.loses = lambda sender, frame: frame.can_id == 0x283
+    net.lose(0x283)
     net.run(10 * PERIOD)
-    net.wire.loses = lambda sender, frame: False
+    net.lose()
     net.run(2 * PERIOD)
     nodes = net.network.nodes
     assert (nodes['a'].pdos.missed, nodes['b'].pdos.missed) == (0, 10)
@@ -302,18 +290,12 @@ def test_missed_pdos_are_counted_and_hold_nothing_up() -> None:
     assert len(net.feedback_times) == 12
     late = [moment - sync for moment, sync in net.feedback_times[1:9]]
     assert late == pytest.approx([UPDATE_SHARE * PERIOD] * len(late))
-
-
-def test_boots_restarts_and_losses_count_no_missed_pdos() -> None:
-    """Only a device that should answer can miss to."""
-    net = network('a', 'b')
-    net.boot()
-    net.run(0.2)
-    net.power_off('a')
+    before = net.network.missed_pdos
+    net.power_off('a')  # only a device that should answer can miss to
     net.power_on('a')
     net.run(0.5)
     net.run_until(net.all_ready)
-    assert net.network.missed_pdos <= 2  # those of the cycle in which it restarted
+    assert net.network.missed_pdos <= before + 2  # those of the cycle in which it restarted
     before = net.network.missed_pdos
     net.network.send_nmt(NmtCommand.RESET_NODE, 3)
     net.run(1.0)
@@ -334,7 +316,7 @@ def test_a_device_that_babbles_while_it_is_lost_is_not_waited_for() -> None:
     net.run(1.0)
     assert net.network.missed_pdos == missed
     net.power_on('a')
-    net.wire.loses = lambda sender, frame: False
+    net.lose()
     net.run_until(lambda: node.online)
     assert node.image.tpdos[0].values is None
 
@@ -508,14 +490,14 @@ def test_a_device_that_does_not_answer_sync_is_reported_before_its_heartbeat_is_
     net.boot()
     net.run(0.2)
     for count in (1, 2):
-        net.wire.loses = lambda sender, frame: frame.can_id in (0x182, 0x282)
+        net.lose(0x182, 0x282)
         net.run(1.0)
         assert not net.drives['a'].view.fresh
         reported = [
             text for text in net.reported(Severity.WARNING) if 'has not answered SYNC' in text
         ]
         assert len(reported) == count
-        net.wire.loses = lambda sender, frame: False
+        net.lose()
         net.run(0.2)
         assert net.drives['a'].view.fresh
 
@@ -574,12 +556,7 @@ def test_the_state_of_the_controller_is_reported_when_it_changes() -> None:
         assert [expected in text for text in reported] == [True] * bool(expected)
     assert (controller.error_frames, controller.transmit_errors) == (5, 0)
     assert 'controller restarted' in controller.last_error
-
-
-def test_an_empty_bus_is_reported_once() -> None:
-    """Without anybody to acknowledge a frame each one is sent over and over."""
-    net = network('a')
-    for _ in range(100):
+    for _ in range(100):  # without anybody to acknowledge a frame it is sent over and over
         net.network.receive(Frame(0x020, bytes(8), timestamp=net.now, is_error=True))
     assert len([text for text in net.reported(Severity.WARNING) if 'acknowledges' in text]) == 1
 
@@ -734,7 +711,7 @@ def test_a_flood_of_emergencies_is_reported_once_with_its_number(code: int) -> N
     """Others are reported at once meanwhile, and the same one again when the flood was over."""
     net = booted(drive_config('a', 2))
     device, node = net.devices['a'], net.network.nodes['a']
-    flood = FaultInjection(Fault.EMCY_FLOOD, delay=0.002)
+    flood = FaultInjection(Fault.EMCY_FLOOD, delay=0.01)
 
     def reported(severity: Severity) -> list[str]:
         found = (event for event in net.events if event.kind is EventKind.EMERGENCY)
@@ -752,7 +729,7 @@ def test_a_flood_of_emergencies_is_reported_once_with_its_number(code: int) -> N
     assert [text[:12] for text in reported(Severity.ERROR)] == ['EMCY: 0x1000', *others]
     counts = reported(Severity.WARNING)
     assert len(counts) == 2, counts
-    assert re.match(r'EMCY: 5\d\d\d more in 10 s \(2\d\d\d x 0x\w{4} ', counts[0]), counts
+    assert re.match(r'EMCY: (9|10)\d\d more in 10 s \([45]\d\d x 0x\w{4} ', counts[0]), counts
     assert len(node.emergencies.history) == 1 + len(others)
     assert len(node_status(node, net.now).emergencies) == len(node.emergencies.history)
 
@@ -919,7 +896,7 @@ def test_a_reset_that_nobody_commanded_is_an_error(enabled: VirtualNetwork) -> N
 
 def test_a_reset_that_is_not_obeyed_does_not_hide_a_later_loss(enabled: VirtualNetwork) -> None:
     """A heartbeat that stops when the reset is long over is an error."""
-    enabled.wire.loses = lambda sender, frame: frame.can_id == 0
+    enabled.lose(0)
     enabled.network.send_nmt(NmtCommand.RESET_NODE, NODE_ID)
     enabled.run(RESET_TIME + 1.0)
     assert enabled.network.nodes[NODE].online

@@ -49,10 +49,7 @@ def random_frame(source: random.Random, *, commanding: bool) -> Frame:
         data = bytes((source.choice((1, 2, 0x80, 0x81, 0x82)), source.choice((0, *NODE_IDS))))
     kind = source.random()
     return Frame(
-        can_id,
-        b'' if kind < 0.02 else data,
-        is_remote=kind < 0.02,
-        is_extended=0.02 < kind < 0.03,
+        can_id, b'' if kind < 0.02 else data, is_remote=kind < 0.02, is_extended=0.02 < kind < 0.03
     )
 
 

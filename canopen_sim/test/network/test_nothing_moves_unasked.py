@@ -66,54 +66,32 @@ STREAMED = [OperationMode.CYCLIC_POSITION, OperationMode.INTERPOLATED_POSITION]
 MODES = [OperationMode.PROFILE_POSITION, OperationMode.PROFILE_VELOCITY, *STREAMED]
 
 
-class Loaded:
-    """A booted network with one drive that sags by SAG_INC while it is enabled."""
+def loaded(**changes: object) -> VirtualNetwork:
+    """Boot one drive that sags by SAG_INC while it is enabled."""
+    net = VirtualNetwork(bus_config(drive_config(JOINT, NODE_ID, **changes)))
+    net.droop(SAG_INC)
+    net.boot()
+    return net
 
-    def __init__(self, **changes: object) -> None:
-        """Boot it."""
-        self.net = VirtualNetwork(bus_config(drive_config(JOINT, NODE_ID, **changes)))
-        self.net.droop(SAG_INC)
-        self.net.boot()
 
-    @property
-    def position(self) -> float:
-        """Where the motor is in [inc]."""
-        return self.net.simulated().position
+def setpoints(net: VirtualNetwork, since: float) -> list[int]:
+    """Return what the master commanded to the streamed mode that the drive was in, in [inc].
 
-    @property
-    def mode(self) -> OperationMode:
-        """Mode of operation that the drive displays."""
-        return OperationMode(self.net.drives[JOINT].view.mode)
-
-    def enable(self, mode: OperationMode) -> None:
-        """Enable the drive and select a mode."""
-        self.net.enable(mode)
-
-    def move(self, mode: OperationMode) -> None:
-        """Move it in a mode."""
-        self.enable(mode)
-        self.net.target(0.8)
-        self.net.run(0.4)
-        assert self.net.drives[JOINT].view.velocity > 0.5
-
-    def setpoints(self, since: float) -> list[int]:
-        """Return what the master commanded to the streamed mode that the drive was in, in [inc].
-
-        One value for each SYNC at which the drive was enabled in one of these modes.
-        """
-        targets, mode, state, found = {TARGET_PDO: 0, STREAM_PDO: 0}, 0, 0, []
-        for sent in self.net.wire.log:
-            frame = sent.frame
-            if frame.can_id in targets:
-                targets[frame.can_id] = struct.unpack_from('<i', frame.data)[0]
-            elif frame.can_id == STATE_PDO:
-                state, mode = struct.unpack('<Hb', frame.data)
-            elif frame.can_id == 0x080 and sent.time >= since and state & 0x6F == 0x27:
-                if mode == OperationMode.CYCLIC_POSITION:
-                    found.append(targets[TARGET_PDO])
-                elif mode == OperationMode.INTERPOLATED_POSITION:
-                    found.append(targets[STREAM_PDO])
-        return found
+    One value for each SYNC at which the drive was enabled in one of these modes.
+    """
+    targets, mode, state, found = {TARGET_PDO: 0, STREAM_PDO: 0}, 0, 0, []
+    for sent in net.wire.log:
+        frame = sent.frame
+        if frame.can_id in targets:
+            targets[frame.can_id] = struct.unpack_from('<i', frame.data)[0]
+        elif frame.can_id == STATE_PDO:
+            state, mode = struct.unpack('<Hb', frame.data)
+        elif frame.can_id == 0x080 and sent.time >= since and state & 0x6F == 0x27:
+            if mode == OperationMode.CYCLIC_POSITION:
+                found.append(targets[TARGET_PDO])
+            elif mode == OperationMode.INTERPOLATED_POSITION:
+                found.append(targets[STREAM_PDO])
+    return found
 
 
 def assert_smooth(setpoints: list[int], deceleration: float) -> None:
@@ -132,48 +110,48 @@ def assert_smooth(setpoints: list[int], deceleration: float) -> None:
 @pytest.mark.parametrize('mode', STREAMED, ids=lambda mode: mode.name)
 def test_a_loaded_axis_does_not_sag_when_the_mode_is_switched(mode: OperationMode) -> None:
     """The set-point that holds it stays the target, from streamed mode to streamed mode."""
-    loaded = Loaded()
-    loaded.enable(mode)
-    loaded.net.run(0.5)
-    begin, rest = loaded.net.now, loaded.position
+    net = loaded()
+    net.enable(mode)
+    net.run(0.5)
+    begin, rest = net.now, net.simulated().position
     for _ in range(10):
         for other in STREAMED:
-            loaded.net.select(JOINT, other)
-            loaded.net.run(0.05)
-    assert loaded.position == pytest.approx(rest, abs=1)
-    assert len(set(loaded.setpoints(begin))) == 1
+            net.select(JOINT, other)
+            net.run(0.05)
+    assert net.simulated().position == pytest.approx(rest, abs=1)
+    assert len(set(setpoints(net, begin))) == 1
 
 
 @pytest.mark.parametrize('mode', STREAMED, ids=lambda mode: mode.name)
 def test_a_loaded_axis_does_not_sag_when_it_has_not_arrived(mode: OperationMode) -> None:
     """The set-point on which it hangs is kept, as it stands a little below it only."""
-    loaded = Loaded()
-    loaded.enable(mode)
-    loaded.net.run(0.5)
-    target = loaded.net.drives[JOINT].setpoint + 0.02
+    net = loaded()
+    net.enable(mode)
+    net.run(0.5)
+    target = net.drives[JOINT].setpoint + 0.02
     with pytest.raises(DriveError, match=r'not at its target.*was halted'):
-        loaded.net.master.drive(JOINT).move_to(target)
-    loaded.net.run(0.5)
-    assert loaded.setpoints(loaded.net.now - 0.2)[-1] == round(target * SCALE)
+        net.master.drive(JOINT).move_to(target)
+    net.run(0.5)
+    assert setpoints(net, net.now - 0.2)[-1] == round(target * SCALE)
 
 
 @pytest.mark.parametrize('mode', STREAMED, ids=lambda mode: mode.name)
 def test_a_mode_switch_that_the_drive_refuses_leaves_it_where_it_is(mode: OperationMode) -> None:
     """For all the seconds of the time-out the set-point that holds the load does not change."""
-    loaded = Loaded()
-    loaded.enable(mode)
-    loaded.net.target(0.2)
-    loaded.net.run(2.0)
-    begin = loaded.net.now
+    net = loaded()
+    net.enable(mode)
+    net.target(0.2)
+    net.run(2.0)
+    begin = net.now
 
-    loaded.net.keep_mode(mode)
+    net.keep_mode(mode)
     with pytest.raises(DriveError, match='did not reach mode Profile position in 0x6061'):
-        loaded.net.select(JOINT, OperationMode.PROFILE_POSITION)
-    loaded.net.run(0.5)
-    assert set(loaded.setpoints(begin)) == {round(0.2 * SCALE)}
-    loaded.net.target(0.1)
-    loaded.net.run(2.0)
-    assert loaded.setpoints(begin)[-1] == round(0.1 * SCALE)
+        net.select(JOINT, OperationMode.PROFILE_POSITION)
+    net.run(0.5)
+    assert set(setpoints(net, begin)) == {round(0.2 * SCALE)}
+    net.target(0.1)
+    net.run(2.0)
+    assert setpoints(net, begin)[-1] == round(0.1 * SCALE)
 
 
 @pytest.mark.parametrize('other', [*MODES, None], ids=str)
@@ -182,69 +160,72 @@ def test_a_switch_in_motion_brakes_first(mode: OperationMode, other: OperationMo
     """A moving profile comes to rest within its limits before another mode is commanded."""
     if other is mode:
         return
-    loaded = Loaded()
-    loaded.move(mode)
-    begin = loaded.net.now
+    net = loaded()
+    net.enable(mode)
+    net.target(0.8)
+    net.run(0.4)
+    assert net.drives[JOINT].view.velocity > 0.5
+    begin = net.now
     if other is None:
-        loaded.net.do(JOINT, 'init')
+        net.do(JOINT, 'init')
     else:
-        loaded.net.select(JOINT, other)
-    loaded.net.run(0.5)
-    assert_smooth(loaded.setpoints(begin - 0.1), 50_000)
-    assert loaded.net.drives[JOINT].view.velocity == 0.0
-    assert loaded.mode == (other or OperationMode.NO_MODE)
+        net.select(JOINT, other)
+    net.run(0.5)
+    assert_smooth(setpoints(net, begin - 0.1), 50_000)
+    assert net.drives[JOINT].view.velocity == 0.0
+    assert net.drives[JOINT].view.mode == (other or OperationMode.NO_MODE)
 
 
 @pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
 def test_enabling_holds_the_motor_where_it_was_moved_by_hand(mode: OperationMode) -> None:
     """Disabled, moved, enabled: it stays, in each mode."""
-    loaded = Loaded()
-    loaded.enable(mode)
+    net = loaded()
+    net.enable(mode)
     if mode is not OperationMode.PROFILE_VELOCITY:
-        loaded.net.target(0.3)
-        loaded.net.run(2.0)
-    loaded.net.do(JOINT, 'disable')
-    drive = loaded.net.simulated()
-    drive.count_from(drive.position - 1234, loaded.net.now)
-    loaded.net.run(0.1)
-    rest = loaded.position
-    loaded.net.do(JOINT, 'enable')
-    loaded.net.run(1.0)
-    assert loaded.position == pytest.approx(rest, abs=SAG_INC + 1)
+        net.target(0.3)
+        net.run(2.0)
+    net.do(JOINT, 'disable')
+    drive = net.simulated()
+    drive.count_from(drive.position - 1234, net.now)
+    net.run(0.1)
+    rest = net.simulated().position
+    net.do(JOINT, 'enable')
+    net.run(1.0)
+    assert net.simulated().position == pytest.approx(rest, abs=SAG_INC + 1)
 
 
 def test_a_drive_that_keeps_its_mode_does_not_jump_when_it_is_enabled() -> None:
     """Some drives refuse mode 0 and stay in mode 8: its target is preloaded all the same."""
-    loaded = Loaded()
-    loaded.enable(OperationMode.CYCLIC_POSITION)
-    loaded.net.target(0.3)
-    loaded.net.run(2.0)
-    loaded.net.do(JOINT, 'disable')
+    net = loaded()
+    net.enable(OperationMode.CYCLIC_POSITION)
+    net.target(0.3)
+    net.run(2.0)
+    net.do(JOINT, 'disable')
 
-    loaded.net.droop(0)
-    loaded.net.keep_mode(8)
-    drive = loaded.net.simulated()
-    loaded.net.drives[JOINT].select(loaded.net.drives[JOINT].modes[OperationMode.NO_MODE])
-    drive.count_from(drive.position - 1234, loaded.net.now)
-    loaded.net.run(0.1)
-    rest = loaded.position
-    loaded.net.do(JOINT, 'init')
-    loaded.net.run(1.0)
-    assert loaded.mode is OperationMode.CYCLIC_POSITION
-    assert loaded.position == pytest.approx(rest, abs=1)
+    net.droop(0)
+    net.keep_mode(8)
+    drive = net.simulated()
+    net.drives[JOINT].select(net.drives[JOINT].modes[OperationMode.NO_MODE])
+    drive.count_from(drive.position - 1234, net.now)
+    net.run(0.1)
+    rest = net.simulated().position
+    net.do(JOINT, 'init')
+    net.run(1.0)
+    assert net.drives[JOINT].view.mode == OperationMode.CYCLIC_POSITION
+    assert net.simulated().position == pytest.approx(rest, abs=1)
 
 
 @pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
 def test_factors_that_contradict_each_other_move_nothing(mode: OperationMode) -> None:
     """However wrong the factors in bus.yml are, the preloaded target is where the drive is."""
     scales = {'scale_pos_from_dev': 0.001, 'offset_pos_from_dev': 0.7, 'offset_pos_to_dev': 333.0}
-    loaded = Loaded(scales=scales, sdo_writes=(*MOTION_WRITES, sdo_write(0x607C, 0, 5_000)))
-    drive = loaded.net.simulated()
-    drive.count_from(drive.position + 7_000, loaded.net.now)
-    loaded.net.run(0.1)
-    loaded.enable(mode)
-    loaded.net.run(1.0)
-    assert loaded.position == pytest.approx(7_000, abs=SAG_INC + 1)
+    net = loaded(scales=scales, sdo_writes=(*MOTION_WRITES, sdo_write(0x607C, 0, 5_000)))
+    drive = net.simulated()
+    drive.count_from(drive.position + 7_000, net.now)
+    net.run(0.1)
+    net.enable(mode)
+    net.run(1.0)
+    assert net.simulated().position == pytest.approx(7_000, abs=SAG_INC + 1)
 
 
 @pytest.mark.parametrize('mapped', [False, True])
@@ -721,12 +702,11 @@ def test_each_axis_of_a_device_has_its_own(tmp_path: Path) -> None:
 def test_any_position_is_met_within_half_an_increment(place: float) -> None:
     """Up to the range of 0x6064."""
     host = DeviceHost(lambda frame: None)
-    add_devices(host, _article(), {'panda_joint1': place})
+    drive = drive_config(
+        JOINT, NODE_ID, scales={'scale_pos_to_dev': 1e3, 'scale_pos_from_dev': 1e-3}
+    )
+    add_devices(host, bus_config(drive), {JOINT: place})
     assert host.devices[0].drives[0].position / 1000 == pytest.approx(place, abs=0.5001e-3)
-
-
-def _article() -> BusConfig:
-    return load_bus(Path(__file__).parents[3] / 'arm_bringup' / 'robots' / 'panda' / 'bus.yml')
 
 
 @pytest.mark.parametrize(

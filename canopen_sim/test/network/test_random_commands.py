@@ -131,11 +131,7 @@ ACCEPTED = {
 """States in which a drive takes a command (CiA 402-2, figure 4)."""
 
 POWERED = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
-UNPOWERED = (
-    DriveState.SWITCH_ON_DISABLED,
-    DriveState.READY_TO_SWITCH_ON,
-    DriveState.SWITCHED_ON,
-)
+UNPOWERED = (DriveState.SWITCH_ON_DISABLED, DriveState.READY_TO_SWITCH_ON, DriveState.SWITCHED_ON)
 LOST_TPDOS = (Fault.TPDO_LOSS, Fault.FRAME_LOSS, Fault.DISCONNECT, BUS_DOWN)
 
 MOVE_KINDS = ((True, False), (True, True), (False, False), (False, True))
@@ -801,11 +797,7 @@ FOUND: tuple[Scenario, ...] = (
     ),
     Scenario(  # the mode that a drive shows goes with the 0 of its first RPDO
         Kind((Fault.MODE_REQUIRED,), options=((0x6007, 0),)),
-        (
-            ('enable', None),
-            ('mode', OperationMode.VELOCITY, None),
-            ('fault', BUS_DOWN, 2.0, None),
-        ),
+        (('enable', None), ('mode', OperationMode.VELOCITY, None), ('fault', BUS_DOWN, 2.0, None)),
         OperationMode.PROFILE_POSITION,
     ),
     Scenario(  # the words of a quick stop keep the halt up, by RPDO and by SDO

@@ -376,9 +376,7 @@ def test_a_segment_of_a_transfer_that_timed_out_is_not_taken_for_another() -> No
     assert second.result() == b'Good!!!'
 
 
-def test_a_device_that_announces_no_length_is_stopped_too(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_device_that_announces_no_length_is_stopped_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """An upload without end is ended."""
     monkeypatch.setattr('arm_canopen.master.sdo_client.UNANNOUNCED_MAX', 1000)
     line = Line()

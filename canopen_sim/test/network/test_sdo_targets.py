@@ -13,14 +13,7 @@ from pathlib import Path
 import re
 
 from bus_rig import booted, VirtualNetwork
-from drive_samples import (
-    bus_config,
-    drive_config,
-    drive_dictionary,
-    DRIVE_EDS,
-    every_mode,
-    PERIOD,
-)
+from drive_samples import bus_config, drive_config, drive_dictionary, DRIVE_EDS, every_mode, PERIOD
 import pytest
 
 from arm_canopen import (
@@ -182,10 +175,10 @@ def test_a_refused_target_is_answered_with_the_reason(mode: OperationMode) -> No
 def test_a_target_that_is_not_answered_is_no_success() -> None:
     """A drive that is silent says nothing of what it has taken; the next target moves it."""
     net = running_in(OperationMode.PROFILE_POSITION)
-    net.wire.loses = lambda sender, frame: frame.can_id == REQUEST
+    net.lose(REQUEST)
     with pytest.raises(DriveError, match='did not answer'):
         net.result(give(net, 0.4))
-    net.wire.loses = lambda sender, frame: False
+    net.lose()
     net.run(1.0)
     assert net.motor() == pytest.approx(0.0, abs=1e-3)
     net.result(give(net, 0.3))
@@ -198,12 +191,12 @@ def test_a_target_whose_answer_is_lost_does_not_go_on_moving(mode: OperationMode
     """The drive has it, and nobody knows: as the answer is an error, the axis is halted."""
     net = running_in(mode)
     net.run(0.1)
-    net.wire.loses = lambda sender, frame: frame.can_id == ANSWER
+    net.lose(ANSWER)
     with pytest.raises(DriveError, match='did not answer'):
         net.result(give(net, 0.4 if mode is not OperationMode.PROFILE_TORQUE else 200.0))
     net.run(1.0)
     assert abs(net.drives[JOINT].view.rate) < 0.01
-    net.wire.loses = lambda sender, frame: False
+    net.lose()
     net.run(0.5)
     net.result(give(net, 0.2 if mode is not OperationMode.PROFILE_TORQUE else 200.0))
     net.run(1.0)
@@ -297,11 +290,7 @@ def test_a_drive_that_is_moved_by_hand_is_not_written_to() -> None:
     net = running_in(OperationMode.PROFILE_POSITION)
     net.do(JOINT, 'disable')
     noise = cycle((b'\x00', b'\x05'))
-    net.wire.alters = lambda sender, frame: (
-        frame._replace(data=next(noise) + frame.data[1:])
-        if frame.can_id == 0x280 + NODE_ID
-        else frame
-    )
+    net.alter(0x280 + NODE_ID, lambda data: next(noise) + data[1:])
     begin = net.now
     net.run(2.0)
     assert downloads(net, since=begin) == []
@@ -383,9 +372,7 @@ def test_a_simulated_drive_has_the_modes_that_its_objects_allow() -> None:
     assert net.drives[JOINT].view.position == pytest.approx(0.3, abs=1e-3)
 
 
-def test_default_mappings_whose_lengths_have_a_flag_of_the_vendor_are_used(
-    tmp_path: Path,
-) -> None:
+def test_default_mappings_whose_lengths_have_a_flag_of_the_vendor_are_used(tmp_path: Path) -> None:
     """Bit 7 of the length in 0x1600 and 0x1A00 is ignored: by boot, PDOs and the comparison."""
 
     def flagged(match: re.Match[str]) -> str:

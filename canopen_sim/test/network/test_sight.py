@@ -39,7 +39,6 @@ from arm_canopen.config import boot_writes, check_bus
 from arm_canopen.config.model.bus import with_event_timer
 from arm_canopen.master.process_image import ReceivedTpdo, SyncRound
 from canopen_core import Place
-from canopen_core.can import Frame
 from canopen_core.standard import ObjectDictionary, Statusword
 from canopen_sim import Fault, FaultInjection
 
@@ -68,10 +67,6 @@ class Led:
         self.net.run(0.8)
         assert self.net.speed() == pytest.approx(1.0, rel=0.05)
 
-    def lose(self, *cob_ids: int) -> None:
-        """Lose all frames of some identifiers."""
-        self.net.wire.loses = lambda sender, frame: frame.can_id in cob_ids
-
     def velocities(self, duration: float = 2.0) -> list[float]:
         """Advance the time by a duration in [s]; return the velocities meanwhile in [rad/s]."""
         found = []
@@ -88,7 +83,7 @@ def test_a_drive_of_which_a_tpdo_is_missing_is_taken_from_its_source(
 ) -> None:
     """Within the time-out it brakes on its ramp; the cause is data, and no target is taken."""
     led = Led(mode, Leader())
-    led.lose(*lost)
+    led.net.lose(*lost)
     assert min(led.velocities(TIME_OUT + 1.5)) > -0.02
     assert led.net.speed() == pytest.approx(0.0, abs=1e-3)
     assert led.source.losses[JOINT].cause is RefusalCause.SILENT
@@ -100,7 +95,7 @@ def test_a_drive_of_which_a_tpdo_is_missing_is_taken_from_its_source(
 def test_a_source_that_goes_on_moves_a_silent_drive_no_further(mode: OperationMode) -> None:
     """What is granted for stopping on the path ends after a second, whatever the source does."""
     led = Led(mode, Leader(heeds=False))
-    led.lose(*TPDOS)
+    led.net.lose(*TPDOS)
     led.net.run(TIME_OUT + 1.0 + 0.3)
     rest = led.net.motor()
     led.net.run(2.0)
@@ -111,7 +106,7 @@ def test_a_drive_that_cannot_be_seen_is_not_enabled() -> None:
     """Neither is its old state taken for the present one."""
     led = Led(OperationMode.CYCLIC_POSITION, Leader())
     led.net.do(JOINT, 'disable', preempt=True)
-    led.lose(*TPDOS)
+    led.net.lose(*TPDOS)
     led.net.run(1.0)
     with pytest.raises(DriveError, match='no TPDOs for'):
         led.net.do(JOINT, 'enable')
@@ -136,16 +131,14 @@ def test_feedback_is_that_of_the_sync_it_is_stamped_with() -> None:
 
 def show(net: VirtualNetwork, word: Callable[[int], int], frames: int = 1_000_000) -> None:
     """Change the statusword of some TPDOs."""
-    left = [frames]
+    left = iter(range(frames))
 
-    def alters(sender: str, frame: Frame) -> Frame:
-        if frame.can_id != STATE_PDO or not left[0]:
-            return frame
-        left[0] -= 1
-        changed = struct.pack('<H', word(struct.unpack_from('<H', frame.data)[0]))
-        return frame._replace(data=changed + frame.data[2:])
+    def shown(data: bytes) -> bytes:
+        (true,) = struct.unpack_from('<H', data)
+        return struct.pack('<H', true if next(left, None) is None else word(true)) + data[2:]
 
-    net.wire.alters = alters
+    net.wire.alters = lambda sender, frame: frame
+    net.alter(STATE_PDO, shown)
 
 
 @pytest.mark.parametrize(
@@ -272,11 +265,11 @@ def test_an_axis_that_droops_and_is_stopped_on_its_way_creeps_once_at_most(
     net.run(0.5)
     net.droop(1500)
     lost = {0x200 + NODE_ID, 0x300 + NODE_ID, 0x400 + NODE_ID}
-    net.wire.loses = lambda sender, frame: frame.can_id in lost
+    net.lose(*lost)
     net.run(1.0)
     assert len(net.reported(Severity.ERROR)) == 1
     stood = net.motor()
-    net.wire.loses = lambda sender, frame: False
+    net.lose()
     net.run(5.0)
     assert abs(net.motor() - stood) < 0.15 + 0.01
     assert net.simulated().state is DriveState.SWITCH_ON_DISABLED
@@ -289,13 +282,7 @@ def test_the_following_error_of_the_drive_counts(duration: float, *, stops: bool
     net = enabled(with_window(None), OperationMode.CYCLIC_POSITION)
     end = net.now + duration
 
-    def show(sender: str, frame: Frame) -> Frame:
-        if frame.can_id != STATE_PDO or net.now > end:
-            return frame
-        word, mode = struct.unpack('<Hb', frame.data)
-        return frame._replace(data=struct.pack('<Hb', word | Statusword.FOLLOWING_ERROR, mode))
-
-    net.wire.alters = show
+    show(net, lambda word: word | Statusword.FOLLOWING_ERROR * (net.now <= end))
     net.run(3.0)
     assert (net.simulated().state is DriveState.SWITCH_ON_DISABLED) is stops
     refusal = net.drives[JOINT].refusal
@@ -430,12 +417,12 @@ def on_change(transmission: int = 255, *, timer: bool = True) -> NodeConfig:
 def test_a_drive_whose_tpdos_stop_to_come_on_change_is_not_fresh(mode: OperationMode) -> None:
     """It is halted on its own ramp, as one that answers SYNC; at rest it stays fresh."""
     led = Led(mode, Leader(), on_change())
-    led.lose(*TPDOS)
+    led.net.lose(*TPDOS)
     velocities = led.velocities()
     assert min(velocities) > -0.02  # it is not thrown back to where it was seen last
     assert velocities[-1] == pytest.approx(0.0, abs=1e-3)
     assert led.source.losses[JOINT].cause is RefusalCause.SILENT
-    led.lose()
+    led.net.lose()
     led.net.run(3.0)
     assert led.net.drives[JOINT].accepts_targets
     assert not [text for text in led.net.reported(Severity.WARNING) if 'goes unnoticed' in text]
@@ -452,7 +439,7 @@ def test_an_axis_is_not_held_at_a_position_of_unknown_age(
     led = Led(mode, Leader(), config)
     (warning,) = [text for text in led.net.reported(Severity.WARNING) if 'goes unnoticed' in text]
     assert 'TPDO 1, 2' in warning
-    led.lose(*TPDOS)
+    led.net.lose(*TPDOS)
     velocities = led.velocities()
     assert min(velocities) > -0.02
     assert velocities[-1] == pytest.approx(0.0, abs=1e-3)
@@ -472,11 +459,11 @@ def test_a_change_that_got_lost_is_read_before_a_drive_is_enabled(
 ) -> None:
     """Else it would count as enabled for good, by the last TPDO that came."""
     net = enabled(config, OperationMode.PROFILE_POSITION)
-    net.wire.loses = lambda sender, frame: frame.can_id in TPDOS
+    net.lose(*TPDOS)
     net.devices[JOINT].faults.inject(FaultInjection(Fault.STO, duration=0.5), net.now)
     net.run(1.0)
     assert net.simulated().state is not DriveState.OPERATION_ENABLED
-    net.wire.loses = lambda sender, frame: False
+    net.lose()
     answer = net.do(JOINT, verb)
     assert 'Operation enabled' in answer
     assert net.simulated().state is DriveState.OPERATION_ENABLED
@@ -487,7 +474,7 @@ def test_a_change_that_got_lost_is_read_before_a_drive_is_enabled(
 def test_a_stop_is_seen_by_sdo_where_its_tpdos_get_lost(config: NodeConfig, verb: str) -> None:
     """It is answered when the drive stands, in its true state, and not before."""
     led = Led(OperationMode.CYCLIC_POSITION, Leader(), config)
-    led.lose(*TPDOS)
+    led.net.lose(*TPDOS)
     answer = led.net.do(JOINT, verb, preempt=True)
     assert led.net.speed() == pytest.approx(0.0, abs=1e-2)
     assert led.net.simulated().state.title in answer
@@ -506,7 +493,7 @@ def test_a_stop_that_cannot_be_seen_at_all_is_not_answered_as_one(config: NodeCo
     )
     net = enabled(config, OperationMode.PROFILE_VELOCITY)
     net.run(1.0)
-    net.wire.loses = lambda sender, frame: frame.can_id in (*TPDOS, 0x580 + NODE_ID)
+    net.lose(*TPDOS, 0x580 + NODE_ID)
     net.target(1.0)
     net.run(1.5)
     assert net.speed() == pytest.approx(1.0, abs=1e-2)
@@ -520,10 +507,10 @@ def test_a_stop_that_cannot_be_seen_at_all_is_not_answered_as_one(config: NodeCo
 def test_a_fault_that_got_lost_is_reset_at_once(config: NodeConfig) -> None:
     """By recover and init; enable names it."""
     net = enabled(config, OperationMode.PROFILE_POSITION)
-    net.wire.loses = lambda sender, frame: frame.can_id in (*TPDOS, 0x080 + NODE_ID)
+    net.lose(*TPDOS, 0x080 + NODE_ID)
     net.devices[JOINT].faults.inject(FaultInjection(Fault.OVER_CURRENT), net.now)
     net.run(1.0)
-    net.wire.loses = lambda sender, frame: False
+    net.lose()
     assert net.simulated().state is DriveState.FAULT
     with pytest.raises(DriveError, match='is faulted; recover it first'):
         net.do(JOINT, 'enable')
@@ -537,12 +524,12 @@ def test_a_drive_that_moved_unseen_is_enabled_where_it_is(
 ) -> None:
     """Its position is read, too, and the motor does not go back to the last one that came."""
     led = Led(mode, Leader(), config)
-    led.lose(*TPDOS)
+    led.net.lose(*TPDOS)
     shown = led.net.motor()
     led.net.run(10.0)
     rest = led.net.motor()
     assert abs(rest - shown) > 0.05
-    led.lose()
+    led.net.lose()
     led.net.do(JOINT, 'enable')
     assert max(map(abs, led.velocities(1.0))) < 0.02
     assert led.net.motor() == pytest.approx(rest, abs=1e-3)
@@ -582,10 +569,10 @@ def test_a_timer_that_is_taken_at_the_next_boot_counts_again() -> None:
         assert any('TPDO 1: its loss goes unnoticed' in text for text in reported) is refuses
         net.run(2.0)
         assert net.drives[JOINT].view.fresh
-        net.wire.loses = lambda sender, frame: frame.can_id == 0x180 + NODE_ID
+        net.lose(0x180 + NODE_ID)
         net.run(1.0)
         assert net.drives[JOINT].view.fresh is refuses
-        net.wire.loses = lambda sender, frame: False
+        net.lose()
 
 
 @pytest.mark.parametrize(
@@ -614,7 +601,7 @@ def test_a_drive_in_operation_is_taken_over_and_gets_its_event_timer() -> None:
     net.run(2.0)
     assert net.network.nodes[JOINT].taken_over
     assert net.drives[JOINT].view.fresh
-    net.wire.loses = lambda sender, frame: frame.can_id in TPDOS
+    net.lose(*TPDOS)
     net.run(1.0)
     assert not net.drives[JOINT].view.fresh
 

@@ -162,11 +162,7 @@ OPTIONS = pytest.mark.parametrize('option', [2, 6], ids=['605A=2', '605A=6'])
 
 
 def inject(
-    monkeypatch: pytest.MonkeyPatch,
-    owner: object,
-    attribute: str,
-    *,
-    times: float = float('inf'),
+    monkeypatch: pytest.MonkeyPatch, owner: object, attribute: str, *, times: float = float('inf')
 ) -> None:
     """Make something fail from now on, with another text each time."""
     original, number = getattr(owner, attribute), count()
@@ -237,12 +233,12 @@ def test_a_deaf_drive_is_stopped_by_sdo_and_not_enabled_by_what_comes_later(
 ) -> None:
     """Its RPDOs are kept back before the SDO leaves: none that gets through ends the stop."""
     failing = MovingDrive(option)
-    lose(failing, *RPDOS)
+    failing.net.lose(*RPDOS)
     inject(monkeypatch, *owner_of(failing, 'mode'), times=1)
     failing.run(0.4)
     assert not failing.controlwords_by_sdo
     failing.run(0.4)
-    lose(failing)
+    failing.net.lose()
     failing.run(RAMP + 2.0)
     assert failing.states[-1] is DriveState.SWITCH_ON_DISABLED
     assert DriveState.OPERATION_ENABLED not in failing.states[1:]
@@ -274,7 +270,7 @@ def test_a_drive_that_is_gone_is_not_said_to_move_on() -> None:
     """As long as its heartbeat is not overdue, it is silent: that is what is reported."""
     failing = MovingDrive(6)
     others = {0x180 + NODE_ID, 0x280 + NODE_ID, 0x380 + NODE_ID, 0x480 + NODE_ID, 0x580 + NODE_ID}
-    lose(failing, *others)
+    failing.net.lose(*others)
     with pytest.raises(DriveError, match='no TPDOs for'):
         failing.net.do(JOINT, 'shutdown', preempt=True)
     assert not [text for text in failing.net.reported() if 'did not come to rest' in text]
@@ -285,7 +281,7 @@ def test_a_drive_that_is_gone_is_not_said_to_move_on() -> None:
 def test_a_stop_by_sdo_waits_for_no_other_sdo(monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither for those in the queue nor for answers that get lost."""
     failing = MovingDrive(6)
-    lose(failing, 0x580 + NODE_ID)
+    failing.net.lose(0x580 + NODE_ID)
     node = failing.net.network.nodes[JOINT]
     for _ in range(30):
         node.sdo.read(0x1018, 1, 0.2)
@@ -304,7 +300,7 @@ def test_a_stop_whose_sdo_is_not_answered_goes_by_rpdo_again(
     """What kept its RPDO back was over at once; a shutdown ends the stop as well."""
     failing = MovingDrive(6)
     inject(monkeypatch, *owner_of(failing, 'controlword'), times=2)
-    lose(failing, 0x600 + NODE_ID)
+    failing.net.lose(0x600 + NODE_ID)
     if verb:
         failing.net.begin(JOINT, verb, preempt=True)
     failing.run(RAMP + 3.0)
@@ -316,13 +312,13 @@ def test_a_shutdown_begins_by_rpdo_and_says_when_the_drive_keeps_its_power(
 ) -> None:
     """The stop before has ended with the RPDO kept back, and no SDO is answered."""
     failing = MovingDrive(6)
-    lose(failing, *RPDOS, 0x600 + NODE_ID)
+    failing.net.lose(*RPDOS, 0x600 + NODE_ID)
     inject(monkeypatch, *owner_of(failing, 'controlword'), times=2)
     failing.run(10.0)
     with pytest.raises(DriveError, match='joint1 is not disabled; cut its power'):
         failing.net.do(JOINT, 'shutdown', preempt=True)
     failing.net.drives[JOINT].controlword.keep_back()
-    lose(failing, 0x600 + NODE_ID)
+    failing.net.lose(0x600 + NODE_ID)
     failing.net.do(JOINT, 'shutdown', preempt=True)
     assert failing.device.state is DriveState.SWITCH_ON_DISABLED
 
@@ -336,7 +332,7 @@ def test_a_device_watches_the_master_until_its_motor_was_seen_to_stand(
     moving = turning(6)
     net, node = moving.net, moving.net.network.nodes[JOINT]
     node.watch_slot = 1
-    lose(moving, *([*RPDOS, 0x600 + NODE_ID] if lost else []))
+    moving.net.lose(*([*RPDOS, 0x600 + NODE_ID] if lost else []))
     net.network.send_nmt(nmt, NODE_ID)
     moving.run(0.3)
     assert abs(net.speed()) > 0.5
@@ -361,11 +357,11 @@ def test_a_drive_that_could_not_be_stopped_is_not_said_to_be_enabled(
     """It is still in Operation Enabled; and the next failure stops it as the first one would."""
     failing = MovingDrive(6)
     inject(monkeypatch, *owner_of(failing, 'controlword'), times=3)
-    lose(failing, *RPDOS, 0x600 + NODE_ID)
+    failing.net.lose(*RPDOS, 0x600 + NODE_ID)
     failing.run(10.0)
     with pytest.raises(DriveError, match='could not be stopped; cut its power'):
         failing.net.do(JOINT, 'enable')
-    lose(failing)
+    failing.net.lose()
     failing.net.do(JOINT, 'enable')
     failing.net.target(50.0)
     failing.net.run(0.6)
@@ -386,12 +382,12 @@ def test_a_drive_that_keeps_its_power_is_stopped_as_soon_as_it_can_be(
     """Neither RPDO nor SDO reaches it at first: that is reported once, with the remedy."""
     failing = MovingDrive(6)
     inject(monkeypatch, *owner_of(failing, 'controlword'))
-    lose(failing, 0x600 + NODE_ID)
+    failing.net.lose(0x600 + NODE_ID)
     failing.run(20.0)
     assert failing.states == [DriveState.OPERATION_ENABLED]
     assert len(failing.errors) == 3, failing.errors
     assert 'Cut its power' in failing.errors[-1]
-    lose(failing)
+    failing.net.lose()
     if verb:
         failing.net.do(JOINT, verb, preempt=True)
     else:
@@ -507,11 +503,6 @@ def stop(net: VirtualNetwork) -> StopReport:
     return report
 
 
-def lose(moving: MovingDrive, *cob_ids: int) -> None:
-    """Lose all frames of some identifiers of the device from now on."""
-    moving.net.wire.loses = lambda sender, frame: frame.can_id in cob_ids
-
-
 def turning(option: int, *writes: tuple[int, int, int]) -> MovingDrive:
     """Return a drive that turns on without set-points, whatever becomes of its master."""
     return MovingDrive(option, (0x6007, 0, 0), *writes, mode=OperationMode.PROFILE_VELOCITY)
@@ -525,9 +516,9 @@ def nmt_commands(moving: MovingDrive) -> list[int]:
 def test_a_late_heartbeat_stops_nothing_while_tpdos_come() -> None:
     """It is reported, and the device is neither lost nor configured anew."""
     moving = MovingDrive()
-    lose(moving, 0x700 + NODE_ID)
+    moving.net.lose(0x700 + NODE_ID)
     moving.run(0.45)  # of a consumer time of 0.3
-    lose(moving)
+    moving.net.lose()
     moving.run(1.0)
     assert moving.states == [DriveState.OPERATION_ENABLED]
     assert nmt_commands(moving) == []
@@ -542,10 +533,10 @@ def test_a_device_that_is_commanded_away_while_it_brakes_is_left_there() -> None
     """Its heartbeat is back, so it is not booted, and its drive is enabled no more."""
     moving = MovingDrive(recovery=RecoveryPolicy.AUTO)
     net = moving.net
-    lose(moving, 0x700 + NODE_ID)
+    moving.net.lose(0x700 + NODE_ID)
     while moving.device.state is DriveState.OPERATION_ENABLED:
         moving.run(PERIOD)
-    lose(moving)
+    moving.net.lose()
     net.network.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, NODE_ID)
     moving.run(3.0 * RAMP)
     assert nmt_commands(moving) == [NmtCommand.ENTER_PRE_OPERATIONAL]
@@ -567,7 +558,7 @@ def test_an_axis_that_turns_when_its_device_starts_is_braked(begins: str, option
     else:
         moving.net.wire.loses = lambda sender, frame: True
         moving.run(0.5)
-        lose(moving)
+        moving.net.lose()
         moving.net.run_until(lambda: not moving.net.network.nodes[JOINT].operational)
     moving.run(RAMP + 3.0)
     assert moving.fastest < STANDING
@@ -587,7 +578,7 @@ def test_a_device_that_comes_back_in_motion_is_braked_before_it_is_configured(
     moving.run(0.6)
     assert not moving.net.network.nodes[JOINT].online
     assert (moving.device.state is DriveState.OPERATION_ENABLED) is not receives
-    lose(moving)
+    moving.net.lose()
     while not nmt_commands(moving):
         moving.run(PERIOD)
     assert abs(moving.net.speed()) < STANDING
@@ -645,7 +636,7 @@ def test_shutdown_of_a_lost_drive_is_no_success_unless_its_rest_is_seen(*, gone:
         with pytest.raises(DriveError, match='not disabled; cut its power: offline'):
             moving.net.do(JOINT, 'shutdown', timeout=5.0)
         return
-    lose(moving, 0x180 + NODE_ID, 0x280 + NODE_ID, 0x700 + NODE_ID)
+    moving.net.lose(0x180 + NODE_ID, 0x280 + NODE_ID, 0x700 + NODE_ID)
     moving.net.run(0.4)
     assert 'Switch on disabled' in moving.net.do(JOINT, 'shutdown', timeout=5.0)
     assert abs(moving.net.speed()) < 1e-3
