@@ -29,7 +29,7 @@ from planning_messages import panda
 from planning_scenes import distances
 from processes import executable
 import pytest
-from readme_folder import CHECKOUT
+from readme_examples import CHECKOUT
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 from simulated_arm import JOINTS, MovingArm, READY, robot_parameters

@@ -17,7 +17,7 @@ import time
 
 from isolation import Isolation
 import pytest
-from readme_folder import READMES, run_examples
+from readme_examples import READMES, run_examples
 
 from arm_canopen import open_bus
 from canopen_core.can import Frame
@@ -26,84 +26,30 @@ pytestmark = [pytest.mark.slow, pytest.mark.xdist_group('without-ros')]
 
 CHECKOUT = Path(__file__).parents[1]
 INSTALLED = (
-    'arm_planning',
-    'arm_servo',
-    'canopen_sim',
-    'canopen_tools',
-    'quad_bringup',
-    'quad_controller[physics]',
-    'quad_sim[env]',
-    'quad_teleop',
-    'robot_viewer',
-    'arm_bringup[motion]',
+    *('arm_planning', 'arm_servo', 'canopen_sim', 'canopen_tools', 'quad_bringup'),
+    *('quad_controller[physics]', 'quad_sim[env]', 'quad_teleop', 'robot_viewer'),
+    *('arm_bringup[motion]',),
 )
 """Packages that nothing else requires; they bring all others."""
-IMPORTED = [
-    'arm_bringup',
-    'arm_canopen',
-    'arm_model',
-    'arm_planning',
-    'arm_servo',
-    'arm_trajectory',
-    'canopen_core',
-    'canopen_sim',
-    'canopen_tools',
-    'first_motion',
-    'message_definitions',
-    'operator_input',
-    'process_supervisor',
-    'quad_bringup',
-    'quad_controller',
-    'quad_description',
-    'quad_hardware',
-    'quad_sim',
-    'quad_sim.env',
-    'quad_sim.physics',
-    'quad_teleop',
-    'black_box',
-    'realtime_loop',
-    'robot_viewer',
-    'rosbag_files',
-    'urdf_reader',
-    'xgo_lib2',
-]
-COMMANDS = [
-    'canopen',
-    'canopen-candump',
-    'canopen-fake-slaves',
-    'fake_xgo',
-    'operator-show-gamepad',
-    'quad-check-policy',
-    'quad-export-mjcf',
-    'quad-urdf',
-    'xgo-calibrate',
-    'xgo-doctor',
-]
+IMPORTED = (
+    *('arm_bringup', 'arm_canopen', 'arm_model', 'arm_planning', 'arm_servo', 'arm_trajectory'),
+    *('canopen_core', 'canopen_sim', 'canopen_tools', 'first_motion', 'message_definitions'),
+    *('operator_input', 'process_supervisor', 'quad_bringup', 'quad_controller'),
+    *('quad_description', 'quad_hardware', 'quad_sim', 'quad_sim.env', 'quad_sim.physics'),
+    *('quad_teleop', 'black_box', 'realtime_loop', 'robot_viewer', 'rosbag_files', 'urdf_reader'),
+    *('xgo_lib2',),
+)
+COMMANDS = (
+    *('canopen', 'canopen-candump', 'canopen-fake-slaves', 'fake_xgo', 'operator-show-gamepad'),
+    *('quad-check-policy', 'quad-export-mjcf', 'quad-urdf', 'xgo-calibrate', 'xgo-doctor'),
+)
 """What has an option --help; operator-show-keys and xgo-protocol have no options at all."""
-FOR_ROS = [
-    'bringup',
-    'calibrate',
-    'candump',
-    'check',
-    'check_policy',
-    'controller_node',
-    'demo',
-    'display',
-    'doctor',
-    'export_mjcf',
-    'fake_slave',
-    'fake_slaves',
-    'hardware_node',
-    'master',
-    'motion_master',
-    'motion_node',
-    'protocol',
-    'robot_state_publisher',
-    'servo_node',
-    'teleop_keyboard',
-    'twist_mux',
-    'urdf',
-]
+FOR_ROS = (
+    *('bringup', 'calibrate', 'candump', 'check', 'check_policy', 'controller_node', 'demo'),
+    *('display', 'doctor', 'export_mjcf', 'fake_slave', 'fake_slaves', 'hardware_node', 'master'),
+    *('motion_master', 'motion_node', 'protocol', 'robot_state_publisher', 'servo_node'),
+    *('teleop_keyboard', 'twist_mux', 'urdf'),
+)
 """Executables of `ros2 run`, which would die on rclpy or have the name of another program."""
 TIMEOUT = 120.0  # [s] for a program on a busy machine
 NO_NETWORK = ('dns error', 'Failed to fetch', 'connect error', 'client error')
