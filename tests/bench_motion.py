@@ -28,8 +28,7 @@ from sensor_msgs.msg import JointState
 from simulated_arm import goal_to, JOINTS, MovingArm, READY, robot_parameters
 from std_msgs.msg import Float64MultiArray
 
-from arm_bringup.description import expand_xacro
-from arm_bringup.robots import installed_robots_folder
+from arm_bringup.robots import expand_xacro, installed_robots_folder
 from arm_model import Array, load_limits, RobotModel
 from arm_servo import JogRequest, MotionCore, SetPoint, TwistCommand
 from arm_servo.core.gateway import CommandGateway, start_worker

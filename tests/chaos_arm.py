@@ -26,7 +26,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from disturbance import Disturbance, Event, full_cpu
 from simulated_arm import goal_to, GoalRun, JOINTS, MovingArm, READY
 
-from arm_bringup.description import expand_xacro
+from arm_bringup.robots import expand_xacro
 from arm_canopen import DriveState
 from arm_model import JointLimits, load_limits, RobotModel
 from canopen_core.can import Frame, open_bus

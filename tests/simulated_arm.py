@@ -27,7 +27,7 @@ from canopen_interfaces.srv import COTargetDouble
 from control_msgs.action import FollowJointTrajectory
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from arm_bringup.description import expand_xacro
+from arm_bringup.robots import expand_xacro
 from arm_msgs.srv import InjectFault
 
 if TYPE_CHECKING:

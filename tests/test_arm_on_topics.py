@@ -22,8 +22,7 @@ from simulated_arm import CONTROLLER, goal_to, GoalRun, reach, READY
 from topic_arm import PATIENT, standalone, TopicArm
 from two_arms import ARMS, GRIPPER, write_two_arms
 
-from arm_bringup.description import expand_xacro
-from arm_bringup.robots import installed_robots_folder
+from arm_bringup.robots import expand_xacro, installed_robots_folder
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -33,9 +33,8 @@ from shape_msgs.msg import SolidPrimitive
 
 from arm_msgs.srv import InjectFault
 from robot_viewer.nodes.motion_planning import DRAGGED, HOLD_EXECUTE
-from robot_viewer.page.jog_panel import Actions, BASE
+from robot_viewer.page.jog_panel import Actions, BASE, HOLD_TARGET
 from robot_viewer.page.robot_page import RobotPage
-from robot_viewer.page.target_panel import HOLD_TARGET
 from robot_viewer.robot_state import ALLOW, Level, RobotState, Stop
 
 if TYPE_CHECKING:

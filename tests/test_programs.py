@@ -23,7 +23,7 @@ import rclpy
 from rclpy.node import Node
 from urdf_reader import DescriptionError
 
-from arm_bringup.exceptions import BringupError
+from arm_bringup.robots import BringupError
 from arm_canopen import CanopenError
 from arm_canopen.nodes.joint_state_publisher import JointStatePublisher
 from canopen_core.can import open_bus

@@ -21,8 +21,7 @@ from tf2_msgs.msg import TFMessage
 from urdf_reader import read_urdf
 import yaml
 
-from arm_bringup.description import read_description, read_semantic
-from arm_bringup.robots import find_robot
+from arm_bringup.robots import find_robot, read_description, read_semantic
 from arm_canopen.master.remote_node import BootPhase
 from arm_servo.teleop.keyboard_teleop import TOOL
 from canopen_core.standard import DriveState, OperationMode

@@ -15,14 +15,19 @@ from urdf_reader import Group, JointKind, KinematicTree, parse_srdf, read_urdf, 
 
 from process_supervisor import RosOptions, USAGE_ERROR
 
-from .bus import in_namespace_of_bus, read_bus
-from .description import read_description, read_semantic
-from .exceptions import BringupError, DescriptionError, RobotError
-from .findings import error, Finding, Severity, warning
-from .motion_check import check_motion
-from .robots import Robot
+from .groups import given_positions
+from .motion_check import check_motion, error, Finding, Severity, warning
+from .robots import (
+    BringupError,
+    DescriptionError,
+    in_namespace_of_bus,
+    read_bus,
+    read_description,
+    read_semantic,
+    Robot,
+    RobotError,
+)
 from .session import add_robot, locate, robots_epilog
-from .start_positions import given_positions
 
 if TYPE_CHECKING:
     from arm_canopen.config import AxisUnits

@@ -1,19 +1,256 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which groups of an SRDF are moved: arms, and the tools at their ends."""
+"""Which groups of an SRDF are moved, what their nodes need to know, and where their drives start.
+
+arm_servo is an optional companion: it brings kinematics and solvers, which the drives alone do not
+need, and nothing here imports it.
+
+Real arms have absolute encoders and are switched on somewhere in their ranges. Simulated drives
+start at 0, unless some joints are beyond their limits there, or links collide: from there nothing
+would move.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import urdf_reader
 from urdf_reader import find_group, KinematicTree, parse_srdf, read_urdf, SemanticDescription
 
-from .bus import read_bus
-from .description import read_description, read_semantic
-from .exceptions import DescriptionError, RobotError
-from .robots import Robot, SETTINGS
+from process_supervisor import (
+    EVERY_NODE,
+    namespaced_parameters,
+    parameters_by_node,
+    RosOptions,
+    StartError,
+)
+
+from .robots import (
+    BringupError,
+    DescriptionError,
+    joint_limits,
+    read_bus,
+    read_description,
+    read_semantic,
+    Robot,
+    RobotError,
+    SETTINGS,
+    START_POSITIONS,
+)
+
+if TYPE_CHECKING:
+    from arm_model import Array, RobotModel
+
+
+def motion_files(
+    robot: Robot, folder: Path, ros: RosOptions, groups: MovedGroups
+) -> Sequence[Path]:
+    """Write the parameter file for the nodes of arm_servo.
+
+    Returns:
+        The files to hand over.
+    """
+    values: dict[str, str | list[str]] = {
+        'robot_description_semantic': read_semantic(robot),
+        'joint_limits': str(robot.limits),
+        'group': groups.names[0],
+        'tip_link': robot.tip_link,
+    }
+    if others := groups.names[1:]:  # an empty list has no type in a parameter file
+        values['other_groups'] = list(others)
+    moveit_servo = {'frame_prefix': ros.frame_prefix}
+    servos = {'servo_node': {'ros__parameters': {'moveit_servo': moveit_servo}}} | {
+        f'{arm}_servo_node': {
+            'ros__parameters': {'group': arm, 'tip_link': '', 'moveit_servo': moveit_servo}
+        }
+        for arm in groups.arms[1:]
+    }
+    path = folder / 'motion.yaml'  # JSON is YAML, whatever characters are in it
+    path.write_text(
+        json.dumps(
+            {
+                EVERY_NODE: {'ros__parameters': values},
+                **{f'{EVERY_NODE}/{name}': values for name, values in servos.items()},
+            }
+        ),
+        encoding='utf-8',
+    )
+    if not robot.controllers.is_file():
+        return [path]
+    return [path, namespaced_parameters(robot.controllers, ros, folder)]
+
+
+def planning_files(
+    robot: Robot, folder: Path, ros: RosOptions, groups: MovedGroups
+) -> Sequence[Path]:
+    """Write the parameter files of :func:`motion_files`, and that of move_group's controllers.
+
+    Raises:
+        RobotError: A group is not in the description, or a file cannot be read.
+    """
+    joints = joints_of_groups(robot, groups)
+    names = controller_names(robot, groups)
+    manager: dict[str, object] = {'controller_names': list(names.values())}
+    manager |= {names[group]: {'joints': list(joints[group])} for group in groups.arms}
+    manager |= {
+        names[tool]: {'joints': list(joints[tool]), 'type': gripper_action(joints[tool])}
+        for tool in groups.tools
+    }
+    own = {'moveit_simple_controller_manager': manager, 'frame_prefix': ros.frame_prefix}
+    values = {'ros__parameters': own}
+    path = folder / 'planning.yaml'
+    path.write_text(json.dumps({f'{EVERY_NODE}/move_group': values}), encoding='utf-8')
+    return [*motion_files(robot, folder, ros, groups), path]
+
+
+def gripper_action(joints: Sequence[str]) -> str:
+    """Return the action by which a gripper of so many joints is moved, by MoveIt's name of it."""
+    return 'GripperCommand' if len(joints) == 1 else 'ParallelGripperCommand'
+
+
+def controller_names(robot: Robot, groups: MovedGroups) -> dict[str, str]:
+    """Return the name of each group's controller; controllers.yaml may name that of the first.
+
+    Raises:
+        RobotError: A file cannot be read as what it should be.
+    """
+    try:
+        table = parameters_by_node(robot.controllers) if robot.controllers.is_file() else {}
+    except StartError as error:
+        raise RobotError(f'{robot.folder}: {error}') from error
+    manager = table.get('controller_manager', {}).get('ros__parameters', {})
+    names = {group: f'{group}_controller' for group in groups.names}
+    main = groups.names[0]
+    return names | {main: str(manager.get('controller_name') or names[main])}
+
+
+@dataclass(frozen=True, slots=True)
+class StartPositions:
+    """Where simulated drives stand at power-on.
+
+    Attributes:
+        positions: Positions that are not 0, by joint, in [rad or m].
+        reason: Why they are not 0, in words.
+    """
+
+    positions: Mapping[str, float] = field(default_factory=dict)
+    reason: str = ''
+
+    def __str__(self) -> str:
+        """Return one line for the log; empty where all stand at 0."""
+        places = ', '.join(f'{name} {place:g}' for name, place in self.positions.items() if place)
+        return f'simulated drives start at {places}, because {self.reason}' if places else ''
+
+
+def start_positions(robot: Robot, urdf: str, drives: Sequence[str]) -> StartPositions:
+    """Choose where the simulated drives of a robot stand at power-on.
+
+    What robot.yaml says counts. Otherwise a group that cannot stand at 0 starts from its start
+    pose, and another drive that cannot from the middle of its range.
+
+    Raises:
+        RobotError: robot.yaml names something that is no drive, or no pose is found.
+    """
+    if robot.start_positions:
+        return StartPositions(given_positions(robot, drives), f'{SETTINGS} has {START_POSITIONS}')
+    ranges = {name: each for name, each in joint_limits(urdf).items() if name in drives}
+    positions: dict[str, float] = {}
+    reasons: list[str] = []
+    for model in _models(robot, urdf):
+        if reason := _trouble_at_zero(model):
+            positions |= _start(model)
+            reasons.append(reason)
+        for name in model.joints:
+            ranges.pop(name, None)
+    for name, each in ranges.items():
+        if reason := _outside(name, each.lower, each.upper):
+            positions[name] = 0.5 * (each.lower + each.upper)
+            reasons.append(reason)
+    return StartPositions(positions, f'at 0 {"; ".join(reasons)}' if reasons else '')
+
+
+def given_positions(robot: Robot, drives: Sequence[str]) -> Mapping[str, float]:
+    """Return the start positions that robot.yaml gives, by drive in [rad or m].
+
+    Raises:
+        RobotError: It names something that is no drive, or a pose that the SRDF does not have.
+    """
+    given = robot.start_positions
+    if isinstance(given, str):
+        return {name: at for name, at in _pose(robot, given).items() if name in drives}
+    if unknown := [name for name in given if name not in drives]:
+        raise RobotError(
+            f'{robot.folder / SETTINGS}: {START_POSITIONS}: bus.yml has no drive '
+            f'{", ".join(unknown)}; drives: {", ".join(drives)}'
+        )
+    return given
+
+
+def _pose(robot: Robot, name: str) -> Mapping[str, float]:
+    """Return a pose of the SRDF, of all groups that have one of this name."""
+    key = f'{robot.folder / SETTINGS}: {START_POSITIONS}'
+    if not robot.semantic.is_file():
+        raise RobotError(f'{key}: {name!r} is a pose of the SRDF, and there is none')
+    try:
+        poses = parse_srdf(read_semantic(robot)).poses.values()
+    except (DescriptionError, urdf_reader.DescriptionError) as error:
+        raise RobotError(f'{robot.folder}: {error}') from error
+    if not any(name in each for each in poses):
+        known = ', '.join(dict.fromkeys(pose for each in poses for pose in each)) or 'none'
+        raise RobotError(f'{key}: the SRDF has no pose {name!r}; poses: {known}')
+    return {joint: at for each in poses for joint, at in each.get(name, {}).items()}
+
+
+def _models(robot: Robot, urdf: str) -> list[RobotModel]:
+    """Return the groups that are moved; none where nothing can move them."""
+    if robot.lacking:
+        return []
+    try:
+        from arm_model import ArmError, load_limits, RobotModel
+    except ImportError:
+        return []
+    try:
+        semantic, limits = read_semantic(robot), load_limits(robot.limits)
+        groups = moved_groups(robot).names
+        return [RobotModel(urdf, semantic, limits, group) for group in groups]
+    except (ArmError, BringupError):
+        return []  # what is to move them reports it
+
+
+def _trouble_at_zero(model: RobotModel) -> str:
+    """Return why a group cannot stand at 0; empty where it can."""
+    import numpy as np
+
+    zero = np.zeros(len(model))
+    for name, lower, upper in zip(
+        model.joints, model.limits.lower, model.limits.upper, strict=True
+    ):
+        if reason := _outside(name, lower, upper):
+            return reason
+    nearest = model.nearest(zero, 0.0, 1)
+    return ' and '.join(nearest[0].links) + ' collide' if nearest else ''
+
+
+def _outside(name: str, lower: float, upper: float) -> str:
+    if lower <= 0.0 <= upper:
+        return ''
+    return f'{name} is outside its range of {lower:g} to {upper:g}'
+
+
+def _start(model: RobotModel) -> dict[str, float]:
+    from arm_model import ModelError, start_pose
+
+    try:
+        start: Array = start_pose(model)
+    except ModelError as error:
+        raise RobotError(
+            f'{error}; or say where the simulated drives start: {START_POSITIONS} in {SETTINGS}'
+        ) from error
+    return {name: float(place) for name, place in zip(model.joints, start, strict=True)}
 
 
 @dataclass(frozen=True, slots=True)

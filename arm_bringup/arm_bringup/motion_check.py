@@ -12,16 +12,58 @@ from urdf_reader import DescriptionError, find_group, KinematicTree, SemanticDes
 
 from process_supervisor import parameters_by_node, StartError
 
-from .description import read_semantic
-from .exceptions import RobotError
-from .findings import error, Finding, warning
-from .groups import choose_groups, MovedGroups
-from .motion import controller_names
-from .robots import Robot, SETTINGS
+from .groups import choose_groups, controller_names, MovedGroups
+from .robots import read_semantic, Robot, RobotError, SETTINGS
 
 if TYPE_CHECKING:
     from arm_canopen.config import AxisUnits
     from arm_model import JointLimits, RobotModel
+from dataclasses import dataclass
+from enum import Enum
+import textwrap
+
+
+class Severity(Enum):
+    """How bad it is."""
+
+    ERROR = 'error'
+    """The robot does not run, or not as it is described."""
+
+    WARNING = 'warning'
+    """It runs; something will surprise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that is wrong.
+
+    Attributes:
+        severity: How bad it is.
+        place: File, and what in it.
+        problem: What is wrong.
+        remedy: What to do.
+    """
+
+    severity: Severity
+    place: str
+    problem: str
+    remedy: str
+
+    def __str__(self) -> str:
+        """Format it in two lines or more."""
+        remedy = textwrap.indent(self.remedy, '    ')
+        return f'{self.severity.value}: {self.place}: {self.problem}\n{remedy}'
+
+
+def error(place: str, problem: str, remedy: str) -> Finding:
+    """Return an error."""
+    return Finding(Severity.ERROR, place, problem, remedy)
+
+
+def warning(place: str, problem: str, remedy: str) -> Finding:
+    """Return a warning."""
+    return Finding(Severity.WARNING, place, problem, remedy)
+
 
 LONGER = 5.0  # times the way of a stop within the limits, from which on one surprises
 START = 'ready'  # pose of the SRDF from which an arm starts

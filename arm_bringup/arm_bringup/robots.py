@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Robot folders: what makes a robot, by convention of file names.
+"""Robot folders: their files, bus and description, and the errors of this package.
 
 ::
 
@@ -15,20 +15,64 @@
       robot.yaml            optional: files of other names, xacro arguments, packages, group
 
 A robot is asked for by name, which means a folder that this package installs, or by a path, which
-means a folder of the user's own.
+means a folder of the user's own. Files of others are taken as they are: what a xacro file includes
+for ros2_control or Gazebo is left out where it is not installed, because the drives are on a
+CANopen bus here.
+
+::
+
+    BringupError
+    ├── RobotError (ValueError)   a robot folder is unknown or incomplete; lists what there is
+    ├── DescriptionError (ValueError)   a xacro file cannot be expanded, or its URDF is not usable
+    └── WaveError (ValueError)    the wave cannot be planned within the limits of a joint
+
+What cannot be started, or refuses, raises the errors of ``process_supervisor``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 import os
 from pathlib import Path
-from typing import Any
+import re
+from typing import Any, TYPE_CHECKING
 
+import urdf_reader
+from urdf_reader import JointRange, read_urdf
 import yaml
 
-from .exceptions import RobotError
+from process_supervisor import RosOptions
+
+if TYPE_CHECKING:
+    from arm_canopen import BusConfig, NodeConfig
+
+
+class BringupError(Exception):
+    """Root of all errors of this package."""
+
+
+class RobotError(BringupError, ValueError):
+    """A robot folder is unknown or incomplete.
+
+    Scenarios: a name misspelt, a folder without bus.yml, a bus.yml whose EDS is missing.
+    """
+
+
+class DescriptionError(BringupError, ValueError):
+    """A xacro file cannot be expanded, or the URDF that it makes is not usable.
+
+    Scenarios: malformed XML, an undefined xacro property, a movable joint without limits.
+    """
+
+
+class WaveError(BringupError, ValueError):
+    """The wave cannot be planned within the limits of a joint.
+
+    Scenarios: a joint's range is narrower than the margins, its velocity limit is zero.
+    """
+
 
 BUS_CONFIG = 'bus.yml'  # name of the bus configuration in a robot folder
 SETTINGS = 'robot.yaml'  # name of the file with what the names of files do not say
@@ -45,38 +89,30 @@ GROUP = 'group'  # key of one group, or of a list
 START_POSITIONS = 'start_positions'  # key of the positions of simulated drives at power-on
 KEYS = (*FILES, *TABLES, *WORDS, GROUP, START_POSITIONS)
 """All keys of :data:`SETTINGS`."""
+INTERPOLATED_POSITION = 7  # mode of operation (CiA 402-2, 0x6060)
+RELATIVE_MESH = re.compile(r'(<mesh\b[^>]*\bfilename\s*=\s*["\'])(?![a-z]+://|/)([^"\']+)')
+"""Meshes beside the description, which the nodes that read it would not find."""
 
 
 @dataclass(frozen=True, slots=True)
 class Robot:
     """A complete robot folder.
 
-    Attributes:
-        name: Name of the folder.
-        bus_config: Its bus.yml.
-        description: Its URDF or xacro file.
-        semantic: Its SRDF, if it is there.
-        limits: Its limits of motion, if they are there.
-        controllers: Parameters of the nodes that move it, if they are there.
-        xacro_args: Values for the xacro arguments of description and SRDF.
-        packages: Folders of packages that are not in AMENT_PREFIX_PATH, by name.
-        groups: Groups of the SRDF that are moved; empty takes all arms of it.
-        tip_link: Link that is moved; empty takes the end of the first group.
-        start_positions: Where simulated drives stand at power-on, by name, in [rad or m]; or the
-            name of a pose of the SRDF.
+    Files that are optional may not be there.
     """
 
-    name: str
+    name: str  # of the folder
     bus_config: Path
     description: Path
     semantic: Path = Path()
     limits: Path = Path()
     controllers: Path = Path()
-    xacro_args: Mapping[str, str] = field(default_factory=dict)
-    packages: Mapping[str, Path] = field(default_factory=dict)
-    groups: tuple[str, ...] = ()
-    tip_link: str = ''
+    xacro_args: Mapping[str, str] = field(default_factory=dict)  # of description and SRDF
+    packages: Mapping[str, Path] = field(default_factory=dict)  # not in AMENT_PREFIX_PATH
+    groups: tuple[str, ...] = ()  # of the SRDF that are moved; empty takes all arms of it
+    tip_link: str = ''  # that is moved; empty takes the end of the first group
     start_positions: Mapping[str, float] | str = field(default_factory=dict)
+    """Of simulated drives at power-on, by name, in [rad or m]; or a pose of the SRDF."""
 
     @property
     def folder(self) -> Path:
@@ -218,3 +254,140 @@ def _word(path: Path, key: str, value: object) -> str:
     if not isinstance(value, (str, int, float)):
         raise RobotError(f'{path}: {key}: {value!r} is no text or number')
     return str(value)
+
+
+def read_bus(robot: Robot) -> BusConfig:
+    """Read the bus.yml of a robot, and so find its mistakes before anything is started.
+
+    Returns:
+        Its bus, with one drive at least.
+
+    Raises:
+        RobotError: The file, or an EDS that it names, is wrong; the message says where and what.
+    """
+    from arm_canopen import CanopenError, load_bus
+
+    try:
+        bus = load_bus(robot.bus_config)
+    except CanopenError as error:
+        raise RobotError(str(error)) from error
+    if not bus.joints:
+        raise RobotError(f'{robot.bus_config} has no drive (a node with a Cia402 driver)')
+    return bus
+
+
+def in_namespace_of_bus(ros: RosOptions, bus: BusConfig) -> RosOptions:
+    """Use the namespace of bus.yml for all nodes, unless the command line has one.
+
+    Raises:
+        RobotError: Its nodes are in several.
+    """
+    named = [bus.master.namespace, *(node.namespace for node in bus.nodes)]
+    given = {namespace.strip('/') for namespace in named} - {''}
+    if len(given) > 1 and not ros.namespace:
+        raise RobotError(
+            f'bus.yml puts its nodes into several namespaces ({", ".join(sorted(given))}); '
+            'choose one for all with --namespace'
+        )
+    return ros.within(next(iter(given), ''))
+
+
+def stream_mode_service(bus: BusConfig) -> str:
+    """Name the service for the mode of streams: what bus.yml asks for, else cyclic position."""
+    drives: list[NodeConfig] = [node for node in bus.nodes if node.is_drive]
+    if all(drive.drive.position_mode == INTERPOLATED_POSITION for drive in drives):
+        return 'interpolated_position_mode'
+    return 'cyclic_position_mode'
+
+
+def read_description(robot: Robot) -> str:
+    """Return the URDF of a robot as XML text.
+
+    Raises:
+        DescriptionError: The file cannot be read or expanded.
+    """
+    urdf = _located(_read(robot.description, robot), robot.packages)
+    return RELATIVE_MESH.sub(
+        lambda found: found[1] + (robot.description.parent / found[2]).resolve().as_uri(), urdf
+    )
+
+
+def read_semantic(robot: Robot) -> str:
+    """Return the SRDF of a robot as XML text.
+
+    Raises:
+        DescriptionError: The file cannot be read or expanded.
+    """
+    return _read(robot.semantic, robot)
+
+
+def _read(path: Path, robot: Robot) -> str:
+    if path.suffix == '.xacro':
+        changed = path.stat().st_mtime_ns if path.is_file() else 0
+        given = (tuple(each.items()) for each in (robot.xacro_args, robot.packages))
+        return _expanded(path, changed, *given)
+    try:
+        return path.read_text(encoding='utf-8')
+    except (OSError, UnicodeDecodeError) as error:
+        raise DescriptionError(f'{path}: {error}') from error
+
+
+@lru_cache(maxsize=4)
+def _expanded(
+    path: Path,
+    changed: int,
+    arguments: tuple[tuple[str, str], ...],
+    packages: tuple[tuple[str, Path], ...],
+) -> str:
+    """Expand a xacro file once as long as it does not change: it takes a tenth of a second."""
+    del changed
+    return expand_xacro(path, dict(arguments), dict(packages))
+
+
+def _located(urdf: str, packages: Mapping[str, Path]) -> str:
+    """Replace ``package://`` of packages that only this robot folder knows by their folders."""
+    for name, folder in packages.items():
+        urdf = urdf.replace(f'package://{name}/', f'{folder.as_uri()}/')
+    return urdf
+
+
+def expand_xacro(
+    path: Path,
+    arguments: Mapping[str, str] | None = None,
+    packages: Mapping[str, Path] | None = None,
+) -> str:
+    """Expand a xacro file.
+
+    Args:
+        path: The xacro file.
+        arguments: Values for its xacro arguments.
+        packages: Folders of packages that are not in AMENT_PREFIX_PATH, by name.
+
+    Returns:
+        What it makes, as XML text.
+
+    Raises:
+        DescriptionError: The file cannot be expanded; the message is xacro's own, or names the
+            package or argument that is missing and the remedy.
+    """
+    try:
+        return urdf_reader.expand_xacro(path, arguments, packages)
+    except urdf_reader.XacroError as error:
+        remedy = ''
+        if error.package:
+            remedy = f', or give its folder in {SETTINGS} (packages: {{{error.package}: FOLDER}})'
+        elif error.argument:
+            remedy = f', or in {SETTINGS} (xacro_args: {{{error.argument}: VALUE}})'
+        raise DescriptionError(f'{error}{remedy}') from error
+
+
+def joint_limits(urdf: str) -> dict[str, JointRange]:
+    """Read the limits of all joints that move by themselves, in the order of the URDF.
+
+    Raises:
+        DescriptionError: The text is no URDF, or a joint lacks its limits.
+    """
+    try:
+        return read_urdf(urdf).ranges()
+    except urdf_reader.DescriptionError as error:
+        raise DescriptionError(str(error)) from error

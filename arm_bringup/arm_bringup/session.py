@@ -1,13 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What bring-up and demo have in common: from the command line to a list of processes."""
+"""What bring-up and demos have in common: from the command line to a list of processes."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator, Mapping, Sequence
 import contextlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 import os
 from pathlib import Path
 
@@ -18,21 +19,42 @@ from process_supervisor import (
     exclusive,
     Executable,
     find_executable,
+    FindExecutable,
+    node_process,
     ProcessSpec,
     RosOptions,
     StartError,
+    state_publisher,
+    view_process,
     write_parameters,
 )
 from process_supervisor.ros_options import add_network, add_timeout, apply_network
 
-from .bus import in_namespace_of_bus, read_bus, stream_mode_service
-from .description import read_description
-from .exceptions import RobotError
-from .groups import moved_groups
-from .robots import find_robot, installed_robots_folder, Robot, robot_names
-from .stack import arm_processes, Stack
-from .start_positions import start_positions, StartPositions
+from .groups import moved_groups, start_positions, StartPositions
+from .robots import (
+    find_robot,
+    in_namespace_of_bus,
+    installed_robots_folder,
+    read_bus,
+    read_description,
+    Robot,
+    robot_names,
+    RobotError,
+    stream_mode_service,
+)
 
+MASTER = Executable('arm_canopen', 'master')
+"""What runs the bus unless something else is asked for."""
+MOTION_NODE = Executable('arm_servo', 'motion_node')
+"""Trajectories and jogging: with the master in it, or for drives that another process has."""
+PLANNER = Executable('arm_planning', 'move_group')
+"""Motions among obstacles, for clients of MoveIt."""
+SLAVES = Executable('canopen_sim', 'fake_slaves')  # simulated drives
+
+MAKE_MOVE = 'build arm_servo (make build) for trajectories and jogging'
+
+MASTER_FIRST, THEN_LISTENERS, SLAVES_LAST = range(3)
+"""Order of stopping: the master disables the drives, so they must still be there."""
 REAL_BUS = 'can0'
 """Bus without --can on hardware: never one on which only simulated drives could be."""
 SIMULATED_BUS = 'auto'
@@ -41,27 +63,110 @@ BUS_REMEDY = 'another bus with --can'  # what a second bring-up on a bus is advi
 
 
 @dataclass(frozen=True, slots=True)
-class Session:
-    """An arm that is about to be brought up.
-
-    Attributes:
-        robot: The robot.
-        bus: Name of its CAN bus, no longer ``auto``.
-        drives: Names of its drives, in the order of bus.yml.
-        ros: Options of all nodes.
-        mode_service: Service that selects the mode in which all of them follow a stream.
-        urdf: Its description.
-        start: Where the simulated drives stand at power-on, and why, for the log.
-        processes: What is to be run.
-    """
+class Stack:
+    """What is to be brought up."""
 
     robot: Robot
-    bus: str
-    drives: list[str]
-    ros: RosOptions
-    mode_service: str
+    bus: str  # name of the CAN bus
+    simulate: bool  # with simulated slaves for all devices of the bus
+    start_positions: Mapping[str, float] = field(default_factory=dict)  # if not 0, [rad or m]
+    ready_timeout: float = 30.0  # of each process in [s]
+    master: Executable = MASTER  # what runs the bus
+    master_parameters: Mapping[str, str] = field(default_factory=dict)  # beside the usual ones
+    master_files: Sequence[Path] = ()  # with parameters, beside the usual one
+    ros: RosOptions = field(default_factory=RosOptions)  # of all nodes
+    plan: bool = False  # with move_group, which has the files of the master
+    view: bool = False  # with the page on which the robot is seen
+
+
+def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
+    """Return the processes that make an arm; they start side by side.
+
+    Raises:
+        StartError: An executable is missing.
+    """
+    make = partial(node_process, find=find, ros=stack.ros, ready_timeout=stack.ready_timeout)
+    bus = {'bus_config': str(stack.robot.bus_config), 'can_interface_name': stack.bus}
+    own = {'backend': 'canopen'} if stack.master == MOTION_NODE else {'robot_joint_states': 'true'}
+    files = (parameters, *stack.master_files)
+    processes: list[ProcessSpec | None] = []
+    if stack.simulate:
+        places = {f'positions.{name}': f'{at!r}' for name, at in stack.start_positions.items()}
+        processes.append(make('slaves', SLAVES, values={**bus, **places}, stop_order=SLAVES_LAST))
+    processes += [
+        make(
+            'master',
+            stack.master,
+            values={**bus, **own, **stack.master_parameters},
+            parameters=files,
+            stop_order=MASTER_FIRST,
+        ),
+        state_publisher(  # without it the arm moves without TF
+            parameters, find, stack.ros, ready_timeout=stack.ready_timeout, order=THEN_LISTENERS
+        ),
+    ]
+    if stack.plan:
+        processes.append(make('planner', PLANNER, parameters=files, stop_order=THEN_LISTENERS))
+    if stack.view:
+        timeout = stack.ready_timeout
+        view = view_process(find, stack.ros, ready_timeout=timeout, stop_order=THEN_LISTENERS)
+        processes.append(view)
+    return [spec for spec in processes if spec is not None]
+
+
+def controller_process(
+    files: Sequence[Path],
+    parameters: Path,
+    ready_timeout: float,
+    find: FindExecutable,
+    ros: RosOptions,
+) -> ProcessSpec:
+    """Return the process that moves drives of another process; that one makes /tf, too.
+
+    Raises:
+        StartError: An executable is missing.
+    """
+    return node_process(
+        'controller',
+        MOTION_NODE,
+        find,
+        ros,
+        values={'backend': 'topics'},
+        parameters=(parameters, *files),
+        ready_timeout=ready_timeout,
+        stop_order=MASTER_FIRST,
+    )
+
+
+def choose_master(robot: Robot, find: FindExecutable) -> tuple[Executable, str]:
+    """Choose what runs the bus.
+
+    Returns:
+        The executable, and in words why it offers no motion; empty when it does.
+    """
+    if find(MOTION_NODE.package, MOTION_NODE.name) is None:
+        return MASTER, MAKE_MOVE
+    if robot.lacking:
+        return MASTER, f'{robot.name} lacks {robot.lacking} for trajectories and jogging'
+    return MOTION_NODE, ''
+
+
+def enabling_services(drives: Sequence[str], mode_service: str) -> list[list[str]]:
+    """Return the services that enable drives; each group is called side by side, one by one."""
+    return [[f'{drive}/{name}' for drive in drives] for name in ('init', mode_service)]
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """An arm that is about to be brought up."""
+
+    robot: Robot
+    bus: str  # name of its CAN bus, no longer ``auto``
+    drives: list[str]  # in the order of bus.yml
+    ros: RosOptions  # of all nodes
+    mode_service: str  # selects the mode in which all of them follow a stream
     urdf: str
-    start: str
+    start: str  # where the simulated drives stand at power-on, and why, for the log
     processes: list[ProcessSpec]
 
 
@@ -194,14 +299,7 @@ def session(
 ) -> Iterator[Session]:
     """Prepare a bring-up; the bus and the namespace are its own as long as the block runs.
 
-    Args:
-        arguments: What :func:`add_arguments` parsed.
-        ros: Options of all nodes.
-        simulate: With simulated slaves.
-        master: What runs the bus.
-        master_parameters: ROS parameters for it beside the usual ones.
-        master_files: Makes parameter files for it, in a folder that lasts as long as the block.
-        plan: With move_group.
+    Args as in :class:`Stack`; ``master_files`` makes files in a folder that lasts as long.
 
     Raises:
         RobotError: The robot folder is unknown or incomplete.

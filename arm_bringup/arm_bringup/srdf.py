@@ -11,8 +11,7 @@ import sys
 
 from process_supervisor import USAGE_ERROR
 
-from .description import expand_xacro, read_description, read_semantic
-from .exceptions import BringupError
+from .robots import BringupError, expand_xacro, read_description, read_semantic
 from .session import add_robot, locate, robots_epilog
 
 MIN_SAMPLES = 1000  # poses at least: with fewer, `never` would say nothing

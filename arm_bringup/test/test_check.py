@@ -12,13 +12,10 @@ import pytest
 from two_arms import write_two_arms
 import yaml
 
-from arm_bringup.bus import in_namespace_of_bus, read_bus
 from arm_bringup.check import check_robot, main
-from arm_bringup.exceptions import RobotError
-from arm_bringup.findings import Severity
-from arm_bringup.groups import moved_groups
-from arm_bringup.motion import controller_names
-from arm_bringup.robots import find_robot, Robot
+from arm_bringup.groups import controller_names, moved_groups
+from arm_bringup.motion_check import Severity
+from arm_bringup.robots import find_robot, in_namespace_of_bus, read_bus, Robot, RobotError
 from process_supervisor import RosOptions
 
 pytestmark = pytest.mark.slow

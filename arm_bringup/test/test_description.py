@@ -11,8 +11,7 @@ from xml.etree import ElementTree as ET
 from model_robots import forward, numbers, transform
 import pytest
 
-from arm_bringup.description import expand_xacro, joint_limits
-from arm_bringup.exceptions import DescriptionError
+from arm_bringup.robots import DescriptionError, expand_xacro, joint_limits
 
 pytestmark = pytest.mark.slow
 

@@ -23,7 +23,7 @@ from urdf_reader import JointRange
 
 from arm_bringup.examples.arm import ArmDemo
 from arm_bringup.examples.wave import Axis, MAX_VELOCITY, quintic_step
-from arm_bringup.exceptions import WaveError
+from arm_bringup.robots import WaveError
 from arm_bringup.session import locate
 
 pytestmark = pytest.mark.slow
@@ -101,7 +101,7 @@ def test_speed_is_that_of_the_cycles_however_late_they_are() -> None:
 def test_a_cell_suits_its_robot(name: str) -> None:
     """Home, and both poses above the part, are free of the pillar; the tip looks down."""
     plan = pytest.importorskip('arm_bringup.examples.plan')
-    from arm_bringup.description import read_description, read_semantic
+    from arm_bringup.robots import read_description, read_semantic
     from arm_model import load_limits, RobotModel, start_pose
 
     robot = locate(argparse.Namespace(robot=name, group=[], xacro_arg=[]))

@@ -15,11 +15,17 @@ import urdf_reader
 from urdf_reader import parse_srdf, read_urdf
 
 from arm_bringup.bringup import parse
-from arm_bringup.description import expand_xacro, read_description, read_semantic
 from arm_bringup.examples.wave import waving_joints
-from arm_bringup.exceptions import DescriptionError, RobotError
 from arm_bringup.groups import choose_groups, moved_groups, MovedGroups
-from arm_bringup.robots import find_robot, Robot
+from arm_bringup.robots import (
+    DescriptionError,
+    expand_xacro,
+    find_robot,
+    read_description,
+    read_semantic,
+    Robot,
+    RobotError,
+)
 from arm_bringup.session import locate
 
 XACRO = 'xmlns:xacro="http://wiki.ros.org/xacro"'

@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 from model_robots import forward
 import pytest
 
-from arm_bringup.description import expand_xacro, joint_limits
+from arm_bringup.robots import expand_xacro, joint_limits
 
 FILE = Path(__file__).parents[1] / 'robots' / 'prbt' / 'prbt.urdf.xacro'
 HALF_PI = math.pi / 2

@@ -10,9 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from arm_bringup.bus import read_bus, stream_mode_service
-from arm_bringup.exceptions import RobotError
-from arm_bringup.robots import find_robot, robot_names
+from arm_bringup.robots import find_robot, read_bus, robot_names, RobotError, stream_mode_service
 from arm_canopen import load_bus
 
 ROBOTS = Path(__file__).parents[1] / 'robots'

@@ -16,7 +16,7 @@ from rclpy.node import Node
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from arm_bringup.enabling import enabling
+from arm_bringup.bringup import enabling
 from arm_bringup.service_client import ServiceClient
 from node_runner import LATCHED, spin
 from process_supervisor import CallError

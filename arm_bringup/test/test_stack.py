@@ -12,10 +12,17 @@ from rclpy.context import Context
 from rclpy.node import Node
 import yaml
 
-from arm_bringup.groups import MovedGroups
-from arm_bringup.motion import choose_master, MAKE_MOVE, motion_files, planning_files
+from arm_bringup.groups import motion_files, MovedGroups, planning_files
 from arm_bringup.robots import Robot
-from arm_bringup.stack import arm_processes, controller_process, MASTER, MOTION_NODE, Stack
+from arm_bringup.session import (
+    arm_processes,
+    choose_master,
+    controller_process,
+    MAKE_MOVE,
+    MASTER,
+    MOTION_NODE,
+    Stack,
+)
 from node_runner import init_ros
 from process_supervisor import EVERY_NODE, Executable, ProcessSpec, RosOptions, StartError
 

@@ -9,13 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from arm_bringup.bus import read_bus
 from arm_bringup.check import check_robot
-from arm_bringup.description import read_description
-from arm_bringup.exceptions import RobotError
-from arm_bringup.robots import find_robot, Robot
-from arm_bringup.stack import arm_processes, Stack
-from arm_bringup.start_positions import start_positions, StartPositions
+from arm_bringup.groups import start_positions, StartPositions
+from arm_bringup.robots import find_robot, read_bus, read_description, Robot, RobotError
+from arm_bringup.session import arm_processes, Stack
 from arm_model import frozen, load_limits, RobotModel
 
 pytestmark = pytest.mark.slow

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 import re
 
-from arm_bringup.description import expand_xacro
+from arm_bringup.robots import expand_xacro
 from arm_model import example_files
 
 BANNER = re.compile(r'(<!-- [=|].*-->\n)+')  # of xacro, with the path of the source

@@ -22,8 +22,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # before numpy is imported
 
 import numpy as np
 
-from arm_bringup.description import expand_xacro
-from arm_bringup.robots import installed_robots_folder
+from arm_bringup.robots import expand_xacro, installed_robots_folder
 from arm_model import Box, Clearances, CollisionObject, load_limits, Pose, RobotModel
 
 CYCLE = 0.001  # period of the cycle in [s]

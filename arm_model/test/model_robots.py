@@ -13,7 +13,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
-from arm_bringup.description import expand_xacro
+from arm_bringup.robots import expand_xacro
 from arm_model import Array, frozen, load_limits, RobotModel
 
 Matrix = NDArray[np.float64]

@@ -41,8 +41,7 @@ import numpy as np
 import pinocchio as pin
 from planning_problems import KINDS, panda, Problem, problem, PROBLEMS
 
-from arm_bringup.description import expand_xacro
-from arm_bringup.robots import installed_robots_folder
+from arm_bringup.robots import expand_xacro, installed_robots_folder
 from arm_model import (
     Array,
     Box,

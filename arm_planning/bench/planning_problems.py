@@ -9,8 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from arm_bringup.description import expand_xacro
-from arm_bringup.robots import installed_robots_folder
+from arm_bringup.robots import expand_xacro, installed_robots_folder
 from arm_model import (
     Array,
     Box,

@@ -10,8 +10,7 @@ import re
 import numpy as np
 import pinocchio as pin
 
-from arm_bringup.description import expand_xacro
-from arm_bringup.robots import installed_robots_folder
+from arm_bringup.robots import expand_xacro, installed_robots_folder
 from arm_model import Array, frozen, load_limits, RobotModel
 
 ROBOTS = ('panda', 'prbt', 'gp110')

@@ -12,10 +12,8 @@ from builtin_interfaces.msg import Time
 import pytest
 from sensor_msgs.msg import JointState
 
-from robot_viewer.nodes import judge as judge_module
-from robot_viewer.nodes import watch as watch_module
-from robot_viewer.nodes.judge import Judge
-from robot_viewer.nodes.watch import Watch
+from robot_viewer.nodes import state
+from robot_viewer.nodes.state import Judge, Watch
 from robot_viewer.robot_state import Stop
 
 PERIOD = 0.05  # [s]
@@ -26,8 +24,7 @@ class Bench:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now = 100.0
-        for module in (judge_module, watch_module):
-            monkeypatch.setattr(module, 'time', SimpleNamespace(monotonic=lambda: self.now))
+        monkeypatch.setattr(state, 'time', SimpleNamespace(monotonic=lambda: self.now))
         self.sentences: list[str] = []
         self.live = SimpleNamespace(held='', holder=0, stop=lambda: None)
         page: Any = SimpleNamespace(live=self.live, last='', watched=False)
@@ -73,7 +70,7 @@ def test_what_the_page_has_moved_is_no_program(bench: Bench) -> None:
     assert bench.look(1.0, 0.0).startswith('READY')
     assert bench.look(0.1, 0.2) == 'MOVING: A program moves it.'
     assert 'executed' in bench.look(1.0, 0.2, 'The plan is executed.')
-    assert bench.look(judge_module.COAST_TIME + 0.1, 0.2) == 'MOVING: A program moves it.'
+    assert bench.look(state.COAST_TIME + 0.1, 0.2) == 'MOVING: A program moves it.'
     bench.calls.running = 'Home joint1'
     assert 'Home joint1 was pressed' in bench.look(0.2, 0.2)
 

@@ -24,21 +24,19 @@ from urdf_reader import about, DescriptionError, link_poses, read_urdf, Transfor
 from urdf_robots import ARM, POSITIONS, random_urdfs
 
 from robot_viewer.nodes.motion_plan import (
+    box_message,
+    changed,
     LINE_POINTS,
+    moved_message,
     PAUSE,
     plan_groups,
     PlannedMotion,
-    SHOWINGS,
-    tip_line,
-)
-from robot_viewer.nodes.planning_messages import (
-    box_message,
-    changed,
-    moved_message,
     pose_message,
     refusal,
     removed_message,
     SceneObject,
+    SHOWINGS,
+    tip_line,
 )
 from robot_viewer.nodes.planning_scene import draw_object
 from robot_viewer.page.robot_scene import links_beyond, moved

@@ -29,8 +29,8 @@ from viewer_rig import in_domain, ViewerRig
 
 from node_runner import LATCHED
 from node_runner.action_goals import Ending, GoalServer, ServedGoal
+from robot_viewer.nodes.motion_plan import changed, SceneObject
 from robot_viewer.nodes.motion_planning import ANSWER_TIME, DRAGGED, NO_GOAL, PlanPanel
-from robot_viewer.nodes.planning_messages import changed, SceneObject
 from robot_viewer.page.robot_page import RobotPage
 
 pytestmark = pytest.mark.scenario

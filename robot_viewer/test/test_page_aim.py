@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from robot_viewer.page.diagnose import drive_html
-from robot_viewer.page.target_panel import (
+from robot_viewer.page.jog_panel import (
     GREATEST_ACCELERATION,
     History,
     KEPT,
@@ -18,6 +17,7 @@ from robot_viewer.page.target_panel import (
     SHORTEST,
     STEP,
 )
+from robot_viewer.page.style import drive_html
 
 
 @given(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(0.1, 3.0), st.floats(0.05, 1.0))

@@ -19,12 +19,10 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 from websockets.typing import Origin, Subprotocol
 
-from robot_viewer.loopback import binding_problem
-from robot_viewer.page import overlay
-from robot_viewer.page.gate import COOKIE, Gate
+from robot_viewer.page import gate
+from robot_viewer.page.gate import binding_problem, COOKIE, Gate, Overlay, STOP_HEADER
 from robot_viewer.page.jog_panel import Actions
 from robot_viewer.page.live import Live, LIVE_PATH
-from robot_viewer.page.overlay import Overlay, STOP_HEADER
 from robot_viewer.page.robot_page import RobotPage
 from robot_viewer.robot_state import Stop
 
@@ -144,7 +142,7 @@ def test_only_a_robot_that_confirms_has_stopped(
     expected: tuple[int, str],
 ) -> None:
     """That the page's own process has the request says nothing of the robot."""
-    monkeypatch.setattr(overlay, 'ANSWER_TIMEOUT', 0.1)
+    monkeypatch.setattr(gate, 'ANSWER_TIMEOUT', 0.1)
     actions.answer = answer
     assert get(page, '/stop', **{STOP_HEADER: '1'})[:2] == expected
 

@@ -24,17 +24,19 @@ from viewer_rig import in_domain, ViewerRig
 
 from node_runner import LATCHED
 from quad_msgs.msg import FootContacts
-from robot_viewer.nodes.body import Body, BodyPanel, DOWN_COLOR
-from robot_viewer.page.robot_page import RobotPage
-from robot_viewer.page.standing import (
+from robot_viewer.nodes.body import (
     battery_text,
+    Body,
+    BodyPanel,
     Contacts,
-    feet_of,
+    DOWN_COLOR,
     horizon_html,
     roll_pitch,
     SOURCES,
     support,
 )
+from robot_viewer.page.robot_page import RobotPage
+from robot_viewer.page.robot_scene import feet_of
 
 LEVEL = (0.0, 0.0, 0.0, 1.0)
 LEGS = {'fl': (0.1, 0.1), 'fr': (0.1, -0.1), 'rl': (-0.1, 0.1), 'rr': (-0.1, -0.1)}

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import pytest
 
-from robot_viewer.robots import of_robot
+from robot_viewer.nodes.interfaces import of_robot
 
 TOPICS = ['/robot_description', '/left/robot_description', '/tf', '/left/joint_states']
 NODES = ['/joint1', '/left/joint1', '/left/wrist/joint2', '/leftover/joint1']

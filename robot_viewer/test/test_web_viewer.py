@@ -40,11 +40,11 @@ from viser import GuiEvent
 
 from node_runner import LATCHED, ParameterError
 from robot_viewer.nodes import controllers as controllers_module
-from robot_viewer.nodes import listening, watch, web_viewer
+from robot_viewer.nodes import interfaces, state, web_viewer
 from robot_viewer.nodes.controllers import Controller
 from robot_viewer.nodes.web_viewer import WebViewer
+from robot_viewer.page.jog_panel import TargetPanel
 from robot_viewer.page.robot_page import RobotPage
-from robot_viewer.page.target_panel import TargetPanel
 from robot_viewer.robot_state import ALLOW, Stop
 
 pytestmark = pytest.mark.scenario
@@ -328,7 +328,7 @@ def test_who_does_not_look_takes_no_messages(
         return [robot.node.count_subscribers(topic) for topic in topics]
 
     robot.spin_until(lambda: listeners() == [2, 1, 1], 'subscriptions')
-    monkeypatch.setattr(listening, 'LINGER', 0.1)
+    monkeypatch.setattr(interfaces, 'LINGER', 0.1)
     opened.append(False)
     robot.spin_until(lambda: listeners() == [1, 0, 1], 'their end')
     robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
@@ -570,7 +570,7 @@ def test_a_robot_that_is_out_of_reach_is_said_to_be(
     robot.node.destroy_publisher(states)  # as a link that was cut for long looks
     robot.spin_until(lambda: not robot.node.count_publishers('joint_states'), 'its end')
     opened.append(False)
-    monkeypatch.setattr(listening, 'LINGER', 0.1)
+    monkeypatch.setattr(interfaces, 'LINGER', 0.1)
     robot.spin_until(lambda: robot.node.count_subscribers('joint_states') == 1, 'a closed page')
     opened.append(True)
     robot.spin_until(gone, 'the words again')
@@ -792,7 +792,7 @@ def test_nothing_that_the_robot_sends_ends_the_page(
         return 'a level of nobody' in robot.viewer.page._statuses.content
 
     robot.spin_until(shown, 'the status')
-    monkeypatch.setattr(watch, 'STATUS_AGE', 0.1)
+    monkeypatch.setattr(state, 'STATUS_AGE', 0.1)
     page = robot.viewer.page
     gone = 'unknown for 0 s; before: a level of nobody'
     robot.spin_until(lambda: gone in page._statuses.content, 'its age')

@@ -14,7 +14,7 @@ import sys
 
 from process_supervisor import USAGE_ERROR
 
-from ..motion import MAKE_MOVE
+from ..session import MAKE_MOVE
 
 
 def motion_demo(argv: Sequence[str] | None = None) -> int:

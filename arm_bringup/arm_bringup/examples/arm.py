@@ -33,22 +33,20 @@ from process_supervisor import (
 from process_supervisor.demo import Demo, make_table, REFRESH_PERIOD, run_demo, signed
 from process_supervisor.ros_options import seconds_from
 
-from ..description import joint_limits
-from ..enabling import enabling_services
-from ..exceptions import BringupError, RobotError
 from ..groups import moved_groups, MovedGroups
-from ..robots import Robot
+from ..robots import BringupError, joint_limits, Robot, RobotError
 from ..service_client import ServiceClient
 from ..session import (
     add_arguments,
+    enabling_services,
     locate,
+    MASTER,
     no_files,
     robots_epilog,
     Session,
     session,
     SIMULATED_BUS,
 )
-from ..stack import MASTER
 
 ANSWER_TIMEOUT = 30.0  # longest time for an answer in [s]
 QUEUE = 5

@@ -32,13 +32,10 @@ from node_runner import LATCHED
 from node_runner.action_goals import GoalClient
 from process_supervisor import CallError, namespaced_parameters, RosOptions
 
-from ..description import read_semantic
-from ..groups import MovedGroups
-from ..motion import controller_names, motion_files
-from ..robots import Robot
+from ..groups import controller_names, motion_files, MovedGroups
+from ..robots import read_semantic, Robot
 from ..service_client import ServiceClient
-from ..session import Session
-from ..stack import MOTION_NODE
+from ..session import MOTION_NODE, Session
 from .arm import ActionRun, ArmDemo, EndRequested, number, parse, QUEUE, run
 
 RATE = 100.0  # rate of the controller's states in [Hz]

@@ -50,14 +50,10 @@ from node_runner import LATCHED
 from node_runner.action_goals import GoalClient
 from process_supervisor import CallError, namespaced_parameters, RosOptions
 
-from ..description import read_semantic
-from ..exceptions import RobotError
-from ..groups import MovedGroups
-from ..motion import controller_names, planning_files
-from ..robots import Robot
+from ..groups import controller_names, MovedGroups, planning_files
+from ..robots import read_semantic, Robot, RobotError
 from ..service_client import ServiceClient
-from ..session import locate, Session
-from ..stack import MOTION_NODE
+from ..session import locate, MOTION_NODE, Session
 from .arm import ActionRun, ANSWER_TIMEOUT, ArmDemo, EndRequested, parse, QUEUE, run
 
 SLOW, CAREFUL, FREE = 0.1, 0.2, 0.5

@@ -21,10 +21,8 @@ import time
 from std_msgs.msg import Float64
 from urdf_reader import JointRange
 
-from ..description import joint_limits
-from ..exceptions import WaveError
 from ..groups import joints_of_groups, moved_groups, MovedGroups
-from ..robots import Robot
+from ..robots import joint_limits, Robot, WaveError
 from ..service_client import ServiceClient
 from ..session import Session
 from .arm import ArmDemo, known, number, parse, run

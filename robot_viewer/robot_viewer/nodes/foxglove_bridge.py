@@ -47,8 +47,8 @@ from node_runner import (
     run_program,
 )
 
-from ..loopback import is_loopback, shown_host
-from .serving import serve
+from ..page.gate import is_loopback, shown_host
+from .interfaces import serve
 
 NAME = 'foxglove_bridge'
 NICENESS = 10

@@ -1,21 +1,256 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What can be planned for, and what was planned; no browser, no ROS."""
+"""What can be planned for, what was planned, and what is in the way, in MoveIt's messages.
+
+The package needs none of these messages where nothing is planned.
+"""
 
 from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, TypeAlias
 
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 from urdf_reader import (
     DescriptionError,
     find_group,
     KinematicTree,
     link_poses,
     parse_srdf,
+    Transform,
     Vector,
 )
+
+Message: TypeAlias = Any
+"""Messages have no types."""
+
+PLANNING_TIME = 5.0
+"""That is allowed in [s]."""
+JOINT_TOLERANCE, PLACE_TOLERANCE, TURN_TOLERANCE = 1e-3, 1e-3, 1e-2
+"""Of goals in [rad] or [m], in [m] and in [rad]."""
+SHAPES = ('primitives', 'primitive_poses', 'meshes', 'mesh_poses')
+"""Fields of a moveit_msgs/CollisionObject that are shown."""
+
+
+def plan_goal(
+    group: PlanGroup, goal: Mapping[str, float] | Transform, frame: str, share: float
+) -> Message:
+    """Return a moveit_msgs/MoveGroup goal that is planned, and not executed.
+
+    Args:
+        group: What moves.
+        goal: Positions of its joints in [rad] or [m], or the pose of its tip.
+        frame: The root link, in which that pose is.
+        share: Of the greatest velocity and acceleration, above 0 to 1.
+    """
+    moveit = import_module('moveit_msgs.msg')
+    message = import_module('moveit_msgs.action').MoveGroup.Goal()
+    request, options = message.request, message.planning_options
+    request.group_name, request.num_planning_attempts = group.name, 1
+    request.allowed_planning_time = PLANNING_TIME
+    request.max_velocity_scaling_factor = request.max_acceleration_scaling_factor = share
+    request.start_state.is_diff = options.planning_scene_diff.is_diff = True
+    options.planning_scene_diff.robot_state.is_diff = options.plan_only = True
+    wanted = moveit.Constraints()
+    if isinstance(goal, Transform):
+        wanted.position_constraints.append(_place(group.tip, goal, frame))
+        wanted.orientation_constraints.append(_turn(group.tip, goal, frame))
+    else:
+        for name, position in goal.items():
+            wanted.joint_constraints.append(
+                moveit.JointConstraint(
+                    joint_name=name,
+                    position=position,
+                    tolerance_above=JOINT_TOLERANCE,
+                    tolerance_below=JOINT_TOLERANCE,
+                    weight=1.0,
+                )
+            )
+    request.goal_constraints.append(wanted)
+    return message
+
+
+def _place(link: str, pose: Transform, frame: str) -> Message:
+    constraint = import_module('moveit_msgs.msg').PositionConstraint(
+        header=Header(frame_id=frame), link_name=link, weight=1.0
+    )
+    solid = import_module('shape_msgs.msg').SolidPrimitive
+    region = constraint.constraint_region
+    region.primitives.append(solid(type=solid.SPHERE, dimensions=[PLACE_TOLERANCE]))
+    region.primitive_poses.append(pose_message(Transform(pose.translation)))
+    return constraint
+
+
+def _turn(link: str, pose: Transform, frame: str) -> Message:
+    return import_module('moveit_msgs.msg').OrientationConstraint(
+        header=Header(frame_id=frame),
+        orientation=pose_message(pose).orientation,
+        link_name=link,
+        absolute_x_axis_tolerance=TURN_TOLERANCE,
+        absolute_y_axis_tolerance=TURN_TOLERANCE,
+        absolute_z_axis_tolerance=TURN_TOLERANCE,
+        weight=1.0,
+    )
+
+
+def ik_request(
+    group: PlanGroup, pose: Transform, frame: str, near: Mapping[str, float]
+) -> Message:
+    """Return a request of compute_ik.
+
+    Args:
+        group: Whose tip is to be there.
+        pose: Where.
+        frame: The root link, in which that pose is.
+        near: Positions of joints in [rad] or [m] where it is looked for first.
+    """
+    message = import_module('moveit_msgs.srv').GetPositionIK.Request()
+    asked = message.ik_request
+    asked.group_name, asked.ik_link_name, asked.avoid_collisions = group.name, group.tip, True
+    asked.robot_state.is_diff = True
+    asked.robot_state.joint_state = JointState(name=list(near), position=list(near.values()))
+    asked.pose_stamped = PoseStamped(header=Header(frame_id=frame), pose=pose_message(pose))
+    return message
+
+
+def positions_of(state: Message, group: PlanGroup) -> dict[str, float]:
+    """Return the positions of a group in a moveit_msgs/RobotState."""
+    positions = dict(zip(state.joint_state.name, state.joint_state.position, strict=False))
+    return {name: positions[name] for name in group.joints if name in positions}
+
+
+def planned_motion(trajectory: Message) -> PlannedMotion:
+    """Return the motion of a moveit_msgs/RobotTrajectory."""
+    joints = trajectory.joint_trajectory
+    times = (p.time_from_start.sec + 1e-9 * p.time_from_start.nanosec for p in joints.points)
+    points = (tuple(map(float, point.positions)) for point in joints.points)
+    return PlannedMotion(tuple(joints.joint_names), tuple(times), tuple(points))
+
+
+def refusal(error_code: Message) -> str:
+    """Return why something was refused, in words; empty where it was not."""
+    kind = type(error_code)
+    if error_code.val == kind.SUCCESS:
+        return ''
+    names = (name for name in dir(type(kind)) if name.isupper())
+    called = (name for name in names if getattr(kind, name, None) == error_code.val)
+    code = next(called, f'code {error_code.val}')
+    return f'{code}: {error_code.message}' if error_code.message else code
+
+
+def box_message(
+    name: str, size: tuple[float, float, float], pose: Transform, frame: str
+) -> Message:
+    """Return a scene to which a box comes.
+
+    Args:
+        name: Of the box.
+        size: In [m].
+        pose: Of its center.
+        frame: In which that is.
+    """
+    moveit, solid = (
+        import_module('moveit_msgs.msg'),
+        import_module('shape_msgs.msg').SolidPrimitive,
+    )
+    box = moveit.CollisionObject(header=Header(frame_id=frame), id=name, pose=pose_message(pose))
+    box.primitives.append(solid(type=solid.BOX, dimensions=list(size)))
+    box.primitive_poses.append(Pose())
+    return _change(box, moveit.CollisionObject.ADD)
+
+
+def moved_message(thing: Message, pose: Transform) -> Message:
+    """Return a scene in which an object is elsewhere."""
+    kind = import_module('moveit_msgs.msg').CollisionObject
+    return _change(kind(header=thing.header, id=thing.id, pose=pose_message(pose)), kind.MOVE)
+
+
+def removed_message(thing: Message) -> Message:
+    """Return a scene without an object."""
+    kind = import_module('moveit_msgs.msg').CollisionObject
+    return _change(kind(header=thing.header, id=thing.id), kind.REMOVE)
+
+
+def _change(thing: Message, operation: bytes) -> Message:
+    thing.operation = operation
+    scene = import_module('moveit_msgs.msg').PlanningScene(is_diff=True)
+    scene.robot_state.is_diff = True
+    scene.world.collision_objects.append(thing)
+    return scene
+
+
+@dataclass(frozen=True, slots=True)
+class SceneObject:
+    """Something that a robot may not touch, or holds.
+
+    Attributes:
+        message: As a moveit_msgs/CollisionObject.
+        attached: The robot holds it.
+    """
+
+    message: Message
+    attached: bool = False
+
+    @property
+    def pose(self) -> Transform:
+        """Where it is in its frame."""
+        return transform_of(self.message.pose)
+
+    @property
+    def frame(self) -> str:
+        """The frame in which it is."""
+        return str(self.message.header.frame_id)
+
+
+def changed(objects: Mapping[str, SceneObject], scene: Message) -> dict[str, SceneObject]:
+    """Return the objects after a moveit_msgs/PlanningScene, which is whole or a change."""
+    kept = dict(objects) if scene.is_diff else {}
+    for message in scene.world.collision_objects:
+        _apply(kept, message, attached=False)
+    if not scene.robot_state.is_diff:
+        kept = {name: each for name, each in kept.items() if not each.attached}
+    for body in scene.robot_state.attached_collision_objects:
+        _apply(kept, body.object, attached=True)
+    return kept
+
+
+def _apply(objects: dict[str, SceneObject], message: Message, *, attached: bool) -> None:
+    kind = type(message)
+    known = objects.get(message.id)
+    if message.operation == kind.REMOVE:
+        if not message.id:
+            objects.clear()
+        objects.pop(message.id, None)
+        return
+    if message.operation == kind.MOVE and known is not None:
+        for shapes in SHAPES:
+            setattr(message, shapes, getattr(known.message, shapes))
+    elif message.operation == kind.APPEND and known is not None:
+        message.pose = known.message.pose
+        for shapes in SHAPES:
+            setattr(message, shapes, [*getattr(known.message, shapes), *getattr(message, shapes)])
+    objects[message.id] = SceneObject(message, attached)
+
+
+def transform_of(pose: Pose) -> Transform:
+    """Return the pose of a geometry_msgs/Pose; one without a rotation has none."""
+    place, turn = pose.position, pose.orientation
+    rotation = (turn.x, turn.y, turn.z, turn.w)
+    if not any(rotation):  # a message that leaves it out
+        return Transform((place.x, place.y, place.z))
+    return Transform((place.x, place.y, place.z), rotation)
+
+
+def pose_message(pose: Transform) -> Pose:
+    """Return a geometry_msgs/Pose."""
+    (x, y, z), (a, b, c, d) = pose.translation, pose.rotation
+    return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=a, y=b, z=c, w=d))
+
 
 LINE_POINTS = 80
 """Of the line that the tip follows."""

@@ -36,15 +36,18 @@ from ..page.live import Hold, RELEASED_AFTER
 from ..page.robot_page import RobotPage
 from ..page.robot_scene import links_beyond, moved, pose_of, put, RobotScene, Tint
 from ..page.style import BAD, Color, GOOD, line, NEUTRAL, PLAIN, WANTED
-from .calls import ActionCall
-from .motion_plan import plan_groups, PlanGroup, PlannedMotion, tip_line
-from .planning_messages import (
+from .interfaces import ActionCall
+from .motion_plan import (
     ik_request,
     Message,
     plan_goal,
+    plan_groups,
+    PlanGroup,
     planned_motion,
+    PlannedMotion,
     positions_of,
     refusal,
+    tip_line,
 )
 from .planning_scene import PlanningScene
 

@@ -30,7 +30,7 @@ from node_runner import LATCHED
 from ..page.robot_page import RobotPage
 from ..page.robot_scene import pose_of, put, RobotScene
 from ..page.style import NEUTRAL
-from .planning_messages import (
+from .motion_plan import (
     box_message,
     changed,
     Message,

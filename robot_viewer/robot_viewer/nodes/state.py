@@ -1,14 +1,25 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run robot_viewer state``: may the robot be moved? One line, and an exit code."""
+"""May the robot be moved? From its topics, for the page, /diagnostics and a terminal.
+
+:class:`Watch` keeps what was last seen of a robot, :class:`Judge` finds out its state for a page
+and does the one action that it wants, and ``ros2 run robot_viewer state`` prints it in one line.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Future
+from dataclasses import replace
+from functools import partial
+import math
+import os
 import sys
 import threading
 import time
+from typing import TYPE_CHECKING
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
@@ -17,8 +28,304 @@ from urdf_reader import read_urdf
 
 from node_runner import LATCHED, make_executor, refuse_misspelt, run_program
 
-from ..robot_state import Level, robot_state, RobotState
-from .watch import Watch
+from ..robot_state import (
+    ALLOW,
+    legs_of,
+    Level,
+    robot_state,
+    RobotState,
+    Seen,
+    SILENCE,
+    STALE,
+    Status,
+    Stop,
+    walks,
+)
+from .interfaces import TRIGGER, TriggerCalls
+
+if TYPE_CHECKING:
+    from ..page.robot_page import RobotPage
+
+STATUS_AGE = 5.0
+"""Time in [s] after which a status that does not come again is unknown."""
+STATUS_SILENCE = 3.5
+"""Time in [s] without any status after which a robot is out of reach, where no one listens to its
+joint states."""
+MOVES = 0.01
+"""Velocity of a joint in [rad/s] or [m/s] above which it moves."""
+STILL_AFTER = 0.3
+"""Time in [s] after which a joint that was not seen to move again stands."""
+OWN = ': robot'
+"""End of the name of the status that a page publishes of its robot."""
+
+
+class Watch:
+    """Takes joint states and diagnostics.
+
+    Attributes:
+        statuses: The last of each name.
+        answer: The status that a page publishes of this robot; None before one.
+    """
+
+    def __init__(self) -> None:
+        self.statuses: dict[str, Status] = {}
+        self.answer: Status | None = None
+        self._times: dict[str, float] = {}
+        self._joints_at: float | None = None
+        self._since: float | None = None  # when it began to listen to joint states
+        self._moved_at = -math.inf
+
+    def forget(self) -> None:
+        """Forget the statuses: they are old, or those of another robot."""
+        self.statuses.clear()
+        self._times.clear()
+
+    @property
+    def joints_age(self) -> float | None:
+        """Time in [s] since the last joint states; None before them."""
+        return None if self._joints_at is None else time.monotonic() - self._joints_at
+
+    def listen(self, *, begins: bool) -> None:
+        """Record that joint states are listened to from now on, or no more."""
+        self._since, self._joints_at = time.monotonic() if begins else None, None
+
+    def take_joints(self, message: JointState) -> None:
+        """Record a message of the robot."""
+        self._joints_at = time.monotonic()
+        if any(abs(velocity) > MOVES for velocity in message.velocity):
+            self._moved_at = self._joints_at
+
+    def take_statuses(self, message: DiagnosticArray) -> None:
+        """Record a message of any node of the robot."""
+        for status in message.status:
+            level = min(status.level[0], STALE)  # others than those of diagnostic_msgs: unknown
+            values = {each.key: each.value for each in status.values}
+            kept = Status(status.name, level, status.message, values)
+            if status.name.endswith(OWN):
+                self.answer = kept
+                continue
+            self.statuses[status.name] = kept
+            self._times[status.name] = time.monotonic()
+
+    @property
+    def legs(self) -> list[Status]:
+        """What the controller of a walking robot says."""
+        return legs_of(self.statuses.values())
+
+    def aged(self, now: float) -> list[Status]:
+        """Return the statuses as they are known now; one that does not come again is unknown."""
+        found = []
+        for name, status in self.statuses.items():
+            age = now - self._times[name]
+            if age >= STATUS_AGE:
+                text = f'unknown for {age:.0f} s; before: {status.message}'
+                status = replace(status, level=STALE, message=text)  # noqa: PLW2901
+            found.append(status)
+        return found
+
+    def silence(self, now: float, *, publishes: bool) -> float:
+        """Return the time in [s] since the last message of the robot; 0 where it sends none.
+
+        Args:
+            now: Steady time.
+            publishes: It was seen to publish joint states.
+        """
+        if publishes and self._since is not None:
+            return now - (self._joints_at or self._since)
+        last = max(self._times.values(), default=now)
+        return now - last if now - last > STATUS_SILENCE else 0.0
+
+    def moves(self, since: float = -math.inf) -> bool:
+        """Whether the robot moves: a walking one follows a velocity, of others a joint moves.
+
+        Args:
+            since: Steady time in [s]; what was seen before does not count.
+        """
+        legs = self.legs
+        if legs:  # they move while it stands, too
+            return any(walks(each) and self._times[each.name] > since for each in legs)
+        return self._moved_at > max(since, time.monotonic() - STILL_AFTER)
+
+    def seen(self, robot: str, services: Iterable[str], *, publishes: bool) -> Seen:
+        """Return what is known now.
+
+        Args:
+            robot: Its name; empty for none.
+            services: Full names of Trigger services.
+            publishes: It was seen to publish joint states.
+        """
+        now = time.monotonic()
+        return Seen(
+            robot=robot,
+            silence=self.silence(now, publishes=publishes),
+            statuses=self.aged(now),
+            services=frozenset(services),
+            moving=self.moves(),
+        )
+
+
+REPORT_PERIOD = 1.0
+"""Time between two statuses of the robot on /diagnostics in [s], where it does not change."""
+PUSH_PERIOD = 0.5
+"""The same of what is shown on pages that are open: without it they have lost their server."""
+SIMULATIONS = ('arm_msgs/srv/InjectFault', 'quad_msgs/srv/InjectFault')
+"""Types of services that only a simulation offers."""
+STAGES = {None: 'braking', True: 'stopped', False: 'failed'}
+"""How far a STOP has come, by whether the robot has confirmed that it stands."""
+BEGIN_TIME, COAST_TIME = 0.5, 3.0
+"""Times in [s] after the page has driven: in which a motion of it may begin, and come to rest."""
+
+
+class Judge:
+    """Finds out whether the robot may be moved; everything in the thread of the node.
+
+    Attributes:
+        robot: Its name; empty for none.
+    """
+
+    def __init__(self, node: Node, page: RobotPage, watch: Watch, calls: TriggerCalls) -> None:
+        self._node, self._page, self._watch, self._calls = node, page, watch, calls
+        self.robot = ''
+        self._simulated = False
+        self._services: frozenset[str] = frozenset()
+        self._stop: Stop | None = None
+        self._stood_at = math.inf  # when the robot has confirmed that
+        self._drove_at = -math.inf  # when the page moved it, as long as that motion goes on
+        self._acting = ''  # the action that runs, and the services that it has called
+        self._group: tuple[str, ...] = ()
+        self._state = RobotState('', Level.UNKNOWN, '')
+        self._reported_at = self._pushed_at = 0.0
+        self._reported: object = None
+        self._pushed: object = None
+        self._publisher = node.create_publisher(DiagnosticArray, 'diagnostics', 10)
+
+    def look(self, services: Mapping[str, Iterable[str]]) -> None:
+        """Record the services of the robot, by name and types.
+
+        An action whose services have gone is over: their answer may never come.
+        """
+        self._services = frozenset(name for name, kinds in services.items() if TRIGGER in kinds)
+        self._simulated = any(kind in SIMULATIONS for each in services.values() for kind in each)
+        self._calls.forget(self._services)
+        if not self._services.issuperset(self._group):
+            self._acting, self._group = '', ()
+
+    def judge(
+        self,
+        positions: Mapping[str, float],
+        *,
+        publishes: bool,
+        limit: str,
+        battery: str,
+        drives: str,
+        controllers: Iterable[str],
+    ) -> None:
+        """Find out how the robot is; show it, and report it.
+
+        Args:
+            positions: Of its joints in [rad] or [m].
+            publishes: It was seen to publish joint states.
+            limit: What limits its motion, in words of the servo.
+            battery: In words.
+            drives: What of the page moves it now, in words; empty for nothing that is known.
+            controllers: Of trajectories, by their full names.
+        """
+        now, live = time.monotonic(), self._page.live
+        seen = self._watch.seen(self.robot, self._services, publishes=publishes)
+        seen.stop, seen.acting = self._stop, self._acting
+        seen.limit, seen.battery = limit, battery
+        program = ''
+        if self._stop is not None and self._stop.stands:
+            seen.moving = self._watch.moves(self._stood_at + STILL_AFTER)
+        elif live.held or drives:
+            self._drove_at = now
+            seen.mover = f'{live.held} is held on a page.' if live.held else drives
+        elif seen.moving and (pressed := self._calls.running):
+            self._drove_at = now
+            seen.mover = f'{pressed} was pressed on a page.'
+        elif seen.moving and now - self._drove_at < COAST_TIME:
+            seen.mover = 'It comes to rest.'
+        elif seen.moving:
+            names = ', '.join(name.rpartition('/')[2] for name in controllers)
+            program = f'a program ({names})' if names else 'a program'
+            seen.mover = f'A{program[1:]} moves it.'
+        elif now - self._drove_at > BEGIN_TIME:
+            self._drove_at = -math.inf
+        self._state = state = robot_state(seen)
+        shown = state, self._stop, self._simulated, program, live.holder
+        if shown != self._reported or now - self._reported_at > REPORT_PERIOD:
+            self._reported, self._reported_at = shown, now
+            self._publish(state)
+        known = positions if seen.silence < SILENCE else {}
+        drawn = shown, tuple(known.values()), self._page.last
+        if self._page.watched and (drawn != self._pushed or now - self._pushed_at > PUSH_PERIOD):
+            self._pushed, self._pushed_at = drawn, now
+            self._page.show_state(
+                state,
+                known,
+                stop='' if self._stop is None else STAGES[self._stop.stands],
+                simulated=self._simulated,
+                program=program,
+                listens=f'It listens in ROS domain {os.environ.get("ROS_DOMAIN_ID") or 0}.',
+            )
+
+    def _publish(self, state: RobotState) -> None:
+        message = DiagnosticArray()
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        values = {
+            'word': state.word,
+            'sentence': state.sentence,
+            'action': state.action,
+            'color': state.level.value,
+        }
+        message.status.append(
+            DiagnosticStatus(
+                name=f'{self._node.get_name()}{OWN}',
+                level=bytes([state.level.diagnostic]),
+                message=str(state),
+                values=[KeyValue(key=key, value=value) for key, value in values.items()],
+            )
+        )
+        self._publisher.publish(message)
+
+    def stop(self, answer: Future[Stop], order: Callable[[Callable[[], None]], None]) -> None:
+        """Record a STOP, and what the robot answers to it."""
+        self._page.live.stop()  # what was allowed just before does not count
+        self._acting, self._group = '', ()
+        self._stop = stop = Stop()
+        answer.add_done_callback(lambda done: order(partial(self._has_stopped, stop, done)))
+
+    def _has_stopped(self, stop: Stop, answer: Future[Stop]) -> None:
+        if self._stop is stop:  # the last one counts, and none that was allowed after
+            self._stop = answer.result()
+            self._stood_at = time.monotonic()
+
+    def act(self, action: str) -> None:
+        """Do the action that is wanted now, if it is still this one."""
+        state = self._state
+        if action != state.action:
+            self._page.say(f'{action}: the state is another one now', failed=True)
+        elif action == ALLOW:
+            self._stop = None
+            self._page.allow()
+            self._page.say('motion is allowed; nothing moves by that')
+        else:
+            self._acting = action
+            self._call(action, [group for group in state.calls if group])
+
+    def _call(self, action: str, groups: list[tuple[str, ...]]) -> None:
+        """Call the next group of services, while each before succeeds and no STOP comes."""
+        self._group = group = groups[0] if groups else ()
+        if not group:
+            self._acting = ''
+            return
+
+        def go_on(well: bool) -> None:
+            if self._group is group:
+                self._call(action, groups[1:] if well else [])
+
+        self._calls.call_all(action, group, go_on)
+
 
 NAME = 'state'
 LOOK_TIME, ANSWER_TIME = 3.0, 1.5

@@ -40,22 +40,31 @@ from node_runner import (
     run_program,
 )
 
-from ..loopback import binding_problem
+from ..page.gate import binding_problem
 from ..page.jog_panel import Offered, Twist, Velocity
 from ..page.robot_page import RobotPage
 from ..page.robot_scene import greatest_velocities
 from ..robot_state import Stop
-from ..robots import of_robot, SET_MODE_TYPE, stops_robot
 from .body import Body
-from .calls import succeeded, text_of, TRIGGER, TriggerCalls
-from .controllers import Controllers
+from .controllers import Controllers, Grippers
 from .first_motion import FirstMotion
-from .grippers import Grippers
-from .judge import Judge
-from .listening import BETWEEN_LOOKS, frames_of, joints_of, Listening
+from .interfaces import (
+    BETWEEN_LOOKS,
+    Border,
+    frames_of,
+    joints_of,
+    Listening,
+    of_robot,
+    serve,
+    SET_MODE_TYPE,
+    stops_robot,
+    succeeded,
+    text_of,
+    TRIGGER,
+    TriggerCalls,
+)
 from .motion_planning import MotionPlanning
-from .serving import Border, serve
-from .watch import Watch
+from .state import Judge, Watch
 
 NAME = 'web_viewer'
 PORT = 8080

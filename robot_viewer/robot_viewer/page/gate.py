@@ -1,25 +1,33 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Who may open the page: this host's own pages, and from elsewhere who has the token.
+"""Who may open the page: this host's own pages, and from elsewhere who has the token; and STOP.
 
 viser serves whoever reaches its port, and any page that a browser of this host has open may
 connect to a loopback port. So each request is looked at before viser sees it.
+
+viser has its controls in a panel, which may be folded, scrolled or busy. STOP goes its own way: a
+request of its own over HTTP, not behind whatever waits in the page's connection.
 """
 
 from __future__ import annotations
 
+import asyncio
 from asyncio import CancelledError
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator, Mapping
+from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from functools import partial
+import gzip
 import hmac
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
 from inspect import isawaitable
+import ipaddress
 import logging
 import os
 from pathlib import Path
 import secrets
+import socket
 from tempfile import NamedTemporaryFile
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -30,9 +38,131 @@ from websockets.datastructures import Headers
 from websockets.exceptions import InvalidMessage
 from websockets.http11 import Request, Response
 
-from ..loopback import is_loopback
-from .live import LIVE_PATH
-from .overlay import ANSWER_TIMEOUT, Overlay, text_response
+from ..robot_state import Stop
+from .live import Live, LIVE_PATH
+
+LOOPBACK_NAMES = frozenset({'localhost', 'ip6-localhost', 'ip6-loopback'})
+ELSEWHERE = {socket.AF_INET: '192.0.2.1', socket.AF_INET6: '2001:db8::1'}
+"""Addresses for documentation, which are no host: by them the way out is found."""
+
+
+def is_loopback(host: str) -> bool:
+    """Whether a host is reached from this computer only."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host in LOOPBACK_NAMES
+
+
+def binding_problem(host: str) -> str:
+    """Return why nothing can be served at a host; empty where it can be."""
+    try:
+        family, kind, _, _, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, kind) as server:
+            server.bind(address)
+    except OSError as error:
+        return error.strerror or str(error)
+    except UnicodeError:
+        return 'no name of a host'
+    return ''
+
+
+def shown_host(host: str) -> str:
+    """Return the host of a URL by which a browser reaches a server.
+
+    Args:
+        host: What the server is bound to; for all addresses of this computer, the URL has the one
+            by which others reach it.
+    """
+    if host in {'localhost', '127.0.0.1'}:
+        return 'localhost'
+    try:
+        address = ipaddress.ip_address(host)
+    except ValueError:
+        return host
+    if address.is_unspecified:
+        address = ipaddress.ip_address(_outward(address.version))
+    return f'[{address}]' if address.version == 6 else str(address)
+
+
+def _outward(version: int) -> str:
+    family = socket.AF_INET if version == 4 else socket.AF_INET6
+    with socket.socket(family, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect((ELSEWHERE[family], 9))  # of a datagram: nothing is sent
+        except OSError:  # there is no network
+            return '127.0.0.1' if version == 4 else '::1'
+        return str(probe.getsockname()[0])
+
+
+STOP_PATH = '/stop'
+STOP_HEADER = 'X-Robot-Stop'
+"""What no page of another site can send without being asked."""
+END = b'</body>'
+ANSWER_TIMEOUT = 30.0
+"""Time in [s] that a request for STOP waits for the robot, which may have a long ramp; the page
+warns long before."""
+NO_ANSWER = 'no answer from the robot: use the emergency stop'
+
+
+class Overlay:
+    """Answers requests for STOP, and adds itself to the page that viser serves.
+
+    Attributes:
+        live: Its connections with the pages.
+    """
+
+    def __init__(self, stop: Callable[[], Future[Stop]], live: Live) -> None:
+        """Set what STOP does: in the server's thread, without waiting for the robot."""
+        self._stop, self.live = stop, live
+        self._html = Path(__file__).with_name('overlay.html').read_bytes()
+        self._page = b''
+
+    async def answer(self, request: Request) -> Response | None:
+        """Return what the robot answers to a request for STOP; None for other requests."""
+        if request.path.partition('?')[0] != STOP_PATH:
+            return None
+        if STOP_HEADER not in request.headers:
+            return text_response(HTTPStatus.FORBIDDEN, f'STOP needs the header {STOP_HEADER}')
+        try:
+            called = asyncio.shield(asyncio.wrap_future(self._stop()))
+            answer = await asyncio.wait_for(called, ANSWER_TIMEOUT)
+        except TimeoutError:
+            return text_response(HTTPStatus.GATEWAY_TIMEOUT, NO_ANSWER)
+        status = HTTPStatus.OK if answer.stands else HTTPStatus.BAD_GATEWAY
+        return text_response(status, answer.text)
+
+    def over(self, response: Response) -> Response:
+        """Return a response with the overlay in it, if it is the page.
+
+        Raises:
+            RuntimeError: The page has no end; it would be without STOP.
+        """
+        if not response.headers.get('Content-Type', '').startswith('text/html'):
+            return response
+        packed = response.headers.get('Content-Encoding') == 'gzip'
+        if not self._page:
+            body = gzip.decompress(response.body) if packed else bytes(response.body)
+            before, end, after = body.rpartition(END)
+            if not end:
+                raise RuntimeError('the page has no </body>: STOP has no place on it')
+            self._page = gzip.compress(before + self._html + end + after)
+        body = self._page if packed else gzip.decompress(self._page)
+        headers = Headers(response.headers.raw_items())
+        headers['Cache-Control'] = 'no-store'  # a page without STOP may be in a cache
+        del headers['Content-Length']
+        headers['Content-Length'] = str(len(body))
+        return Response(response.status_code, response.reason_phrase, headers, body)
+
+
+def text_response(
+    status: HTTPStatus, text: str, headers: Mapping[str, str] | None = None
+) -> Response:
+    """Make a response of one line."""
+    body = f'{text}\n'.encode()
+    own = {'Content-Type': 'text/plain; charset=utf-8', 'Content-Length': str(len(body))}
+    return Response(status, status.phrase, Headers({**(headers or {}), **own}), body)
+
 
 COOKIE = 'robot_viewer_token_{}'
 """By port: a browser sends the cookies of a host to all its ports, and each page has one."""

@@ -27,20 +27,18 @@ from viser import (
     ViserServer,
 )
 
-from ..loopback import shown_host
 from ..robot_state import BUS, drives_of, FOLLOWS, Level, RobotState, Status, Stop
-from .diagnose import drive_html, Log
-from .gate import Gate
-from .jog_panel import Actions, JogPanel, joint_texts, Offered, Velocity
+from .gate import Gate, Overlay, shown_host
+from .jog_panel import Actions, History, JogPanel, joint_texts, Offered, PlotPanel, Velocity
 from .live import Hold, Live, RELEASED_AFTER
-from .overlay import Overlay
-from .robot_scene import Ground, RobotScene
-from .standing import feet_of
+from .robot_scene import feet_of, Ground, RobotScene
 from .style import (
     add_speed,
     BAD,
     CAUTION,
+    drive_html,
     GOOD,
+    Log,
     NEUTRAL,
     pad,
     PRESENT,
@@ -50,7 +48,6 @@ from .style import (
     WANTED,
     WARNING,
 )
-from .target_panel import History, PlotPanel
 
 ARM_SPEED, LEGS_SPEED = 20.0, 30.0
 """In the beginning, in [%]."""

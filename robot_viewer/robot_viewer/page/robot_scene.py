@@ -42,6 +42,9 @@ FAULTY: Tint = (0.79, 0.16, 0.16, 1.0)
 """Of the links of joints whose drives report a fault."""
 PLAIN = (0.7, 0.72, 0.75, 1.0)
 """Color of what the description gives none: red, green, blue and opacity from 0 to 1."""
+FOOT = '_foot'
+"""How the names of the links of feet end."""
+LEAST_FEET = 3
 
 
 class Ground:
@@ -344,3 +347,9 @@ def links_beyond(tree: KinematicTree, joints: frozenset[str]) -> frozenset[str]:
         if joint.name in joints or follows or joint.parent in beyond:
             beyond.add(joint.child)
     return frozenset(beyond)
+
+
+def feet_of(tree: KinematicTree) -> tuple[str, ...]:
+    """Return the links of the feet; none where there are too few to stand on."""
+    feet = tuple(link for link in tree.links if link.endswith(FOOT))
+    return feet if len(feet) >= LEAST_FEET else ()

@@ -1,0 +1,409 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The interfaces of one robot, as its viewers use them.
+
+Its nodes among those of other robots, topics that are read while a page is open, services and
+actions that nothing waits for, and how a viewer is served.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+import sys
+import threading
+import traceback
+from typing import Any, Protocol, TYPE_CHECKING
+
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.client import Client
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+from rclpy.subscription import Subscription
+from rclpy.task import Future
+
+from node_runner import log_as, notify_ready, spin
+
+if TYPE_CHECKING:
+    from rclpy.action.client import ActionClient
+
+DESCRIPTION = '/robot_description'
+"""What each robot has in its namespace."""
+SET_NMT_TYPE, SET_MODE_TYPE = 'canopen_interfaces/srv/CONmtID', 'quad_msgs/srv/SetMode'
+"""Of services that only a master of drives has, and only the controller of a walking robot."""
+
+
+def of_robot(description: str, topics: Iterable[str], nodes: Iterable[str]) -> list[str]:
+    """Return the nodes of one robot: no other one's namespace is nearer to them.
+
+    Args:
+        description: Full name of the topic with the description of the robot.
+        topics: Full names of all topics.
+        nodes: Full names of nodes.
+    """
+    robots = {name.removesuffix(DESCRIPTION) for name in topics if name.endswith(DESCRIPTION)}
+    own = description.removesuffix(DESCRIPTION)
+    robots.add(own)
+
+    def nearest(node: str) -> str | None:
+        above = [robot for robot in robots if node.startswith(f'{robot}/')]
+        return max(above, key=len, default=None)
+
+    return sorted(node for node in set(nodes) if nearest(node) == own)
+
+
+def stops_robot(node: str, services: Mapping[str, Collection[str]]) -> bool:
+    """Return whether the `stop` of a node is that of a robot: it leads drives, or legs.
+
+    Args:
+        node: Its full name.
+        services: Names and types of what it offers.
+    """
+    beside = node.rpartition('/')[0]
+    return SET_NMT_TYPE in services.get(f'{node}/set_nmt', ()) or SET_MODE_TYPE in services.get(
+        f'{beside}/set_mode', ()
+    )
+
+
+TRIGGER = 'std_srvs/srv/Trigger'
+Done = Callable[[Any, str], None]
+"""Takes the result of an action, or None and why there is none."""
+
+
+class Report(Protocol):
+    """Reports what became of a request."""
+
+    def __call__(self, what: str, text: str, *, failed: bool) -> None:
+        """Report it."""
+
+
+class TriggerCalls:
+    """Clients of Trigger services; everything in the thread of the node."""
+
+    def __init__(self, node: Node, report: Report) -> None:
+        self._node, self._report = node, report
+        self._clients: dict[str, Client] = {}
+        self._running: dict[str, Sequence[str]] = {}
+
+    @property
+    def running(self) -> str:
+        """What was requested last and is not answered yet, in words; empty for nothing."""
+        return next(reversed(self._running), '')
+
+    def forget(self, services: frozenset[str]) -> None:
+        """Wait for no answer of services that are none of these."""
+        self._running = {w: each for w, each in self._running.items() if services >= set(each)}
+
+    def client(self, service: str) -> Client:
+        """Return the client of a service, which finds its server in time when made early."""
+        if service not in self._clients:
+            from std_srvs.srv import Trigger  # the bridge to Foxglove calls none
+
+            self._clients[service] = self._node.create_client(Trigger, service)
+        return self._clients[service]
+
+    def call(self, service: str) -> Future | None:
+        """Call a service; return its answer to come, None where it is not there."""
+        client = self.client(service)
+        if not client.service_is_ready():
+            self._report(service, 'is not there', failed=True)
+            return None
+        future = client.call_async(client.srv_type.Request())
+
+        def answered(done: Future) -> None:
+            self._report(service, text_of(done), failed=not succeeded(done))
+
+        future.add_done_callback(answered)
+        return future
+
+    def call_all(
+        self, what: str, services: Sequence[str], done: Callable[[bool], None] | None = None
+    ) -> None:
+        """Call services at the same time; report all answers at once, the failures first.
+
+        Args:
+            what: What it is for, in words.
+            services: Their full names.
+            done: Takes whether all have succeeded.
+        """
+        if not services:
+            self._report(what, 'is not offered', failed=True)
+            if done is not None:
+                done(False)
+            return
+        answers: dict[str, tuple[bool, str]] = {}
+
+        def take(service: str, call: Future | None) -> None:
+            text = 'its service is not there' if call is None else text_of(call)
+            answers[service] = call is not None and succeeded(call), text
+            if len(answers) < len(services):
+                return
+            self._running.pop(what, None)
+            bad = [f'{_node_of(each)}: {said}' for each, (ok, said) in answers.items() if not ok]
+            texts = bad or list(dict.fromkeys(said for _, said in answers.values() if said))
+            count = f'{len(services) - len(bad)} of {len(services)} done'
+            self._report(what, '; '.join((count, *texts)), failed=bool(bad))
+            if done is not None:
+                done(not bad)
+
+        self._running[what] = services
+        for service in services:
+            client = self.client(service)
+            if client.service_is_ready():
+                call = client.call_async(client.srv_type.Request())
+                call.add_done_callback(partial(take, service))
+            else:
+                take(service, None)
+
+
+def succeeded(call: Future) -> bool:
+    """Return whether a call was answered with success."""
+    return call.exception() is None and bool(call.result().success)
+
+
+def text_of(call: Future) -> str:
+    """Return what a call was answered with, in words."""
+    error = call.exception()
+    return f'no answer: {error}' if error is not None else str(call.result().message)
+
+
+def _node_of(service: str) -> str:
+    return service.rpartition('/')[0].rpartition('/')[2]
+
+
+class ActionCall:
+    """A goal that may be canceled at any time, also before the server has answered.
+
+    Attributes:
+        ended: There is a result, or will be none.
+    """
+
+    def __init__(self, client: ActionClient, goal: Any, done: Done) -> None:  # noqa: ANN401
+        """Send it."""
+        self._done, self._handle = done, None
+        self._is_canceled = self.ended = False
+        client.send_goal_async(goal).add_done_callback(self._answered)
+
+    def cancel(self) -> None:
+        """Cancel it."""
+        if self._is_canceled:
+            return
+        self._is_canceled = True
+        if self._handle is not None:
+            self._handle.cancel_goal_async()
+
+    def _answered(self, future: Future) -> None:
+        if future.exception() is not None:
+            self._end(None, f'no answer: {future.exception()}')
+            return
+        handle = future.result()
+        if not handle.accepted:
+            self._end(None, 'the goal was not accepted')
+            return
+        self._handle = handle
+        if self._is_canceled:
+            handle.cancel_goal_async()
+        handle.get_result_async().add_done_callback(self._ended)
+
+    def _ended(self, future: Future) -> None:
+        error = future.exception()
+        if error is not None:
+            self._end(None, f'no result: {error}')
+        else:
+            self._end(future.result().result, '')
+
+    def _end(self, result: Any, why: str) -> None:  # noqa: ANN401
+        self.ended = True
+        self._done(result, why)
+
+
+class Border:
+    """Where errors of what comes from ROS end: said once in a sentence, and all else goes on."""
+
+    def __init__(self, node: Node, say: Callable[[str], None] = lambda _: None) -> None:
+        self._node, self._say = node, say
+        self._said: set[str] = set()
+
+    @contextmanager
+    def around(self, what: str) -> Iterator[None]:
+        """Report what the block raises, and go on behind it."""
+        try:
+            yield
+        except Exception as error:  # noqa: BLE001  # whatever comes from ROS
+            self.report(what, error)
+
+    def report(self, what: str, error: Exception) -> None:
+        """Log an error once."""
+        text = f'{what}: {_reason(error)}'
+        if text in self._said:
+            return
+        self._said.add(text)
+        self._node.get_logger().error(text)
+        self._node.get_logger().debug(''.join(traceback.format_exception(error)))
+        self._say(text)
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, ModuleNotFoundError):
+        package = (error.name or str(error)).partition('.')[0]
+        return f'{package} is not installed here: run `make build`, or install it'
+    return str(error) if isinstance(error, ValueError) else f'{type(error).__name__}: {error}'
+
+
+def serve(
+    node: Node,
+    seen_at: str,
+    close: Callable[[], None],
+    stop: threading.Event,
+    border: Border | None = None,
+) -> None:
+    """Serve a viewer until it is to end, and let its viewers go."""
+    border = border or Border(node)
+    log_as(node)
+    sys.stdout.write(f'{seen_at}\n')  # not into /rosout and bags: it may have a token
+    sys.stdout.flush()
+    notify_ready(seen_at)
+    try:
+        spin([node], stop, survive=lambda error: border.report('a message or answer', error))
+    finally:
+        close()
+        node.destroy_node()
+
+
+LINGER = 5.0
+"""How long it goes on after the last look in [s]: a page that is loaded anew needs it at once."""
+NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+BETWEEN_LOOKS = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Of topics with several publishers: it keeps what comes from one look to the next.
+
+At rest, with ten looks a second, that holds up to 500 Hz of all publishers together; of more the
+oldest is lost.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A topic that is read.
+
+    Attributes:
+        kind: Class of its messages.
+        name: Its name.
+        take: Takes the newest message; for some it returns whether such ones are of no interest.
+        qos: Of the subscription.
+        by: Of messages that differ in this, each newest one is taken.
+    """
+
+    kind: Any
+    name: str
+    take: Callable[[Any], bool | None]
+    qos: QoSProfile
+    by: Callable[[bytes], Hashable]
+
+
+def joints_of(data: bytes) -> Hashable:
+    """Return the frame of a JointState and the names of its joints."""
+    frame, at = _strings(data, 12, 1)  # behind its stamp
+    joints, _ = _strings(data, at + 4, _whole(data, at))
+    return frame + joints
+
+
+def frames_of(data: bytes) -> Hashable:
+    """Return the names of all frames of a TFMessage."""
+    frames, at = tuple[bytes, ...](), 8
+    while at < len(data):
+        pair, at = _strings(data, at + 8, 2)  # behind a stamp
+        frames += pair
+        at += (4 - at) % 8 + 56  # seven doubles; CDR aligns them from behind its head of 4 bytes
+    return frames
+
+
+def _strings(data: bytes, at: int, count: int) -> tuple[tuple[bytes, ...], int]:
+    """Return strings in CDR, without what is between them (any bytes), and the place behind."""
+    found = list[bytes]()
+    while len(found) < count and at < len(data):
+        end = at + 4 + _whole(data, at)
+        found.append(data[at + 4 : end])
+        at = (end + 3) & ~3
+    return tuple(found), at
+
+
+def _whole(data: bytes, at: int) -> int:
+    return int.from_bytes(data[at : at + 4], 'little' if data[1] else 'big')
+
+
+class Listening:
+    """Reads topics as long as a page is open.
+
+    No executor serves the subscriptions: a wake-up for each message costs more than all else. At
+    each look the newest message of each kind is decoded.
+
+    Attributes:
+        group: Of the subscriptions.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self.group = ReentrantCallbackGroup()
+        self._topics: list[Topic] = []
+        self._made: list[tuple[Topic, Subscription, set[Hashable]]] = []
+        self._last_look: float | None = None
+
+    @property
+    def active(self) -> bool:
+        """Whether it is subscribed."""
+        return bool(self._made)
+
+    def add(
+        self,
+        kind: Any,  # noqa: ANN401  # message types have no type
+        name: str,
+        take: Callable[[Any], bool | None],
+        qos: QoSProfile = NEWEST,
+        by: Callable[[bytes], Hashable] = lambda _: None,
+    ) -> None:
+        """Read a topic while a page is open, see :class:`Topic`."""
+        self._topics.append(Topic(kind, name, take, qos, by))
+        if self._made:
+            self._subscribe(self._topics[-1])
+
+    def _subscribe(self, topic: Topic) -> None:
+        made = self._node.create_subscription(
+            topic.kind, topic.name, lambda _: None, topic.qos, callback_group=self.group, raw=True
+        )
+        self._made.append((topic, made, set()))
+
+    def newest(self) -> Iterator[Callable[[], None]]:
+        """Yield what processes each message that is new."""
+        for topic, subscription, dropped in self._made:
+            found = dict[Hashable, bytes]()
+            with subscription.handle:
+                for _ in range(topic.qos.depth):
+                    taken = subscription.handle.take_message(topic.kind, True)
+                    if taken is None:
+                        break
+                    found[topic.by(taken[0])] = taken[0]
+            for key in (each for each in found if each not in dropped):
+                yield partial(self._process, topic, dropped, key, found[key])
+
+    @staticmethod
+    def _process(topic: Topic, dropped: set[Hashable], key: Hashable, data: bytes) -> None:
+        if topic.take(deserialize_message(data, topic.kind)):
+            dropped.add(key)
+
+    def update(self, now: float, *, looked_at: bool) -> bool:
+        """Begin or end; return whether it has just begun."""
+        if looked_at:
+            self._last_look = now
+            begins = not self._made
+            if begins:
+                for topic in self._topics:
+                    self._subscribe(topic)
+            return begins
+        if self._made and self._last_look is not None and now - self._last_look > LINGER:
+            for _, subscription, _ in self._made:
+                self._node.destroy_subscription(subscription)
+            self._made = []
+        return False
