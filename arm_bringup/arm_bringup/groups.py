@@ -130,15 +130,11 @@ def controller_names(robot: Robot, groups: MovedGroups) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class StartPositions:
-    """Where simulated drives stand at power-on.
-
-    Attributes:
-        positions: Positions that are not 0, by joint, in [rad or m].
-        reason: Why they are not 0, in words.
-    """
+    """Where simulated drives stand at power-on."""
 
     positions: Mapping[str, float] = field(default_factory=dict)
-    reason: str = ''
+    """Positions that are not 0, by joint, in [rad or m]."""
+    reason: str = ''  # why they are not 0, in words
 
     def __str__(self) -> str:
         """Return one line for the log; empty where all stand at 0."""
@@ -255,15 +251,11 @@ def _start(model: RobotModel) -> dict[str, float]:
 
 @dataclass(frozen=True, slots=True)
 class MovedGroups:
-    """The groups of a robot that are moved; no two have a joint in common.
-
-    Attributes:
-        arms: Groups that are jogged and follow trajectories; the first is the main one.
-        tools: Groups of end effectors.
-    """
+    """The groups of a robot that are moved; no two have a joint in common."""
 
     arms: tuple[str, ...]
-    tools: tuple[str, ...] = ()
+    """Groups that are jogged and follow trajectories; the first is the main one."""
+    tools: tuple[str, ...] = ()  # groups of end effectors
 
     @property
     def names(self) -> tuple[str, ...]:

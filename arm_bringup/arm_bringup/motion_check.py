@@ -35,19 +35,12 @@ class Severity(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that is wrong.
+    """One thing that is wrong."""
 
-    Attributes:
-        severity: How bad it is.
-        place: File, and what in it.
-        problem: What is wrong.
-        remedy: What to do.
-    """
-
-    severity: Severity
-    place: str
-    problem: str
-    remedy: str
+    severity: Severity  # how bad it is
+    place: str  # file, and what in it
+    problem: str  # what is wrong
+    remedy: str  # what to do
 
     def __str__(self) -> str:
         """Format it in two lines or more."""

@@ -61,82 +61,49 @@ class Level(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """A diagnostic_msgs/DiagnosticStatus.
+    """A diagnostic_msgs/DiagnosticStatus."""
 
-    Attributes:
-        name: What it is about.
-        level: 0 good, 1 warning, 2 error, 3 stale.
-        message: In words.
-        values: What was measured, by name.
-    """
-
-    name: str
-    level: int
-    message: str
-    values: Mapping[str, str] = field(default_factory=dict)
+    name: str  # what it is about
+    level: int  # 0 good, 1 warning, 2 error, 3 stale
+    message: str  # in words
+    values: Mapping[str, str] = field(default_factory=dict)  # what was measured, by name
 
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """A STOP of the page after which nothing was allowed yet.
+    """A STOP of the page after which nothing was allowed yet."""
 
-    Attributes:
-        text: The robot's answer; empty before it came.
-        stands: The robot has confirmed that it stands; None before its answer.
-    """
-
-    text: str = ''
-    stands: bool | None = None
+    text: str = ''  # the robot's answer; empty before it came
+    stands: bool | None = None  # the robot has confirmed that it stands; None before its answer
 
 
 @dataclass(slots=True)
 class Seen:
-    """What is known of a robot now.
+    """What is known of a robot now."""
 
-    Attributes:
-        robot: Its name; empty for none.
-        silence: Time in [s] since its last message.
-        statuses: Its diagnostics that are not old.
-        services: Full names of the Trigger services that may be called.
-        stop: The STOP that counts.
-        moving: Its joints move; of a walking robot, it follows a velocity.
-        mover: What moves it, in words; empty where that is unknown.
-        limit: What limits its motion, in the words of the servo.
-        acting: What was requested by the action and goes on, in words.
-        battery: In words.
-    """
-
-    robot: str = ''
-    silence: float = 0.0
-    statuses: Sequence[Status] = ()
-    services: frozenset[str] = frozenset()
-    stop: Stop | None = None
-    moving: bool = False
-    mover: str = ''
-    limit: str = ''
-    acting: str = ''
-    battery: str = ''
+    robot: str = ''  # its name; empty for none
+    silence: float = 0.0  # time in [s] since its last message
+    statuses: Sequence[Status] = ()  # its diagnostics that are not old
+    services: frozenset[str] = frozenset()  # full names of the Trigger services that may be called
+    stop: Stop | None = None  # the STOP that counts
+    moving: bool = False  # its joints move; of a walking robot, it follows a velocity
+    mover: str = ''  # what moves it, in words; empty where that is unknown
+    limit: str = ''  # what limits its motion, in the words of the servo
+    acting: str = ''  # what was requested by the action and goes on, in words
+    battery: str = ''  # in words
 
 
 @dataclass(frozen=True, slots=True)
 class RobotState:
-    """The answer.
+    """The answer."""
 
-    Attributes:
-        word: In capitals.
-        level: What it means.
-        sentence: The reason, and what to do.
-        action: Label of the one action that is wanted now; empty for none.
-        calls: Services of that action; each group is called when the one before has succeeded.
-        faulty: Drives that report a fault.
-    """
-
-    word: str
-    level: Level
-    sentence: str
-    action: str = ''
+    word: str  # in capitals
+    level: Level  # what it means
+    sentence: str  # the reason, and what to do
+    action: str = ''  # label of the one action that is wanted now; empty for none
     calls: tuple[tuple[str, ...], ...] = ()
-    faulty: tuple[str, ...] = ()
+    """Services of that action; each group is called when the one before has succeeded."""
+    faulty: tuple[str, ...] = ()  # drives that report a fault
 
     @property
     def movable(self) -> bool:

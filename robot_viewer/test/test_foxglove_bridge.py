@@ -60,19 +60,12 @@ class Robot(Node):
 
 @dataclass(frozen=True)
 class Rig:
-    """A robot, and a bridge beside it.
+    """A robot, and a bridge beside it."""
 
-    Attributes:
-        robot: The robot.
-        isolation: Of both.
-        url: Of the bridge.
-        process: The bridge.
-    """
-
-    robot: Robot
-    isolation: Isolation
-    url: str
-    process: RunningProcess
+    robot: Robot  # the robot
+    isolation: Isolation  # of both
+    url: str  # of the bridge
+    process: RunningProcess  # the bridge
 
 
 def bridge(env: dict[str, str], *parameters: str) -> RunningProcess:

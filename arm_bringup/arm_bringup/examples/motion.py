@@ -80,20 +80,14 @@ WORST_PATH = 5e-3  # greatest distance of a set-point from the path of a traject
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """One state of the trajectory controller; set-points unless they are called measured.
+    """One state of the trajectory controller; set-points unless they are called measured."""
 
-    Attributes:
-        time: Time of its cycle in [s].
-        speed: Speed override, 0 to 1.
-        tool: Position of the tool in [m].
-    """
-
-    time: float
+    time: float  # time of its cycle in [s]
     position: Array
     velocity: Array
     measured: Array
-    speed: float
-    tool: Array
+    speed: float  # speed override, 0 to 1
+    tool: Array  # position of the tool in [m]
     measured_tool: Array
 
 

@@ -91,31 +91,21 @@ WITH_GRIPPER = '_hand'  # what follows the name of a robot in that of its folder
 
 @dataclass(frozen=True)
 class Cell:
-    """Where an arm picks and places: a table around its first axis, a pillar in the middle.
-
-    Attributes:
-        group: The group that moves.
-        reach: Reach of the arm in [m]; table, pillar and wall are shares of it.
-        centre: Direction of the pillar, its distance, and the height of the table.
-        part: Edges of the part in [m].
-        below: How far the middle of the part is below the tip while it is held in [m].
-        turn: Turn of the tip against the part in [rad].
-        touch_links: Links that the part may touch while it is held.
-        above: Joint positions near which the straight approach to each of the two places begins.
-        aside: Joint, and its position, of a pose on whose way a box can appear.
-        gripper: Group and joint of the gripper, and where it is open and closed; None without.
-    """
+    """Where an arm picks and places: a table around its first axis, a pillar in the middle."""
 
     group: str
-    reach: float
+    reach: float  # reach of the arm in [m]; table, pillar and wall are shares of it
     centre: tuple[float, float, float]
-    part: tuple[float, float, float]
-    below: float
-    turn: float
-    touch_links: tuple[str, ...]
+    """Direction of the pillar, its distance, and the height of the table."""
+    part: tuple[float, float, float]  # edges of the part in [m]
+    below: float  # how far the middle of the part is below the tip while it is held in [m]
+    turn: float  # turn of the tip against the part in [rad]
+    touch_links: tuple[str, ...]  # links that the part may touch while it is held
     above: tuple[tuple[float, ...], tuple[float, ...]]
-    aside: tuple[str, float]
+    """Joint positions near which the straight approach to each of the two places begins."""
+    aside: tuple[str, float]  # joint, and its position, of a pose on whose way a box can appear
     gripper: tuple[str, str, float, float] | None = None
+    """Group and joint of the gripper, and where it is open and closed; None without."""
 
     def at(self, spread: float, height: float, further: float = 0.0) -> tuple[float, ...]:
         """Return x, y, z and yaw at an angle from the pillar, on a height above the table."""

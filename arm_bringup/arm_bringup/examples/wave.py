@@ -51,14 +51,10 @@ class Axis:
     """One drive: its swing, and how well it follows.
 
     Positions are in [rad] or [m], times on the steady clock in [s].
-
-    Attributes:
-        limits: Range and speed of its joint.
-        phase: How far it is ahead in [rad].
     """
 
-    limits: JointRange
-    phase: float
+    limits: JointRange  # range and speed of its joint
+    phase: float  # how far it is ahead in [rad]
     centre: float = field(init=False)
     amplitude: float = field(init=False)
     velocity: float = field(init=False)  # that it never exceeds

@@ -54,15 +54,10 @@ SOURCES: Mapping[str, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Contacts:
-    """Which feet are on the ground, as it was published.
-
-    Attributes:
-        feet: Their links.
-        source: How that is known.
-    """
+    """Which feet are on the ground, as it was published."""
 
     feet: frozenset[str]
-    source: str
+    source: str  # how that is known
 
     def html(self, found: Support) -> str:
         """Return it in words."""
@@ -84,19 +79,14 @@ class Contacts:
 
 @dataclass(frozen=True, slots=True)
 class Support:
-    """What the feet on the ground span, in the root link in [m].
-
-    Attributes:
-        corners: On the ground below the feet, all round the robot; fewer than three span nothing.
-        centre: Of mass; None where the description has no masses.
-        below: The place on the ground below it.
-        margin: How far that is inside of the corners; below zero outside, None without a span.
-    """
+    """What the feet on the ground span, in the root link in [m]."""
 
     corners: tuple[Vector, ...]
-    centre: Vector | None
-    below: Vector | None
+    """On the ground below the feet, all round the robot; fewer than three span nothing."""
+    centre: Vector | None  # of mass; None where the description has no masses
+    below: Vector | None  # the place on the ground below it
     margin: float | None
+    """How far that is inside of the corners; below zero outside, None without a span."""
 
 
 def foot_radius(tree: KinematicTree, foot: str) -> float:

@@ -135,33 +135,22 @@ Report = Callable[[str, bool], None]
 
 @dataclass(slots=True)
 class Controller:
-    """A controller that was found.
+    """A controller that was found."""
 
-    Attributes:
-        commands: Where it takes trajectories.
-        joints: Its joints, once it has named them.
-        positions: Where they are in [rad] or [m].
-        references: Where the controller holds them.
-        wanted: Targets that were not sent yet, and the share of the greatest velocity.
-        targets: Where the joints are on their way to; empty when they are not.
-        ends: Steady time at which they are there in [s].
-        sent: Steady time of the last trajectory in [s].
-        aimed: Targets whose button is held, and their share of the greatest velocity.
-        held_at: Steady time at which it was seen to be held in [s].
-        lets_go: The robot was stopped, or did not follow, and nothing was sent since.
-    """
-
-    commands: Publisher
-    joints: tuple[str, ...] = ()
-    positions: dict[str, float] = field(default_factory=dict)
-    references: dict[str, float] = field(default_factory=dict)
+    commands: Publisher  # where it takes trajectories
+    joints: tuple[str, ...] = ()  # its joints, once it has named them
+    positions: dict[str, float] = field(default_factory=dict)  # where they are in [rad] or [m]
+    references: dict[str, float] = field(default_factory=dict)  # where the controller holds them
     wanted: tuple[Mapping[str, float], float] | None = None
+    """Targets that were not sent yet, and the share of the greatest velocity."""
     targets: Mapping[str, float] = field(default_factory=dict)
-    ends: float = -math.inf
-    sent: float = -math.inf
+    """Where the joints are on their way to; empty when they are not."""
+    ends: float = -math.inf  # steady time at which they are there in [s]
+    sent: float = -math.inf  # steady time of the last trajectory in [s]
     aimed: tuple[Mapping[str, float], float] | None = None
-    held_at: float = -math.inf
-    lets_go: bool = False
+    """Targets whose button is held, and their share of the greatest velocity."""
+    held_at: float = -math.inf  # steady time at which it was seen to be held in [s]
+    lets_go: bool = False  # the robot was stopped, or did not follow, and nothing was sent since
 
     @property
     def busy(self) -> bool:

@@ -79,17 +79,11 @@ CHOOSE = 'choose'
 
 @dataclass(frozen=True, slots=True)
 class Disabling:
-    """A drive that has to be without power, and is not confirmed to be.
-
-    Attributes:
-        joint: Its joint.
-        why: What its motion did.
-        deadline: Time until which it has to be confirmed in [s].
-    """
+    """A drive that has to be without power, and is not confirmed to be."""
 
     joint: str
-    why: str
-    deadline: float
+    why: str  # what its motion did
+    deadline: float  # time until which it has to be confirmed in [s]
 
 
 class FirstMotion:

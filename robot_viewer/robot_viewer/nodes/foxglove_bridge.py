@@ -106,14 +106,11 @@ class Admission:
 
     A browser lets any page connect to a port of this computer, and names the page's site in the
     header Origin, which the page cannot change. Programs send none.
-
-    Attributes:
-        origins: Sites whose pages may connect, besides those of this host; `*` for all.
-        token: What a client has to have in its URL; empty where none is needed.
     """
 
     origins: frozenset[str]
-    token: str
+    """Sites whose pages may connect, besides those of this host; `*` for all."""
+    token: str  # what a client has to have in its URL; empty where none is needed
 
     def refusal(self, path: str, origins: Sequence[str]) -> str:
         """Return why a request is refused; empty when it is not."""
@@ -130,21 +127,13 @@ class Admission:
 
 @dataclass(eq=False, slots=True)
 class _Channel:
-    """A topic that is offered.
-
-    Attributes:
-        type: Name of its type.
-        kind: Class of its messages.
-        offer: What clients know of it.
-        subscription: There while a client wants it.
-        qos: Of the subscription.
-    """
+    """A topic that is offered."""
 
     type: str
-    kind: Any
-    offer: dict[str, object]
-    subscription: Subscription | None = None
-    qos: QoSProfile | None = None
+    kind: Any  # class of its messages
+    offer: dict[str, object]  # what clients know of it
+    subscription: Subscription | None = None  # there while a client wants it
+    qos: QoSProfile | None = None  # of the subscription
 
 
 @dataclass(eq=False, slots=True)

@@ -286,21 +286,14 @@ oldest is lost.
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """A topic that is read.
+    """A topic that is read."""
 
-    Attributes:
-        kind: Class of its messages.
-        name: Its name.
-        take: Takes the newest message; for some it returns whether such ones are of no interest.
-        qos: Of the subscription.
-        by: Of messages that differ in this, each newest one is taken.
-    """
-
-    kind: Any
+    kind: Any  # class of its messages
     name: str
     take: Callable[[Any], bool | None]
-    qos: QoSProfile
-    by: Callable[[bytes], Hashable]
+    """Takes the newest message; for some it returns whether such ones are of no interest."""
+    qos: QoSProfile  # of the subscription
+    by: Callable[[bytes], Hashable]  # of messages that differ in this, each newest one is taken
 
 
 def joints_of(data: bytes) -> Hashable:

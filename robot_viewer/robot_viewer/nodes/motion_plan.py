@@ -186,15 +186,10 @@ def _change(thing: Message, operation: bytes) -> Message:
 
 @dataclass(frozen=True, slots=True)
 class SceneObject:
-    """Something that a robot may not touch, or holds.
+    """Something that a robot may not touch, or holds."""
 
-    Attributes:
-        message: As a moveit_msgs/CollisionObject.
-        attached: The robot holds it.
-    """
-
-    message: Message
-    attached: bool = False
+    message: Message  # as a moveit_msgs/CollisionObject
+    attached: bool = False  # the robot holds it
 
     @property
     def pose(self) -> Transform:
@@ -262,19 +257,13 @@ SHOWINGS = 3
 
 @dataclass(frozen=True, slots=True)
 class PlanGroup:
-    """A group of joints that motions are planned for.
-
-    Attributes:
-        name: Its name.
-        joints: Its joints, from the base out.
-        tip: Link that a goal in space is for.
-        states: Positions in [rad] or [m] by joint, by the name of the state.
-    """
+    """A group of joints that motions are planned for."""
 
     name: str
-    joints: tuple[str, ...]
-    tip: str
+    joints: tuple[str, ...]  # its joints, from the base out
+    tip: str  # link that a goal in space is for
     states: Mapping[str, Mapping[str, float]]
+    """Positions in [rad] or [m] by joint, by the name of the state."""
 
 
 def plan_groups(tree: KinematicTree, semantic: str) -> dict[str, PlanGroup]:
@@ -303,17 +292,11 @@ def plan_groups(tree: KinematicTree, semantic: str) -> dict[str, PlanGroup]:
 
 @dataclass(frozen=True, slots=True)
 class PlannedMotion:
-    """A motion from its start to its goal.
+    """A motion from its start to its goal."""
 
-    Attributes:
-        joints: The joints that move.
-        times: Of its points in [s], increasing.
-        points: Positions in [rad] or [m], in the order of the joints.
-    """
-
-    joints: tuple[str, ...]
-    times: tuple[float, ...]
-    points: tuple[tuple[float, ...], ...]
+    joints: tuple[str, ...]  # the joints that move
+    times: tuple[float, ...]  # of its points in [s], increasing
+    points: tuple[tuple[float, ...], ...]  # positions in [rad] or [m], in the order of the joints
 
     @property
     def duration(self) -> float:

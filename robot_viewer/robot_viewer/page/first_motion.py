@@ -70,36 +70,22 @@ class Saw(Enum):
 
 @dataclass(frozen=True, slots=True)
 class MotionRequest:
-    """The motion that a person requests.
-
-    Attributes:
-        joint: Name of the joint.
-        distance: How far; negative for the other way.
-        speed: How fast, per second.
-    """
+    """The motion that a person requests."""
 
     joint: str
-    distance: float
-    speed: float
+    distance: float  # how far; negative for the other way
+    speed: float  # how fast, per second
 
 
 @dataclass(frozen=True, slots=True)
 class BusPlace:
-    """Where the scales of an axis are written.
+    """Where the scales of an axis are written."""
 
-    Attributes:
-        path: The bus.yml, on the computer of the robot.
-        inode: Its inode when the robot was started.
-        changed: When it was changed last then, in [ns].
-        device: Section of the device.
-        channel: Place of the axis in its channels; None for a device with one axis.
-    """
-
-    path: Path
-    inode: int
-    changed: int
-    device: str
-    channel: int | None
+    path: Path  # the bus.yml, on the computer of the robot
+    inode: int  # its inode when the robot was started
+    changed: int  # when it was changed last then, in [ns]
+    device: str  # section of the device
+    channel: int | None  # place of the axis in its channels; None for a device with one axis
 
     @property
     def is_here(self) -> bool:
@@ -142,19 +128,12 @@ class BusPlace:
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """How a joint counts.
+    """How a joint counts."""
 
-    Attributes:
-        kind: What it does.
-        scales: Those that the master uses.
-        says: What the drive says about its increments.
-        place: Where they are written.
-    """
-
-    kind: JointKind
+    kind: JointKind  # what it does
     scales: AxisScales
-    says: DriveFacts
-    place: BusPlace
+    says: DriveFacts  # what the drive says about its increments
+    place: BusPlace  # where they are written
 
 
 def motion_plan(

@@ -198,17 +198,11 @@ def motion_time(
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """A joint at one time.
-
-    Attributes:
-        time: Steady time.
-        target: Where it was to be.
-        position: Where it was.
-    """
+    """A joint at one time."""
 
     time: float
-    target: float
-    position: float
+    target: float  # where it was to be
+    position: float  # where it was
 
 
 class History:
@@ -300,19 +294,12 @@ class Actions(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Offered:
-    """What can be driven.
+    """What can be driven."""
 
-    Attributes:
-        joints: Single joints that are jogged, from the base on.
-        tool: The tool is jogged.
-        grippers: Their joints by the names of their controllers.
-        targets: Joints that a controller brings to a target.
-    """
-
-    joints: tuple[str, ...] = ()
-    tool: bool = False
-    grippers: tuple[tuple[str, str], ...] = ()
-    targets: tuple[str, ...] = ()
+    joints: tuple[str, ...] = ()  # single joints that are jogged, from the base on
+    tool: bool = False  # the tool is jogged
+    grippers: tuple[tuple[str, str], ...] = ()  # their joints by the names of their controllers
+    targets: tuple[str, ...] = ()  # joints that a controller brings to a target
 
 
 @dataclass(slots=True)

@@ -39,23 +39,15 @@ _Press: TypeAlias = tuple[Hashable, Hashable]  # a page and its button
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """A button that acts as long as it is held.
+    """A button that acts as long as it is held."""
 
-    Attributes:
-        label: What it is called, and what is held.
-        act: Called with each heartbeat.
-        rest: Called when it is let go.
-        start: Called with the first heartbeat of a press.
-        always: It counts whatever state the robot is in, but not after STOP.
-        key: The key that holds it, where keys move the robot; that of a joint with its direction.
-    """
-
-    label: str
-    act: Callable[[], None]
-    rest: Callable[[], None]
-    start: Callable[[], None] | None = None
-    always: bool = False
+    label: str  # what it is called, and what is held
+    act: Callable[[], None]  # called with each heartbeat
+    rest: Callable[[], None]  # called when it is let go
+    start: Callable[[], None] | None = None  # called with the first heartbeat of a press
+    always: bool = False  # it counts whatever state the robot is in, but not after STOP
     key: str = ''
+    """The key that holds it, where keys move the robot; that of a joint with its direction."""
 
 
 class Live:

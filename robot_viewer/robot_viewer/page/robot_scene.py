@@ -64,17 +64,11 @@ class Ground:
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """How a robot is shown.
+    """How a robot is shown."""
 
-    Attributes:
-        path: Of its base in the scene.
-        links: Those that are seen; None for all.
-        tint: Color of all of it; None for those of the description.
-    """
-
-    path: str = ROOT
-    links: frozenset[str] | None = None
-    tint: Tint | None = None
+    path: str = ROOT  # of its base in the scene
+    links: frozenset[str] | None = None  # those that are seen; None for all
+    tint: Tint | None = None  # color of all of it; None for those of the description
 
 
 class RobotScene:
