@@ -16,9 +16,55 @@ from small_bringup import read_until, SmallWorkspace
 from small_processes import TIMEOUT
 
 from arm_bringup import bringup
+from arm_bringup.bringup import next_commands
 from arm_bringup.examples.wave import main as demo
+from process_supervisor import RosOptions
 
-pytestmark = pytest.mark.slow
+DRIVES, MODE = ['shoulder', 'elbow'], 'cyclic_position_mode'
+
+
+def test_an_enabled_arm_is_jogged_and_follows_trajectories() -> None:
+    """In its namespace; nothing is enabled by hand."""
+    controllers = ['arm_controller', 'hand_controller']
+    ros = RosOptions('left')
+    text = next_commands(DRIVES, MODE, controllers, ros, enabled=True, simulated=False)
+    assert text.splitlines() == [
+        'in a second terminal:',
+        '    ros2 run arm_servo servo_keyboard_input --ros-args -r __ns:=/left',
+        '    ros2 action info /left/arm_controller/follow_joint_trajectory',
+        '    ros2 action info /left/hand_controller/follow_joint_trajectory',
+        '    ros2 topic echo --once /left/joint_states',
+    ]
+
+
+def test_drives_that_are_not_enabled_are_enabled_first() -> None:
+    """By the services of each, or the option that is named; move_group comes last."""
+    text = next_commands(
+        DRIVES, MODE, ['arm_controller'], RosOptions(), enabled=False, simulated=True, planned=True
+    )
+    assert text.splitlines() == [
+        'in a second terminal (--enable enables all drives at the start):',
+        *(
+            f'    ros2 service call /shoulder/{service} std_srvs/srv/Trigger # and of the others'
+            for service in ('init', MODE)
+        ),
+        '    ros2 run arm_servo servo_keyboard_input',
+        '    ros2 action info /arm_controller/follow_joint_trajectory',
+        '    ros2 action info /move_action',
+        '    ros2 topic echo --once /joint_states',
+    ]
+
+
+def test_drives_alone_get_a_target_in_simulation_only() -> None:
+    """It is absolute, so no arm on hardware gets one proposed."""
+    simulated, real = (
+        next_commands(['axis'], MODE, [], RosOptions(), enabled=True, simulated=each)
+        for each in (True, False)
+    )
+    assert 'ros2 service call /axis/target canopen_interfaces/srv/COTargetDouble' in simulated
+    assert '{ target: 0.1 }' in simulated
+    assert real.splitlines()[1:] == ['    ros2 topic echo --once /joint_states']
+
 
 PANDA = Path(__file__).parents[1] / 'robots' / 'panda'
 
@@ -39,6 +85,7 @@ def workspace(tmp_path: Path, prefix: Path, isolation: Isolation) -> SmallWorksp
     return workspace
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_it_with_0_after_the_master_and_the_slaves(
     workspace: SmallWorkspace,
 ) -> None:
@@ -55,6 +102,7 @@ def test_ctrl_c_ends_it_with_0_after_the_master_and_the_slaves(
     assert list(workspace.folder.glob('arm_bringup-*/')) == []
 
 
+@pytest.mark.slow
 def test_hardware_is_on_can0_unless_said_otherwise(workspace: SmallWorkspace) -> None:
     """And no slaves are started: the master would find two drives for each."""
     with workspace.bringup('panda') as process:
@@ -68,6 +116,7 @@ def test_hardware_is_on_can0_unless_said_otherwise(workspace: SmallWorkspace) ->
     assert '/target' not in seen, 'it is absolute: nothing for an arm that is anywhere'
 
 
+@pytest.mark.slow
 def test_a_master_that_never_gets_ready_ends_it(workspace: SmallWorkspace) -> None:
     """After the time-out that was asked for; what it waited for is said."""
     workspace.install('arm_canopen', 'master', line='waiting for panda_joint3', ready=False)
@@ -77,6 +126,7 @@ def test_a_master_that_never_gets_ready_ends_it(workspace: SmallWorkspace) -> No
     assert 'waiting for panda_joint3' in output.split('error: ')[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('arguments', 'words'),
     [
@@ -98,6 +148,7 @@ def test_what_cannot_be_started_says_so_at_once(
     assert 'Traceback' not in output
 
 
+@pytest.mark.slow
 def test_a_robot_without_its_eds_says_which_file_and_line(workspace: SmallWorkspace) -> None:
     """Before anything is started."""
     folder = workspace.folder / 'my_arm'
@@ -111,6 +162,7 @@ def test_a_robot_without_its_eds_says_which_file_and_line(workspace: SmallWorksp
     assert 'ready' not in output
 
 
+@pytest.mark.slow
 def test_a_workspace_that_is_not_built_says_how(workspace: SmallWorkspace) -> None:
     """A missing executable is reported with the remedy."""
     (workspace.folder / 'prefix/lib/canopen_sim/fake_slaves').unlink()
@@ -119,6 +171,7 @@ def test_a_workspace_that_is_not_built_says_how(workspace: SmallWorkspace) -> No
     assert 'make build' in output
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('what', ['bus', 'namespace'])
 def test_a_second_bring_up_on_the_same_is_refused(
     workspace: SmallWorkspace, isolation: Isolation, what: str
@@ -140,6 +193,7 @@ def test_a_second_bring_up_on_the_same_is_refused(
         assert first.returncode == 0
 
 
+@pytest.mark.slow
 def test_a_second_simulated_arm_has_a_bus_of_its_own(workspace: SmallWorkspace) -> None:
     """In a namespace of the same domain, without a choice of the bus."""
     with contextlib.ExitStack() as stack:
@@ -160,6 +214,7 @@ def test_a_second_simulated_arm_has_a_bus_of_its_own(workspace: SmallWorkspace) 
             assert process.returncode == 0
 
 
+@pytest.mark.slow
 def test_the_namespace_of_bus_yml_is_that_of_all_nodes(
     workspace: SmallWorkspace, tmp_path: Path
 ) -> None:
@@ -181,6 +236,7 @@ def test_the_namespace_of_bus_yml_is_that_of_all_nodes(
     assert len(re.findall(' in /cell$', seen, re.MULTILINE)) == len(LINES)
 
 
+@pytest.mark.slow
 def test_help_names_the_robots(workspace: SmallWorkspace) -> None:
     """And what each argument means."""
     code, output = workspace.run('--help')
@@ -189,6 +245,7 @@ def test_help_names_the_robots(workspace: SmallWorkspace) -> None:
         assert words in output
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     'words', [['--simulat'], ['--simulate', '--enabl'], ['--can', 'x', '--e']]
 )

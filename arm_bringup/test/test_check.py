@@ -16,7 +16,25 @@ from arm_bringup.check import check_robot, main
 from arm_bringup.groups import controller_names, moved_groups
 from arm_bringup.motion_check import Severity
 from arm_bringup.robots import find_robot, in_namespace_of_bus, read_bus, Robot, RobotError
+from arm_bringup.srdf import main as make_srdf
 from process_supervisor import RosOptions
+
+SAMPLES = ('--samples', '3000')
+
+
+def test_a_xacro_file_is_enough(capsys: pytest.CaptureFixture[str]) -> None:
+    """The SRDF goes to stdout, the report to stderr."""
+    assert make_srdf([str(ROBOTS / 'gp110' / 'gp110.urdf.xacro'), *SAMPLES]) == 0
+    out, err = capsys.readouterr()
+    assert '<chain base_link=' in out
+    assert 'pose ready found' in err
+
+
+def test_a_robot_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
+    """It is refused with its path."""
+    assert make_srdf(['./nothing']) == 2
+    assert 'nothing does not exist' in capsys.readouterr().err
+
 
 pytestmark = pytest.mark.slow
 

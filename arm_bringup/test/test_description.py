@@ -13,10 +13,69 @@ import pytest
 
 from arm_bringup.robots import DescriptionError, expand_xacro, joint_limits
 
-pytestmark = pytest.mark.slow
+FILE = Path(__file__).parents[1] / 'robots' / 'prbt' / 'prbt.urdf.xacro'
+HALF_PI = math.pi / 2
+
+# upper limit [rad] and effort [Nm] of joint 1 to 6; all are symmetrical and turn at 1.57 rad/s
+LIMITS = [
+    (2.96706, 370.0),
+    (2.53073, 370.0),
+    (2.35620, 176.0),
+    (2.96706, 176.0),
+    (2.96706, 41.6),
+    (3.12414, 20.1),
+]
+
+
+def prbt(**arguments: str) -> str:
+    """Expand the PRBT's xacro."""
+    return expand_xacro(FILE, arguments)
+
+
+def test_the_limits_are_those_of_the_arm() -> None:
+    """Range, velocity and effort of each joint, in their order."""
+    limits = joint_limits(prbt())
+    assert list(limits) == [f'prbt_joint_{number}' for number in range(1, 7)]
+    for joint, (upper, _) in zip(limits.values(), LIMITS, strict=True):
+        assert (joint.lower, joint.upper, joint.velocity) == (-upper, upper, 1.57)
+    efforts = [float(limit.attrib['effort']) for limit in ET.fromstring(prbt()).iter('limit')]  # noqa: S314
+    assert efforts == [effort for _, effort in LIMITS]
+
+
+@pytest.mark.parametrize(
+    ('positions', 'xyz'),
+    [
+        ((0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0014)),
+        ((0.0, 0.0, HALF_PI, 0.0, HALF_PI, 0.0), (-0.307, 0.0, 0.5264)),
+    ],
+    ids=['straight', 'ready'],
+)
+def test_the_flange_of_the_prbt_is_where_the_arm_has_it(
+    positions: tuple[float, ...], xyz: tuple[float, float, float]
+) -> None:
+    """Forward kinematics of the description meets the check poses."""
+    angles = {f'prbt_joint_{number}': angle for number, angle in enumerate(positions, start=1)}
+    flange = forward(ET.fromstring(prbt()), angles, 'prbt_flange')  # noqa: S314
+    assert flange[:3, 3] == pytest.approx(xyz, abs=1e-4)
+
+
+def test_links_have_their_masses_and_shapes() -> None:
+    """19.5 kg in all, about the masses' own centres, and every shape is drawn and collides."""
+    root = ET.fromstring(prbt())  # noqa: S314
+    masses = [float(mass.attrib['value']) for mass in root.iter('mass')]
+    assert sum(masses) == pytest.approx(19.52)
+    for link in root.iter('link'):
+        assert len(link.findall('visual')) == len(link.findall('collision'))
+
+
+def test_the_prefix_is_an_argument() -> None:
+    """For two arms in one description."""
+    root = ET.fromstring(prbt(prefix='left_'))  # noqa: S314
+    names = [element.get('name', '') for tag in ('link', 'joint') for element in root.iter(tag)]
+    assert all(name.startswith('left_') for name in names)
+
 
 ROBOTS = Path(__file__).parents[1] / 'robots'
-HALF_PI = math.pi / 2
 
 # name, xyz [m], rpy [rad], lower, upper [rad], velocity [rad/s], effort [Nm]: data sheet and
 # modified Denavit-Hartenberg table of the Franka Emika Panda
@@ -47,6 +106,7 @@ def panda(**arguments: str) -> ET.Element:
     return ET.fromstring(urdf)  # noqa: S314
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('row', JOINTS, ids=[row[0] for row in JOINTS])
 def test_a_joint_is_where_the_arm_has_it(row: Row) -> None:
     """Origin, axis and limits of each joint are those of the table."""
@@ -64,6 +124,7 @@ def test_a_joint_is_where_the_arm_has_it(row: Row) -> None:
     assert [float(limit.attrib[key]) for key in keys] == values
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('positions', 'xyz'),
     [
@@ -81,12 +142,14 @@ def test_the_flange_is_where_the_arm_has_it(
     assert flange[2, 2] == pytest.approx(-1.0, abs=1e-3)  # it points down
 
 
+@pytest.mark.slow
 def test_the_tool_centre_point_is_between_the_finger_tips() -> None:
     """The hand hangs turned by 45 degrees below the flange."""
     tcp = forward(panda(), at(READY), 'panda_hand_tcp')
     assert tcp[2, 3] == pytest.approx(0.4869, abs=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('arguments', 'there', 'gone'),
     [
@@ -103,12 +166,14 @@ def test_hand_and_fingers_are_arguments(arguments: dict[str, str], there: str, g
     assert gone not in links
 
 
+@pytest.mark.slow
 def test_fingers_without_a_hand_are_refused() -> None:
     """With a sentence, not with a URDF of two roots."""
     with pytest.raises(DescriptionError, match='hand:=true'):
         panda(hand='false', fingers='true')
 
 
+@pytest.mark.slow
 def test_the_description_is_one_tree_with_plausible_masses() -> None:
     """One root; every link with mass has a positive inertia that fulfils the triangle rule."""
     root = panda(fingers='true')
@@ -127,6 +192,7 @@ def test_the_description_is_one_tree_with_plausible_masses() -> None:
     assert 15 < total < 20  # the data sheet says about 18 kg
 
 
+@pytest.mark.slow
 def test_a_capsule_is_a_cylinder_between_two_spheres() -> None:
     """Of each collision capsule, the ends of the cylinder are the centres of the spheres."""
     for link in panda(fingers='true').iter('link'):
@@ -145,6 +211,7 @@ def test_a_capsule_is_a_cylinder_between_two_spheres() -> None:
                 assert ball.get('radius') == shape.get('radius')
 
 
+@pytest.mark.slow
 def test_the_limits_are_read_in_the_order_of_the_joints() -> None:
     """Fixed joints and joints that mimic others are left out."""
     urdf = ET.tostring(panda(fingers='true'), encoding='unicode')
@@ -162,11 +229,13 @@ def one_joint(kind: str, limit: str = '') -> str:
     )
 
 
+@pytest.mark.slow
 def test_a_continuous_joint_has_no_range() -> None:
     """Its lower and upper limits are infinite."""
     assert joint_limits(one_joint('continuous', '<limit velocity="1"/>'))['a'].lower == -math.inf
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('urdf', 'words'),
     [
@@ -183,6 +252,7 @@ def test_a_description_that_is_not_usable_says_why(urdf: str, words: str) -> Non
         joint_limits(urdf)
 
 
+@pytest.mark.slow
 def test_a_broken_xacro_says_which_file_and_what(tmp_path: Path) -> None:
     """The message has the file and xacro's own words."""
     file = tmp_path / 'arm.urdf.xacro'

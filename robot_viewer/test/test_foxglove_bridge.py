@@ -6,7 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+import queue
 import re
+import socket
 import threading
 
 from foxglove_client import FORMER, FoxgloveClient
@@ -16,13 +18,87 @@ import pytest
 import rclpy
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+from websockets.client import ClientProtocol
 from websockets.exceptions import InvalidStatus
+from websockets.uri import parse_uri
 
 from node_runner import spin
+from robot_viewer.nodes.foxglove_bridge import Admission, FOXGLOVE_ORIGINS, PROTOCOLS, Server
 
-pytestmark = [pytest.mark.scenario, pytest.mark.xdist_group('foxglove-bridge')]
+ANYWHERE = frozenset({'*'})
+FOXGLOVE = frozenset(FOXGLOVE_ORIGINS)
+
+
+@pytest.mark.parametrize(
+    ('origin', 'admitted'),
+    [
+        ('https://app.foxglove.dev', True),
+        ('file://', True),
+        ('http://localhost:8080', True),
+        ('http://[::1]:8080', True),
+        ('https://app.foxglove.dev.evil.example', False),
+        ('http://localhost.evil.example', False),
+        ('https://evil.example', False),
+        ('null', False),
+        ('', False),
+    ],
+)
+def test_sites_on_loopback(origin: str, admitted: bool) -> None:
+    """A page cannot change its Origin; a program sends none."""
+    admission = Admission(FOXGLOVE, '')
+    assert not admission.refusal('/', [])
+    assert bool(admission.refusal('/', [origin])) != admitted
+    assert not Admission(ANYWHERE, '').refusal('/', [origin])
+
+
+def test_from_elsewhere_the_token_counts() -> None:
+    """Whatever the site is."""
+    admission = Admission(FOXGLOVE, 'secret')
+    assert not admission.refusal('/?token=secret', [])
+    for path in ('/', '/?token=', '/?token=secretx', '/secret', '/?token=s\u00e9cret'):
+        assert 'token' in admission.refusal(path, [])
+    assert 'allowed_origins' in admission.refusal('/?token=secret', ['https://evil.example'])
+
+
+def test_a_topic_that_is_offered_anew_is_subscribed_to_anew() -> None:
+    """A subscription ends with its channel: each message comes once, and under a number of now."""
+    taken = queue.SimpleQueue[str]()
+    server = Server(('127.0.0.1', 0), Admission(FOXGLOVE, ''), taken.put)
+    client = FoxgloveClient(f'ws://127.0.0.1:{server.port}')
+    try:
+        for number in (1, 2):
+            string = {'schemaName': 'std_msgs/msg/String', 'schema': 'string data'}
+            form = {'encoding': 'cdr', 'schemaEncoding': 'ros2msg', **string}
+            server.offer('/a', {'id': number, 'topic': '/a', **form})
+            client.subscribe('/a')
+            assert taken.get(timeout=60.0) == '/a'
+            for text in ('first', 'second'):
+                server.send('/a', 0, serialize_message(String(data=text)))
+            assert [client.next_message('/a').data for _ in range(2)] == ['first', 'second']
+            server.withdraw('/a')
+            client.until(lambda: '/a' not in client.channels, 'its end')
+            assert not server.wanted
+    finally:
+        client.close()
+        server.close()
+
+
+def test_a_client_that_does_not_answer_is_not_waited_for() -> None:
+    """As one on a computer that sleeps: it holds up no end of the bridge."""
+    server = Server(('127.0.0.1', 0), Admission(FOXGLOVE, ''), lambda _: None)
+    protocol = ClientProtocol(parse_uri(f'ws://127.0.0.1:{server.port}'), subprotocols=PROTOCOLS)
+    protocol.send_request(protocol.connect())
+    with socket.create_connection(('127.0.0.1', server.port), timeout=60.0) as silent:
+        silent.sendall(b''.join(protocol.data_to_send()))
+        assert silent.recv(1000).startswith(b'HTTP/1.1 101')
+        ending = threading.Thread(target=server.close, daemon=True)
+        ending.start()
+        ending.join(5.0)
+        assert not ending.is_alive()
+
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 MESH = b'solid cube\nendsolid cube\n'
@@ -116,6 +192,8 @@ def client(rig: Rig) -> Iterator[FoxgloveClient]:
     connected.close()
 
 
+@pytest.mark.scenario
+@pytest.mark.xdist_group('foxglove-bridge')
 def test_topics_come_as_they_are_while_somebody_wants_them(
     rig: Rig, client: FoxgloveClient
 ) -> None:
@@ -134,6 +212,8 @@ def test_topics_come_as_they_are_while_somebody_wants_them(
     robot.until(lambda: robot.states.get_subscription_count() == 0, 'end of the subscription')
 
 
+@pytest.mark.scenario
+@pytest.mark.xdist_group('foxglove-bridge')
 def test_who_comes_late_gets_what_is_latched(rig: Rig, client: FoxgloveClient) -> None:
     """Also when another client has the topic already."""
     for each in (client, FoxgloveClient(rig.url)):
@@ -142,6 +222,8 @@ def test_who_comes_late_gets_what_is_latched(rig: Rig, client: FoxgloveClient) -
     each.close()
 
 
+@pytest.mark.scenario
+@pytest.mark.xdist_group('foxglove-bridge')
 def test_clients_from_before_the_sdk_are_served(rig: Rig) -> None:
     """As @foxglove/ws-protocol of npm and Lichtblick; one that is killed leaves nothing."""
     robot, client = rig.robot, FoxgloveClient(rig.url, protocol=FORMER)
@@ -154,6 +236,8 @@ def test_clients_from_before_the_sdk_are_served(rig: Rig) -> None:
     robot.until(lambda: robot.states.get_subscription_count() == 0, 'its end')
 
 
+@pytest.mark.scenario
+@pytest.mark.xdist_group('foxglove-bridge')
 def test_a_number_that_no_message_carries_is_refused(rig: Rig, client: FoxgloveClient) -> None:
     """Its client keeps its connection, and the others get their messages."""
     robot, topic, other = rig.robot, '/joint_states', FoxgloveClient(rig.url)
@@ -175,6 +259,8 @@ def test_a_number_that_no_message_carries_is_refused(rig: Rig, client: FoxgloveC
     other.close()
 
 
+@pytest.mark.scenario
+@pytest.mark.xdist_group('foxglove-bridge')
 def test_files_of_packages_are_fetched(rig: Rig, client: FoxgloveClient) -> None:
     """Meshes, and nothing else."""
     assert rig.url
@@ -190,6 +276,8 @@ def test_files_of_packages_are_fetched(rig: Rig, client: FoxgloveClient) -> None
         assert reason in answer
 
 
+@pytest.mark.scenario
+@pytest.mark.xdist_group('foxglove-bridge')
 @pytest.mark.parametrize(
     ('origin', 'admitted'),
     [
@@ -210,6 +298,8 @@ def test_pages_of_other_sites_are_refused(rig: Rig, origin: str, admitted: bool)
     assert 'allowed_origins' in refused.value.response.body.decode()
 
 
+@pytest.mark.scenario
+@pytest.mark.xdist_group('foxglove-bridge')
 def test_a_port_in_use_is_named(rig: Rig) -> None:
     """With what to do."""
     port = rig.url.rpartition(':')[2]
