@@ -62,14 +62,7 @@ AGAIN = 1.0  # pause after a refusal in [s]: a drive that has not booted yet say
 def enabling(
     drives: Sequence[str], mode_service: str, say: Callable[[str], None], namespace: str = ''
 ) -> Iterator[None]:
-    """Enable drives beside what runs in the block.
-
-    Args:
-        drives: Their names.
-        mode_service: Service of each that selects the mode of streams.
-        say: Takes a line that says how it went, from any thread.
-        namespace: Theirs.
-    """
+    """Enable drives beside what runs in the block; ``say`` is called in any thread."""
     ended = threading.Event()
     thread = threading.Thread(
         target=_enable,
@@ -172,18 +165,9 @@ def next_commands(
     simulated: bool,
     planned: bool = False,
 ) -> str:
-    """Return the text to print, in lines.
+    """Return the commands to print; ``controllers`` are those of trajectories.
 
     A target of a single drive is absolute, so it is proposed for simulated ones only.
-
-    Args:
-        drives: Names of the drives.
-        mode_service: Service of each that selects the mode of streams.
-        controllers: Names of the trajectory controllers; empty without motion.
-        ros: Options of all nodes.
-        enabled: The bring-up enables the drives.
-        simulated: The drives are simulated.
-        planned: move_group runs, too.
     """
 
     def lines() -> Iterator[str]:
@@ -207,11 +191,7 @@ def next_commands(
 
 
 def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
-    """Parse the command line.
-
-    Returns:
-        What was asked for, and the options of all nodes.
-    """
+    """Parse the command line: what was asked for, and the options of all nodes."""
     parser = argparse.ArgumentParser(
         prog='ros2 run arm_bringup bringup',
         description='Bring an arm up: CANopen master with all its drives, /joint_states, '

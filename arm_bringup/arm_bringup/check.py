@@ -44,10 +44,9 @@ def srdf_command(robot: Robot) -> str:
 def check_semantic(
     robot: Robot, tree: KinematicTree
 ) -> tuple[list[Finding], SemanticDescription | None]:
-    """Compare the SRDF of a robot with its description.
+    """Compare the SRDF of a robot with its description; return what is wrong.
 
-    Returns:
-        What is wrong, and the SRDF where no group mixes names of the description with others.
+    The SRDF is returned where no group mixes names of the description with others.
     """
     place = robot.semantic.name
     try:
@@ -102,11 +101,7 @@ def _named(group: Group) -> Mapping[str, Sequence[str]]:
 
 
 def check_robot(robot: Robot) -> list[Finding]:
-    """Check everything in a robot folder.
-
-    Returns:
-        What is wrong; empty when all is well.
-    """
+    """Check everything in a robot folder; return what is wrong."""
     findings, drives = _bus(robot)
     try:
         urdf = read_description(robot)

@@ -49,11 +49,7 @@ if TYPE_CHECKING:
 def motion_files(
     robot: Robot, folder: Path, ros: RosOptions, groups: MovedGroups
 ) -> Sequence[Path]:
-    """Write the parameter file for the nodes of arm_servo.
-
-    Returns:
-        The files to hand over.
-    """
+    """Write the parameter files for the nodes of arm_servo."""
     values: dict[str, str | list[str]] = {
         'robot_description_semantic': read_semantic(robot),
         'joint_limits': str(robot.limits),

@@ -73,14 +73,9 @@ def check_motion(
     semantic: SemanticDescription,
     drives: Mapping[str, AxisUnits | None],
 ) -> list[Finding]:
-    """Check the files that trajectories and jogging need.
+    """Check the files that trajectories and jogging need; SRDF and limits exist.
 
-    Args:
-        robot: The robot; its SRDF and its limits exist.
-        urdf: Its description as XML text.
-        tree: The same.
-        semantic: Its SRDF.
-        drives: Joints with a drive, and what it is set to, where that is known.
+    ``drives`` are the joints with a drive, and what it is set to, where that is known.
     """
     try:
         from arm_model import LimitsError, load_limits, ModelError, RobotModel

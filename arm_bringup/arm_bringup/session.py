@@ -139,11 +139,7 @@ def controller_process(
 
 
 def choose_master(robot: Robot, find: FindExecutable) -> tuple[Executable, str]:
-    """Choose what runs the bus.
-
-    Returns:
-        The executable, and in words why it offers no motion; empty when it does.
-    """
+    """Choose what runs the bus; return why it offers no motion, too: empty when it does."""
     if find(MOTION_NODE.package, MOTION_NODE.name) is None:
         return MASTER, MAKE_MOVE
     if robot.lacking:
@@ -225,10 +221,7 @@ def robots_epilog() -> str:
 
 
 def locate(arguments: argparse.Namespace) -> Robot:
-    """Find a robot of this package, or by a path.
-
-    Args:
-        arguments: What :func:`add_robot` parsed; it overrides the robot folder.
+    """Find the robot that :func:`add_robot` parsed, which overrides the robot folder.
 
     Raises:
         RobotError: There is none; the message lists those that exist.
@@ -256,11 +249,7 @@ def no_files(robot: Robot, folder: Path, ros: RosOptions) -> Sequence[Path]:
 
 @contextlib.contextmanager
 def own_bus(wanted: str | None, *, simulate: bool) -> Iterator[str]:
-    """Hold a bus, as long as the block runs.
-
-    Args:
-        wanted: What was asked for; None takes the usual one.
-        simulate: ``auto`` is a bus that no other bring-up has; else it is where the drives are.
+    """Hold a bus, as long as the block runs; in simulation ``auto`` is one that nothing else has.
 
     Raises:
         StartError: Another bring-up is on it.

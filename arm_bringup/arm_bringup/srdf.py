@@ -42,11 +42,7 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Make the SRDF.
-
-    Returns:
-        0, or 2 when there is no such robot or it cannot be used.
-    """
+    """Make the SRDF; return 0, or 2 when there is no such robot or it cannot be used."""
     from arm_model import ArmError, load_limits
     from arm_planning import make_srdf, SRDF_SAMPLES
 

@@ -100,17 +100,7 @@ def known(value: float, digits: int = 0) -> str:
 
 
 class ArmDemo(Demo[ServiceClient]):
-    """A demo on simulated drives: enables them, and shows what /diagnostics has of them.
-
-    Attributes:
-        arm: The processes of the arm.
-        limits: Its joints that have a drive.
-        duration: How long the demo runs in [s]; infinite until Ctrl-C.
-        drives: Figures of each drive of /diagnostics, and its message, by name.
-        bus: Figures of the bus.
-        rows: Name and figures of each part of the summary.
-        moved: Names of the joints that the demo moves.
-    """
+    """A demo on simulated drives: enables them, and shows what /diagnostics has of them."""
 
     opening = 'booting'
     widest = WORDS_FROM
@@ -131,7 +121,7 @@ class ArmDemo(Demo[ServiceClient]):
             arm: The processes of the arm.
             limits: Its joints that have a drive.
             duration: How long the demo runs in [s]; None until Ctrl-C.
-            commands: Commands to try in a second terminal.
+            commands: To try in a second terminal.
             enabled: Drives that are enabled; without any all of the joints.
         """
         title = f'{arm.robot.name}: {len(arm.drives)} simulated drives on {arm.bus}{self.beside}'
@@ -141,11 +131,11 @@ class ArmDemo(Demo[ServiceClient]):
         # title, head, its rule, a blank line, two lines of the bus, and one that is left free: a
         # full terminal would scroll at each refresh
         self.lines = len(limits) + 7 + bool(self.label)
-        self.drives: Mapping[str, Mapping[str, str]] = {}
+        self.drives: Mapping[str, Mapping[str, str]] = {}  # of /diagnostics, by name
         self.bus: Mapping[str, str] = {}
-        self.rows: list[tuple[str, str]] = []
+        self.rows: list[tuple[str, str]] = []  # of the summary
         self.found: list[str] = []
-        self.moved: set[str] = set()
+        self.moved: set[str] = set()  # joints that the demo moves
         self._enabling = enabling_services(list(enabled or limits), arm.mode_service)
 
     @abstractmethod
@@ -361,11 +351,7 @@ def _gauge(position: float, limits: JointRange) -> Text:
 
 
 class ActionRun:
-    """A goal on its way.
-
-    Attributes:
-        feedback: What the server has sent so far.
-    """
+    """A goal on its way; ``feedback`` is what the server has sent so far."""
 
     def __init__(
         self,
@@ -422,14 +408,7 @@ MakeDemo = Callable[[Session, Mapping[str, JointRange], float | None, MovedGroup
 def parse(
     argv: Sequence[str], name: str, description: str, duration: str
 ) -> tuple[argparse.Namespace, RosOptions]:
-    """Parse the command line of a demo.
-
-    Args:
-        argv: Arguments without the program's name.
-        name: Name of its executable.
-        description: What it does, for the help.
-        duration: What ``--duration`` does, for the help.
-    """
+    """Parse the command line of a demo; ``description`` and ``duration`` are texts of the help."""
     parser = argparse.ArgumentParser(
         prog=f'ros2 run arm_bringup {name}',
         description=description,
@@ -456,12 +435,7 @@ def run(
     """Bring a simulated arm up, and run a demo until its end or Ctrl-C.
 
     Args:
-        parsed: What :func:`parse` returned.
-        make_demo: Makes the demo.
-        master: What runs the bus.
-        find_robot: Finds the robot that is asked for.
         files: Makes the parameter files of motion nodes; None for a demo of drives.
-        plan: With move_group.
         endless: The table runs until Ctrl-C, without a summary.
         errors: What is raised besides, where a robot does not suit the demo.
 

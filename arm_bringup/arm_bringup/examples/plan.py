@@ -351,12 +351,7 @@ class Plan(ArmDemo):
         return self._go(name, self._solve(above, cell.above[place], free=True), FREE)
 
     def _meet(self, target: Mapping[str, float], speed: float = SLOW) -> None:
-        """Put a box in the way of a motion: the arm stops, and the goal is reached around it.
-
-        Args:
-            target: Where the motion ends, by joint.
-            speed: Share of the limits at which the arm moves.
-        """
+        """Put a box in the way of a motion: the arm stops, and reaches the goal around it."""
         name = 'box in the way'
         self.enter('slowly on, until a box appears in the way')
         shown = len(self.paths)

@@ -104,12 +104,7 @@ def support(
 ) -> Support:
     """Return what the feet on the ground span, and where the centre of mass is over it.
 
-    Args:
-        places: Of all feet in the root link in [m].
-        on_ground: Those that are on the ground.
-        attitude: Of the root link in a level frame.
-        centre: Of mass, in the root link in [m].
-        radius: Of the feet in [m].
+    Places are in the root link, whose attitude is that in a level frame.
     """
     x, y, z, w = attitude
     back = (-x, -y, -z, w)
@@ -147,12 +142,7 @@ def roll_pitch(attitude: Quaternion) -> tuple[float, float]:
 
 
 def horizon_html(attitude: Quaternion | None, battery: str) -> str:
-    """Return an artificial horizon with its numbers, and the battery.
-
-    Args:
-        attitude: Of the body in a level frame; None where nothing measures it.
-        battery: In words; empty where nothing does.
-    """
+    """Return an artificial horizon with its numbers, and the battery, of what is measured."""
     parts = []
     if attitude is not None:
         roll, pitch = (math.degrees(angle) for angle in roll_pitch(attitude))
@@ -173,12 +163,7 @@ def horizon_html(attitude: Quaternion | None, battery: str) -> str:
 
 
 def battery_text(percentage: float, voltage: float) -> str:
-    """Return the charge of a battery in words; what is not measured is left out.
-
-    Args:
-        percentage: From 0 to 1, or NaN.
-        voltage: In [V], or NaN or 0.
-    """
+    """Return a charge of 0 to 1 and [V] in words; what is not measured is left out."""
     parts = []
     if math.isfinite(percentage):
         parts.append(f'{100.0 * percentage:.0f} %')
@@ -211,12 +196,7 @@ Pose: TypeAlias = tuple[float, float, float]
 
 
 class Body:
-    """Attitude, battery, feet and pose; in the thread of the node, but for :meth:`send`.
-
-    Attributes:
-        battery: Its charge in words; empty where nothing measures it.
-        panel: Where it is shown; None before something of it is known.
-    """
+    """Attitude, battery, feet and pose; in the thread of the node, but for :meth:`send`."""
 
     def __init__(
         self, node: Node, page: RobotPage, listening: Listening, positions: Mapping[str, float]

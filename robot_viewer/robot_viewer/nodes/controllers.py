@@ -185,10 +185,6 @@ class Controllers:
 
     Commands are trajectories of one point, on the topic: a later one takes over from the one
     before, and a controller whose drives are not enabled follows none.
-
-    Attributes:
-        found: By the full name of the controller.
-        history: What their joints did.
     """
 
     def __init__(
@@ -236,10 +232,7 @@ class Controllers:
     def aim(self, targets: Mapping[str, float], share: float, at: float) -> None:
         """Send joints to targets, and no other joint, as long as this is called again.
 
-        Args:
-            targets: By joint in [rad] or [m].
-            share: Of the greatest velocity, above 0 to 1.
-            at: Steady time in [s] at which the button was seen to be held.
+        ``share`` is that of the greatest velocity, ``at`` when the button was seen to be held.
         """
         if time.monotonic() - at > RELEASED_AFTER:
             return  # this node was held up; the button may be let go

@@ -145,21 +145,12 @@ class _Client:
 
 
 class Server:
-    """The clients, in a thread of their own.
-
-    Attributes:
-        port: Where it listens.
-    """
+    """The clients, in a thread of their own; ``wanted`` is called with a topic."""
 
     def __init__(
         self, address: tuple[str, int], admission: Admission, wanted: Callable[[str], None]
     ) -> None:
-        """Listen.
-
-        Args:
-            address: Host and port; port 0 for a free one.
-            admission: Decides who may connect.
-            wanted: Called with a topic that a client wants, or wants no more.
+        """Listen; port 0 is a free one.
 
         Raises:
             OSError: The address cannot be bound.
@@ -453,11 +444,7 @@ def class_of(name: str) -> Any:  # noqa: ANN401  # message types have no type
 
 
 def main() -> int:
-    """Run until Ctrl-C.
-
-    Returns:
-        0, or 1 when it could not begin.
-    """
+    """Run until Ctrl-C; return 0, or 1 when it could not begin."""
     return run_program(NAME, _serve)
 
 

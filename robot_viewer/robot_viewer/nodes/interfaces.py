@@ -39,10 +39,7 @@ SET_NMT_TYPE, SET_MODE_TYPE = 'canopen_interfaces/srv/CONmtID', 'quad_msgs/srv/S
 def of_robot(description: str, topics: Iterable[str], nodes: Iterable[str]) -> list[str]:
     """Return the nodes of one robot: no other one's namespace is nearer to them.
 
-    Args:
-        description: Full name of the topic with the description of the robot.
-        topics: Full names of all topics.
-        nodes: Full names of nodes.
+    All names are full ones; ``description`` is the topic with that of the robot.
     """
     robots = {name.removesuffix(DESCRIPTION) for name in topics if name.endswith(DESCRIPTION)}
     own = description.removesuffix(DESCRIPTION)
@@ -56,12 +53,7 @@ def of_robot(description: str, topics: Iterable[str], nodes: Iterable[str]) -> l
 
 
 def stops_robot(node: str, services: Mapping[str, Collection[str]]) -> bool:
-    """Return whether the `stop` of a node is that of a robot: it leads drives, or legs.
-
-    Args:
-        node: Its full name.
-        services: Names and types of what it offers.
-    """
+    """Return whether the `stop` of a node is that of a robot: it leads drives, or legs."""
     beside = node.rpartition('/')[0]
     return SET_NMT_TYPE in services.get(f'{node}/set_nmt', ()) or SET_MODE_TYPE in services.get(
         f'{beside}/set_mode', ()
@@ -97,7 +89,7 @@ class TriggerCalls:
         """Wait for no answer of services that are none of these."""
         self._running = {w: each for w, each in self._running.items() if services >= set(each)}
 
-    def client(self, service: str) -> Client:
+    def client(self, service: str) -> Any:  # noqa: ANN401  # requests have no type
         """Return the client of a service, which finds its server in time when made early."""
         if service not in self._clients:
             from std_srvs.srv import Trigger  # the bridge to Foxglove calls none
@@ -122,13 +114,7 @@ class TriggerCalls:
     def call_all(
         self, what: str, services: Sequence[str], done: Callable[[bool], None] | None = None
     ) -> None:
-        """Call services at the same time; report all answers at once, the failures first.
-
-        Args:
-            what: What it is for, in words.
-            services: Their full names.
-            done: Takes whether all have succeeded.
-        """
+        """Call services at the same time; report all answers at once, the failures first."""
         if not services:
             self._report(what, 'is not offered', failed=True)
             if done is not None:
@@ -175,11 +161,7 @@ def _node_of(service: str) -> str:
 
 
 class ActionCall:
-    """A goal that may be canceled at any time, also before the server has answered.
-
-    Attributes:
-        ended: There is a result, or will be none.
-    """
+    """A goal that may be canceled at any time, also before the server has answered."""
 
     def __init__(self, client: ActionClient, goal: Any, done: Done) -> None:  # noqa: ANN401
         """Send it."""
@@ -330,11 +312,8 @@ def _whole(data: bytes, at: int) -> int:
 class Listening:
     """Reads topics as long as a page is open.
 
-    No executor serves the subscriptions: a wake-up for each message costs more than all else. At
-    each look the newest message of each kind is decoded.
-
-    Attributes:
-        group: Of the subscriptions.
+    No executor serves the subscriptions, which are in a group of their own: a wake-up for each
+    message costs more than all else. At each look the newest message of each kind is decoded.
     """
 
     def __init__(self, node: Node) -> None:

@@ -42,11 +42,8 @@ def plan_goal(
 ) -> Message:
     """Return a moveit_msgs/MoveGroup goal that is planned, and not executed.
 
-    Args:
-        group: What moves.
-        goal: Positions of its joints in [rad] or [m], or the pose of its tip.
-        frame: The root link, in which that pose is.
-        share: Of the greatest velocity and acceleration, above 0 to 1.
+    A pose is that of the tip in ``frame``, the root link; ``share`` is that of the greatest
+    velocity and acceleration, above 0 to 1.
     """
     moveit = import_module('moveit_msgs.msg')
     message = import_module('moveit_msgs.action').MoveGroup.Goal()
@@ -101,14 +98,7 @@ def _turn(link: str, pose: Transform, frame: str) -> Message:
 def ik_request(
     group: PlanGroup, pose: Transform, frame: str, near: Mapping[str, float]
 ) -> Message:
-    """Return a request of compute_ik.
-
-    Args:
-        group: Whose tip is to be there.
-        pose: Where.
-        frame: The root link, in which that pose is.
-        near: Positions of joints in [rad] or [m] where it is looked for first.
-    """
+    """Return a request of compute_ik for a pose of the tip in a frame, near some positions."""
     message = import_module('moveit_msgs.srv').GetPositionIK.Request()
     asked = message.ik_request
     asked.group_name, asked.ik_link_name, asked.avoid_collisions = group.name, group.tip, True
@@ -146,14 +136,7 @@ def refusal(error_code: Message) -> str:
 def box_message(
     name: str, size: tuple[float, float, float], pose: Transform, frame: str
 ) -> Message:
-    """Return a scene to which a box comes.
-
-    Args:
-        name: Of the box.
-        size: In [m].
-        pose: Of its center.
-        frame: In which that is.
-    """
+    """Return a scene to which a box comes, of a size in [m] about a pose in a frame."""
     moveit, solid = (
         import_module('moveit_msgs.msg'),
         import_module('shape_msgs.msg').SolidPrimitive,
@@ -304,11 +287,7 @@ class PlannedMotion:
         return self.times[-1] if self.times else 0.0
 
     def at(self, time: float) -> dict[str, float]:
-        """Return where the joints are in [rad] or [m], between points on a straight line.
-
-        Args:
-            time: Since its start in [s]; before and after it they rest.
-        """
+        """Return where the joints are at a time in [s], which rest before and after the motion."""
         after = bisect_right(self.times, time)
         if not 0 < after < len(self.times):
             ends = self.points[min(after, len(self.points) - 1)] if self.points else ()
@@ -320,11 +299,7 @@ class PlannedMotion:
         return dict(zip(self.joints, places, strict=True))
 
     def shown(self, elapsed: float) -> dict[str, float] | None:
-        """Return where the joints are as it is shown again and again; None when that has ended.
-
-        Args:
-            elapsed: Since the first showing began in [s].
-        """
+        """Return where the joints are as it is shown again and again; None when that has ended."""
         number, time = divmod(elapsed, self.duration + PAUSE)
         return self.at(time) if number < SHOWINGS else None
 

@@ -83,12 +83,7 @@ class _Links:
 
 
 class MotionPlanning:
-    """What people plan; everything in the thread of the node, and nothing waits.
-
-    Attributes:
-        panel: Where it is shown; None before there is a move_group and a robot.
-        scene: The objects that it plans around.
-    """
+    """What people plan; everything in the thread of the node, and nothing waits."""
 
     def __init__(
         self,
@@ -410,12 +405,7 @@ class MotionPlanning:
 
 
 class PlanPanel:
-    """Goal, ghost and path of a planned motion on the page.
-
-    Attributes:
-        tree: The robot that it is for.
-        hold: Number of the button that executes.
-    """
+    """Goal, ghost and path of a planned motion on the page."""
 
     def __init__(
         self, page: RobotPage, robot: RobotScene, groups: Sequence[str], plan: MotionPlanning

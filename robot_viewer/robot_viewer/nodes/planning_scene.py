@@ -61,12 +61,7 @@ class Say(Protocol):
 
 
 class PlanningScene:
-    """What move_group has in its scene; everything in the thread of the node.
-
-    Attributes:
-        chosen: The object that can be dragged or removed.
-        gizmo: The arrows that drag it.
-    """
+    """What move_group has in its scene; everything in the thread of the node."""
 
     def __init__(self, node: Node, say: Say) -> None:
         self._node, self._say = node, say

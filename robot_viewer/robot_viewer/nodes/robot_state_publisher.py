@@ -203,9 +203,5 @@ def check(parameters: Iterable[Parameter]) -> SetParametersResult:
 
 
 def main() -> int:
-    """Run until Ctrl-C.
-
-    Returns:
-        0, or 1 when it could not begin.
-    """
+    """Run until Ctrl-C; return 0, or 1 when it could not begin."""
     return run_node(NAME, _start, DescriptionError)

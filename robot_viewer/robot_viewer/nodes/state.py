@@ -124,36 +124,21 @@ class Watch:
         return found
 
     def silence(self, now: float, *, publishes: bool) -> float:
-        """Return the time in [s] since the last message of the robot; 0 where it sends none.
-
-        Args:
-            now: Steady time.
-            publishes: It was seen to publish joint states.
-        """
+        """Return the time in [s] since the last message of the robot; 0 where it sends none."""
         if publishes and self._since is not None:
             return now - (self._joints_at or self._since)
         last = max(self._times.values(), default=now)
         return now - last if now - last > STATUS_SILENCE else 0.0
 
     def moves(self, since: float = -math.inf) -> bool:
-        """Whether the robot moves: a walking one follows a velocity, of others a joint moves.
-
-        Args:
-            since: Steady time in [s]; what was seen before does not count.
-        """
+        """Whether the robot moves: a walking one follows a velocity, of others a joint moves."""
         legs = self.legs
         if legs:  # they move while it stands, too
             return any(walks(each) and self._times[each.name] > since for each in legs)
         return self._moved_at > max(since, time.monotonic() - STILL_AFTER)
 
     def seen(self, robot: str, services: Iterable[str], *, publishes: bool) -> Seen:
-        """Return what is known now.
-
-        Args:
-            robot: Its name; empty for none.
-            services: Full names of Trigger services.
-            publishes: It was seen to publish joint states.
-        """
+        """Return what is known now of a robot, by its name and its Trigger services."""
         now = time.monotonic()
         return Seen(
             robot=robot,
@@ -177,11 +162,7 @@ BEGIN_TIME, COAST_TIME = 0.5, 3.0
 
 
 class Judge:
-    """Finds out whether the robot may be moved; everything in the thread of the node.
-
-    Attributes:
-        robot: Its name; empty for none.
-    """
+    """Finds out whether the robot may be moved; everything in the thread of the node."""
 
     def __init__(self, node: Node, page: RobotPage, watch: Watch, calls: TriggerCalls) -> None:
         self._node, self._page, self._watch, self._calls = node, page, watch, calls
@@ -222,13 +203,7 @@ class Judge:
     ) -> None:
         """Find out how the robot is; show it, and report it.
 
-        Args:
-            positions: Of its joints in [rad] or [m].
-            publishes: It was seen to publish joint states.
-            limit: What limits its motion, in words of the servo.
-            battery: In words.
-            drives: What of the page moves it now, in words; empty for nothing that is known.
-            controllers: Of trajectories, by their full names.
+        ``limit`` are the words of the servo, ``drives`` what of the page moves it, in words.
         """
         now, live = time.monotonic(), self._page.live
         seen = self._watch.seen(self.robot, self._services, publishes=publishes)
@@ -375,11 +350,7 @@ class StateNode(Node):
 
 
 def main() -> int:
-    """Print the state.
-
-    Returns:
-        0 where the robot may be moved.
-    """
+    """Print the state; return 0 where the robot may be moved."""
     return run_program(NAME, _look, help_text=HELP)
 
 

@@ -613,11 +613,7 @@ def _stop_beside(node: str) -> str:
 
 
 def main() -> int:
-    """Run until Ctrl-C.
-
-    Returns:
-        0, or 1 when it could not begin.
-    """
+    """Run until Ctrl-C; return 0, or 1 when it could not begin."""
     return run_program(NAME, _serve)
 
 

@@ -162,11 +162,7 @@ def lead(plan: MotionPlan) -> float:
 
 
 class GuardedTargets:
-    """Targets of one motion: at most one for each heartbeat, and none without.
-
-    Attributes:
-        guard: Decides whether the joint may move on.
-    """
+    """Targets of one motion: at most one for each heartbeat, and none without."""
 
     def __init__(self, plan: MotionPlan, now: float) -> None:
         """Begin at rest."""

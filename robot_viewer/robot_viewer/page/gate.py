@@ -70,9 +70,7 @@ def binding_problem(host: str) -> str:
 def shown_host(host: str) -> str:
     """Return the host of a URL by which a browser reaches a server.
 
-    Args:
-        host: What the server is bound to; for all addresses of this computer, the URL has the one
-            by which others reach it.
+    Of one that is bound to all addresses it is that by which others reach this computer.
     """
     if host in {'localhost', '127.0.0.1'}:
         return 'localhost'
@@ -106,11 +104,7 @@ NO_ANSWER = 'no answer from the robot: use the emergency stop'
 
 
 class Overlay:
-    """Answers requests for STOP, and adds itself to the page that viser serves.
-
-    Attributes:
-        live: Its connections with the pages.
-    """
+    """Answers requests for STOP, and adds itself to the page that viser serves."""
 
     def __init__(self, stop: Callable[[], Future[Stop]], live: Live) -> None:
         """Set what STOP does: in the server's thread, without waiting for the robot."""
@@ -187,9 +181,6 @@ class Gate:
     under a name that was pointed here (DNS rebinding), moves the robot. Beyond it a token is
     needed, once in the URL and then as a cookie, and Origin has to be the page's own host. The
     token stays, so that the STOP of a page that is open works when its server was started again.
-
-    Attributes:
-        token: What a page from elsewhere needs; empty on loopback.
     """
 
     def __init__(self, host: str, overlay: Overlay) -> None:

@@ -60,12 +60,7 @@ Move = Callable[[Mapping[str, float], float], None]
 
 
 class TargetPanel:
-    """A slider for each joint; it moves a violet target, and the joint only while it is held.
-
-    Attributes:
-        seen: The target is shown.
-        hold: Number of the button that moves to it.
-    """
+    """A slider for each joint; it moves a violet target, and the joint only while it is held."""
 
     def __init__(
         self,
@@ -176,13 +171,9 @@ def motion_time(
     velocities: Mapping[str, float],
     share: float,
 ) -> float:
-    """Return how long a smooth motion takes.
+    """Return how long a smooth motion takes, at a share of the greatest velocities.
 
-    Args:
-        start: Where the joints are; one that is missing does not move.
-        target: Where they are to be.
-        velocities: Greatest velocity of each; 1 for one that is missing.
-        share: Of the greatest velocity, above 0 to 1.
+    Joints without a start do not move; those without a velocity have 1.
     """
     longest = SHORTEST
     for name, position in target.items():

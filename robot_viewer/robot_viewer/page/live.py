@@ -117,11 +117,9 @@ class Live:
         self._deadman.end(number)
 
     def refuses(self, what: str, *, always: bool = True) -> bool:
-        """Whether something may not be done now; if so the page says why.
+        """Whether something that one press requests may not be done now; if so the page says why.
 
-        Args:
-            what: It is requested by one press.
-            always: It counts whatever state the robot is in, but not after STOP.
+        ``always``: it counts whatever state the robot is in, but not after STOP.
         """
         if self.stopped:
             self._command('say', f'{what}: stopped; press {ALLOW} first')

@@ -143,19 +143,7 @@ class Panel(Protocol):
 
 
 class RobotPage:
-    """A page in a browser; shows come from one thread, actions leave in any.
-
-    Attributes:
-        url: Where it is, with the token where it needs one.
-        server: That of viser.
-        robot: The robot that is shown; None before one.
-        live: Its buttons that are held, and what its overlay shows.
-        speed: Share of the greatest velocity that is chosen, above 0 to 1.
-        last: What was said last, with the time.
-        velocity: Of the tool or of walking forwards in [m/s], by the share; None where unknown.
-        cancel: Drops what is planned.
-        before_log: Order of a folder before the log.
-    """
+    """A page in a browser; shows come from one thread, actions leave in any."""
 
     def __init__(self, host: str, port: int, actions: Actions) -> None:
         self._actions = actions
@@ -178,7 +166,7 @@ class RobotPage:
             command.on_trigger(partial(self._look_from, view))
         self.server.on_client_connect(lambda client: self._place_camera(client, 'Fit'))
         self._log = Log()
-        self.last = ''
+        self.last = ''  # what was said last, with the time
         self._panels: dict[type, Panel] = {}
         self._tabs: GuiTabGroupHandle | None = None
         self._lay_out(('Drive', 'Plan', 'See', 'Diagnose'))
@@ -189,7 +177,7 @@ class RobotPage:
             self._tabs.remove()
         self.live.clear()
         self.velocity: Callable[[float], float] | None = None
-        self.cancel: Callable[[], object] = lambda: None
+        self.cancel: Callable[[], object] = lambda: None  # drops what is planned
         gui = self.server.gui
         self._tabs = gui.add_tab_group()
         self._groups: dict[str, GuiTabHandle] = {}
@@ -218,7 +206,7 @@ class RobotPage:
             self._drive: GuiDropdownHandle[str] | None = None
             self._drive_state: GuiHtmlHandle | None = None
             log = gui.add_folder('Log')
-            self.before_log = log.order - 0.5
+            self.before_log = log.order - 0.5  # order of a folder
             with log:
                 self._log_html: GuiHtmlHandle = gui.add_html('')
 
@@ -316,13 +304,8 @@ class RobotPage:
     ) -> None:
         """Show how the robot is, and enable what may be done then.
 
-        Args:
-            state: The answer to whether it may be moved.
-            positions: Of the joints in [rad] or [m]; none where they are unknown.
-            stop: Stage of the STOP that counts: braking, stopped, failed, or empty.
-            simulated: A simulation runs beside the page.
-            program: Name of a program that moves it; empty for none.
-            listens: Where the page looks for robots, in words.
+        ``stop`` is the stage of the STOP that counts: braking, stopped, failed, or empty;
+        ``program`` the name of one that moves it; ``listens`` where robots are looked for.
         """
         self.live.movable = state.movable
         if self.robot is not None:

@@ -72,13 +72,7 @@ class Look:
 
 
 class RobotScene:
-    """The links of a robot below one another in a scene, so that a joint moves one frame.
-
-    Attributes:
-        tree: Its description.
-        notes: What cannot be shown, in words.
-        size: How far its links reach from the root in [m].
-    """
+    """The links of a robot below one another in a scene, so that a joint moves one frame."""
 
     def __init__(
         self,
@@ -90,7 +84,7 @@ class RobotScene:
     ) -> None:
         """Show the robot, each joint at zero or the limit next to it."""
         look = look or Look()
-        self.notes: list[str] = []
+        self.notes: list[str] = []  # what cannot be shown, in words
         self._scene, self.tree = scene, tree
         self._links, self._tint = look.links or frozenset(tree.links), look.tint
         self._meshes = meshes or Meshes(folder)
@@ -105,14 +99,10 @@ class RobotScene:
         self._add_shapes()
         free = (joint for joint in self._movable.values() if joint.mimic is None)
         self.place({joint.name: start_position(joint) for joint in free})
-        self.size = self._reach(tree.root)
+        self.size = self._reach(tree.root)  # how far its links reach from the root in [m]
 
     def place(self, positions: Mapping[str, float]) -> None:
-        """Move joints; those that follow one of them move along.
-
-        Args:
-            positions: In [rad] or [m] by name; names of other robots do not matter.
-        """
+        """Move joints; those that follow one of them move along, names of others do not matter."""
         for name, joint in self._movable.items():
             position = joint_position(joint, positions)
             if position is not None and math.isfinite(position):
@@ -314,13 +304,7 @@ def _load(path: Path) -> object:
 def moved(
     tree: KinematicTree, positions: Mapping[str, float], goals: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return positions with some joints at goals; what follows those is left out, to follow.
-
-    Args:
-        tree: The robot.
-        positions: Measured, in [rad] or [m] by name.
-        goals: In [rad] or [m] by name.
-    """
+    """Return positions with some joints at goals; what follows those is left out, to follow."""
     followers = {j.name for j in tree.movable() if j.mimic and j.mimic.source in goals}
     return {name: at for name, at in positions.items() if name not in followers} | dict(goals)
 

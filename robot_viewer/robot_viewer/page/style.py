@@ -63,11 +63,7 @@ class _Entry:
 
 
 class Log:
-    """The last entries; what is said again is counted. Thread-safe.
-
-    Attributes:
-        html: All of it, the last entry first.
-    """
+    """The last entries; what is said again is counted. Thread-safe."""
 
     def __init__(self) -> None:
         """Begin with none."""
