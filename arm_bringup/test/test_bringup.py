@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The bring-up as a program, with small processes in place of the real ones."""
+"""The bring-up with small processes in place of the real ones, and what it proposes."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The Panda's description against the numbers of the arm, and what a broken one says."""
+"""The Panda's and the PRBT's description against the numbers of the arms, and broken ones."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Robot folders by name and by path, and the buses of the Panda and the PRBT."""
+"""Robot folders by name and by path, their buses, and where simulated drives start."""
 
 from __future__ import annotations
 

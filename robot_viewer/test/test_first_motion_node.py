@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The first motion between a page and a drive: what is asked, and what becomes of no answer."""
+"""The first motion of the page: targets by heartbeats, the drive, what was seen, the file."""
 
 from __future__ import annotations
 

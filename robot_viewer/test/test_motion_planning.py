@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Plans on the page over DDS, beside a move_group that answers when the test says so."""
+"""Plans and the scene on the page: in messages, and over DDS beside a fake move_group."""
 
 from __future__ import annotations
 

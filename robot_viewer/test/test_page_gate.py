@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Who may open the page: requests as browsers send them, to the real server of it."""
+"""Who may open the page, by requests as browsers send them; and who holds a button of it."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The robot in the scene of a page."""
+"""The robot in the scene of a page, targets and plots, drive reports, and whose drives it has."""
 
 from __future__ import annotations
 

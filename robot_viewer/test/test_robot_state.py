@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""May the robot be moved? The worst that was seen counts."""
+"""May the robot be moved? The worst that was seen counts; who moves it is said, too."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which transforms follow from which messages."""
+"""Which transforms follow from which messages: as a library, as a node, and beside pinocchio."""
 
 from __future__ import annotations
 

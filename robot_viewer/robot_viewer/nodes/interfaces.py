@@ -103,7 +103,7 @@ class TriggerCalls:
         if not client.service_is_ready():
             self._report(service, 'is not there', failed=True)
             return None
-        future = client.call_async(client.srv_type.Request())
+        future: Future = client.call_async(client.srv_type.Request())
 
         def answered(done: Future) -> None:
             self._report(service, text_of(done), failed=not succeeded(done))
