@@ -26,12 +26,13 @@ from .modes import (
     NEW_SET_POINT,
     NO_BITS,
 )
+from .modes.cyclic_position import Following, FollowingWatch, MARGIN_TIME
 from .modes.mode import check_setpoint, check_target, TORQUE_MODES
 from .motion import AxisFeedback, Refusal, RefusalCause, Setpoint
 from .parameters import quirks_of
 from .state import AxisState, DriveStatus, FAULTY, LOOK_PERIOD, POWERED
 from .state_machine import Command, ControlwordOutput, fault_reset, next_command
-from .stop import BrakingWatch, Following, FollowingWatch, Halt, MARGIN_TIME, StopSequence
+from .stop import BrakingWatch, Halt, StopSequence
 
 FOLLOWS_COMMAND = int(Statusword.FOLLOWS_COMMAND)
 FOLLOWING_ERROR = int(Statusword.FOLLOWING_ERROR)

@@ -33,8 +33,8 @@ from arm_canopen import (
     RefusalCause,
     Severity,
 )
+from arm_canopen.cia402.modes.cyclic_position import Following, FollowingWatch
 from arm_canopen.cia402.motion_group import stop_all
-from arm_canopen.cia402.stop import Following, FollowingWatch
 from arm_canopen.config import boot_writes, check_bus
 from arm_canopen.config.model.bus import with_event_timer
 from arm_canopen.master.process_image import ReceivedTpdo, SyncRound
