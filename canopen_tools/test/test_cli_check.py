@@ -16,8 +16,7 @@ import sys
 from typing import NamedTuple
 
 from can_addresses import free_multicast
-from config_mutations import mutated
-from config_samples import BUS, write_bus
+from config_samples import BUS, mutated, write_bus
 from device_rig import Rig
 from eds_samples import DRIVE_ROWS, eds_text, FACTOR_ROWS, Row
 import pytest
