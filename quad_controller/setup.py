@@ -14,12 +14,12 @@ runpy.run_path(str(SHARED))['setup_package'](
         'attach_contract = quad_controller.attach_contract:main',
         'check_policy = quad_controller.policy_check.main:main',
         'controller_node = quad_controller.nodes.controller_node:main',
-        'replay_policy = quad_controller.replay_policy:main',
+        'replay_policy = quad_controller.recording:main',
     ],
     commands=[
         'quad-attach-contract = quad_controller.attach_contract:main',
         'quad-check-policy = quad_controller.policy_check.main:main',
-        'quad-replay-policy = quad_controller.replay_policy:main',
+        'quad-replay-policy = quad_controller.recording:main',
     ],
     package_data=['policies/*.onnx'],
 )

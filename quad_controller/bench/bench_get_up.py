@@ -22,7 +22,7 @@ import os
 import numpy as np
 
 from quad_controller import Controller, GaitParameters, ServoModel, State, StateParameters
-from quad_controller.states.get_up_poses import Lying, lying_on
+from quad_controller.states.get_up import Lying, lying_on
 from quad_description import quadruped, robot_urdf
 from quad_description.rotations import down_in_body, normalized, Quaternion
 from quad_sim import parse_servo
@@ -58,12 +58,7 @@ def attitude(random: np.random.Generator, side: Lying | None) -> Quaternion:
 
 
 def fallen(seed: int, side: Lying | None, servo: str) -> PhysicsBackend:
-    """Return a robot that was dropped and came to rest.
-
-    Args:
-        side: With which side below it is dropped; None for any attitude.
-        servo: Its servos, as fake_xgo takes them.
-    """
+    """Return a robot that was dropped, with a side or anything below, and came to rest."""
     random = np.random.default_rng(seed)
     robot = Robot(URDF, parse_servo(servo))
     pose = tuple(random.uniform(limits.lower, limits.upper) for limits in MODEL.limits)
@@ -82,13 +77,7 @@ def fallen(seed: int, side: Lying | None, servo: str) -> PhysicsBackend:
 def get_up(
     seed: int, side: Lying | None = None, only: bool = False, servo: str = 'nominal'
 ) -> Outcome:
-    """Drop a robot, and let it get up.
-
-    Args:
-        side: With which side below it is dropped; None for any attitude.
-        only: Do nothing where it came to rest on another side.
-        servo: Its servos, as fake_xgo takes them.
-    """
+    """Drop a robot, and let it get up; `only` if it came to rest on that side."""
     backend = fallen(seed, side, servo)
     state = backend.observe()
     if state.imu is None:

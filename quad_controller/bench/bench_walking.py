@@ -16,7 +16,7 @@ from dataclasses import replace
 
 from quad_controller import Velocity
 from quad_controller.gait.parameters import LOW_AND_WIDE
-from quad_controller.policy.report import table_text
+from quad_controller.policy.options import table_text
 from quad_controller.policy_check.arenas import AS_MADE, Conditions, RobotChoice, TIPPING_PUSH
 from quad_controller.policy_check.course import course_for, CourseFigures
 from quad_controller.policy_check.findings import Table

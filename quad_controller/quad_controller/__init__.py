@@ -24,18 +24,13 @@ those of REP 103, quaternions x, y, z, w.
 """
 
 from .exceptions import ParameterError, PolicyError, QuadControllerError
-from .gait.body import BodyPose
 from .gait.generator import GaitGenerator
-from .gait.parameters import GaitParameters
-from .gait.schedule import Gait
-from .gait.servo_compensation import ServoModel
-from .gait.velocity import Velocity
+from .gait.parameters import Gait, GaitParameters, ServoModel
+from .gait.velocity import BodyPose, Velocity
 from .policy.load import find_policy, load_policy
 from .policy.options import PolicyOptions
 from .states.controller import Controller
-from .states.modes import Answer, MODES, State
-from .states.parameters import StateParameters
-from .states.status import Output, Status
+from .states.modes import Answer, MODES, Output, State, StateParameters, Status
 
 __version__ = '0.1.0'
 

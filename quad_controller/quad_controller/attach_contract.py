@@ -12,15 +12,13 @@ import sys
 from quad_description import run_command
 
 from .exceptions import PolicyError, QuadControllerError
-from .policy import onnx_file
 from .policy.check import scale_rows
+from .policy.contract.build import build_contract
 from .policy.contract.document import ContractDocument, setting
-from .policy.contract.files import read_contract_file
 from .policy.contract.mjlab import CONTRACT_KEY, read_metadata
-from .policy.contract.model import build_contract
-from .policy.load import find_policy, SHIPPED
-from .policy.network import OnnxNetwork
-from .policy.report import table_text
+from .policy.load import find_policy, read_contract_file, SHIPPED
+from .policy.network import OnnxNetwork, read_model, SIDES_KEY, with_metadata
+from .policy.options import table_text
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -38,7 +36,7 @@ def run(arguments: Sequence[str]) -> int:
         if target.parent == SHIPPED:
             raise PolicyError(f'{model.name} is shipped: write another file (--output)')
         _write(model, target, document)
-        written = onnx_file.read_model(target)
+        written = read_model(target)
     except (QuadControllerError, OSError) as error:
         sys.stdout.write(f'{error}\n')
         return 1
@@ -68,11 +66,11 @@ def _document(model: Path, files: Sequence[Path], settings: Sequence[str]) -> Co
 
 def _write(model: Path, target: Path, document: ContractDocument) -> None:
     """Write the model with its contract, whole or not at all."""
-    read = onnx_file.read_model(model)
-    data = onnx_file.with_metadata(read.data, CONTRACT_KEY, document.to_yaml())
+    read = read_model(model)
+    data = with_metadata(read.data, CONTRACT_KEY, document.to_yaml())
     if read.sides:
         # exports that were renamed may share the name of their side file
-        data = onnx_file.with_metadata(data, onnx_file.SIDES_KEY, read.sides_digest)
+        data = with_metadata(data, SIDES_KEY, read.sides_digest)
     if read.sides and target.resolve().parent != model.resolve().parent:
         names = ', '.join(read.sides)
         raise PolicyError(f'the weights of {model} lie in {names}: write --output beside them')

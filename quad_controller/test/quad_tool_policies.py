@@ -21,8 +21,7 @@ import onnx
 from onnx import helper, numpy_helper, TensorProto
 import yaml
 
-from quad_gait_policies import joined, STAND
-from quad_gait_rig import ROBOT
+from quad_gait_rig import joined, ROBOT, STAND
 
 Floats = npt.NDArray[np.float32]
 # an order that is neither ours nor alphabetical, as simulators have them: joint by joint

@@ -21,11 +21,10 @@ from quad_controller import (
     ServoModel,
     Velocity,
 )
-from quad_controller.gait.body import BodyLimits, feet_in_body, Leveller, UPRIGHT
 from quad_controller.gait.generator import HeadingHold
-from quad_controller.gait.servo_compensation import ServoCompensation
+from quad_controller.gait.parameters import ServoCompensation
 from quad_controller.gait.stepping import Stepper
-from quad_controller.gait.velocity import REST
+from quad_controller.gait.velocity import BodyLimits, feet_in_body, Leveller, REST, UPRIGHT
 from quad_description import quadruped
 from quad_description.rotations import Vector
 

@@ -14,12 +14,12 @@ import pytest
 
 from quad_controller import find_policy
 from quad_controller.attach_contract import run as attach
+from quad_controller.policy.contract.build import build_contract
 from quad_controller.policy.contract.mjlab import read_metadata
-from quad_controller.policy.contract.model import build_contract, PolicyContract
+from quad_controller.policy.contract.model import PolicyContract
 from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy_check.main import ExitCode, run
-from quad_gait_policies import joined, metadata, write_policy
-from quad_gait_rig import ROBOT
+from quad_gait_rig import joined, metadata, ROBOT, write_policy
 
 SHIPPED = str(find_policy('trot_ppo'))
 TURN = ['--walk', '0.2', '0', '0.3', '--duration', '4', '--servo', 'firm']

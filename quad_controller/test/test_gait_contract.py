@@ -23,18 +23,17 @@ from quad_controller import (
     Velocity,
 )
 from quad_controller.attach_contract import run
+from quad_controller.policy.contract.build import build_contract
 from quad_controller.policy.contract.document import document_of, read_yaml
-from quad_controller.policy.contract.files import read_contract_file
 from quad_controller.policy.contract.mjlab import read_metadata
-from quad_controller.policy.contract.model import build_contract, RecurrentState
-from quad_controller.policy.load import LoadedPolicy
+from quad_controller.policy.contract.model import RecurrentState
+from quad_controller.policy.load import LoadedPolicy, read_contract_file
 from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy.observation import Situation
 from quad_controller.policy.options import GravitySource
 from quad_description import ImuSample, JointSample, RobotState
 from quad_description.rotations import normalized
-from quad_gait_policies import STAND
-from quad_gait_rig import ROBOT, UPRIGHT
+from quad_gait_rig import ROBOT, STAND, UPRIGHT
 from quad_tool_policies import DEFAULTS, JOINTS, ReferencePolicy, Step, Tool, TOOLS, write_network
 
 pytestmark = pytest.mark.slow

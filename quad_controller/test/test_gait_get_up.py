@@ -13,12 +13,17 @@ from hypothesis import strategies as st
 import pytest
 
 from quad_controller import Controller, GaitParameters, State, StateParameters
-from quad_controller.states.get_up import BLIND_DEADLINE, MAX_TRIES
-from quad_controller.states.get_up_poses import Lying, lying_on, RECOVERIES, Stage
+from quad_controller.states.get_up import (
+    BLIND_DEADLINE,
+    Lying,
+    lying_on,
+    MAX_TRIES,
+    RECOVERIES,
+    Stage,
+)
 from quad_description import ImuSample, PRESETS, quadruped, robot_urdf
 from quad_description.rotations import about, from_rpy, Quaternion, rotate
-from quad_gait_policies import STAND
-from quad_gait_rig import ARM_ROBOT, FOLDED, PERIOD, Rig, ROBOT, tilted, UPRIGHT
+from quad_gait_rig import ARM_ROBOT, FOLDED, PERIOD, Rig, ROBOT, STAND, tilted, UPRIGHT
 
 QUARTER = math.pi / 2
 ATTITUDES: dict[Lying, Quaternion] = {

@@ -13,7 +13,7 @@ import numpy.typing as npt
 import pytest
 
 from quad_controller import Controller, GaitParameters, StateParameters
-from quad_controller.states.get_up_poses import Lying, RECOVERIES, Stage
+from quad_controller.states.get_up import Lying, RECOVERIES, Stage
 from quad_description import LEGS
 from quad_sim.physics import Robot
 

@@ -25,11 +25,12 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64, String
 
 from node_runner import LATCHED, ParameterError
-from quad_controller import QuadControllerError, replay_policy
+from quad_controller import QuadControllerError
 from quad_controller.nodes.controller_node import ControllerNode
+from quad_controller.recording import run as replay_policy
 from quad_description import DescriptionError, quadruped, robot_urdf
 from quad_description.rotations import IDENTITY, Quaternion
-from quad_gait_policies import joined, metadata, write_policy
+from quad_gait_rig import joined, metadata, write_policy
 from quad_msgs.msg import JointCommand
 from quad_msgs.srv import LoadPolicy, SetMode
 
@@ -234,7 +235,7 @@ def test_a_shipped_policy_is_found_checked_watched_and_recorded(
         assert 'dry run' in robot.mode('policy').message
         process.stop()
     (recording,) = tmp_path.iterdir()
-    assert replay_policy.run([str(recording)]) == 0
+    assert replay_policy([str(recording)]) == 0
 
 
 def test_a_policy_that_does_not_fit_leaves_the_gait(isolation: Isolation, tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ from quad_controller import (
 from quad_controller.gait.parameters import AS_TUNED, LOW_AND_WIDE
 from quad_description import quadruped, robot_urdf, RobotState, Targets
 from quad_description.rotations import about_z, multiply, roll_pitch_yaw
-from quad_gait_physics import FIRM, firm, MODEL, PERIOD, PhysicsRig
+from quad_gait_rig import FIRM, firm, MODEL, PERIOD, PhysicsRig
 from quad_hardware.estimation import (
     ImuMounting,
     LegOdometry,

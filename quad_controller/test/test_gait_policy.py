@@ -29,8 +29,18 @@ from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy.observation import gravity, Situation
 from quad_controller.policy.options import GravitySource, ImuFrame
 from quad_description import ImuSample, JointSample
-from quad_gait_policies import FakeNetwork, joined, metadata, STAND, TERMS, write_policy
-from quad_gait_rig import ARM_ROBOT, ROBOT, tilted, UPRIGHT
+from quad_gait_rig import (
+    ARM_ROBOT,
+    FakeNetwork,
+    joined,
+    metadata,
+    ROBOT,
+    STAND,
+    TERMS,
+    tilted,
+    UPRIGHT,
+    write_policy,
+)
 
 pytestmark = pytest.mark.slow
 

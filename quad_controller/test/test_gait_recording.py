@@ -20,18 +20,16 @@ from quad_controller import (
     Output,
     ParameterError,
     PolicyOptions,
-    replay_policy,
     StateParameters,
     Velocity,
 )
-from quad_controller.nodes.recorder import Recorder
+from quad_controller.nodes.messages import Recorder
 from quad_controller.policy.options import GravitySource
 from quad_controller.policy.runner import PolicyRunner
-from quad_controller.recording import inputs_of, PolicyRun, read_recording, TOPIC, unpack
-from quad_controller.replay_policy import feed
+from quad_controller.recording import feed, inputs_of, PolicyRun, read_recording, TOPIC, unpack
+from quad_controller.recording import run as replay_policy
 from quad_description import JointSample, RobotState
-from quad_gait_physics import FIRM, firm, MODEL
-from quad_gait_rig import PERIOD, ROBOT, STANDING, UPRIGHT
+from quad_gait_rig import FIRM, firm, MODEL, PERIOD, ROBOT, STANDING, UPRIGHT
 from quad_msgs.msg import ControllerStep
 from quad_sim.physics import PhysicsBackend
 from rosbag_files import BagReader, METADATA_FILE
@@ -136,7 +134,7 @@ def test_a_recorded_walk_is_answered_the_same(
     folder = walk(tmp_path / 'walk', 5.0)
     reader = BagReader(folder)
     assert [(each.topic.name, each.count) for each in reader.metadata.topics] == [(TOPIC, 250)]
-    assert replay_policy.run([str(folder)]) == 0
+    assert replay_policy([str(folder)]) == 0
     printed = capsys.readouterr().out
     assert 'trot_ppo.onnx' in printed
     assert 'the same' in printed
@@ -148,11 +146,11 @@ def test_a_recorded_walk_is_answered_the_same(
     off = np.abs(answers[-1].action - answers[-1].step['action']).max()
     assert off == pytest.approx(0.01, abs=1e-3)
     (file,) = folder.glob('*.mcap')
-    assert replay_policy.run([str(file)]) == 0  # the file of a folder that says which policy ran
+    assert replay_policy([str(file)]) == 0  # the file of a folder that says which policy ran
     (folder / METADATA_FILE).unlink()
     for recording in (folder, file):
         capsys.readouterr()
-        assert replay_policy.run([str(recording)]) == 1
+        assert replay_policy([str(recording)]) == 1
         assert 'does not say which policy ran' in capsys.readouterr().out
 
 
@@ -167,15 +165,15 @@ def test_a_policy_is_replayed_as_it_was_run(
     folder = walk(tmp_path / 'walk', 3.0, options=options)
     contract.unlink()
     assert 'own.yaml' in PolicyRun('', options, PERIOD).keep_contract(folder)
-    assert replay_policy.run([str(folder)]) == 0
+    assert replay_policy([str(folder)]) == 0
     assert 'the same' in capsys.readouterr().out
     other = tmp_path / 'other.yaml'
     other.write_text('period: 0.02\n', encoding='utf-8')
-    assert replay_policy.run([str(folder), '--contract', str(other)]) == 1
+    assert replay_policy([str(folder), '--contract', str(other)]) == 1
     assert 'NOT the same' in capsys.readouterr().out
     # a model that is named is another one: what was set for the recorded one is not its
     named = shutil.copy(find_policy('trot_ppo'), tmp_path / 'named.onnx')
-    assert replay_policy.run([str(folder), str(named)]) == 1
+    assert replay_policy([str(folder), str(named)]) == 1
     assert 'NOT the same' in capsys.readouterr().out
 
 
@@ -200,5 +198,5 @@ def test_what_is_no_recording_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """In one line."""
-    assert replay_policy.run([str(tmp_path / 'nothing')]) == 1
+    assert replay_policy([str(tmp_path / 'nothing')]) == 1
     assert 'nothing' in capsys.readouterr().out

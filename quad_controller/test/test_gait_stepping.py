@@ -14,11 +14,9 @@ import pytest
 
 from quad_builds import urdf
 from quad_controller import Gait, GaitGenerator, GaitParameters, Velocity
-from quad_controller.gait.body import UPRIGHT
-from quad_controller.gait.schedule import SCHEDULES
-from quad_controller.gait.servo_compensation import ServoModel
+from quad_controller.gait.parameters import SCHEDULES, ServoModel
 from quad_controller.gait.stepping import Stepper, SwingLift
-from quad_controller.gait.velocity import REST
+from quad_controller.gait.velocity import REST, UPRIGHT
 from quad_controller.states.motion import StepLimiter
 from quad_description import quadruped, Targets
 

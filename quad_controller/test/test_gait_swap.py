@@ -17,8 +17,18 @@ from quad_controller import (
     Velocity,
 )
 from quad_description import Targets
-from quad_gait_physics import FIRM, firm, MODEL, PhysicsRig
-from quad_gait_rig import PERIOD, policy_rig, STAND, standing, StillPolicy, tilted
+from quad_gait_rig import (
+    FIRM,
+    firm,
+    MODEL,
+    PERIOD,
+    PhysicsRig,
+    policy_rig,
+    STAND,
+    standing,
+    StillPolicy,
+    tilted,
+)
 
 CROUCHED = tuple(angle + 0.1 for angle in STAND)
 STANDING_LOW = tuple(angle + 0.05 for angle in STAND)

@@ -25,10 +25,9 @@ from quad_controller import (
     StateParameters,
     Velocity,
 )
-from quad_controller.policy.contract.model import build_contract
+from quad_controller.policy.contract.build import build_contract
 from quad_controller.policy.runner import PolicyRunner
-from quad_gait_physics import MODEL
-from quad_gait_policies import FakeNetwork
+from quad_gait_rig import FakeNetwork, MODEL
 from quad_sim.env import NO_RANDOMIZATION, WalkingEnv
 
 pytestmark = pytest.mark.slow

@@ -21,8 +21,7 @@ from quad_controller.exceptions import CheckError
 from quad_controller.gait.parameters import LOW_AND_WIDE
 from quad_controller.gait.velocity import REST
 from quad_controller.policy.contract.model import CommandRanges, Gains
-from quad_controller.policy.gains import gain_rows, ServoResponse
-from quad_controller.policy.report import table_text
+from quad_controller.policy.options import gain_rows, ServoResponse, table_text
 from quad_controller.policy_check.arenas import (
     Conditions,
     PhysicsArena,
@@ -52,8 +51,7 @@ from quad_controller.policy_check.findings import (
 from quad_controller.policy_check.main import ExitCode, run
 from quad_controller.policy_check.trial import Candidate, chain_duration, run_trials, Trial
 from quad_description import robot_urdf, RobotState
-from quad_gait_policies import metadata, write_policy
-from quad_gait_rig import ROBOT
+from quad_gait_rig import metadata, ROBOT, write_policy
 from quad_hardware import NoAnswerError
 from quad_sim import CommandTiming, ServedRobot
 from quad_sim.physics import Metered, PhysicsBackend, Robot

@@ -55,9 +55,6 @@ PLANT = Randomization(
 def contract_of(path: Path, kind: str) -> ContractDocument:
     """Return the contract of an ONNX file, for a policy that is trained on the plant from there.
 
-    Args:
-        kind: How the policy is made, for people.
-
     Raises:
         PolicyError: The file cannot be read.
     """

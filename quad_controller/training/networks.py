@@ -101,10 +101,7 @@ def explore(actor: Actor, deviation: float) -> None:
 
 
 def learned_in(path: Path, actor: Actor) -> Normaliser:
-    """Give an actor the layers of an ONNX file that :func:`policy_export.export` wrote.
-
-    Returns:
-        The normalisation of its observations.
+    """Give an actor the layers that an export wrote; return the normalisation of observations.
 
     Raises:
         PolicyError: It has other layers.

@@ -5,17 +5,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from networks import Actor, Judge, Normaliser
+from contract_env import contract_of, PERIOD, PLANT, walking_env
+from networks import Actor, explore, Judge, layers_of, learned_in, Normaliser
 import numpy as np
+from policy_export import export
+from progress import Progress
+import skrl
 from skrl.agents.jax.ppo import PPO, PPO_CFG
 from skrl.envs.wrappers.jax import wrap_env
 from skrl.memories.jax import RandomMemory
 from skrl.resources.preprocessors.jax import RunningStandardScaler
 from skrl.resources.schedulers.jax import KLAdaptiveLR
 
+from quad_controller.policy.contract.build import build_contract
+from quad_controller.policy.contract.mjlab import CONTRACT_KEY
 from quad_sim.env import ProcessVectorEnv, Randomization
 
 ROLLOUT = 32  # steps of each environment between two updates
@@ -40,11 +48,7 @@ class Practice:
         curves: Path,
         seed: int,
     ) -> None:
-        """Prepare it.
-
-        Args:
-            curves: Folder for the files that TensorBoard reads.
-        """
+        """Prepare it; `curves` is the folder for the files that TensorBoard reads."""
         self._envs, self._wrapped = envs, wrap_env(envs, wrapper='gymnasium', verbose=False)
         self._randomization, self._period, self._actor = randomization, period, actor
         observations, actions = envs.single_observation_space, envs.single_action_space
@@ -168,3 +172,37 @@ def _settings(normaliser: Normaliser, curves: Path) -> PPO_CFG:
             'checkpoint_interval': 0,
         },
     )
+
+
+DEVIATION = 0.18  # of the actions that are tried when practice begins: 0.05 rad
+
+
+def train(start: Path, target: Path, progress: Progress, *, seed: int, environments: int) -> None:
+    """Train the policy of an ONNX file, and write another, until the time of `progress` is over.
+
+    Raises:
+        PolicyError: The layers of the start cannot be trained.
+    """
+    skrl.config.jax.device = 'cpu'
+    skrl.config.jax.key = seed
+    skrl.logger.setLevel('WARNING')
+    document = contract_of(start, f'PPO from {start.stem} (quad_sim/Walk-v0, 1 to 12 N m/rad)')
+    make = partial(walking_env, build_contract(document), PLANT)
+    with closing(ProcessVectorEnv(make, environments)) as envs:
+        actor = Actor(envs.single_observation_space, envs.single_action_space)
+        actor.init_state_dict(role='policy')
+        normaliser = learned_in(start, actor)
+        explore(actor, DEVIATION)
+        practice = Practice(
+            actor,
+            normaliser,
+            envs,
+            PLANT,
+            period=PERIOD,
+            curves=target.parent / 'curves',
+            seed=seed,
+        )
+        for practised in practice.until(lambda: progress.share):
+            progress.figures(practised)
+        practice.close()
+    export(layers_of(actor, normaliser), target, {CONTRACT_KEY: document.to_yaml()})

@@ -35,7 +35,7 @@ def run(arguments: Sequence[str]) -> int:
     # a library for a graphics card would only warn that there is none
     os.environ.setdefault('JAX_PLATFORMS', 'cpu')
     try:
-        from learning import train
+        from practice import train
     except ImportError as error:
         sys.stdout.write(f'{error}; `make train` installs what a training needs\n')
         return 1
@@ -55,14 +55,7 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _judge(path: Path, progress: Progress, duration: float) -> int:
-    """Check a policy, and compare it with the gait.
-
-    Args:
-        duration: Of each command of the comparison [s].
-
-    Returns:
-        The exit code of check_policy.
-    """
+    """Check a policy against the gait, so long [s] for each command; return its exit code."""
     code = max(_check(path, progress, walk) for walk in WALKS)
     figures = ['--duration', f'{duration:g}', '--report', str(path.with_name('figures.csv'))]
     check_policy([str(path), '--servo', SERVO, '--compare', *figures])

@@ -95,9 +95,6 @@ def foot_link(tree: KinematicTree, leg: str) -> str:
 def leg_geometry(tree: KinematicTree, leg: str) -> LegGeometry:
     """Derive the geometry of a leg from the joints between the body and its foot.
 
-    Args:
-        leg: One of :data:`LEGS`.
-
     Raises:
         DescriptionError: Other than three turning joints move the foot, an axis points
             elsewhere, or a length is zero.
@@ -172,11 +169,7 @@ class LegSolution:
 
 
 def solve(leg: LegGeometry, foot: Vector) -> LegSolution:
-    """Return the joint positions for a foot, the nearest ones when it is out of reach.
-
-    Args:
-        foot: Centre of the foot in the body's frame in [m].
-    """
+    """Return the joint positions for a foot in the body's frame [m], or the nearest ones."""
     hip, one, two = leg.hip, leg.thigh_length, leg.calf_length
     x = foot[0] - hip[0] - leg.thigh_x
     y, z = foot[1] - hip[1], foot[2] - hip[2]
@@ -204,11 +197,7 @@ def solve(leg: LegGeometry, foot: Vector) -> LegSolution:
 
 
 def foot_position(leg: LegGeometry, angles: Vector) -> Vector:
-    """Return the centre of the foot in the body's frame in [m].
-
-    Args:
-        angles: Hip, thigh, calf in [rad].
-    """
+    """Return the foot's centre in the body's frame [m] by the angles of hip, thigh, calf."""
     roll, upper, lower = _pitches(leg, angles)
     x = leg.thigh_x - leg.thigh_length * math.sin(upper) - leg.calf_length * math.sin(lower)
     z = leg.thigh_z - leg.thigh_length * math.cos(upper) - leg.calf_length * math.cos(lower)
@@ -217,11 +206,7 @@ def foot_position(leg: LegGeometry, angles: Vector) -> Vector:
 
 
 def calf_rotation(leg: LegGeometry, angles: Vector) -> Quaternion:
-    """Return how calf and foot are turned against the zero pose, in the body's frame.
-
-    Args:
-        angles: Hip, thigh, calf in [rad].
-    """
+    """Return how calf and foot are turned against the zero pose, in the body's frame."""
     roll = leg.signs[0] * angles[0] / 2
     pitch = (leg.signs[1] * angles[1] + leg.signs[2] * angles[2]) / 2
     sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
@@ -229,11 +214,7 @@ def calf_rotation(leg: LegGeometry, angles: Vector) -> Quaternion:
 
 
 def jacobian(leg: LegGeometry, angles: Vector) -> tuple[Vector, Vector, Vector]:
-    """Return the derivative of the foot's position by each joint, one column after another.
-
-    Args:
-        angles: Hip, thigh, calf in [rad].
-    """
+    """Return the foot's position [m] by each joint [rad], one column after another."""
     roll, upper, lower = _pitches(leg, angles)
     sine, cosine = math.sin(roll), math.cos(roll)
     lower_x = -leg.calf_length * math.cos(lower)
@@ -264,12 +245,9 @@ MAX_GAP = 0.005  # [m] above the plane of the other three, of a foot that stands
 
 
 def raised_feet(feet: Sequence[Vector]) -> tuple[str, ...]:
-    """Return the feet that are in the air while the other three stand, whatever their plane.
+    """Return the feet [m] in the air while the other three stand, whatever their plane.
 
     With one foot or a diagonal pair lifted, the robot rocks: both feet of the diagonal are raised.
-
-    Args:
-        feet: Their centres in the body, in the order of FEET [m].
     """
     raised = []
     for index, link in enumerate(FEET):
@@ -348,11 +326,7 @@ class Quadruped:
         return [(positions[a], positions[b], positions[c]) for a, b, c in self.leg_indices]
 
     def feet(self, positions: Sequence[float]) -> Feet:
-        """Return where the feet are for the positions of the joints [rad].
-
-        Args:
-            positions: In the order of ``names``; what comes behind the legs may be left out.
-        """
+        """Return where the feet are, by joint positions [rad]; those behind the legs may miss."""
         one, two, three, four = (
             foot_position(leg, angles)
             for leg, angles in zip(self.legs, self.leg_angles(positions), strict=True)
@@ -373,11 +347,7 @@ class Quadruped:
         return [solve(leg, foot) for leg, foot in zip(self.legs, feet, strict=True)]
 
     def place(self, solutions: Sequence[LegSolution], others: Sequence[float]) -> Targets:
-        """Put the legs' joint positions among those of all joints.
-
-        Args:
-            others: Positions of all joints; those of the legs in it are replaced.
-        """
+        """Replace the legs' positions among those of all joints."""
         return self.with_legs([solution.angles for solution in solutions], others)
 
     def with_legs(self, angles: Sequence[Vector], others: Sequence[float]) -> Targets:

@@ -129,11 +129,7 @@ class Pose(Enum):
 
 
 def pose_positions(pose: Pose, arm: bool = False) -> dict[str, float]:
-    """Return the joint positions of a pose.
-
-    Returns:
-        Positions in [rad], for the gripper in [m], by the joint's name in the order of the URDF.
-    """
+    """Return the joint positions of a pose [rad], of the gripper [m], in the order of the URDF."""
     numbers: dict[str, Any] = robot_numbers()['poses'][pose.value]
     positions = {
         f'{leg}_{joint}_joint': float(value)

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
+from quad_builds import centre_of_mass, inertia, link_pose, mass, parse, rotation
 from quad_description import (
     DescriptionError,
     LEGS,
@@ -27,7 +28,6 @@ from quad_description import (
     run_command,
 )
 from quad_description.presets import run
-from quad_kinematics import centre_of_mass, inertia, link_pose, mass, parse, rotation
 
 pytestmark = pytest.mark.slow
 

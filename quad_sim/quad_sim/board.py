@@ -210,22 +210,13 @@ class Turn:
     """A turn under way; over when :meth:`rate` is zero."""
 
     def __init__(self, angle: float, yaw: float, now: float) -> None:
-        """Begin to turn.
-
-        Args:
-            angle: How far [rad]; counter-clockwise is positive, more than a turn is allowed.
-            yaw: Heading now [rad].
-        """
+        """Begin to turn by an angle [rad], counter-clockwise positive, at a heading."""
         self._left = angle
         self._yaw = yaw
         self._deadline = now + 1.0 + MAX_DURATION_RATIO * abs(angle) / TURN_RATE
 
     def rate(self, yaw: float, now: float) -> float:
-        """Return how fast to turn [rad/s].
-
-        Args:
-            yaw: Heading now [rad], which may have wrapped around.
-        """
+        """Return how fast to turn [rad/s] by the heading [rad], which may have wrapped around."""
         self._left -= math.remainder(yaw - self._yaw, 2.0 * math.pi)
         self._yaw = yaw
         if abs(self._left) < TURN_DONE or now > self._deadline:

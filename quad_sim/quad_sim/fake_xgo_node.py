@@ -39,11 +39,7 @@ class FakeXgoNode(Node):
     """Offers ``~/push``, ``~/fault`` and ``~/stand``, and publishes what physics knows."""
 
     def __init__(self, server: Server, simulation: Simulation) -> None:
-        """Make the services.
-
-        Args:
-            server: The loop in which the robot lives.
-        """
+        """Make the services; the robot lives in the server's loop."""
         super().__init__('fake_xgo')
         self._server, self._simulation = server, simulation
         self.create_service(Push, '~/push', self._push)
@@ -135,10 +131,7 @@ def serve_with_ros(
     ros_arguments: Sequence[str],
     report_ready: Callable[[], None],
 ) -> None:
-    """Run the robot in a thread and its node in this one, until the robot is stopped.
-
-    Args:
-        server: The loop in which the robot lives; the caller's signal handlers end it.
+    """Run the robot in a thread and its node in this one, until signal handlers end the server.
 
     Raises:
         SimulationError: What ended the robot.

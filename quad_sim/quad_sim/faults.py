@@ -81,12 +81,7 @@ class Fault:
 def make_fault(
     name: str, settings: Iterable[str], start: float = 0.0, duration: float = FOREVER
 ) -> Fault:
-    """Return a fault from words.
-
-    Args:
-        settings: ``name=value`` each; ``at`` and ``for`` go before the arguments.
-        start: From when [s].
-        duration: For how long [s].
+    """Return a fault from words ``name=value``; ``at`` and ``for`` go before the arguments [s].
 
     Raises:
         SetupError: A word has no sense; the message lists the known ones.

@@ -137,12 +137,7 @@ class TargetRamp:
     """The set-points of all servos, one value for each time step."""
 
     def __init__(self, joints: Sequence[Joint], timestep: float, values: Array) -> None:
-        """Stand still.
-
-        Args:
-            joints: Names and limits, in the order of the values.
-            timestep: Time between two calls of :meth:`advance` [s].
-        """
+        """Stand still; values are in the order of the joints, a call takes a timestep [s]."""
         self._index = {joint.name: index for index, joint in enumerate(joints)}
         self._lower = np.array([joint.limits.lower for joint in joints])
         self._upper = np.array([joint.limits.upper for joint in joints])
@@ -167,11 +162,9 @@ class TargetRamp:
         self._next_arrival = self._last_arrival = self._step
 
     def approach(self, targets: Targets, duration: float) -> None:
-        """Begin to approach targets; joints that are not named go on with what they do.
+        """Begin to approach targets in a time [s]; other joints go on with what they do.
 
-        Args:
-            targets: Where to; what lies beyond a limit is taken to the limit, as servos do.
-            duration: How long it takes [s]; 0 for a step.
+        What lies beyond a limit is taken to the limit, as servos do.
 
         Raises:
             TargetError: A name is unknown, a value is not finite, or there are too many or few.
@@ -254,11 +247,7 @@ class KinematicRobot:
         noise: Noise = NONE,
         seed: int = 0,
     ) -> None:
-        """Hold the robot.
-
-        Args:
-            pose: Joint positions at the start [rad]; zero for those left out.
-            noise: What :meth:`measure` adds.
+        """Hold the robot at a pose [rad], zero for those left out; :meth:`measure` adds noise.
 
         Raises:
             SetupError: The pose names joints that the robot lacks.

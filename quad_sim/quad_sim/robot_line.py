@@ -45,11 +45,7 @@ class Wire:
     """One direction of a serial line."""
 
     def __init__(self, faults: FaultPlan, muted_by: FaultKind, seed: int, *, slow: bool) -> None:
-        """Lay the wire.
-
-        Args:
-            muted_by: The fault in which nothing gets through.
-        """
+        """Lay a wire that one of the faults mutes."""
         self.counters = LineCounters()
         self._faults = faults
         self._muted_by = muted_by

@@ -181,12 +181,7 @@ class Server:
         terminal: PseudoTerminal,
         watch: Callable[[], None] = lambda: None,
     ) -> None:
-        """Connect robot and terminal.
-
-        Args:
-            terminal: Where programs find it; closing it is up to the caller.
-            watch: Is called every 20 ms, between two turns of the loop.
-        """
+        """Connect robot and terminal, which the caller closes; ``watch`` is called every 20 ms."""
         self._plant, self._line, self._terminal = plant, line, terminal
         self._actions: deque[tuple[Future[object], Callable[[], object]]] = deque()
         self._wake_read, self._wake_write = os.pipe()

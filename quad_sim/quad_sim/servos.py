@@ -66,10 +66,7 @@ class Servos:
         model: Model,
         mounts: Mapping[int, Mount],
     ) -> None:
-        """Connect to a robot.
-
-        Args:
-            mounts: Servos that are not mounted as a driver expects, by motor id.
+        """Connect to a robot; mounts are those that a driver does not expect, by motor id.
 
         Raises:
             SetupError: A joint has no motor on this board, or a mounted servo no joint.
@@ -106,11 +103,7 @@ class Servos:
         self._speed = dict.fromkeys(self.fitted, MAX_SPEED)
 
     def command(self, angles: Mapping[int, float], duration: float | None = None) -> None:
-        """Send servos to angles [deg]; servos that the robot lacks are left out.
-
-        Args:
-            duration: Time of the way [s]; None for the servo's own.
-        """
+        """Send servos to angles [deg] in a time [s] or their own; what it lacks is left out."""
         positions = {
             self._joint[motor]: self._offset[motor] + self._gain[motor] * angle
             for motor, angle in angles.items()

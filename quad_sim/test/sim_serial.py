@@ -1,20 +1,189 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A simulated robot on a real pseudo-terminal inside the test's process."""
+"""Simulated robots on serial lines, in virtual time or a pseudo-terminal; a client of v1."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+import struct
 import threading
 import time
 
 import serial
 
-from quad_hardware.protocol import Frame, Protocol, ROBOT_KINDS, StreamParser, V2
+from quad_hardware.link.dialects import V1Dialect, V2Dialect
+from quad_hardware.protocol import Frame, LEG_MOTORS, Protocol, ROBOT_KINDS, StreamParser, V1, V2
+from quad_hardware.report import Report
 from quad_sim.options import build, parse_arguments, Simulation
 from quad_sim.server import PseudoTerminal, Server
+
+SPEED_RANGES = {0x30: 25.0, 0x31: 18.0, 0x32: 100.0}
+GAP = 0.001  # [s] the vendor's advice
+
+
+class V1Client:
+    """A client of protocol v1 written from the public description of its bytes.
+
+    It shares nothing with the product: no table, no codec, no parser. Its habits are those of the
+    vendor's library: zero is encoded as 127, servos are written one frame at a time, an answer is
+    read byte by byte without looking at its kind or address.
+    """
+
+    def __init__(self, path: str) -> None:
+        """Open the port as the vendor's library does."""
+        self.port = serial.Serial(path, 115200, timeout=1.0)
+
+    def close(self) -> None:
+        """Close the port."""
+        self.port.close()
+
+    def write(self, address: int, data: bytes) -> None:
+        """Send a write."""
+        length = 8 + len(data)
+        check = 255 - (length + 0x00 + address + sum(data)) % 256
+        frame = b'\x55\x00' + bytes([length, 0x00, address]) + data + bytes([check]) + b'\x00\xaa'
+        self.port.write(frame)
+        time.sleep(len(frame) * 10 / 115200 + GAP)
+
+    def read(self, address: int, count: int) -> bytes:
+        """Ask for bytes and return the data of the answer, empty without one."""
+        check = 255 - (9 + 0x02 + address + count) % 256
+        self.port.write(bytes([0x55, 0x00, 9, 0x02, address, count, check, 0x00, 0xAA]))
+        if self.port.read_until(b'\x55\x00')[-2:] != b'\x55\x00':
+            return b''
+        length = self.port.read(1)[0]
+        rest: bytes = self.port.read(length - 3)
+        body = bytes([length]) + rest[:-3]
+        assert rest[-2:] == b'\x00\xaa'
+        assert (sum(body) + rest[-3]) % 256 == 255
+        return rest[2:-3]
+
+    def move(self, address: int, speed: float) -> None:
+        """Walk or turn; zero becomes 127."""
+        limit = SPEED_RANGES[address]
+        self.write(
+            address, bytes([int((min(max(speed, -limit), limit) + limit) / 2 / limit * 255)])
+        )
+
+    def firmware(self) -> str:
+        """Read the version."""
+        return self.read(0x07, 10).decode('ascii').rstrip('\0')
+
+    def battery(self) -> int:
+        """Read the charge [%]."""
+        return self.read(0x01, 1)[0]
+
+    def attitude(self) -> tuple[float, ...]:
+        """Read roll, pitch and yaw one after the other [deg]."""
+        return tuple(
+            float(struct.unpack('<f', self.read(code, 4))[0]) for code in (0x62, 0x63, 0x64)
+        )
+
+    def imu(self) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
+        """Read acceleration [m/s2], rate [deg/s] and attitude [deg]."""
+        data = self.read(0x65, 24)
+        words = struct.unpack('<6h3f', data)
+        acceleration = tuple(word / 16384 * 9.8 for word in words[:3])
+        return acceleration, tuple(word / 16.4 for word in words[3:6]), words[6:]
+
+    def motors(self) -> bytes:
+        """Read 15 servos."""
+        return self.read(0x50, 15)
+
+
+TICK = 0.001  # [s]
+
+
+class VirtualRobot:
+    """The robot that the arguments of fake_xgo describe; nothing here waits."""
+
+    def __init__(self, *arguments: str, protocol: Protocol = V2) -> None:
+        """Build it and begin at time zero."""
+        self.simulation = build(parse_arguments(list(arguments)))
+        self.line = self.simulation.line
+        self.protocol = protocol
+        self.line.set_baud(protocol.baud)
+        self.parser = StreamParser(protocol, ROBOT_KINDS)
+        self.now = 0.0
+        self.received = b''
+
+    def send(self, frame: Frame) -> None:
+        """Begin to send a frame."""
+        self.line.receive(frame.encode(self.protocol), self.now)
+
+    def run(self, duration: float) -> list[Frame]:
+        """Advance the time; return the frames that arrived."""
+        frames = []
+        for _ in range(round(duration / TICK)):
+            self.now += TICK
+            if data := self.line.advance(self.now):
+                self.received += data
+                frames += self.parser.feed(data)
+        return frames
+
+    def ask(self, frame: Frame) -> list[Frame]:
+        """Send a frame and return what comes within 20 ms."""
+        self.send(frame)
+        return self.run(0.02)
+
+
+class Line:
+    """A robot on its serial line, bytes and all, in virtual time."""
+
+    def __init__(self, *arguments: str, protocol: Protocol) -> None:
+        self.robot = VirtualRobot(*arguments, protocol=protocol)
+        self.dialect = (V1Dialect if protocol is V1 else V2Dialect)(0.0)
+        self._reports: list[Report] = []
+        self._first: dict[int, float] = {}
+        self.swung: set[int] = set()  # motors that were sent anywhere
+
+    def now(self) -> float:
+        """Return the virtual time [s]."""
+        return self.robot.now
+
+    def wait_until(self, moment: float) -> None:
+        """Let the time pass."""
+        while self.robot.now < moment:
+            self._pass()
+
+    def _pass(self) -> float:
+        sent = -1.0
+        now, commanding = self.robot.now, self.dialect.pending
+        if data := self.dialect.step(now).send:
+            self.robot.line.receive(data, now)
+            if commanding and not self.dialect.pending:
+                sent = now + self.dialect.protocol.wire_time(len(data))
+        for frame in self.robot.run(TICK):
+            if report := self.dialect.handle_frame(frame, self.robot.now):
+                self._reports.append(report)
+        return sent
+
+    def command(self, angles: Mapping[int, float]) -> float:
+        """Send angles [deg]; return when they had left."""
+        self.swung |= {m for m, a in angles.items() if a != self._first.setdefault(m, a)}
+        self.dialect.command(angles)
+        while (sent := self._pass()) < 0.0:
+            pass
+        return sent
+
+    def rounded(self, motor: int, angle: float) -> float:
+        """Return an angle as the line brings it [deg]."""
+        span = self.dialect.spans.get(motor)
+        return angle if span is None else span.decode(span.encode(angle))
+
+    def reports(self) -> list[Report]:
+        """Return the reports since."""
+        reports, self._reports = self._reports, []
+        return reports
+
+    def angles(self) -> dict[int, float]:
+        """Return the angles of now [deg]."""
+        self.wait_until(self.robot.now + 0.1)
+        found = self._reports[-1].positions
+        return {motor: found[motor] for motor in LEG_MOTORS}
+
 
 TEST_TIMEOUT = 10.0  # [s] until a test gives up
 

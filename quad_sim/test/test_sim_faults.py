@@ -12,8 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 import serial
-from sim_serial import Listener, serve, TEST_TIMEOUT
-from sim_virtual import VirtualRobot
+from sim_serial import Listener, serve, TEST_TIMEOUT, VirtualRobot
 
 from quad_hardware.protocol import Code, Fault, Frame, Kind, V2
 from quad_sim import SetupError

@@ -11,8 +11,7 @@ from pathlib import Path
 import time
 
 import pytest
-from sim_serial import serve, Served, TEST_TIMEOUT
-from sim_v1_client import V1Client
+from sim_serial import serve, Served, TEST_TIMEOUT, V1Client
 
 pytestmark = pytest.mark.slow
 

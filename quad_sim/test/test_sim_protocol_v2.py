@@ -12,8 +12,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from sim_serial import Listener, serve
-from sim_virtual import VirtualRobot
+from sim_serial import Listener, serve, VirtualRobot
 
 from quad_hardware.protocol import (
     Code,

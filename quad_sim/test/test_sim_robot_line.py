@@ -9,7 +9,7 @@ import math
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
-from sim_virtual import VirtualRobot
+from sim_serial import VirtualRobot
 
 from quad_description import movable_joints, robot_urdf
 from quad_hardware.protocol import (

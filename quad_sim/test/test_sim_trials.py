@@ -12,7 +12,7 @@ import time
 
 import numpy as np
 import pytest
-from sim_virtual import VirtualRobot
+from sim_serial import VirtualRobot
 
 from quad_description import robot_urdf
 from quad_hardware.protocol import Code, Frame, Kind

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from sim_virtual import VirtualRobot
+from sim_serial import VirtualRobot
 
 from quad_description import movable_joints, robot_urdf
 from quad_hardware.protocol import Frame, Kind, Register, V1

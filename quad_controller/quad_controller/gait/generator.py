@@ -11,12 +11,9 @@ import math
 from quad_description import Quadruped, Targets
 from quad_description.rotations import Vector
 
-from .body import BodyPose, feet_in_body, Leveller, UPRIGHT
-from .parameters import GaitParameters
-from .schedule import Gait, Schedule
-from .servo_compensation import LOOK, ServoCompensation
+from .parameters import Gait, GaitParameters, LOOK, Schedule, ServoCompensation
 from .stepping import Stepper, SwingLift
-from .velocity import REST, Velocity
+from .velocity import BodyPose, feet_in_body, Leveller, REST, UPRIGHT, Velocity
 
 MAX_ERROR = 0.3  # [rad] a robot that was turned by hand does not turn back further
 MAX_CORRECTION = 0.4  # [rad/s]
@@ -30,21 +27,12 @@ class HeadingHold:
     """
 
     def __init__(self, gain: float) -> None:
-        """Start without a course.
-
-        Args:
-            gain: Correction per error in [1/s]; 0 switches it off.
-        """
+        """Start without a course; the gain is the correction per error in [1/s], 0 for none."""
         self._gain = gain
         self._course: float | None = None
 
     def step(self, velocity: Velocity, heading: float | None, dt: float) -> Velocity:
-        """Return the velocity to walk with.
-
-        Args:
-            velocity: The one that is wanted; at rest the course is forgotten.
-            heading: Measured yaw in [rad], None when it is not known.
-        """
+        """Return the velocity to walk with by the measured yaw [rad]; rest forgets the course."""
         if heading is None or velocity.at_rest or self._gain == 0.0:
             self._course = None
             return velocity

@@ -1,21 +1,179 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What can be tuned of the gait, in CHAMP's words where CHAMP has one."""
+"""What can be tuned of the gait, in CHAMP's words where CHAMP has one; the schedules of its legs.
+
+Set-points can make soft servos be where a firm one would be. A position servo is a spring: it lags
+behind a moving set-point and sags under the robot's weight. The set-point is moved ahead by what
+the spring needs, from the motion of the next step and, for the legs that stand, from their share
+of the weight::
+
+    command = q + (damping / kp) q' + (inertia / kp) q'' - J^T f / kp,   f = m g / standing legs
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from enum import Enum
 import math
 
-from quad_description import Feet, Quadruped
+from quad_description import Feet, jacobian, Quadruped, Targets
 
-from ..exceptions import ParameterError
-from ..settings import check_settings, setting
-from .body import BodyLimits
-from .schedule import Gait, LEG_LENGTH, Schedule, SCHEDULES
-from .servo_compensation import ServoModel
-from .velocity import VelocityLimits
+from ..exceptions import check_settings, ParameterError, setting
+from .velocity import BodyLimits, VelocityLimits
+
+
+class Gait(Enum):
+    """The gaits; the value is their name in ``set_mode``."""
+
+    TROT = 'trot'
+    CRAWL = 'crawl'
+    PACE = 'pace'
+
+
+@dataclass(frozen=True, slots=True)
+class Schedule:
+    """A gait; phases are shares of a period.
+
+    A leg stands while its own phase (the gait's plus its offset) is below the duty.
+    """
+
+    # lead of each leg's phase, front left, front right, back left, back right
+    offsets: tuple[float, float, float, float]
+    stance_duration: float  # how long a foot stays on the ground in [s]
+    duty: float  # share of the period that a foot stands
+    sway: float  # how far the body moves to the side away from the legs in the air in [m]
+    # largest speed of a foot over the body that the gait keeps its balance at in [m/s]
+    speed: float
+
+    def scaled(self, leg_length: float) -> Schedule:
+        """Return the gait of a robot with other legs [m].
+
+        At equal Froude numbers (v^2 / g l) times and speeds grow with the root of the legs.
+        """
+        size = leg_length / LEG_LENGTH
+        if abs(size - 1.0) < 0.01:
+            return self
+        root = math.sqrt(size)
+        return replace(
+            self,
+            stance_duration=self.stance_duration * root,
+            sway=self.sway * size,
+            speed=self.speed * root,
+        )
+
+    @property
+    def period(self) -> float:
+        """Duration of a cycle in [s]."""
+        return self.stance_duration / self.duty
+
+    @property
+    def swing_duration(self) -> float:
+        """How long a foot is in the air in [s]."""
+        return self.period - self.stance_duration
+
+    @property
+    def sway_phase(self) -> float:
+        """Phase at which the middle of the left legs' swings lies; the body is right then.
+
+        It is the phase of the first harmonic of "left legs in the air minus right legs".
+        """
+        sides = (1.0, -1.0, 1.0, -1.0)
+        centre = (1.0 + self.duty) / 2  # of the swing, in the leg's own phase
+        angles = [math.tau * (centre - offset) for offset in self.offsets]
+        sine = sum(side * math.sin(angle) for side, angle in zip(sides, angles, strict=True))
+        cosine = sum(side * math.cos(angle) for side, angle in zip(sides, angles, strict=True))
+        return math.atan2(sine, cosine) / math.tau
+
+
+LEG_LENGTH = 0.1349  # [m] thigh and calf of the XGO
+SCHEDULES = {
+    Gait.TROT: Schedule((0.0, 0.5, 0.5, 0.0), 0.1456, 0.52, 0.0, 0.45),
+    Gait.CRAWL: Schedule((0.0, 0.5, 0.75, 0.25), 0.8, 0.8, 0.012, 0.06),
+    Gait.PACE: Schedule((0.0, 0.5, 0.0, 0.5), 0.12, 0.6, 0.0, 0.13),
+}
+"""The gaits as they were found to walk in physics simulation with the XGO's dimensions."""
+
+GRAVITY = 9.81  # [m/s^2]
+LOOK = 2  # steps of the motion, after the newest one, that it looks at
+MAX_SAG = 1.0  # [rad] beyond which a servo carries nothing
+STEP_LOAD = 1.25  # of its share of the weight: what each of two legs carries; found in physics
+
+
+@dataclass(frozen=True, slots=True)
+class ServoModel:
+    """A servo as a spring with a damper.
+
+    The stiffness is what the vendor published. Damping and inertia are those with which the gait
+    keeps its speed in physics, at every stiffness from 1.1 to 10 N m/rad.
+    """
+
+    kp: float = setting(2.45, 0.01, 1000.0, 'stiffness of a servo [N m/rad]')
+    damping: float = setting(0.058, 0.0, 10.0, 'what holds a servo back by its speed [N m s/rad]')
+    inertia: float = setting(0.0, 0.0, 1.0, 'what a joint turns [kg m2]')
+    mass: float = setting(0.0, 0.0, 100.0, 'what the legs carry [kg]; 0: as in the URDF')
+
+
+class ServoCompensation:
+    """Changes joint targets; costs one step of delay, since it looks one step ahead."""
+
+    def __init__(self, robot: Quadruped, servo: ServoModel) -> None:
+        """Start without a past."""
+        self._robot = robot
+        self._servo = servo
+        self._weight = GRAVITY * (servo.mass or robot.mass)
+        self._window: list[tuple[Targets, tuple[bool, ...]]] = []
+
+    def reset(self) -> None:
+        """Forget the motion so far."""
+        self._window.clear()
+
+    def at_rest(self, targets: Targets) -> Targets:
+        """Return the set-points for standing still on all legs at some targets [rad].
+
+        Raises:
+            ParameterError: Servos that are so soft cannot carry the robot.
+        """
+        moved = list(targets)
+        self._carry(moved, targets, (True,) * len(self._robot.legs))
+        sag = max(abs(a - b) for a, b in zip(moved, targets, strict=True))
+        if sag > MAX_SAG:
+            raise ParameterError(
+                f'servos of {self._servo.kp:g} N m/rad sag by {sag:.1f} rad below '
+                f'{self._weight / GRAVITY:.1f} kg; set servo_compensation.kp to the stiffness of '
+                'those of this robot [N m/rad], or servo_compensation.enabled to false'
+            )
+        return self._robot.clamp(moved)
+
+    def step(self, targets: Targets, contacts: tuple[bool, ...], dt: float) -> Targets:
+        """Return the set-points for the targets of one step ago [rad]."""
+        window = self._window
+        window.append((targets, contacts))
+        while len(window) <= LOOK:
+            window.append((targets, contacts))
+        if len(window) > LOOK + 1:
+            del window[0]
+        before, (now, stand), after = window[0][0], window[1], window[2][0]
+        step = max(dt, 1e-3)
+        lead, inertia = self._servo.damping / self._servo.kp, self._servo.inertia / self._servo.kp
+        moved = [
+            q + lead * (b - a) / (2 * step) + inertia * (b - 2 * q + a) / (step * step)
+            for a, q, b in zip(before, now, after, strict=True)
+        ]
+        self._carry(moved, now, stand)
+        return self._robot.clamp(moved)
+
+    def _carry(self, moved: list[float], now: Targets, stand: Sequence[bool]) -> None:
+        share = self._weight / max(sum(stand), 1) / self._servo.kp
+        if sum(stand) <= len(stand) // 2:
+            share *= STEP_LOAD
+        legs = zip(self._robot.legs, self._robot.leg_indices, stand, strict=True)
+        for leg, indices, stands in legs:
+            if stands:
+                hip, thigh, calf = indices
+                columns = jacobian(leg, (now[hip], now[thigh], now[calf]))
+                for index, column in zip(indices, columns, strict=True):
+                    moved[index] -= column[2] * share
 
 
 @dataclass(frozen=True, slots=True)

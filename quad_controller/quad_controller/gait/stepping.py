@@ -19,7 +19,7 @@ import math
 from quad_description import Feet, Quadruped
 from quad_description.rotations import Vector
 
-from .schedule import Schedule
+from .parameters import Schedule
 from .velocity import Velocity
 
 SPEED_RATIO = 0.97  # of the joints' speed; levelling and turning take their part, too
@@ -41,13 +41,7 @@ class SwingLift:
     def __init__(
         self, robot: Quadruped, neutral: Feet, schedule: Schedule, swing_height: float
     ) -> None:
-        """Search for the height at some speeds, ahead and to the side.
-
-        Args:
-            robot: Whose joints have limits of their speed.
-            neutral: Where the feet are without motion, in the body's frame [m].
-            swing_height: How high a foot is lifted where the joints allow it [m].
-        """
+        """Search for the height [m] at some speeds, ahead and to the side, about neutral feet."""
         self._robot, self._neutral, self._schedule = robot, neutral, schedule
         step = schedule.speed / (SPEEDS - 1)
         self._speeds = [step * index for index in range(SPEEDS)]
@@ -109,24 +103,13 @@ def arc(part: float) -> float:
 
 
 def swing_way(velocity: float, part: float, schedule: Schedule) -> float:
-    """Return how far a swing that goes on steadily is from the neutral place in [m].
-
-    Args:
-        velocity: Of the foot over the ground [m/s].
-        part: How much of the swing is done, 0 to 1.
-    """
+    """Return how far a swing at a steady velocity [m/s] is from the neutral place [m]."""
     half, slope = 0.5 * schedule.stance_duration * velocity, -velocity * schedule.swing_duration
     return hermite((-half, slope), (half, slope), part)
 
 
 def hermite(start: tuple[float, float], end: tuple[float, float], part: float) -> float:
-    """Return a cubic between two values.
-
-    Args:
-        start: Value and change per part at part 0.
-        end: The same at part 1.
-        part: How much of the way is done, 0 to 1.
-    """
+    """Return a cubic between two values with their changes per part; the part is 0 to 1."""
     rest = 1.0 - part
     rise = part * part * (3.0 - 2.0 * part)
     bend = part * rest * (start[1] * rest - end[1] * part)

@@ -1,12 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Velocities of the body: clamped to what the robot can do, and changed no faster than it can."""
+"""Velocity of the body and its pose over the feet: clamped, and changed no faster than it can."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 from typing import NamedTuple
+
+from quad_description.rotations import axes_from_rpy, Vector
 
 
 class Velocity(NamedTuple):
@@ -81,3 +84,116 @@ class VelocityLimits:
 def approach(value: float, target: float, most: float) -> float:
     """Return a value that has moved towards a target by no more than a step."""
     return target if abs(target - value) <= most else value + math.copysign(most, target - value)
+
+
+@dataclass(frozen=True, slots=True)
+class BodyPose:
+    """A pose of the body relative to its normal one over the feet."""
+
+    x: float = 0.0  # forward in [m]
+    y: float = 0.0  # to the left in [m]
+    z: float = 0.0  # up in [m]
+    roll: float = 0.0  # about x in [rad]
+    pitch: float = 0.0  # about y, positive is nose down, in [rad]
+    yaw: float = 0.0  # about z in [rad]
+
+    @property
+    def finite(self) -> bool:
+        """Whether all parts are numbers."""
+        return all(map(math.isfinite, self.parts))
+
+    @property
+    def parts(self) -> tuple[float, float, float, float, float, float]:
+        """All six numbers."""
+        return self.x, self.y, self.z, self.roll, self.pitch, self.yaw
+
+
+UPRIGHT = BodyPose()
+
+
+@dataclass(frozen=True, slots=True)
+class BodyLimits:
+    """How far and how fast the body may be moved over the feet."""
+
+    shift: float = 0.025  # along x and y in [m]
+    height: float = 0.03  # along z, up and down, in [m]
+    roll: float = 0.35  # about x in [rad]
+    pitch: float = 0.3  # about y in [rad]
+    yaw: float = 0.25  # about z in [rad]
+    speed: float = 0.05  # along all axes in [m/s]
+    turn_speed: float = 0.8  # about all axes in [rad/s]
+
+    def clamp(self, pose: BodyPose) -> BodyPose:
+        """Return the nearest pose within the limits."""
+        most = (self.shift, self.shift, self.height, self.roll, self.pitch, self.yaw)
+        return BodyPose(
+            *(min(max(part, -limit), limit) for part, limit in zip(pose.parts, most, strict=True))
+        )
+
+    def approach(self, pose: BodyPose, target: BodyPose, dt: float) -> BodyPose:
+        """Return the pose after a step of motion towards a target."""
+        if pose == target:
+            return pose
+        move, turn = self.speed * dt, self.turn_speed * dt
+        return BodyPose(
+            approach(pose.x, target.x, move),
+            approach(pose.y, target.y, move),
+            approach(pose.z, target.z, move),
+            approach(pose.roll, target.roll, turn),
+            approach(pose.pitch, target.pitch, turn),
+            approach(pose.yaw, target.yaw, turn),
+        )
+
+
+def feet_in_body(feet: Sequence[Vector], pose: BodyPose, centre: Vector) -> list[Vector]:
+    """Return feet [m] that stay in the frame of a body that moves and turns about a centre."""
+    axes = axes_from_rpy(pose.roll, pose.pitch, pose.yaw)
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = axes
+    cx, cy, cz = centre
+    moved_x, moved_y, moved_z = cx + pose.x, cy + pose.y, cz + pose.z
+    moved = []
+    for foot_x, foot_y, foot_z in feet:
+        x, y, z = foot_x - moved_x, foot_y - moved_y, foot_z - moved_z
+        moved.append(
+            (
+                cx + xx * x + xy * y + xz * z,
+                cy + yx * x + yy * y + yz * z,
+                cz + zx * x + zy * y + zz * z,
+            )
+        )
+    return moved
+
+
+class Leveller:
+    """Turns the body against the tilt that was measured: proportional, filtered, bounded."""
+
+    def __init__(self, gain: float, most: float = 0.2, cut_off: float = 4.0) -> None:
+        """Start level.
+
+        Args:
+            gain: Correction per tilt; 0 switches it off.
+            most: Largest correction in [rad].
+            cut_off: Of the low-pass filter in [Hz].
+        """
+        self._gain = gain
+        self._most = most
+        self._rate = math.tau * cut_off
+        self._roll = 0.0
+        self._pitch = 0.0
+
+    def step(
+        self, attitude: tuple[float, float, float] | None, pose: BodyPose, dt: float
+    ) -> BodyPose:
+        """Return the requested pose with the correction added; it fades without an attitude."""
+        roll = pitch = 0.0
+        if attitude is not None:
+            roll, pitch = attitude[0] - pose.roll, attitude[1] - pose.pitch
+        share = 1.0 - math.exp(-self._rate * dt)
+        self._roll += share * (self._bounded(roll) - self._roll)
+        self._pitch += share * (self._bounded(pitch) - self._pitch)
+        return BodyPose(
+            pose.x, pose.y, pose.z, pose.roll + self._roll, pose.pitch + self._pitch, pose.yaw
+        )
+
+    def _bounded(self, error: float) -> float:
+        return min(max(-self._gain * error, -self._most), self._most)

@@ -20,11 +20,11 @@ from typing import Any
 from quad_description import RobotState
 
 from ..states.controller import Controller
-from ..states.status import Output
+from ..states.modes import Output
 
-PAIR_TIME = 0.002  # [s] that joint states wait for the attitude of the same report
 WINDOW = 0.08  # periods before and after its time in which feedback makes a step
 GAIN = 0.2  # share of its distance from the schedule that an arrival draws the schedule by
+PAIR_TIME = 0.002  # [s] that joint states wait for the attitude of the same report
 RECORDED_STEPS = 1000  # that the figures are of
 
 StepTimes = tuple[float, float, float | None]
@@ -44,11 +44,7 @@ class Pacer:
         self.overruns = 0  # steps that were left out because the one before came too late
 
     def deadline(self, fresh: bool) -> float:
-        """Return when a step is due at the latest.
-
-        Args:
-            fresh: Whether feedback is there that no step has used.
-        """
+        """Return when a step is due at the latest; fresh is feedback that no step has used."""
         if fresh:
             return self._due
         return self._due + self._window if self._locked else self._due
@@ -58,11 +54,7 @@ class Pacer:
         return now >= self._due - self._window
 
     def stepped(self, now: float, arrival: float | None) -> None:
-        """Schedule the next step.
-
-        Args:
-            arrival: When the feedback arrived that it used, None without.
-        """
+        """Schedule the next step after one that used feedback of that arrival, or none."""
         error = 0.0 if arrival is None else arrival - self._due
         error = min(max(error, -self._window), self._window)
         self._due += self._period + GAIN * error
@@ -132,11 +124,7 @@ class ControlLoop:
         self._thread = threading.Thread(target=self._guarded, name='control', daemon=True)
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:
-        """Begin to step.
-
-        Args:
-            begin: Called first in the thread, which may want a priority.
-        """
+        """Begin to step; ``begin`` is called first in the thread, which may want a priority."""
         self._begin = begin
         self._pacer = Pacer(self._period, time.monotonic())
         self._thread.start()

@@ -53,14 +53,12 @@ from ..policy.load import find_policy, load_policy, LoadedPolicy
 from ..policy.runner import PolicyRunner
 from ..recording import PolicyRun
 from ..states.controller import Controller
-from ..states.modes import Answer, Fault
-from ..states.policy_motion import NO_POLICY
-from ..states.status import EventKind, Output, Status
+from ..states.machine import NO_POLICY
+from ..states.modes import Answer, EventKind, Fault, Output, Status
 from . import messages
 from .control_loop import ControlLoop
-from .other_type import OtherTypeSubscription
+from .messages import OtherTypeSubscription, Recorder
 from .parameters import changed_gait, declare_parameters
-from .recorder import Recorder
 
 COMMAND_QOS = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST, depth=1

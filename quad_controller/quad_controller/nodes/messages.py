@@ -1,26 +1,43 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""ROS messages to and from the controller's values."""
+"""ROS messages to and from the controller's values, and a recorder of steps that holds up none."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from array import array
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 import math
+from pathlib import Path
+import queue
+import threading
+import time
+from typing import Any
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Pose
+import numpy as np
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Header
 
+from message_definitions import DefinitionError, message_definition
+from node_runner import init_ros
 from quad_description import FEET, ImuSample, JointSample, Quadruped, Targets
 from quad_description.rotations import normalized, roll_pitch_yaw
-from quad_msgs.msg import FootContacts, JointCommand
+from quad_msgs.msg import ControllerStep, FootContacts, JointCommand
+from rosbag_files import BagError, BagWriter, OfferedQos, Topic, WriterOptions
 
-from ..gait.body import BodyPose
-from ..states.status import Status
-from .recorder import Recorder
+from ..exceptions import ParameterError
+from ..gait.velocity import BodyPose, REST
+from ..recording import TOPIC
+from ..states.modes import Output, Status
 
 UNMEASURED = -1.0  # first covariance of what an IMU does not measure (sensor_msgs/Imu, REP 145)
 STILL_TITLES = frozenset({'relax', 'to relax', 'lie', 'to lie'})
@@ -171,11 +188,7 @@ class CommandFilter:
         self._moved = False
 
     def select(self, targets: Targets, title: str, unreported: Sequence[str]) -> Targets:
-        """Return the targets to send.
-
-        Args:
-            targets: Of all joints [rad].
-        """
+        """Return the targets to send, of those of all joints [rad]."""
         self._moved = self._moved or title not in STILL_TITLES
         if unreported and not (self.others_move and self._moved):
             return targets[: self._count]
@@ -250,3 +263,184 @@ def recorder_diagnostic(node: str, recorder: Recorder) -> DiagnosticStatus:
 
 def _values(values: dict[str, str]) -> list[KeyValue]:
     return [KeyValue(key=key, value=value) for key, value in values.items()]
+
+
+TYPE = 'quad_msgs/msg/ControllerStep'
+NS = 1_000_000_000
+BACKLOG = 500  # steps that wait at most: 10 s
+FLUSH_PERIOD = 1.0  # [s] after which what was written outlives the process
+
+
+class Recorder:
+    """One recording, from :meth:`start` to :meth:`close`.
+
+    Attributes:
+        folder: Where it is.
+        lost: Steps that were not written, because the disk was too slow or full.
+        failure: Why nothing is written any more; empty as long as it is.
+    """
+
+    def __init__(self, folder: Path, about: Mapping[str, str], backlog: int = BACKLOG) -> None:
+        """Make the folder; at most ``backlog`` steps wait.
+
+        Raises:
+            ParameterError: It cannot be made.
+        """
+        self.folder = folder
+        self.lost, self.failure = 0, ''
+        try:
+            self._writer = BagWriter(folder, WriterOptions(custom=about))
+            definition = message_definition(TYPE)
+            self._writer.set_topic(Topic(TOPIC, TYPE, definition, qos=(OfferedQos(),)))
+        except (BagError, DefinitionError) as error:
+            raise ParameterError(f'record: {error}') from error
+        self._steps: queue.Queue[tuple[Output, int, float, float, float]] = queue.Queue(backlog)
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._run, name='recorder', daemon=True)
+
+    def start(self) -> None:
+        """Begin to write."""
+        self._thread.start()
+
+    def offer(
+        self, output: Output, stamp: int, dt: float, computing: float, latency: float | None
+    ) -> None:
+        """Hand in a step; one that finds no place is lost, and counted. Never waits.
+
+        Args:
+            stamp: When it was sent in [ns since 1970].
+            dt: Time since the step before in [s].
+            computing: Time from its begin to the command in [s].
+            latency: Time from the joint states to the command in [s]; None without.
+        """
+        latency = math.nan if latency is None else latency
+        try:
+            self._steps.put_nowait((output, stamp, dt, computing, latency))
+        except queue.Full:
+            self.lost += 1
+
+    def close(self) -> None:
+        """Write what waits, and finish the recording."""
+        self._closing.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        else:
+            self._drain()
+        try:
+            self._writer.close()
+        except BagError as error:
+            self.failure = self.failure or str(error)
+
+    def _run(self) -> None:
+        flushed = time.monotonic()
+        while not self._closing.is_set():
+            self._write_next()
+            if time.monotonic() - flushed > FLUSH_PERIOD:
+                flushed = time.monotonic()
+                self._guarded_flush()
+        self._drain()
+
+    def _drain(self) -> None:
+        while not self._steps.empty():
+            self._write_next()
+
+    def _write_next(self) -> None:
+        try:
+            output, stamp, *times = self._steps.get(timeout=0.1)
+        except queue.Empty:
+            return
+        if self.failure:
+            self.lost += 1
+            return
+        step = serialize_message(_message(output, stamp, *times))
+        try:
+            self._writer.write(TOPIC, step, stamp, stamp)
+        except BagError as error:
+            self.failure = str(error)
+            self.lost += 1
+
+    def _guarded_flush(self) -> None:
+        try:
+            self._writer.flush()
+        except BagError as error:
+            self.failure = str(error)
+
+
+def _message(
+    output: Output, stamp: int, dt: float, computing: float, latency: float
+) -> ControllerStep:
+    """Return a step as it is recorded."""
+    sec, nanosec = divmod(stamp, NS)
+    seen, asked = output.situation, output.asked
+    joints, imu = (seen.joints, seen.imu) if seen is not None else (None, None)
+    velocity = seen.velocity if seen is not None else REST
+    numbers = {
+        'target': output.targets,
+        'position': joints and joints.positions,
+        'velocity': joints and joints.velocities,
+        'orientation': imu and imu.orientation,
+        'angular_velocity': imu and imu.angular_velocity,
+        'acceleration': imu and imu.acceleration,
+        'linear_velocity': seen and seen.linear_velocity,
+        'foot_contacts': seen and seen.foot_contacts,
+        'command': (velocity.x, velocity.y, velocity.yaw),
+        'observation': asked and asked.answer.observation,
+        'action': asked and asked.answer.action,
+    }
+    return ControllerStep(
+        stamp=Time(sec=sec, nanosec=nanosec),
+        state=output.title,
+        policy=asked.policy.name if asked else '',
+        policy_digest=asked.policy.digest if asked else '',
+        policy_step=asked.step if asked else 0,
+        dt=dt,
+        computing=computing,
+        latency=latency,
+        **{name: _numbers(values) for name, values in numbers.items()},
+    )
+
+
+def _numbers(values: Any) -> array[float]:  # noqa: ANN401  # a sequence, an array or None
+    return array('f', np.ravel(() if values is None else values).tolist())
+
+
+class OtherTypeSubscription:
+    """Calls back in a thread of its own until it is closed."""
+
+    def __init__(
+        self, node: Node, kind: type, topic: str, take: Callable[[Any], None], qos: int
+    ) -> None:
+        """Subscribe to an absolute topic; what DDS raises leaves nothing behind."""
+        self._context = Context()
+        init_ros([], self._context)
+        try:
+            self._subscribe(node, kind, topic, take, qos)
+        except BaseException:
+            rclpy.shutdown(context=self._context)
+            raise
+        self._thread = threading.Thread(target=self._spin, name=topic, daemon=True)
+        self._thread.start()
+
+    def _subscribe(
+        self, node: Node, kind: type, topic: str, take: Callable[[Any], None], qos: int
+    ) -> None:
+        self._node = Node(
+            f'{node.get_name()}_{topic.rpartition("/")[2]}',
+            context=self._context,
+            namespace=node.get_namespace(),
+            use_global_arguments=False,
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
+        self._node.create_subscription(kind, topic, take, qos)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+
+    def close(self) -> None:
+        """End it."""
+        rclpy.shutdown(context=self._context)
+        self._thread.join()
+
+    def _spin(self) -> None:
+        with suppress(ExternalShutdownException):
+            self._executor.spin()

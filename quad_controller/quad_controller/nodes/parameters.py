@@ -15,13 +15,11 @@ from rclpy.node import Node
 from node_runner import declare_thread_priority, ParameterReader, refuse_misspelt
 from quad_description import DescriptionError, PRESETS, Quadruped, quadruped, robot_urdf
 
-from ..gait.body import BodyLimits
-from ..gait.parameters import GaitParameters
-from ..gait.schedule import Gait
-from ..gait.servo_compensation import ServoModel
+from ..exceptions import settings_of
+from ..gait.parameters import Gait, GaitParameters, ServoModel
+from ..gait.velocity import BodyLimits
 from ..policy.options import PolicyOptions
-from ..settings import settings_of
-from ..states.parameters import StateParameters
+from ..states.modes import StateParameters
 
 THREAD_PRIORITY = 45  # SCHED_FIFO: below that of the driver, which it waits for
 

@@ -14,10 +14,9 @@ from quad_description import Quadruped, Targets
 from .contract import mjlab
 from .contract.document import ContractDocument
 from .contract.model import PolicyContract
-from .gains import gain_rows, ServoResponse
 from .network import FLOAT, Floats, observation_ports, OnnxNetwork, Port
 from .observation import observed_places
-from .report import Row, Verdict
+from .options import gain_rows, Row, ServoResponse, Verdict
 
 MAX_POSE_DISTANCE = 0.8  # [rad] of the default pose from where the gait stands
 MAX_LEAN = 0.35  # of the hips' height that feet may be ahead of where they carry the weight

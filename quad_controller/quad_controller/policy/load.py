@@ -4,26 +4,71 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+import re
 
 from quad_description import FEET, ImuSample, JointSample, Quadruped, Targets
 
 from ..exceptions import PolicyError
 from ..gait.velocity import REST
 from .check import check_answers, check_contract
-from .contract.document import ContractDocument, document_of
-from .contract.files import read_contract_file
+from .contract.build import build_contract
+from .contract.configs import read_playground, read_rl_sar
+from .contract.document import ContractDocument, document_of, Values
+from .contract.isaac_lab import load_tagged, read_deploy, read_env
 from .contract.mjlab import CONTRACT_KEY, read_metadata
-from .contract.model import build_contract, PolicyContract, Source
+from .contract.model import PolicyContract, Source
 from .network import Floats, OnnxNetwork
 from .observation import Situation
-from .options import ImuFrame, PolicyOptions
-from .report import Report, Row
+from .options import ImuFrame, PolicyOptions, Report, Row
 from .runner import PolicyRunner
 
 SHIPPED = Path(__file__).parents[1] / 'policies'
 UPRIGHT = ImuSample((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81))
+
+
+def read_contract_file(path: Path, joints: Sequence[str] = ()) -> ContractDocument:
+    """Read a file: our own YAML, or that of a training tool.
+
+    Args:
+        joints: Names of the joints in the policy's order, where they are known already.
+
+    Raises:
+        PolicyError: It cannot be read, or is none of them.
+    """
+    try:
+        text = path.read_text(encoding='utf-8')
+    except (OSError, UnicodeDecodeError) as error:
+        raise PolicyError(f'contract {path}: {error}') from error
+    values = load_tagged(text, path.name)
+    try:
+        return _read(values, path, joints)
+    except (AttributeError, IndexError, KeyError, TypeError, ValueError, re.error) as error:
+        if isinstance(error, PolicyError):
+            raise
+        raise PolicyError(f'contract {path}: a value is not of its form: {error}') from error
+
+
+def _read(values: Values, path: Path, joints: Sequence[str]) -> ContractDocument:
+    keys = set(values)
+    if {'step_dt', 'observations', 'actions'} <= keys:
+        return read_deploy(values, path.name)
+    if {'sim', 'decimation', 'observations'} <= keys:
+        return read_env(values, path.name, joints)
+    if 'ctrl_dt' in keys:
+        return read_playground(values, path.name)
+    inner = next(iter(values.values())) if len(values) == 1 else values
+    if isinstance(inner, dict) and ({'observations', 'dt', 'joint_mapping'} & set(inner)):
+        return read_rl_sar(values, path.name)
+    if {'joints', 'observation', 'action', 'period', 'default_positions'} & keys:
+        return document_of(values, path.name)
+    raise PolicyError(
+        f'contract {path}: neither a contract of ours (joints, period, observation, action) nor '
+        f'deploy.yaml, env.yaml, config.yaml of rl_sar or config.json of Playground; its keys: '
+        f'{", ".join(map(str, sorted(keys, key=str)))}'
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +96,6 @@ class LoadedPolicy:
 
 def document_for(network: OnnxNetwork, options: PolicyOptions) -> ContractDocument:
     """Return all that is known of a policy's contract; what counts most lies on top.
-
-    Args:
-        network: The network, with what its file has.
 
     Raises:
         PolicyError: A file cannot be read, or a value of it.

@@ -14,8 +14,7 @@ import numpy.typing as npt
 from quad_description import FEET, ImuSample, JointSample
 from quad_description.rotations import Vector
 
-from ..gait.body import BodyPose, UPRIGHT
-from ..gait.velocity import Velocity
+from ..gait.velocity import BodyPose, UPRIGHT, Velocity
 from .contract.model import (
     BodyFrame,
     HistoryLayout,
@@ -38,8 +37,7 @@ BLEND_WEIGHT = 0.1
 def gravity(imu: ImuSample, source: GravitySource) -> Vector:
     """Return the direction of gravity in the body's frame, (0, 0, -1) upright.
 
-    Args:
-        imu: Attitude and specific force; an accelerometer at rest reads +g upward (REP 145).
+    An accelerometer at rest reads +g upward (REP 145).
     """
     down = imu.down
     if source is GravitySource.EULER or imu.acceleration is None:

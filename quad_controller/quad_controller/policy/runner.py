@@ -103,8 +103,7 @@ class PolicyRunner:
     def inexact(self, joints: JointSample | None, *, stated: bool = False) -> str:
         """Return why joint velocities may be too inexact for it; nothing where they are not.
 
-        Args:
-            stated: Only if the contract states what it was trained with.
+        ``stated``: only if the contract states what it was trained with.
         """
         noise = self.contract.velocity_noise
         error = 0.0 if joints is None else joints.velocity_error

@@ -26,9 +26,8 @@ from quad_sim import (
 from quad_sim.physics import Meter, Metered, PhysicsBackend, Robot, Variation
 
 from ..exceptions import CheckError
-from ..gait.parameters import GaitParameters
-from ..gait.servo_compensation import ServoModel
-from ..policy.gains import ServoResponse
+from ..gait.parameters import GaitParameters, ServoModel
+from ..policy.options import ServoResponse
 
 MAX_PAUSE = 0.15  # [s] between two steps, which the controller is not to blame for
 SILENCE_TIMEOUT = 20.0  # [s] with a robot that does not report
@@ -109,11 +108,7 @@ class PhysicsArena:
     """A robot in physics, in virtual time."""
 
     def __init__(self, choice: RobotChoice, conditions: Conditions = AS_MADE) -> None:
-        """Make robot and ground.
-
-        Args:
-            conditions: What is otherwise than as it is made.
-        """
+        """Make robot and ground."""
         urdf = choice.urdf
         ground = Terrain(roughness=conditions.roughness, seed=1)
         self._robot = Robot(urdf, parse_servo(choice.servo), ground)
@@ -233,10 +228,7 @@ class SerialArena(Backend):
 
 @contextmanager
 def serial_arena(choice: RobotChoice, *, noise: bool = True) -> Iterator[SerialArena]:
-    """Simulate a robot behind a serial port, and open the port.
-
-    Args:
-        noise: Its sensors are as noisy as those of a board.
+    """Simulate a robot, by default as noisy as a board, behind a serial port, and open the port.
 
     Raises:
         CheckError: The simulation or the line failed.

@@ -25,8 +25,7 @@ from ..policy.contract.model import CommandRanges
 from ..policy.network import Floats
 from ..policy.runner import PolicyRunner
 from ..states.controller import Controller
-from ..states.modes import State
-from ..states.parameters import StateParameters
+from ..states.modes import State, StateParameters
 
 if TYPE_CHECKING:
     from quad_sim import CommandTiming
@@ -105,12 +104,7 @@ class CourseFigures:
         return 60.0 * self.falls / time if time > 0.0 else math.inf
 
     def mean(self, name: str, axis: str | None = None) -> float:
-        """Return the mean of an attribute of the passages, where there is one; else NaN.
-
-        Args:
-            name: Of an attribute of :class:`Passage`.
-            axis: A key of :data:`AXES`; None for all.
-        """
+        """Return the mean of an attribute of the passages of an axis, or all; NaN without any."""
         values = [
             getattr(each, name) for each in self.passages if axis is None or each.axis == axis
         ]
@@ -124,11 +118,7 @@ class CourseFigures:
 
 
 def course_for(ranges: CommandRanges | None) -> tuple[Velocity, ...]:
-    """Return three speeds of each axis that a policy was trained for, and one backward.
-
-    Args:
-        ranges: What it is commanded within; None for no limits.
-    """
+    """Return three speeds of each axis that a policy was trained for, and one backward."""
     commands = []
     limits = [(-math.inf, math.inf)] * len(AXES) if ranges is None else ranges.axes
     for axis, (least, most) in zip(AXES.values(), limits, strict=True):
@@ -157,11 +147,7 @@ class WalkingRobot:
         state: RobotState,
         gait: GaitParameters = AS_TUNED,
     ) -> None:
-        """Begin with a robot on the ground.
-
-        Args:
-            policy: What walks; None for the gait.
-        """
+        """Begin with a robot on the ground, walked by a policy or the gait."""
         self._backend, self._robot, self._policy, self._gait = backend, robot, policy, gait
         self.restart(state)
 
@@ -260,22 +246,14 @@ class CourseWalker:
         policy: PolicyRunner | None,
         gait: GaitParameters = AS_TUNED,
     ) -> None:
-        """Put the robot on its feet.
-
-        Args:
-            policy: What walks; None for the gait.
-        """
+        """Put the robot on its feet, walked by a policy or the gait."""
         self._arena, self.interruptions = arena, 0
         self._walker = WalkingRobot(arena.backend, robot, policy, arena.stand(), gait)
 
     def walk(
         self, commands: Sequence[Velocity], duration: float, *, push: float = 0.0, seed: int = 1
     ) -> CourseFigures:
-        """Walk as commanded.
-
-        Args:
-            push: Change of the velocity at once, to any side, every two seconds, in [m/s].
-        """
+        """Walk as commanded, pushed to any side every two seconds by so much [m/s]."""
         random = np.random.default_rng(seed)
         passages = [self._passage(command, duration, push, random) for command in commands]
         self._walker.run(REST_TIME, REST)

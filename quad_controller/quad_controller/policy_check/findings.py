@@ -54,9 +54,7 @@ def unseen_terms(
 ) -> Iterator[str]:
     """Yield which terms count so little that a walk does not show whether they are right.
 
-    Args:
-        network: Of the policy; one without memory.
-        observed: What it saw on a walk, an observation in each row.
+    The network has no memory; ``observed`` has an observation of the walk in each row.
     """
     plain = _answers(network, observed)
     # what varies is mirrored about its mean: all of gravity turned round is another robot

@@ -22,9 +22,8 @@ from ..gait.parameters import GaitParameters
 from ..gait.velocity import Velocity
 from ..policy.load import find_policy, load_policy, LoadedPolicy
 from ..policy.network import OnnxNetwork
-from ..policy.options import GravitySource, ImuFrame, PolicyOptions
-from ..policy.report import table_text
-from ..states.parameters import StateParameters
+from ..policy.options import GravitySource, ImuFrame, PolicyOptions, table_text
+from ..states.modes import StateParameters
 from .course import course_for, walk
 from .findings import (
     against_gait,

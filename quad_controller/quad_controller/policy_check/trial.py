@@ -20,7 +20,7 @@ from ..gait.parameters import AS_TUNED, GaitParameters
 from ..gait.velocity import Velocity
 from ..policy.load import load_policy, LoadedPolicy, shipped_policies
 from ..policy.options import PolicyOptions
-from ..states.parameters import StateParameters
+from ..states.modes import StateParameters
 from .arenas import AS_MADE, Conditions, PhysicsArena, RobotChoice, serial_arena
 from .course import CourseFigures, CourseWalker, REST_TIME, SETTLE_TIME, STAND_TIME
 

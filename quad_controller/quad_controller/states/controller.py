@@ -16,19 +16,18 @@ from quad_description import (
     Targets,
 )
 
-from ..gait.body import BodyPose
 from ..gait.generator import GaitGenerator
-from ..gait.parameters import GaitParameters
-from ..gait.schedule import Gait
-from ..gait.velocity import REST, Velocity
+from ..gait.parameters import Gait, GaitParameters
+from ..gait.velocity import BodyPose, REST, Velocity
 from ..policy.observation import Situation
 from ..policy.runner import PolicyRunner
-from .commands import Commands
 from .get_up import get_up_refusal, stands
-from .health import Health
-from .machine import Poses, StateMachine
+from .health import Commands, Health, TrackingMonitor, UnseenJoints
+from .machine import NO_POLICY, PolicyChoice, Poses, StateMachine
 from .modes import (
     Answer,
+    Event,
+    EventKind,
     Fault,
     FaultLatch,
     GAIT_STATES,
@@ -36,17 +35,17 @@ from .modes import (
     ModeRequest,
     MODES,
     MOVING_STATES,
+    Notices,
     ON_FEET,
+    Output,
     parse_mode,
     State,
+    StateParameters,
+    Status,
     UPRIGHT_STATES,
     WAYS_DOWN,
 )
 from .motion import StepLimiter
-from .parameters import StateParameters
-from .policy_motion import NO_POLICY, PolicyChoice
-from .status import Event, EventKind, Notices, Output, Status
-from .tracking import TrackingMonitor, UnseenJoints
 
 MAX_STEP = 0.05  # [s] after a longer pause the gait goes on where it was instead of leaping
 
@@ -110,11 +109,7 @@ class Controller:
         self._tolerated: frozenset[Fault] = frozenset()  # present when the way down was requested
 
     def set_mode(self, text: str) -> Answer:
-        """Request a mode.
-
-        Args:
-            text: One of :data:`.modes.MODES` or an alias.
-        """
+        """Request one of :data:`.modes.MODES`, or an alias."""
         request = parse_mode(text)
         if request is None:
             return Answer(False, f'unknown mode {text!r}; choose one of {", ".join(MODES)}')
@@ -191,13 +186,10 @@ class Controller:
         return ''
 
     def follow(self, policy: PolicyRunner | None) -> Answer:
-        """Follow another policy from now on, or the gait.
+        """Follow another policy, which fits the robot, from now on, or the gait for None.
 
         A robot that walks comes to stand first, as on every other way between two modes; then
         the policy, or the gait instead of a policy, moves it. Lying or relaxed, nothing moves.
-
-        Args:
-            policy: It fits the robot; None for none.
         """
         machine, policies = self._machine, self._policies
         moves = machine.can_swap and not policies.dry_run
@@ -259,11 +251,7 @@ class Controller:
         self._health.refuse(what, reason)
 
     def step(self, state: RobotState, dt: float) -> Output:
-        """Advance.
-
-        Returns:
-            The targets to send, and what happened.
-        """
+        """Advance; return the targets to send, and what happened."""
         refused = self._health.take(state, dt)
         events = [Event(EventKind.REPEATED, text) for text in refused]
         self._commands.pass_time(dt)

@@ -1,20 +1,23 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Watches what is measured: its age, the attitude and the battery."""
+"""Watches what is measured and requested: ages, attitude, battery, joints that stand still.
+
+Messages that keep coming with the same values have no age that would show it: joints that stand
+still while their targets move have frozen sensors, or servos without power.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 import math
 
-from quad_description import ImuSample, JointSample, RobotState
+from quad_description import ImuSample, JointSample, RobotState, Targets
 from quad_description.rotations import Vector
 
-from ..gait.velocity import REST
+from ..gait.velocity import BodyPose, REST, UPRIGHT, Velocity
 from ..policy.observation import Situation
 from ..policy.runner import PolicyRunner
-from .modes import Fault
-from .parameters import StateParameters
+from .modes import Answer, Fault, MOVING_STATES, State, StateParameters
 
 REFUSAL_LIFE = 0.2
 """How long a message of no use is a reason for silence in [s]; then nothing comes at all."""
@@ -54,11 +57,7 @@ class Health:
         self._low_for: float | None = None
 
     def take(self, measurement: RobotState, dt: float) -> list[str]:
-        """Record new values.
-
-        Returns:
-            What was refused and why.
-        """
+        """Record new values; return what was refused and why."""
         waited = self._waited(dt, received=measurement.joints is not None)
         self.joints_age += waited
         self.imu_age += waited
@@ -255,3 +254,147 @@ def _longer(time: float | None, dt: float) -> float:
 def _turn_rate(imu: ImuSample) -> float:
     """Return the greatest rate of an attitude in [rad/s], 0 when it is not measured."""
     return math.hypot(*(imu.angular_velocity or ()))
+
+
+AGREEMENT = 0.05  # [rad] two samples of a robot that is not moved differ by less
+
+
+class UnseenJoints:
+    """Compares joints with their targets when they are known again.
+
+    A robot that was started anew lies; one without its cable may be bent by hand. What was held
+    before would move it unasked.
+
+    Within a band they are as they were, or gave way to their load. Beyond it they were moved,
+    if a second sample has the same: one may be damaged.
+    """
+
+    def __init__(self, band: float) -> None:
+        """Begin without having seen them; a joint may be off its target by the band [rad]."""
+        self._band = band
+        self._is_unseen = True
+        self._first: JointSample | None = None
+        self._last: JointSample | None = None
+
+    @property
+    def is_pending(self) -> bool:
+        """Whether a first sample is beyond the band, and a second one is to agree."""
+        return self._first is not None
+
+    def lose(self) -> None:
+        """Compare anew with the next samples."""
+        self._is_unseen, self._first = True, None
+
+    def see(self) -> None:
+        """Compare nothing until they are lost again."""
+        self._is_unseen, self._first = False, None
+
+    def moved(self, joints: JointSample, targets: Targets) -> bool:
+        """Whether something else has moved them from their targets; once, after they were lost."""
+        if joints is self._last:  # nothing new was received
+            return False
+        self._last = joints
+        if not self._is_unseen:
+            return False
+        if _apart(joints.positions, targets) <= self._band:
+            self.see()
+            return False
+        first, self._first = self._first, joints
+        if first is None or _apart(joints.positions, first.positions) > AGREEMENT:
+            return False
+        self.see()
+        return True
+
+
+def _apart(one: Targets, other: Targets) -> float:
+    return max(abs(a - b) for a, b in zip(one, other, strict=True))
+
+
+WINDOW = 1.0  # [s] longer than a period of every gait
+MIN_TRAVEL = 0.15  # [rad] that a target must have gone to be of interest
+MIN_RATIO = 0.1  # of that way, that its joint must have gone; soft servos go a third
+
+
+class TrackingMonitor:
+    """Compares how far targets and joints went."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        """Begin with a new window."""
+        self._names = tuple(names)
+        self._targets: list[Sequence[float]] = []
+        self._measured: list[Sequence[float]] = []
+        self._time = 0.0
+        self.text = ''  # which joints did not follow in the last window; empty when all did
+
+    def step(self, targets: Sequence[float], measured: Sequence[float], dt: float) -> None:
+        """Record where all joints were sent and are measured in a step [rad]."""
+        self._targets.append(targets)
+        self._measured.append(measured)
+        self._time += dt
+        if self._time < WINDOW:
+            return
+        wanted, gone = _travel(self._targets), _travel(self._measured)
+        stuck = [
+            name
+            for name, way, went in zip(self._names, wanted, gone, strict=True)
+            if way > MIN_TRAVEL and went < MIN_RATIO * way
+        ]
+        moving = sum(way > MIN_TRAVEL for way in wanted)
+        which = 'all that move' if len(stuck) == moving > 1 else ', '.join(stuck)
+        self.text = (
+            f'do not follow their targets: {which}; are the servos on, and their angles alive?'
+            if stuck
+            else ''
+        )
+        self._targets, self._measured, self._time = [], [], 0.0
+
+
+def _travel(rows: Sequence[Sequence[float]]) -> list[float]:
+    return [max(column) - min(column) for column in zip(*rows, strict=True)]
+
+
+class Commands:
+    """The newest commands."""
+
+    def __init__(self, timeout: float) -> None:
+        """Start at rest; a velocity that is older than the time-out [s] counts as zero."""
+        self._timeout = timeout
+        self._velocity = REST
+        self._age = math.inf
+        self.pose = UPRIGHT  # pose of the body over its feet
+        self.refused = 0  # how many commands were not finite
+
+    def set_velocity(self, velocity: Velocity) -> Answer:
+        """Set the velocity; one that is not finite stops the robot."""
+        if not velocity.finite:
+            self.refused += 1
+            self._velocity = REST
+            return Answer(False, f'rejected {velocity}: it is not finite; stopping')
+        self._velocity, self._age = velocity, 0.0
+        return Answer(True, '')
+
+    def set_pose(self, pose: BodyPose) -> Answer:
+        """Set the pose of the body; it stays until the next one."""
+        if not pose.finite:
+            self.refused += 1
+            return Answer(False, f'rejected {pose}: it is not finite; the pose stays')
+        self.pose = pose
+        return Answer(True, '')
+
+    def pass_time(self, dt: float) -> None:
+        """Increase the age of the velocity by a duration in [s]."""
+        self._age += dt
+
+    def velocity(self, state: State) -> Velocity:
+        """Return the velocity that counts in a state."""
+        if state not in MOVING_STATES or self._age > self._timeout:
+            return REST
+        if state is State.TURN:
+            return Velocity(yaw=self._velocity.yaw)
+        return self._velocity
+
+    def warning(self, state: State) -> str:
+        """Return a warning of a stream of velocities that broke off without a zero, or nothing."""
+        if state in MOVING_STATES and not self._velocity.at_rest and self._age > self._timeout:
+            return f'the last velocity came {self._age:.1f} s ago; it counts as zero'
+        return ''

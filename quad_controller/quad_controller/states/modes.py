@@ -1,14 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The states of the controller, the words with which they are requested, and what ends them."""
+"""The states of the controller: the words that request them, what ends them, what is reported."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum, IntEnum
+import math
 
-from ..gait.schedule import Gait
+from quad_description import EMPTY_BATTERY, MAX_TILT, Targets
+
+from ..exceptions import check_settings, ParameterError, setting, switch
+from ..gait.parameters import Gait
+from ..gait.velocity import Velocity
+from ..policy.observation import Situation
+from ..policy.runner import PolicyRunner, PolicyStep
 
 
 class Reaction(IntEnum):
@@ -40,7 +47,6 @@ REACTIONS: Mapping[Fault, Reaction] = {
     Fault.TARGET: Reaction.HOLD,
     Fault.PAUSE: Reaction.LIE_DOWN,  # the hardware node may have begun it
 }
-
 
 LYING_FAULTS = frozenset({Fault.JOINTS, Fault.FALLEN})
 """What stops a robot on its way down, if it was in order when the way down was requested."""
@@ -157,3 +163,135 @@ class Answer:
 
     accepted: bool  # whether it is followed
     message: str  # what happens now, or why not and what can be done
+
+
+@dataclass(frozen=True, slots=True)
+class StateParameters:
+    """Tuning of everything but the gait and the policy."""
+
+    period: float = setting(0.02, 0.002, 0.1, 'time between two steps [s]')
+    command_timeout: float = setting(0.5, 0.05, 10.0, 'an older velocity counts as zero [s]')
+    warn_age: float = setting(0.06, 0.01, 5.0, 'older joint states and attitudes are reported [s]')
+    hold_age: float = setting(0.2, 0.02, 5.0, 'with older ones nothing moves on [s]')
+    fault_age: float = setting(0.5, 0.05, 10.0, 'older ones are a fault [s]')
+    max_tilt: float = setting(MAX_TILT, 0.1, math.pi, 'more is a fall [rad]')
+    max_turn_rate: float = setting(8.0, 1.0, 100.0, 'a faster body is falling [rad/s]')
+    fall_time: float = setting(0.1, 0.0, 2.0, 'how long it must be so [s]')
+    low_battery: float = setting(
+        EMPTY_BATTERY, 0.0, 0.9, 'charge 0 to 1 below which the robot lies down; 0: never'
+    )
+    battery_time: float = setting(3.0, 0.0, 60.0, 'how long it must be so [s]')
+    require_imu: bool = switch(True, 'no leg moves without a known attitude')
+    lie_height: float = setting(
+        0.055, 0.01, 1.0, "hip axes above the feet's centres when it lies [m]"
+    )
+    blend_speed: float = setting(1.0, 0.1, 10.0, 'fastest joint between two poses [rad/s]')
+    blend_time: float = setting(1.0, 0.2, 10.0, 'shortest time between two poses [s]')
+    hold_band: float = setting(
+        0.25, 0.02, 3.2, 'a held joint that is further off is not pulled back [rad]'
+    )
+    # the set-points of soft servos are ahead of the joints, and faster for a moment; cutting them
+    # at the speed of the joints costs a trot 1 to 7 % of its own, with 1.1 to 10 N m/rad
+    setpoint_speed_ratio: float = setting(
+        1.0, 0.05, 5.0, 'speed of set-points per speed of joints; 2: nothing of a trot is cut'
+    )
+    policy_fallback_walks: bool = switch(
+        False, 'the gait walks on when a policy fails, instead of standing'
+    )
+    get_up_swings: bool = switch(
+        False, 'the mode get_up may throw the robot off its back, at full speed'
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse what makes no sense.
+
+        Raises:
+            ParameterError: A value is outside of its range; the message has name and range.
+        """
+        check_settings(self)
+        if not self.warn_age <= self.hold_age <= self.fault_age:
+            raise ParameterError(
+                f'warn_age {self.warn_age}, hold_age {self.hold_age} and fault_age '
+                f'{self.fault_age} must grow in this order'
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """The controller at one moment."""
+
+    state: State  # what it is doing
+    title: str  # its name, with the way to it as long as it stands up or lies down
+    goal: State  # what it is on the way to
+    gait: Gait  # the gait
+    velocity: Velocity  # velocity that the gait walks
+    faults: tuple[str, ...]  # latched faults with their reasons
+    warnings: tuple[str, ...]  # what is not right but no fault
+    joints_age: float  # time since the joint states in [s]
+    imu_age: float  # time since the attitude in [s]
+    battery: float | None  # charge 0 to 1, None when it is not known
+    refused: int  # samples and commands that could not be used
+    limited: int  # targets of single joints that were too fast and were cut
+    unreachable: int  # steps in which a leg did not reach its target
+    policy: str = ''  # name of the policy that is loaded; empty for none
+
+
+class EventKind(Enum):
+    """How an event is to be reported."""
+
+    NEWS = 'news'
+    WARNING = 'warning'
+    TROUBLE = 'trouble'
+    REPEATED = 'repeated'  # trouble of every step: reported now and then only
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that people should know."""
+
+    kind: EventKind  # how it is to be reported
+    text: str  # what happened, and the remedy if there is one
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A policy that was asked in a step."""
+
+    policy: PolicyRunner  # which one
+    answer: PolicyStep  # what it answered
+    step: int  # how often it was stepped since its reset; 1 for the first time
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """What one step gives."""
+
+    # positions of all joints in [rad]; None as long as no joint state was received
+    targets: Targets | None
+    shadow: Targets | None  # what the policy would do, in a dry run; None otherwise
+    title: str  # name of the state, with the way to it
+    ready: bool  # whether all measurements were received once that walking needs
+    events: tuple[Event, ...]
+    situation: Situation | None = None  # what the motion knew; None when nothing moved
+    asked: Asked | None = None  # the policy that was asked, followed or watched; None for none
+
+
+class Notices:
+    """Compares what is the matter now with what was the matter in the step before."""
+
+    def __init__(self) -> None:
+        self._present: set[str] = set()
+
+    def step(self, present: dict[str, str], over: dict[str, str]) -> Iterator[Event]:
+        """Yield what has changed.
+
+        Args:
+            present: What is the matter, by a name for it.
+            over: What to say when it is no longer, by the same names; nothing where there is none.
+        """
+        for name, text in present.items():
+            if name not in self._present:
+                yield Event(EventKind.WARNING, text)
+        for name in sorted((self._present - set(present)) & set(over)):
+            yield Event(EventKind.NEWS, over[name])
+        self._present = set(present)

@@ -24,11 +24,7 @@ class StepLimiter:
     """
 
     def __init__(self, limits: Sequence[JointLimits], period: float, speed: float = 1.0) -> None:
-        """Start at no target.
-
-        Args:
-            speed: Speed of a target per speed of its joint.
-        """
+        """Start at no target; ``speed`` is that of a target per speed of its joint."""
         self._limits = tuple(limits)
         self._longest = MAX_PERIODS * period
         self._speed = speed
@@ -50,11 +46,7 @@ class StepLimiter:
         self._last = None
 
     def step(self, targets: Sequence[float], dt: float) -> Targets:
-        """Return what may be sent instead of some targets.
-
-        Args:
-            targets: What is wanted; finite.
-        """
+        """Return what may be sent instead of some finite targets."""
         if self._last is None:
             return self.start(targets)
         dt = min(dt, self._longest) * self._speed
@@ -105,12 +97,7 @@ class Hold(Motion):
     """
 
     def __init__(self, targets: Targets, band: float) -> None:
-        """Hold some targets.
-
-        Args:
-            targets: Positions of all joints in [rad].
-            band: How far a joint may be off in [rad].
-        """
+        """Hold some targets; a joint may be off by the band [rad]."""
         self._targets = targets
         self._band = band
 
@@ -128,14 +115,7 @@ class Blend(Motion):
     """Goes from one pose to another, all joints together, with a soft start and end."""
 
     def __init__(self, start: Targets, end: Targets, speed: float, least: float) -> None:
-        """Plan it.
-
-        Args:
-            start: Where the joints are in [rad].
-            end: Where they shall be in [rad].
-            speed: Speed of the fastest joint in [rad/s].
-            least: Shortest duration in [s].
-        """
+        """Plan it: fastest joint at a speed [rad/s], at least so long [s]."""
         self._start, self._end = start, end
         way = max(abs(b - a) for a, b in zip(start, end, strict=True))
         # a cosine is pi / 2 times as fast in its middle as on average
@@ -160,14 +140,7 @@ class Swing(Motion):
     """Takes each joint to a pose by itself, as fast as it may: no soft start, no common end."""
 
     def __init__(self, start: Targets, end: Targets, speed: float, duration: float) -> None:
-        """Plan it.
-
-        Args:
-            start: Where the joints are in [rad].
-            end: Where they shall be in [rad]; those that are not there in time are left short.
-            speed: Speed of each joint in [rad/s].
-            duration: How long it takes in [s].
-        """
+        """Plan it: each joint at a speed [rad/s]; what is not there in time is left short."""
         self._targets, self._end, self._speed = start, end, speed
         self._left = duration
 

@@ -113,11 +113,7 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
     def reset(
         self, *, seed: Seed = None, options: dict[str, Any] | None = None
     ) -> tuple[Floats, dict[str, Any]]:
-        """Begin an episode in all of them.
-
-        Args:
-            seed: Of the first; that of each other is one more. Or one for each.
-        """
+        """Begin an episode in all of them; seeds go up by one from the first, or are a list."""
         seeds = seed if isinstance(seed, list) else self._seeds(seed)
         for worker in self._workers:
             worker.order('reset', [seeds[index] for index in worker.indices], options)

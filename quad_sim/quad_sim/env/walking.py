@@ -84,11 +84,7 @@ class RewardWeights:
     def terms(
         self, motion: Motion, commanded: Vector, period: float, *, fallen: bool
     ) -> dict[str, float]:
-        """Return what each term is worth in one step.
-
-        Args:
-            commanded: Velocity ahead and to the left in [m/s], turning in [rad/s].
-        """
+        """Return what each term is worth in one step; commanded are x, y [m/s] and yaw [rad/s]."""
         (x, y, up), (roll, pitch, yaw) = motion.velocity.linear, motion.velocity.angular
         wanted_x, wanted_y, wanted_yaw = commanded
         off = math.hypot(x - wanted_x, y - wanted_y)

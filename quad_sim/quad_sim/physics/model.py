@@ -305,12 +305,7 @@ class InertialUnit:
     """What imu_link feels. :meth:`sample` goes with every step of the physics."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        """Fix the unit to the robot.
-
-        Args:
-            model: With the sensors of :func:`~.model.build_model`.
-            data: What it feels; its arrays stay where they are.
-        """
+        """Fix the unit to the robot; the arrays of its data stay where they are."""
         self._data = data
         self._accelerometer = _readings(model, data, ACCELEROMETER)
         self._gyro = _readings(model, data, GYRO)

@@ -47,10 +47,7 @@ _FAR = 10.0  # [m] farther than any part of a robot is from the floor at the sta
 
 
 def start_positions(joints: Sequence[str], pose: Mapping[str, float]) -> Array:
-    """Return where the joints are at the start.
-
-    Args:
-        pose: Positions of some [rad]; the others stand.
+    """Return where the joints are at the start [rad]; those that the pose leaves out stand.
 
     Raises:
         SetupError: The pose names joints that the robot lacks.
@@ -69,14 +66,9 @@ def place(
     orientation: Quaternion,
     drop: float,
 ) -> None:
-    """Put the robot on the ground with the joint positions that it has.
+    """Put the robot's lowest point on the ground, or a drop [m] above; its data change in place.
 
-    Joints that mimic others go where those are; the base turns as the ground does and comes down
-    until the robot's lowest point touches it.
-
-    Args:
-        data: Its state; changed in place.
-        drop: How far the lowest point is above the ground [m].
+    Joints that mimic others go where those are; the base turns as the ground does.
     """
     _follow_mimics(model, data)
     normal = np.array(terrain.normal)

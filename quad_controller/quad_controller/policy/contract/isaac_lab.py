@@ -18,8 +18,7 @@ import yaml
 
 from ...exceptions import PolicyError
 from .document import ContractDocument, document_of, known, Values
-from .model import Source
-from .terms import ISAAC_LAB
+from .model import ISAAC_LAB, Source
 
 JOINTS_HINT = 'the file does not have the order of the joints; Isaac Lab prints robot.joint_names'
 PER_TERM = {'layout': 'per_term', 'newest': 'last', 'start': 'repeat'}

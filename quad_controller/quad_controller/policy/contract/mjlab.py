@@ -23,8 +23,7 @@ from typing import Any
 
 from ...exceptions import PolicyError
 from .document import ContractDocument, document_of, known, read_yaml, Values
-from .model import Source
-from .terms import MJLAB
+from .model import MJLAB, Source
 
 CONTRACT_KEY = 'policy_contract'
 """Key of a whole contract in YAML; its values count before all others of the file."""

@@ -1,23 +1,27 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Contracts from rl_sar: ``config.yaml`` of a policy, with ``base.yaml`` of its robot.
+"""Contracts from rl_sar (``config.yaml``, ``base.yaml``) and MuJoCo Playground (``config.json``).
 
-Each file has one key (``go2``, ``go2/himloco``) above all others. Observations are scaled, then
-clipped as a whole; actions are clipped before they are scaled, and remembered so. In
-``observations_history`` 0 is the newest step. A ``joint_mapping`` of the policy's file counts
-before that of its robot. Which axes an angular velocity has stands in rl_sar's code, not in its
-files: on a robot those of the body.
+In rl_sar a policy has a ``config.yaml``, its robot a ``base.yaml``. Each file has one key
+(``go2``, ``go2/himloco``) above all others. Observations are scaled, then clipped as a whole;
+actions are clipped before they are scaled, and remembered so. In ``observations_history`` 0 is the
+newest step. A ``joint_mapping`` of the policy's file counts before that of its robot. Which axes
+an angular velocity has stands in rl_sar's code, not in its files: on a robot those of the body.
+
+The order of the observation in Playground is that of the Go1 joystick's ``state``: it stands in
+their code, not in the file. So do the names of the joints and the default pose (keyframe
+``home``), and the frame of the IMU's site: those are asked for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+import math
 from typing import Any
 
 from .document import ContractDocument, document_of, known, permuted, Values
-from .model import Source
-from .terms import RL_SAR
+from .model import RL_SAR, Source
 
 SCALES = {
     'lin_vel': 'lin_vel_scale',
@@ -30,7 +34,7 @@ SCALES = {
 LAYOUTS = {'time': 'frames', 'term': 'per_term'}
 
 
-def read_config(values: Mapping[str, Any], origin: str) -> ContractDocument:
+def read_rl_sar(values: Mapping[str, Any], origin: str) -> ContractDocument:
     """Read a ``config.yaml`` or ``base.yaml``."""
     config: Mapping[str, Any] = values
     robot = ''
@@ -62,10 +66,10 @@ def read_config(values: Mapping[str, Any], origin: str) -> ContractDocument:
     )
     if 'observations' in config:
         contract['observation'] = _observation(config, origin, refusals)
-    return replace(document_of(contract, origin, HINTS, refusals), joint_order=order)
+    return replace(document_of(contract, origin, RL_SAR_HINTS, refusals), joint_order=order)
 
 
-HINTS = {
+RL_SAR_HINTS = {
     'joints': 'base.yaml of the robot has joint_names and joint_mapping',
     'period': 'base.yaml of the robot has dt and decimation',
 }
@@ -114,3 +118,52 @@ def _history(
             f'{origin}: observations_history {history} has gaps; all of {steps} are needed'
         )
     return contract
+
+
+PLAYGROUND_TERMS: dict[str, Values] = {
+    'linvel': {'source': Source.LINEAR_VELOCITY.value},
+    'gyro': {'source': Source.ANGULAR_VELOCITY.value},
+    'gravity': {'source': Source.GRAVITY.value},
+    'joint_angles': {'source': Source.JOINT_POSITIONS.value, 'relative': True},
+    'joint_vel': {'source': Source.JOINT_VELOCITIES.value},
+    'last_act': {'source': Source.LAST_ACTION.value},
+    'command': {'source': Source.COMMAND.value},
+}
+JOYSTICK = 'Go1 joystick of MuJoCo Playground'
+GO1_KEYS = {'command_config', 'history_len', 'noise_config', 'pert_config'}
+"""No other task of Playground 0.2.0 has all of these."""
+PLAYGROUND_HINTS = {
+    'joints': 'order of the actuators in the MJCF file of the training',
+    'default_positions': 'keyframe "home" of the MJCF file of the training',
+    **{
+        f'observation.terms.{name}.frame': 'frame of the site "imu" in the MJCF file'
+        for name in ('linvel', 'gyro')
+    },
+}
+
+
+def read_playground(values: Mapping[str, Any], origin: str) -> ContractDocument:
+    """Read ``config.json`` of a training."""
+    stiffness, damping = (
+        value if isinstance(value, (int, float)) else None
+        for value in (values.get('Kp'), values.get('Kd'))
+    )
+    contract = known(
+        period=values.get('ctrl_dt'),
+        action=known(scale=values.get('action_scale')),
+        gains=known(stiffness=stiffness, damping=damping),
+    )
+    refusals: tuple[str, ...] = ()
+    if not values.keys() >= GO1_KEYS or values['history_len'] != 1:
+        refusals = (f'{origin} is of another task than the Go1 joystick; write its contract',)
+    terms = document_of(
+        {'observation': {'terms': {k: dict(v) for k, v in PLAYGROUND_TERMS.items()}}}, JOYSTICK
+    )
+    document = terms.over(document_of(contract, origin))
+    noise = values.get('noise_config') or {}
+    level, each = noise.get('level', 1.0), (noise.get('scales') or {}).get('joint_vel')
+    if isinstance(level, (int, float)) and isinstance(each, (int, float)):
+        deviation = level * each / math.sqrt(3.0)  # uniform, to either side
+        known_noise = {'observation': {'terms': {'joint_vel': {'noise': deviation}}}}
+        document = document_of(known_noise, origin).over(document)
+    return ContractDocument(document.values, document.origins, PLAYGROUND_HINTS, refusals)
