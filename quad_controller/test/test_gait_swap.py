@@ -8,14 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from quad_controller import (
-    find_policy,
-    GaitGenerator,
-    load_policy,
-    PolicyOptions,
-    State,
-    Velocity,
-)
+from quad_controller import find_policy, GaitGenerator, load_policy, PolicyOptions, State, Velocity
 from quad_description import Targets
 from quad_gait_rig import (
     FIRM,

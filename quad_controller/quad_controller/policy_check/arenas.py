@@ -16,13 +16,7 @@ from quad_description import Backend, robot_urdf, RobotState
 from quad_hardware import CommandError, HardwareError, NoAnswerError
 from quad_hardware.backend import JointBytes, robot_at
 from quad_hardware.protocol import Model, V2
-from quad_sim import (
-    CommandTiming,
-    parse_servo,
-    ServedRobot,
-    SimulationError,
-    Terrain,
-)
+from quad_sim import CommandTiming, parse_servo, ServedRobot, SimulationError, Terrain
 from quad_sim.physics import Meter, Metered, PhysicsBackend, Robot, Variation
 
 from ..exceptions import CheckError
