@@ -188,9 +188,8 @@ class DriveSource:
     def attach(self, attach: Callable[[MotionSource], Future[None]]) -> None:
         """Get back the drives that were taken away; any thread, and it waits for nothing.
 
-        Args:
-            attach: What attaches a source to the bus before the next cycle. When that fails, the
-                drives are away as before, and the next command tries again.
+        ``attach`` attaches a source to the bus before the next cycle. When that fails, the drives
+        are away as before, and the next command tries again.
         """
         before = self._released
         self._released = {}  # before, so that a drive which is taken away right after is known

@@ -125,10 +125,9 @@ class TrajectoryTimer:
     def foreseen(
         cls, limits: JointLimits, path: Path, state: TimerState, ahead: float
     ) -> TimerState:
-        """Return where a timer will be when nothing comes in between.
+        """Return where a timer will be in [s] from now when nothing comes in between.
 
-        Args:
-            ahead: Time from now in [s]; less than 0 is the past, at the present speed.
+        Less than 0 is the past, at the present speed.
         """
         left = ahead - state.waiting if ahead > state.waiting else min(ahead, 0.0)
         timer = cls(limits, state.speed_scaling)

@@ -346,9 +346,7 @@ def approach_path(
 ) -> Path | None:
     """Return the path from a motion to the begin of another path; None where there is none.
 
-    Args:
-        begin: Where it leads, with velocity and acceleration within the limits.
-        duration: How long it lasts in [s]; longer where the joints need that.
+    It lasts ``duration`` in [s], longer where the joints need that.
     """
     # an arm that is beyond a limit may come back
     lower = np.minimum(limits.lower, state.position)

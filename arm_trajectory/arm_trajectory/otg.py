@@ -26,11 +26,7 @@ class Plan:
     __slots__ = ('_begin', '_lower', '_trajectory', '_upper', 'duration')
 
     def __init__(self, trajectory: Native, begin: Array | None = None) -> None:
-        """Wrap a trajectory of ruckig.
-
-        Args:
-            begin: Where it begins in [rad], for one that was planned from zero.
-        """
+        """Wrap a trajectory of ruckig; one planned from zero begins at ``begin`` in [rad]."""
         self._begin = begin
         self._trajectory = trajectory
         self.duration = float(trajectory.duration)
@@ -152,11 +148,7 @@ class OnlineTrajectoryGenerator:
     def to_state(
         self, state: RobotState, target: RobotState, shortest: float | None = None
     ) -> Plan | None:
-        """Plan to a state.
-
-        Args:
-            target: Where to arrive, its velocity and acceleration within the limits.
-        """
+        """Plan to a state whose velocity and acceleration are within the limits."""
         demand = self._to_position
         demand.current_position = state.position.tolist()
         demand.current_velocity = state.velocity.tolist()

@@ -39,23 +39,14 @@ ROUNDING_TOLERANCE = 1e-6  # rounding that is let pass in [rad]
 
 
 def shifted(coefficients: Array, by: Array) -> Array:
-    """Return the coefficients of polynomials (k, 6, n) whose times begin later.
-
-    Args:
-        coefficients: Those of the polynomials (k, 6, n), or of one for all (6, n).
-        by: How much later in [s] (k).
-    """
+    """Return the coefficients of polynomials (k, 6, n), or (6, n), that begin later by [s] (k)."""
     powers = by[:, None, None] ** np.maximum(_POWERS - _POWERS[:, None], 0.0)
     moved: Array = (_BINOMIAL * powers) @ coefficients
     return moved
 
 
 def lines(durations: Array, positions: Array) -> Array:
-    """Return the coefficients (k, 6, n) of the straight motions from each place to the next.
-
-    Args:
-        positions: Positions in [rad] (k + 1, n).
-    """
+    """Return the coefficients (k, 6, n) of straight motions between positions (k + 1, n) [rad]."""
     pieces = np.zeros((len(durations), 6, positions.shape[1]))
     pieces[:, 0] = positions[:-1]
     pieces[:, 1] = np.diff(positions, axis=0) / durations[:, None]
@@ -63,11 +54,9 @@ def lines(durations: Array, positions: Array) -> Array:
 
 
 def cubics(durations: Array, positions: Array, velocities: Array) -> Array:
-    """Return the coefficients (k, 6, n) of the cubics from each place to the next.
+    """Return the coefficients (k, 6, n) of the cubics from each place to the next (k + 1, n).
 
-    Args:
-        positions: Positions in [rad] (k + 1, n).
-        velocities: Velocities in [rad/s] (k + 1, n).
+    Positions are in [rad], velocities in [rad/s].
     """
     pieces = lines(durations, positions)
     t, slope, first, last = (
@@ -83,12 +72,9 @@ def cubics(durations: Array, positions: Array, velocities: Array) -> Array:
 
 
 def quintics(durations: Array, positions: Array, velocities: Array, accelerations: Array) -> Array:
-    """Return the coefficients (k, 6, n) of the quintics from each place to the next.
+    """Return the coefficients (k, 6, n) of the quintics from each place to the next (k + 1, n).
 
-    Args:
-        positions: Positions in [rad] (k + 1, n).
-        velocities: Velocities in [rad/s] (k + 1, n).
-        accelerations: Accelerations in [rad/s2] (k + 1, n).
+    Positions are in [rad], velocities in [rad/s], accelerations in [rad/s2].
     """
     t, p, v, a = durations[:, None], positions[:-1], velocities[:-1], accelerations[:-1]
     way = positions[1:] - p - (v + 0.5 * a * t) * t
@@ -176,13 +162,7 @@ class Path:
         return RobotState(powers @ c, first @ c, second @ c)
 
     def derived(self, order: int, places: Places, times: Array) -> Array:
-        """Return a derivative (m, n) by the path's time.
-
-        Args:
-            order: How often to derive: 0 is the position in [rad].
-            places: Numbers of the segments (m).
-            times: Times since their begin in [s] (m).
-        """
+        """Return a derivative (m, n) of segments (m) at times since their begin in [s] (m)."""
         count = self.coefficients.shape[1]
         powers = np.vander(times, count - order, increasing=True)
         factors = [math.perm(power, order) for power in range(order, count)]

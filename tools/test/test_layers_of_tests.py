@@ -21,7 +21,7 @@ SHIPPED_ROBOTS = {
     'arm_model/test/model_robots.py',
     'arm_planning/bench/bench_planning.py',
     'arm_planning/bench/planning_problems.py',
-    'arm_servo/bench/servo_arms.py',
+    'arm_servo/bench/bench_servo.py',
 }
 """Files that find the robots of arm_bringup as data."""
 

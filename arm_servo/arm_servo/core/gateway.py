@@ -61,13 +61,7 @@ class CommandGateway:
     def __init__(
         self, core: MotionCore, worker: Executor, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """Wait for the arm.
-
-        Args:
-            core: The core; from here on it is the gateway's.
-            worker: Prepares motions, one after the other; see :func:`start_worker`.
-            clock: Steady time, the one of the cycle.
-        """
+        """Wait for the arm; the core is the gateway's now, ``clock`` the one of the cycle."""
         self.model: RobotModel = core.model  # the arm
         # what the core did in the last cycle
         self.snapshot = Snapshot(0.0, None, None, 'the cycle has not begun yet')
@@ -182,11 +176,7 @@ class CommandGateway:
     def get_ready_for(
         self, source: Source, client: Hashable, get_ready: Callable[[], bool]
     ) -> None:
-        """Get back the drives for a client whose stream begins.
-
-        Args:
-            get_ready: Gets them back; returns whether they were away.
-        """
+        """Get back the drives, if they are away, for a client whose stream begins."""
         self._gate.ask(source, client, self._clock())  # first: the cycle may be quicker
         if not get_ready():
             self._gate.ask(source, client, -math.inf)

@@ -101,17 +101,12 @@ class MotionQueue:
         worker: Executor,
         clock: Callable[[], float],
         *,
+        # where the arm stands while others have its drives: from there a motion is tried before
+        # the drives are taken from them; None where the arm follows
         rest: Callable[[], RobotState | None],
+        # has a trajectory checked in the present scene that was prepared in an old one
         recheck: Callable[[Execution], None],
     ) -> None:
-        """Begin empty.
-
-        Args:
-            clock: Steady time, the one of the cycle.
-            rest: Where the arm stands while others have its drives: from there a motion is tried
-                before the drives are taken from them. None where the arm follows.
-            recheck: Has a trajectory checked in the present scene that was prepared in an old one.
-        """
         self._core, self._mailbox = core, mailbox
         self._worker, self._clock, self._rest, self._recheck = worker, clock, rest, recheck
         limits = core.model.limits
@@ -289,12 +284,8 @@ class MotionQueue:
     def _in_step(self, goal: TrajectoryGoal, lag: float, margin: float) -> TrajectoryGoal:
         """Delay a goal of a stream to the lag of those before it, which keeps the speed.
 
-        Each waits for another time until it can begin. Without a margin the arm would have no time
-        to correct what the times of arrival differ by.
-
-        Args:
-            lag: Time from its request to its begin in [s].
-            margin: Time by which the lag of the stream is longer in [s].
+        Each waits for another time until it can begin. Without a margin in [s], by which the lag
+        is longer, the arm would have no time to correct what the times of arrival differ by.
         """
         self._lag = max(self._lag, min(lag + margin, MAX_LAG))
         wait = max(self._lag - lag, 0.0)

@@ -62,12 +62,7 @@ class PreparedScene:
     def of(
         cls, scene: PlanningScene, version: int, *, near: Array | None, checks_paths: bool
     ) -> PreparedScene:
-        """Prepare a scene.
-
-        Args:
-            near: Where the arm is in [rad]: every pair is measured there, so that the cycle has
-                not to. None where that is not known.
-        """
+        """Prepare a scene: all pairs are measured ``near`` [rad], so that the cycle has not to."""
         clearances = Clearances(scene)
         if near is not None:
             clearances.least(near, 0.0)

@@ -69,11 +69,7 @@ class ClearanceFloor:
     def too_near(
         self, stop: Plan, begin: float, state: RobotState, now: float, clearance: float | None
     ) -> LeastClearance | None:
-        """Return which links a stop would bring too near, and how near; None for none.
-
-        Args:
-            clearance: Least distance between links in [m]; None is any.
-        """
+        """Return which links a stop would bring too near, and how near; None for none."""
         if clearance is None:
             self._floor = None
             return None
@@ -411,9 +407,6 @@ class MovingArms:
         """Use attached bodies, allowed collisions and joints beside the arms of a scene.
 
         It is measured here, in the thread of the caller.
-
-        Args:
-            scene: A scene of one of the arms, in which the others are checked.
         """
         given, present = self._given, self._clearances.scene
         if scene is given:
