@@ -313,6 +313,15 @@ def test_a_displacement_that_does_not_fit_is_refused_alone(topics: Topics) -> No
     assert 'panda_joint1: ' in topics._servo._refusals.fresh(0.0)
 
 
+def test_displacements_before_one_into_contact_are_carried_out(topics: Topics) -> None:
+    """The last would turn the hand into the forearm; those that it added to lead where asked."""
+    begin = topics.drives.path[-1][5]
+    for way in (-0.01, -0.01, -0.02, -1.4):
+        topics.send(JOG, JointJog(joint_names=['panda_joint6'], displacements=[way]))
+    topics.drives.run(300)
+    assert topics.drives.path[-1][5] - begin == pytest.approx(-0.04, abs=1e-6)
+
+
 def test_a_displacement_of_zero_keeps_those_that_wait(topics: Topics) -> None:
     """Also that they get the drives."""
     begin = topics.drives.path[-1][0]

@@ -13,7 +13,7 @@ import math
 import threading
 from typing import Any
 
-from arm_model import ArmError, RobotState
+from arm_model import ArmError, CommandError, RobotState
 from arm_trajectory import GoalCode, StateMovedError, TrajectoryGoal
 
 from ..controllers.controller import NotReadyError, Outcome, refused, Source
@@ -61,6 +61,8 @@ class MotionCommand:
     requested: float  # steady time of the request in [s]
     get_ready: Callable[[], object] = lambda: None  # gets the drives back
     stream: Hashable = None  # where each newer one replaces those that wait; None for nowhere
+    # the sum of displacements that it added to, which counts where this one is refused
+    before: MotionCommand | None = None
     # its execution, or None for a single target, once it began; else why it is refused
     future: Future[Execution | None] = field(default_factory=Future)
     # how it ended, whatever became of it; set once, at the latest when the cycle fails
@@ -131,21 +133,23 @@ class MotionQueue:
         beyond limits is refused alone.
         """
         error: ArmError | None = None
+        before: MotionCommand | None = None
         with self._lock:
             number = self._mailbox.gate.number() if number is None else number
             replaced = [each for each in self._waiting if stream and each.stream == stream]
             try:
                 for each in replaced:
                     if isinstance(request, DisplacementRequest) and not self._is_void(each):
+                        before = each.before if request.is_zero else each
                         get_ready = each.get_ready if request.is_zero else get_ready
                         request = request.beyond(each.request)
                 if isinstance(request, DisplacementRequest) and stream:
                     self._check_displacement(request)
             except ArmError as refusal:
-                error, replaced = refusal, []
+                error, replaced, before = refusal, [], None
             for each in replaced:
                 self._waiting.remove(each)
-            command = MotionCommand(request, number, self._clock(), get_ready, stream)
+            command = MotionCommand(request, number, self._clock(), get_ready, stream, before)
             if len(self._waiting) >= MAX_QUEUED_MOTIONS:
                 error = error or NotReadyError(
                     f'{MAX_QUEUED_MOTIONS} motions wait already; send them more slowly'
@@ -377,7 +381,10 @@ class MotionQueue:
         return True
 
     def _refuse(self, command: MotionCommand, error: BaseException) -> None:
-        """End a motion that does not begin; a jog that was held for it goes on."""
+        """End a motion that does not begin; a jog that was held for it goes on.
+
+        So does the sum of displacements that it added to.
+        """
 
         def go_on(_cycle: Cycle) -> bool:
             self._core.hold(is_held=False)
@@ -391,6 +398,15 @@ class MotionQueue:
             else:
                 command.future.set_exception(error)
         command.end(CANCELED if isinstance(error, CancelledError) else refused(error))
+        each = command.before
+        if each and isinstance(error, CommandError) and not isinstance(error, StateMovedError):
+            with self._lock:
+                self._waiting.appendleft(
+                    MotionCommand(
+                        *(each.request, each.number, each.requested, each.get_ready),
+                        *(each.stream, each.before),
+                    )
+                )
         self._end(command)
 
     def _end(self, command: MotionCommand) -> None:
