@@ -75,6 +75,11 @@ def test_an_unexpected_error_is_the_result_of_a_goal(
     else:
         drives.run(100)
         monkeypatch.setattr(goal, 'publish_feedback', lambda _: 1 // 0)
+        node.watch()
+        drives.run()
+        node.watch()
+        assert goal.ending == ''  # the arm still brakes
+        drives.run(300)
     node.watch()
     assert goal.ending == 'aborted'
     assert goal.result.error_code == GoalCode.INVALID_GOAL

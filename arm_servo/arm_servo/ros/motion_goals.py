@@ -24,11 +24,12 @@ from arm_model import ArmError
 from arm_trajectory import GoalCode
 from node_runner.action_goals import Ending, GoalServer, ServedGoal
 
-from ..controllers.controller import Outcome
+from ..controllers.controller import Outcome, Source
 from ..core.gateway import CommandGateway
 from ..core.motion_queue import MotionCommand
 
 START_TIMEOUT = 5.0  # time in which a goal must be planned and taken by the cycle in [s]
+REST_TIMEOUT = 10.0  # time after which a goal that has failed is answered without rest in [s]
 
 
 @dataclass(slots=True, eq=False)
@@ -39,6 +40,7 @@ class MotionGoal(ServedGoal):
     command: MotionCommand | None = None  # None for a goal that is refused at once
     begin: float = field(default_factory=time.monotonic)
     outcome: Outcome | None = None  # how it ended; None while it goes on
+    rest_by: float = math.inf  # steady time at which a goal that has failed is answered anyway
 
 
 GoalT = TypeVar('GoalT', bound=MotionGoal)
@@ -73,6 +75,7 @@ class MotionGoals(GoalServer[GoalT]):
             conclude=conclude,
             fail=fail,
             refusals=(ArmError,),
+            has_stopped=self._has_come_to_rest,
         )
 
     def outcome(self, goal: GoalT, timeout: float = START_TIMEOUT) -> Outcome | None:
@@ -95,6 +98,14 @@ class MotionGoals(GoalServer[GoalT]):
 
     def _order(self, goal: GoalT) -> None:
         goal.command = self._request(goal)
+
+    def _has_come_to_rest(self, goal: GoalT) -> bool:
+        """Return whether the arm has stopped for a goal that has failed, or others move it."""
+        now, point = time.monotonic(), self._gateway.snapshot.set_point
+        goal.rest_by = min(goal.rest_by, now + REST_TIMEOUT)
+        is_braking = point is not None and point.source is Source.NONE and point.state.moving
+        has_ended = goal.command is None or goal.command.ended.done()
+        return now > goal.rest_by or (has_ended and not is_braking)
 
     def _end_motion(self, goal: GoalT) -> None:
         if goal.command is not None:

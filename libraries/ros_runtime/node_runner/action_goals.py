@@ -178,6 +178,7 @@ class GoalServer(Generic[GoalT]):
         conclude: Callable[[GoalT], tuple[Ending, Any]],
         fail: Callable[[GoalT, Exception], Any],
         refusals: tuple[type[Exception], ...] = (),
+        has_stopped: Callable[[GoalT], bool] = lambda _: True,
     ) -> None:
         """Offer the action; all callbacks run in the executor, and none of them ends it.
 
@@ -192,11 +193,14 @@ class GoalServer(Generic[GoalT]):
                 what ``start``, ``conclude`` or a :meth:`watch` has raised.
             refusals: What ``start`` raises for goals that cannot be carried out; anything else is
                 a defect, and has its traceback in the log.
+            has_stopped: Whether what was begun for a goal stands still: a goal for which a
+                :meth:`watch` has raised is canceled, and answered then.
         """
         self._received: dict[bytes, GoalT] = {}  # goals that are not accepted yet
         self._goals: dict[bytes, GoalT] = {}
         self._accept, self._start, self._cancel = accept, start, cancel
         self._conclude, self._fail, self._refusals = conclude, fail, refusals
+        self._has_stopped = has_stopped
         self._name, self._log = name, node.get_logger()
         self._server = _Server(
             node,
@@ -222,10 +226,12 @@ class GoalServer(Generic[GoalT]):
         """Look at each goal that has not ended; one for which that raises is ended and aborted."""
         for goal in self.running:
             try:
-                look(goal)
-            except Exception as error:  # noqa: BLE001, PERF203  # the others are looked at, too
+                if goal.failure is None:
+                    look(goal)
+            except Exception as error:  # noqa: BLE001  # the others are looked at, too
                 goal.failure = error
                 self._end_early(goal.handle)
+            if goal.failure is not None and self._has_stopped(goal):
                 self.end(goal)
 
     def end(self, goal: GoalT) -> None:
