@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+import re
 
 import pytest
 import rclpy
@@ -14,17 +15,75 @@ from rclpy.context import Context
 from rclpy.node import Node
 
 from process_supervisor import ProcessSpec, StartError, write_parameters
-from quad_bringup.bringup import quad_processes, Stack
+from quad_bringup.bringup import (
+    ArgumentError,
+    argv,
+    LAUNCH_ARGUMENTS,
+    parse,
+    quad_processes,
+    Stack,
+)
 from quad_controller.nodes.parameters import declare_parameters as controller_parameters
 from quad_controller.nodes.parameters import NodeSettings as ControllerSettings
 from quad_description import movable_joints, robot_urdf
 from quad_hardware.calibration.main import write_parameters as write_calibration
+from quad_hardware.calibration.odometry import BRING_UP
+from quad_hardware.doctor.graph import check_graph, Observation
 from quad_hardware.nodes.parameters import declare_parameters as hardware_parameters
 from quad_hardware.nodes.parameters import NodeSettings as HardwareSettings
 from quad_hardware.protocol import Code, Frame, Kind, Register, ROBOT_KINDS, StreamParser, V2
 from quad_sim.options import build, parse_arguments, Simulation
 
-pytestmark = pytest.mark.slow
+DEFAULTS = {argument.name: argument.default for argument in LAUNCH_ARGUMENTS}
+
+
+def test_without_arguments_it_is_the_real_robot_on_its_own_computer() -> None:
+    """As in the article: ros2 launch quad_bringup bringup.launch.py."""
+    arguments = parse(argv(DEFAULTS))[0]
+    assert not arguments.simulate
+    assert arguments.port == '/dev/ttyAMA0'
+    assert arguments.preset == 'lite'
+    simulated = parse(argv({**DEFAULTS, 'simulate': 'true'}))[0]
+    assert simulated.simulate
+    assert simulated.port is None
+
+
+def test_every_argument_reaches_the_bring_up() -> None:
+    """Under its own name."""
+    given = {'preset': 'mini', 'arm': 'True', 'policy': '/a.onnx', 'calibration': '/c.yaml'}
+    arguments = parse(argv({**DEFAULTS, **given, 'port': '/dev/ttyUSB0'}))[0]
+    assert (arguments.port, arguments.preset, arguments.arm) == ('/dev/ttyUSB0', 'mini', True)
+    assert (arguments.policy, arguments.calibration) == (Path('/a.onnx'), Path('/c.yaml'))
+    assert parse(argv({**DEFAULTS, 'gait': 'pace'}))[0].gait == 'pace'
+
+
+def test_a_flag_that_is_neither_true_nor_false_is_refused() -> None:
+    """With its name."""
+    with pytest.raises(ArgumentError, match='arm:=maybe'):
+        argv({**DEFAULTS, 'arm': 'maybe'})
+
+
+def test_launch_can_read_the_file() -> None:
+    """Where ROS has launch; all arguments are declared."""
+    # not 'launch' itself: without ROS' package, the folder beside this one has that name
+    sources = pytest.importorskip('launch.launch_description_sources')
+    launch = pytest.importorskip('launch')
+    file = Path(__file__).parents[1] / 'launch' / 'bringup.launch.py'
+    source = sources.PythonLaunchDescriptionSource(str(file))
+    description = source.get_launch_description(launch.LaunchContext())
+    declared = {argument.name for argument in description.get_launch_arguments()}
+    assert declared == set(DEFAULTS)
+
+
+def test_commands_that_the_tools_of_quad_hardware_print_are_accepted() -> None:
+    """As remedies of doctor and calibrate."""
+    one_node = Observation(1.0, nodes={'hardware_node'})
+    found = [*check_graph(Observation(1.0), '/dev/x'), *check_graph(one_node, '/dev/x')]
+    printed = [BRING_UP, *(finding.remedy for finding in found)]
+    command = re.compile(r'ros2 run quad_bringup bringup((?: --?\S+ [/\w]+)*)')
+    commands = [match[1].split() for text in printed for match in command.finditer(text)]
+    assert [parse(words)[0].port for words in commands] == ['/dev/ttyAMA0', '/dev/x', '/dev/x']
+
 
 OURS = ('quad_hardware', 'quad_sim', 'quad_controller', 'robot_viewer')
 
@@ -83,6 +142,7 @@ def simulator_of(specs: dict[str, ProcessSpec]) -> tuple[Path, Simulation]:
     return options.link, build(options)
 
 
+@pytest.mark.slow
 def test_hardware_has_no_simulator_and_simulation_has(tmp_path: Path) -> None:
     """The bridge opens the port that it is given; only of a simulated robot the IMU is known."""
     port = tmp_path / 'xgo'
@@ -105,6 +165,7 @@ def test_hardware_has_no_simulator_and_simulation_has(tmp_path: Path) -> None:
         assert bridge_of(part).robot.joints_checked is known
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(('preset', 'arm'), [('lite', False), ('mini', True)])
 def test_everyone_has_the_same_robot(tmp_path: Path, preset: str, arm: bool) -> None:
     """Bridge, controller and simulator: the joints of the description, in its order."""
@@ -118,6 +179,7 @@ def test_everyone_has_the_same_robot(tmp_path: Path, preset: str, arm: bool) -> 
     assert robot.model.value == preset
 
 
+@pytest.mark.slow
 def test_a_calibration_counts(tmp_path: Path) -> None:
     """What calibrate has written reaches the bridge, beside the description."""
     calibration = tmp_path / 'calibration.yaml'
@@ -128,6 +190,7 @@ def test_a_calibration_counts(tmp_path: Path) -> None:
     assert settings.robot.estimator.mounting.checked
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('protocol', ['auto', 'v2', 'v1'])
 def test_both_ends_of_the_line_speak_the_same_protocol(tmp_path: Path, protocol: str) -> None:
     """Whichever the bridge tries first, the simulated robot answers in it."""
@@ -142,6 +205,7 @@ def test_both_ends_of_the_line_speak_the_same_protocol(tmp_path: Path, protocol:
     assert [frame.address for frame in received] == [register]
 
 
+@pytest.mark.slow
 def test_gait_and_policy_reach_the_controller(tmp_path: Path) -> None:
     """A policy, and a folder for recordings, only where there is one."""
     settings = controller_of(processes(tmp_path, Stack('p', gait='crawl')))
@@ -153,6 +217,7 @@ def test_gait_and_policy_reach_the_controller(tmp_path: Path) -> None:
     assert settings.record == '/runs'
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('missing', OURS)
 def test_a_workspace_that_is_not_built_says_so(tmp_path: Path, missing: str) -> None:
     """Whichever package it is."""

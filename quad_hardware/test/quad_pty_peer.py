@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 import os
@@ -15,8 +15,10 @@ import select
 import threading
 import time
 import tty
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
+from quad_hardware.calibration.wizard import CancelledError, Console
 from quad_hardware.protocol import (
     ANGLE_SPANS,
     BULK_READ_ORDER,
@@ -31,15 +33,56 @@ from quad_hardware.protocol import (
     Protocol,
     Register,
     scatter,
+    STATE,
     StreamParser,
     Torque,
     V1,
     V2,
 )
-from quad_state_frames import state_frame
 
 if TYPE_CHECKING:
     from typing_extensions import Self
+
+
+REST = {'battery': 100, 'acceleration': (0.0, 0.0, 9.8)}
+
+
+def state_frame(**values: float | tuple[float, ...]) -> Frame:
+    """Return a state frame; what is not given is zero, or that of a robot at rest."""
+    runs = {part.name: (0,) * part.count for part in STATE.fields}
+    for name, value in {**REST, **values}.items():
+        runs[name] = value if isinstance(value, tuple) else (value,)
+    return Frame(Kind.PUSH, STATE.address, STATE.pack(**runs))
+
+
+def read_state(frame: Frame) -> SimpleNamespace:
+    """Return the values of a state frame by name; ``euler2`` is the valid attitude."""
+    runs = STATE.unpack(frame.payload)
+    return SimpleNamespace(**{n: run if len(run) > 1 else run[0] for n, run in runs.items()})
+
+
+class Script(Console):
+    """Someone who answers in order, moves the robot before, and remembers what was said."""
+
+    def __init__(self, *answers: str | tuple[Callable[[], None], str]) -> None:
+        self._answers = list(answers)
+        self.said: list[str] = []
+
+    def write(self, text: str) -> None:
+        """Listen."""
+        self.said.append(text)
+
+    def prompt(self, question: str) -> str:
+        """Answer; leave when there is no answer left."""
+        self.said.append(question)
+        if not self._answers:
+            raise CancelledError('cancelled; nothing was written')
+        answer = self._answers.pop(0)
+        if isinstance(answer, tuple):
+            move, answer = answer
+            move()
+        return answer
+
 
 PUSH_PERIOD = 0.02  # [s]
 TURN_REPORTS = 25  # of the IMU, in which a hand turns the body, however late they are

@@ -15,7 +15,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
-from quad_calibration_script import Script
 from quad_description import movable_joints, robot_urdf
 from quad_description.rotations import (
     conjugate,
@@ -37,7 +36,7 @@ from quad_hardware.filters import STANDARD_GRAVITY
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.protocol import LEG_MOTORS, Protocol, V1, V2
 from quad_hardware.report import Report
-from quad_pty_peer import PtyPeer
+from quad_pty_peer import PtyPeer, Script
 
 pytestmark = pytest.mark.slow
 

@@ -16,17 +16,54 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticStatus
 from isolation import Isolation, reserve
 import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
 from rclpy.qos import ReliabilityPolicy
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
-from node_runner import LATCHED
+from node_runner import LATCHED, ParameterError
 from quad_description import FEET, movable_joints, Pose, pose_positions, robot_urdf
+from quad_hardware import HardwareError
 from quad_hardware.joints import LimiterSettings, MAX_PERIOD
 from quad_hardware.nodes.hardware_node import HardwareNode
+from quad_hardware.nodes.parameters import declare_parameters, NodeSettings
 from quad_hardware.protocol import BULK_READ_ORDER, MOTOR_ORDER, Protocol, V1, V2
 from quad_msgs.msg import FootContacts
 from quad_node_rig import NodeRig, TIMEOUT
+
+WRONG = {
+    'protokoll:=old': "did you mean 'protocol'",
+    'protocol:=v3': "protocol is 'v3': it must be auto, vendor, v1 or v2",
+    'joints.fl_hip_joint.sign:=0': 'sign 0 is neither 1 nor -1',
+    'joints.fl_calf_joint.offset:=6.9': 'correct joints.fl_calf_joint.offset',
+    'robot_description:=<robot/>': 'has no <link>',
+    'robot_description:=none': 'no XML',
+    'max_joint_speed:=fast': "max_joint_speed is 'fast': it must be a number",
+    'max_joint_speed:=500.0': 'max_joint_speed is 500.0: it must be 0.1 to 100.0',
+    'publish_tf:=3': 'publish_tf is 3: it must be true or false',
+}
+
+
+def read(argument: str) -> NodeSettings:
+    """What the node understands of a parameter on its command line."""
+    context = Context()
+    rclpy.init(args=['--ros-args', '-p', argument], context=context)
+    node = Node('hardware_node', context=context, enable_rosout=False)
+    try:
+        return declare_parameters(node)
+    finally:
+        node.destroy_node()
+        rclpy.shutdown(context=context)
+
+
+@pytest.mark.parametrize(('argument', 'reason'), WRONG.items())
+def test_a_wrong_parameter_is_refused(argument: str, reason: str) -> None:
+    """The message names the value and the remedy."""
+    with pytest.raises((ParameterError, HardwareError), match=re.escape(reason)):
+        read(argument)
+
 
 pytestmark = [pytest.mark.scenario, pytest.mark.xdist_group('hardware_node')]
 

@@ -19,8 +19,7 @@ from xgo_lib2.registry import feedback_slot_of
 
 from quad_hardware.link.open import silence_cause
 from quad_hardware.protocol import LEG_MOTORS, V1, V2
-from quad_pty_peer import PtyPeer
-from quad_state_frames import state_frame
+from quad_pty_peer import PtyPeer, state_frame
 
 ROOT = Path(__file__).parents[1]
 

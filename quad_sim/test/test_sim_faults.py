@@ -15,11 +15,11 @@ import serial
 from sim_serial import Listener, serve, TEST_TIMEOUT, VirtualRobot
 
 from quad_hardware.protocol import Code, Fault, Frame, Kind, V2
+from quad_pty_peer import read_state
 from quad_sim import SetupError
 from quad_sim.faults import Fault as LineFault
 from quad_sim.faults import FaultKind, FaultPlan, make_fault, parse_fault
 from quad_sim.robot_line import Wire
-from quad_state_frames import read_state
 
 KINEMATIC = ('--physics', 'none', '--noise', 'none')
 ON = Frame(Kind.WRITE, Code.FEEDBACK, b'\x01')

@@ -25,8 +25,8 @@ from std_srvs.srv import Trigger
 
 from quad_hardware.protocol import Code, Frame, Kind
 from quad_msgs.srv import InjectFault, Push
+from quad_pty_peer import read_state
 from quad_sim.fake_xgo import run
-from quad_state_frames import read_state
 
 pytestmark = pytest.mark.slow
 

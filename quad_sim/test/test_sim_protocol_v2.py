@@ -25,8 +25,8 @@ from quad_hardware.protocol import (
     V1,
     V2,
 )
+from quad_pty_peer import read_state
 from quad_sim.board import Overload, OVERLOAD_TIME
-from quad_state_frames import read_state
 
 KINEMATIC = ('--physics', 'none', '--noise', 'none')
 FEEDBACK_ON = Frame(Kind.WRITE, Code.FEEDBACK, b'\x01')

@@ -4,19 +4,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 import math
 from pathlib import Path
+import threading
+import time
+from typing import Any
 
+from geometry_msgs.msg import Twist
 from hypothesis import given
 from hypothesis import strategies as st
+from isolation import Isolation
+from nav_msgs.msg import Odometry
 import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
 import yaml
 
-from quad_calibration_script import Script
 from quad_hardware import CommandError
+from quad_hardware.calibration import odometry
 from quad_hardware.calibration.main import read_parameters, run_calibrate, write_parameters
+from quad_hardware.calibration.odometry import Place, way
 from quad_hardware.calibration.wizard import (
     MIN_TURN,
     moved_motor,
@@ -26,13 +38,161 @@ from quad_hardware.calibration.wizard import (
 )
 from quad_hardware.joints import JointServo
 from quad_hardware.protocol import Protocol, V1, V2
-from quad_pty_peer import PtyPeer
+from quad_pty_peer import PtyPeer, Script
 
-pytestmark = pytest.mark.slow
+PERIOD = 0.01  # [s]
+
+
+class WalkingRobot(Node):
+    """Goes as commanded; its odometry counts what its scale says."""
+
+    def __init__(self, context: Context) -> None:
+        """Stand at an angle, for the way counts in the robot's own heading."""
+        super().__init__('hardware_node', context=context)
+        self.declare_parameter('odometry.scale_x', 1.25)
+        self.velocity = Twist()
+        self.way = 0.0
+        self._odom = self.create_publisher(Odometry, 'odom', 10)
+        self.create_subscription(Twist, 'cmd_vel', self._move, 1)
+        self.create_timer(PERIOD, self._step)
+
+    def _move(self, message: Twist) -> None:
+        self.velocity = message
+
+    def _step(self) -> None:
+        self.way += self.velocity.linear.x * PERIOD
+        message = Odometry()
+        message.pose.pose.position.y = self.way
+        message.pose.pose.orientation.z = message.pose.pose.orientation.w = math.sqrt(0.5)
+        self._odom.publish(message)
+
+
+@pytest.fixture
+def walking_robot(isolation: Isolation, monkeypatch: pytest.MonkeyPatch) -> Iterator[WalkingRobot]:
+    """A robot in a domain of its own, served in a thread."""
+    for name, value in isolation.env.items():
+        monkeypatch.setenv(name, value)
+    context = Context()
+    rclpy.init(context=context)
+    robot = WalkingRobot(context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(robot)
+    thread = threading.Thread(target=spin, args=(executor,))
+    thread.start()
+    yield robot
+    rclpy.shutdown(context=context)
+    thread.join()
+    robot.destroy_node()
+
+
+def spin(executor: Any) -> None:
+    """Serve until the context ends."""
+    with suppress(ExternalShutdownException):
+        executor.spin()
+
+
+@pytest.mark.scenario
+def test_the_scale_is_what_the_tape_says(walking_robot: WalkingRobot, tmp_path: Path) -> None:
+    """It walks, stops, and the scale of before is multiplied by tape over odometry."""
+    output = tmp_path / 'found.yaml'
+    script = Script('', '0.15')
+    command = ['odometry', '--distance', '0.3', '--speed', '0.5', '--output', str(output)]
+    assert run_calibrate(command, script) == 0, script.said
+    assert walking_robot.velocity.linear.x == 0.0
+    said = float(
+        next(line for line in script.said if line.startswith('odometry measured')).split()[2]
+    )
+    assert said >= 0.3
+    scale = read_parameters(output)['odometry']['scale_x']  # type: ignore[index]
+    assert scale == pytest.approx(1.25 * 0.15 / said, rel=2e-3)
+
+
+@pytest.mark.scenario
+def test_a_way_in_another_unit_is_asked_for_again(
+    walking_robot: WalkingRobot, tmp_path: Path
+) -> None:
+    """Centimetres would make a scale that the bridge refuses."""
+    output = tmp_path / 'found.yaml'
+    script = Script('', '15', '0.15')
+    command = ['odometry', '--distance', '0.1', '--speed', '0.5', '--output', str(output)]
+    assert run_calibrate(command, script) == 0, script.said
+    assert any('was it in metres?' in text for text in script.said)
+    assert read_parameters(output)['odometry']['scale_x'] < 10.0  # type: ignore[index]
+    assert walking_robot.velocity.linear.x == 0.0
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize('option', ['--speed', '--distance'])
+@pytest.mark.parametrize('value', ['0', '-1', 'nan', 'inf', 'far'])
+def test_a_way_that_cannot_be_walked_is_refused(
+    option: str, value: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Before anything moves, and the message names the option."""
+    with pytest.raises(SystemExit) as ended:
+        run_calibrate(['odometry', f'{option}={value}'], Script())
+    assert ended.value.code == 2
+    assert option in capsys.readouterr().err
+
+
+@pytest.mark.scenario
+def test_who_breaks_off_has_it_stopped(
+    walking_robot: WalkingRobot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C on the way: the robot is commanded to stand, and nothing is written."""
+    place = odometry.Walker.place
+
+    def break_off(walker: odometry.Walker) -> Place:
+        if walking_robot.way > 0.02:
+            raise KeyboardInterrupt
+        return place(walker)
+
+    monkeypatch.setattr(odometry.Walker, 'place', break_off)
+    output = tmp_path / 'found.yaml'
+    script = Script('')
+    command = ['odometry', '--speed', '0.5', '--output', str(output)]
+    assert run_calibrate(command, script) == 1
+    assert script.said[-1] == 'cancelled; nothing was written'
+    assert not output.exists()
+    deadline = time.monotonic() + 10.0
+    while walking_robot.velocity.linear.x != 0.0:
+        assert time.monotonic() < deadline, 'it walks on'
+        time.sleep(0.01)
+
+
+@pytest.mark.scenario
+def test_nobody_there_is_said(
+    isolation: Isolation, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Without a robot in the domain, and nothing is written."""
+    for name, value in isolation.env.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr(odometry, 'ODOMETRY_TIMEOUT', 0.3)
+    script = Script('')
+    output = tmp_path / 'found.yaml'
+    assert run_calibrate(['odometry', '--output', str(output)], script) == 1
+    assert 'bringup' in script.said[-1]
+    assert not output.exists()
+
+
+@pytest.mark.scenario
+@given(*[st.floats(-3, 3)] * 3, *[st.floats(-2, 2)] * 2)
+def test_a_way_is_taken_in_the_heading_of_its_start(
+    x: float, y: float, yaw: float, ahead: float, aside: float
+) -> None:
+    """Both axes, from any place."""
+    end = (
+        x + math.cos(yaw) * ahead - math.sin(yaw) * aside,
+        y + math.sin(yaw) * ahead + math.cos(yaw) * aside,
+        0.0,
+    )
+    assert way((x, y, yaw), end, 'x') == pytest.approx(ahead, abs=1e-9)
+    assert way((x, y, yaw), end, 'y') == pytest.approx(aside, abs=1e-9)
+
 
 KNEE = JointServo('fl_calf_joint', 11, lower=-1.134, upper=0.8727)
 
 
+@pytest.mark.slow
 @given(
     st.sampled_from([1, -1]),
     st.floats(-1.0, 1.0),
@@ -47,6 +207,7 @@ def test_sign_and_offset_are_found(sign: int, offset: float, turn: float) -> Non
     assert found.position(true.angle(0.7)) == pytest.approx(0.7)
 
 
+@pytest.mark.slow
 def test_a_turn_that_shows_nothing_is_refused() -> None:
     """A hand that shakes is no direction."""
     with pytest.raises(CommandError, match=r'motor 11 turned by 3.0 degrees'):
@@ -55,6 +216,7 @@ def test_a_turn_that_shows_nothing_is_refused() -> None:
     assert moved_motor({11: 0.0}, {11: 1.0}) is None
 
 
+@pytest.mark.slow
 def test_limits_are_measured_within_those_of_the_urdf() -> None:
     """With a margin to the stop, in either order of the ends."""
     found = with_limits(KNEE, 40.0, -90.0)
@@ -65,6 +227,7 @@ def test_limits_are_measured_within_those_of_the_urdf() -> None:
         with_limits(KNEE, 1.0, 2.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('protocol', [V2, V1], ids=lambda protocol: protocol.name)
 def test_a_joint_is_calibrated_by_hand(tmp_path: Path, protocol: Protocol) -> None:
     """Torque off, two places, torque on where it is, and the file has what was found."""
@@ -91,6 +254,7 @@ def test_a_joint_is_calibrated_by_hand(tmp_path: Path, protocol: Protocol) -> No
     assert joint['fl_calf_joint']['offset'] == pytest.approx(math.radians(10.0), abs=0.01)  # type: ignore[index]
 
 
+@pytest.mark.slow
 def test_who_leaves_gets_torque_back_and_no_file(tmp_path: Path) -> None:
     """In the middle of a joint; the robot holds where it was put."""
     output = tmp_path / 'found.yaml'
@@ -103,6 +267,7 @@ def test_who_leaves_gets_torque_back_and_no_file(tmp_path: Path) -> None:
     assert not output.exists()
 
 
+@pytest.mark.slow
 def test_a_wrong_motor_is_noticed(tmp_path: Path) -> None:
     """Someone moves another joint than asked: it is said which motor turned, and asked again."""
     output = tmp_path / 'found.yaml'
@@ -123,6 +288,7 @@ def test_a_wrong_motor_is_noticed(tmp_path: Path) -> None:
     assert 'Is this the right joint?' in text
 
 
+@pytest.mark.slow
 def test_all_zeros_at_once(tmp_path: Path) -> None:
     """In a jig: every offset is where the servo is, every sign stays."""
     output = tmp_path / 'found.yaml'
@@ -135,6 +301,7 @@ def test_all_zeros_at_once(tmp_path: Path) -> None:
     assert {j['offset'] for j in joints.values()} == {round(-math.radians(5.0), 5)}  # type: ignore[attr-defined]
 
 
+@pytest.mark.slow
 def test_a_robot_of_no_known_firmware_is_calibrated(tmp_path: Path) -> None:
     """The message names the option, and the option does it."""
     output = tmp_path / 'found.yaml'
@@ -148,6 +315,7 @@ def test_a_robot_of_no_known_firmware_is_calibrated(tmp_path: Path) -> None:
     assert output.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('protocol', [V1, V2], ids=lambda protocol: protocol.name)
 def test_a_preset_of_another_robot_is_refused(tmp_path: Path, protocol: Protocol) -> None:
     """Its limits would count: the message names the right one, and that one is taken."""
@@ -162,6 +330,7 @@ def test_a_preset_of_another_robot_is_refused(tmp_path: Path, protocol: Protocol
     assert output.exists()
 
 
+@pytest.mark.slow
 def test_no_robot_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With the remedy, and nothing is written."""
     monkeypatch.setattr('quad_hardware.calibration.wizard.REPORT_TIMEOUT', 0.5)
@@ -171,6 +340,7 @@ def test_no_robot_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     assert 'no such device' in script.said[-1]
 
 
+@pytest.mark.slow
 def test_a_file_keeps_what_it_had(tmp_path: Path) -> None:
     """New values go beside old ones, also within a joint; other files are refused."""
     path = tmp_path / 'p.yaml'
@@ -189,6 +359,7 @@ def test_a_file_keeps_what_it_had(tmp_path: Path) -> None:
         write_parameters(path, {})
 
 
+@pytest.mark.slow
 def test_a_number_is_asked_for_until_there_is_one() -> None:
     """A comma is a point; words, nothing and zero are not."""
     script = Script('far', '', '-1', 'inf', '0,95')
@@ -196,6 +367,7 @@ def test_a_number_is_asked_for_until_there_is_one() -> None:
     assert len(script.said) == 9
 
 
+@pytest.mark.slow
 def test_joints_that_nobody_has_are_refused(tmp_path: Path) -> None:
     """Before any torque is taken away, with the names that there are."""
     script = Script()
@@ -204,6 +376,7 @@ def test_joints_that_nobody_has_are_refused(tmp_path: Path) -> None:
     assert script.said[0].startswith("no joint is called 'fl_femur'; there are fl_hip_joint")
 
 
+@pytest.mark.slow
 def test_skipped_joints_write_no_file(tmp_path: Path) -> None:
     """What was there before is not written as if it had been found."""
     output = tmp_path / 'found.yaml'

@@ -2,20 +2,93 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+import threading
 from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
+from input_devices import InjectedDevice, InjectedDevices, xbox_pad
+from isolation import Isolation
 import pytest
+import rclpy
+from ros_client import RosClient
+from teleop_robot import Robot, TEST_TIMEOUT
 
 from operator_input import CommandStream
 from operator_input.gamepad import AT_REST, Axis, Button, Deadman, GamepadState
+from operator_input.ros import serve_teleop
 from quad_teleop import BodyPose, Mode, Speeds, Velocity
 from quad_teleop.mappings import GamepadTeleop, MODE_BUTTONS
 from quad_teleop.motion import NEUTRAL, PoseSteps, rest_of, RobotRequest, ZERO
+from quad_teleop.nodes.teleop import TeleopGamepad
 
-pytestmark = pytest.mark.slow
+ABS_Y, ABS_HAT0Y = 1, 0x11
+SOUTH, LEFT_SHOULDER, RIGHT_SHOULDER, SELECT = 0x130, 0x136, 0x137, 0x13A
+FORWARD = (0.15, 0.0, 0.0)
+
+
+@pytest.fixture
+def pad() -> InjectedDevice:
+    """Make an Xbox pad."""
+    return xbox_pad()
+
+
+@pytest.fixture
+def context(isolation: Isolation) -> Iterator[None]:
+    """Start ROS in the test's domain."""
+    rclpy.init(domain_id=isolation.domain_id)
+    try:
+        yield
+    finally:
+        rclpy.shutdown()
+
+
+@pytest.fixture
+def robot(context: None, pad: InjectedDevice, isolation: Isolation) -> Iterator[Robot]:
+    """Run the node's own loop on the pad, and listen."""
+    stop = threading.Event()
+    node = TeleopGamepad(InjectedDevices(pad))
+    thread = threading.Thread(target=serve_teleop, args=[node, stop])
+    thread.start()
+    try:
+        with RosClient(isolation.domain_id) as client:
+            robot = Robot(client)
+            robot.wait_until_linked()
+            client.spin_until(lambda: node.robot.has_subscriber, TEST_TIMEOUT, 'link')
+            yield robot
+    finally:
+        stop.set()
+        thread.join()
+        assert pad.is_closed
+
+
+@pytest.mark.scenario
+def test_deadman_stick_and_turbo(pad: InjectedDevice, robot: Robot) -> None:
+    """Stick alone: nothing. With the deadman it walks, with turbo faster; let go, it stops."""
+    pad.move(ABS_Y, -32768)
+    robot.listen_for(0.3)
+    assert robot.twists == []
+    pad.press(LEFT_SHOULDER)
+    robot.wait_for(FORWARD)
+    pad.press(RIGHT_SHOULDER)
+    robot.wait_for((0.3, 0.0, 0.0))
+    pad.release(RIGHT_SHOULDER)
+    pad.release(LEFT_SHOULDER)
+    robot.wait_until_silent()
+
+
+@pytest.mark.scenario
+def test_modes_and_body(pad: InjectedDevice, robot: Robot) -> None:
+    """With the deadman, A asks to stand and the d-pad lifts the body."""
+    pad.press(LEFT_SHOULDER)
+    pad.press(SOUTH)
+    robot.client.spin_until(lambda: robot.modes == ['stand'], TEST_TIMEOUT, 'set_mode')
+    pad.move(ABS_HAT0Y, -1)
+    robot.client.spin_until(lambda: bool(robot.poses), TEST_TIMEOUT, 'body pose')
+    assert robot.poses[0].position.z == pytest.approx(0.005)
+
 
 NO_ROBOT: Any = None
 DEADMAN, TURBO = Button.LEFT_SHOULDER, Button.RIGHT_SHOULDER
@@ -38,6 +111,7 @@ def state(*buttons: Button, **axes: float) -> GamepadState:
     return GamepadState({Axis[name]: way for name, way in axes.items()}, frozenset(buttons))
 
 
+@pytest.mark.slow
 def test_sticks_move_only_with_the_deadman() -> None:
     """The left one walks, the right one turns; turbo alone is a deadman, at its speeds."""
     target = teleop()
@@ -49,6 +123,7 @@ def test_sticks_move_only_with_the_deadman() -> None:
     assert target.step(0.2) == Velocity(0.3, 0.0, -1.2)
 
 
+@pytest.mark.slow
 def test_centred_stick_with_the_deadman_holds_the_robot() -> None:
     """A held deadman keeps others away: it says zero as long as it is held."""
     target = teleop()
@@ -56,6 +131,7 @@ def test_centred_stick_with_the_deadman_holds_the_robot() -> None:
     assert [target.step(0.05 * index) for index in range(10)] == [ZERO] * 10
 
 
+@pytest.mark.slow
 def test_without_a_deadman_button_rest_is_silence() -> None:
     """Where no button is needed, an untouched or unplugged gamepad does not stream zeros."""
     target = teleop(Deadman(enable=None, turbo=None))
@@ -66,6 +142,7 @@ def test_without_a_deadman_button_rest_is_silence() -> None:
     assert [word for word in words if word is not None] == [ZERO] * 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(('button', 'mode'), MODE_BUTTONS.items())
 def test_modes_that_move_need_the_deadman(button: Button, mode: Mode) -> None:
     """A button hit by accident does not make the robot stand up; lying down is always allowed."""
@@ -73,6 +150,7 @@ def test_modes_that_move_need_the_deadman(button: Button, mode: Mode) -> None:
     assert teleop().feed(state(button)) == ([mode] if mode is Mode.LIE else [])
 
 
+@pytest.mark.slow
 def test_a_fault_is_cleared_by_a_button() -> None:
     """Once for a press, with the deadman or without; nothing moves by it."""
     target = teleop()
@@ -84,6 +162,7 @@ def test_a_fault_is_cleared_by_a_button() -> None:
 PARTLY, AT_A_STOP, AT_THE_RIM = {'LEFT_Y': 0.6}, {'LEFT_Y': 1.0}, {'LEFT_X': 0.7, 'LEFT_Y': 0.7}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('sticks', 'ends_at'), [(PARTLY, 3.0), (AT_A_STOP, 10.0), (AT_THE_RIM, 10.0)]
 )
@@ -108,6 +187,7 @@ def test_a_pad_that_does_not_change_is_no_hand(sticks: dict[str, float], ends_at
         assert target.step(now + 0.1) not in {None, ZERO}
 
 
+@pytest.mark.slow
 def test_a_hand_that_trembles_goes_on() -> None:
     """Changes within the dead zone are a sign of life; a stick in the middle needs none."""
     target = teleop()
@@ -123,6 +203,7 @@ def test_a_hand_that_trembles_goes_on() -> None:
     assert resting.step(10.0) == Velocity(0.15, 0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_d_pad_lifts_and_tilts_step_by_step() -> None:
     """Each press is a step, as far as the limit; start is neutral."""
     target = teleop()
@@ -141,6 +222,7 @@ STATES = st.builds(
 )
 
 
+@pytest.mark.slow
 @given(st.lists(STATES, max_size=30))
 def test_speed_is_bounded_and_only_with_the_deadman(states: list[GamepadState]) -> None:
     """Whatever the pad reports: no motion without the button, and none above the speeds."""
@@ -156,6 +238,7 @@ def test_speed_is_bounded_and_only_with_the_deadman(states: list[GamepadState]) 
             assert abs(velocity.yaw) <= limit * 4
 
 
+@pytest.mark.slow
 @given(st.lists(STATES, max_size=10))
 def test_lost_gamepad_stops(states: list[GamepadState]) -> None:
     """At rest, as after it was unplugged, the last word is zero and then there is none."""
