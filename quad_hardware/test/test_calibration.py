@@ -341,6 +341,21 @@ def test_no_robot_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 @pytest.mark.slow
+def test_servos_are_measured_of_joints_that_were_checked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before the first motion no leg swings; a simulated robot needs none."""
+    monkeypatch.setattr('quad_hardware.calibration.wizard.REPORT_TIMEOUT', 0.5)
+    monkeypatch.chdir(tmp_path)
+    script = Script()
+    command = ['servos', '--port', str(tmp_path / 'none')]
+    assert run_calibrate(command, script) == 1
+    assert 'calibrate first-motion' in script.said[-1]
+    write_parameters(tmp_path / 'quad_calibration.yaml', {'joints_checked': True})
+    assert run_calibrate(command, script) == 1
+    assert 'no such device' in script.said[-1]
+
+
 def test_a_file_keeps_what_it_had(tmp_path: Path) -> None:
     """New values go beside old ones, also within a joint; other files are refused."""
     path = tmp_path / 'p.yaml'

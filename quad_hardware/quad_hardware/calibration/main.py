@@ -20,8 +20,9 @@ from ..estimation import ImuMounting
 from ..exceptions import CommandError, HardwareError
 from ..joints import JointServo, servo_of
 from ..link import AUTO, DEFAULT_PORT, LinkOptions, MODEL_CHOICES, PROTOCOL_CHOICES
+from ..link.open import is_pseudo_terminal
 from ..protocol import LEG_MOTORS
-from ..serial_robot import JOINTS_CHECKED
+from ..serial_robot import JOINTS_CHECKED, UNCHECKED_JOINTS
 from .imu import calibrate_imu
 from .wizard import calibrate_joints, CancelledError, Console, limp_robot, zero_all
 
@@ -179,9 +180,11 @@ def _servos(options: argparse.Namespace, console: Console) -> None:
     from .servos import calibrate_servos
 
     urdf = robot_urdf(options.preset, options.arm)
-    known = {} if options.calibration is None else read_parameters(options.calibration)
+    known = read_parameters(options.calibration or DEFAULT_FILE)
     if options.calibration is not None and not known:
         raise CommandError(f'{options.calibration} is no file of calibrate joints')
+    if known.get(JOINTS_CHECKED) is not True and not is_pseudo_terminal(options.port):
+        raise CommandError(UNCHECKED_JOINTS)
     servos = _calibrated(urdf, known)
     with limp_robot(_link(options), [servo.motor for servo in servos]) as robot:
         calibrate_servos(console, robot, servos, urdf, options.leg, repeat=options.repeat)
@@ -258,7 +261,11 @@ def _parser() -> argparse.ArgumentParser:
     for kind in (joints, first, servos):
         kind.add_argument('--preset', choices=PRESETS, default='lite', help='(%(default)s)')
         kind.add_argument('--arm', action='store_true', help='with the arm on its back')
-    servos.add_argument('--calibration', type=Path, help='file of calibrate joints')
+    servos.add_argument(
+        '--calibration',
+        type=Path,
+        help=f'file of calibrate joints and first-motion ({DEFAULT_FILE})',
+    )
     servos.add_argument('--leg', choices=LEGS, default=LEGS[0], help='(%(default)s)')
     servos.add_argument(
         '--repeat', type=int, choices=range(1, 5), default=1, help='of the motion (%(default)s)'

@@ -179,13 +179,18 @@ def connect(path: str, protocols: Iterable[Protocol] = PROTOCOLS, baud: int = 0)
     raise NoAnswerError(f'no robot answers on {path} ({", ".join(tried)}); {silence_cause(path)}')
 
 
+def is_pseudo_terminal(path: str) -> bool:
+    """Return whether a simulated robot is behind a device file, or a link to one."""
+    return Path(path).resolve().is_relative_to(PSEUDO_TERMINALS)
+
+
 def silence_cause(path: str) -> str:
     """Return what to check where there is no answer on a port.
 
     Args:
         path: Device file, or a link to one.
     """
-    if Path(path).resolve().is_relative_to(PSEUDO_TERMINALS):
+    if is_pseudo_terminal(path):
         return (
             'it is a pseudo-terminal: does the simulated robot behind it still start, and is this '
             'machine too busy?'
