@@ -43,11 +43,7 @@ class CommandLoss:
         reaction: LossReaction = LossReaction.LIE,
         timeout: float = STREAM_TIMEOUT,
     ) -> None:
-        """Begin without a stream.
-
-        Args:
-            raised: Names the feet that are in the air at targets of the legs [rad].
-        """
+        """Begin without a stream; ``raised`` names feet in the air at targets of legs [rad]."""
         self.timeout = timeout  # a pause after which a stream has ended [s]
         self._joints, self._legs = joints, joints.names[: joints.leg_count]
         servos = joints.servos[: joints.leg_count]

@@ -46,11 +46,7 @@ class GravityCheck:
         self._reports: deque[tuple[Quaternion, Vector]] = deque(maxlen=REPORTS)
 
     def take(self, attitude: Quaternion, acceleration: Vector | None) -> None:
-        """Add a report.
-
-        Args:
-            acceleration: Specific force in the body [m/s²]; None when it is not measured.
-        """
+        """Add a report; None without an accelerometer, else specific force in the body [m/s²]."""
         if acceleration is not None:
             self._reports.append((attitude, acceleration))
 
@@ -108,11 +104,7 @@ class AttitudeRate:
     """
 
     def __init__(self, cutoff: float) -> None:
-        """Begin at rest.
-
-        Args:
-            cutoff: Of the low-pass [Hz].
-        """
+        """Begin at rest; the low-pass has a cutoff [Hz]."""
         self._cutoff = cutoff
         self._last: tuple[float, Quaternion] | None = None
         self._rate = ZERO
@@ -153,11 +145,7 @@ class JointRate:
     """
 
     def __init__(self, cutoff: float) -> None:
-        """Begin at rest.
-
-        Args:
-            cutoff: Of the low-pass [Hz].
-        """
+        """Begin at rest; the low-pass has a cutoff [Hz]."""
         self._error = 0.0  # as reports show it, rms [rad/s]
         self._period = NOMINAL_PERIOD  # between reports, in the mean [s]
         self._cutoff = cutoff

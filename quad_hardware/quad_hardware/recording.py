@@ -94,11 +94,7 @@ def format_transfer(time: float, data: bytes, *, sent: bool) -> str:
 
 
 def format_event(event: Event, time: float) -> str:
-    """Return the line of what is no transfer, with its end.
-
-    Args:
-        time: When, on the wall clock [s].
-    """
+    """Return the line of what is no transfer, with its end; the time is of the wall clock [s]."""
     if isinstance(event, StateEntered):
         kind = 'state'
         content: dict[str, object] = {'state': event.state.value, 'detail': event.detail}
@@ -224,11 +220,7 @@ class SerialMemory:
     """
 
     def __init__(self, port: str, window: float) -> None:
-        """Begin with nothing.
-
-        Args:
-            window: How far back it reaches [s].
-        """
+        """Begin with nothing; the window is how far back it reaches [s]."""
         self._port, self._window = port, window
         self._transfers: deque[tuple[float, bytes, bool]] = deque()
         self._events: deque[Event] = deque(maxlen=EVENTS)

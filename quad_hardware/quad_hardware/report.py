@@ -138,11 +138,7 @@ class Plausibility:
     """
 
     def __init__(self, motors: Collection[int]) -> None:
-        """Begin without a report.
-
-        Args:
-            motors: Ids of those that a joint uses; what the others report is nothing.
-        """
+        """Begin without a report; what motors report that no joint uses is nothing."""
         self._motors = tuple(motors)
         self._last: Report | None = None
         self._refused = 0
@@ -257,11 +253,7 @@ class ServoWatch:
     """Finds servos that will not carry the robot any longer: silent, overloaded or too hot."""
 
     def __init__(self, motors: Collection[int]) -> None:
-        """Begin without a report.
-
-        Args:
-            motors: Ids of those that a joint uses.
-        """
+        """Begin without a report; the motors are those that a joint uses."""
         self._motors, self._confirmed = motors, Confirmed[_Problem]()
 
     def check(self, state: Report) -> str:

@@ -157,11 +157,7 @@ class SerialRobot(ObservedRobot):
         self._driver.start(begin)
 
     def end(self, report_loss: Callable[[str], None]) -> None:
-        """Lay the robot down where it may not be left as it is, and close the port.
-
-        Args:
-            report_loss: Takes what :meth:`miss_commands` says, before the robot moves.
-        """
+        """Lay the robot down where it may not be left as it is, report why, and close the port."""
         while (loss := self.miss_commands()) is None:
             time.sleep(NOMINAL_PERIOD)
         if loss:

@@ -258,11 +258,7 @@ class Keyboard:
         return StatusLine(self._terminal)
 
     def wait(self, timeout: float, others: Iterable[int] = ()) -> list[KeyEvent]:
-        """Wait for something to happen to a key.
-
-        Args:
-            timeout: Longest wait [s].
-            others: File descriptors that end the wait too.
+        """Wait for at most a time [s] for a key, or for one of other file descriptors.
 
         Returns:
             What happened, in its order; empty after the time-out.

@@ -137,12 +137,7 @@ class TerminalKeyboard:
     """
 
     def __init__(self, path: str = CONTROLLING_TERMINAL, *, kitty: bool = True) -> None:
-        """Prepare; the terminal is touched on entering the context.
-
-        Args:
-            path: Device of the terminal.
-            kitty: Request the Kitty keyboard protocol.
-        """
+        """Prepare; the terminal is touched on entering the context."""
         self._path = path
         self._kitty = kitty
         self._descriptor: int | None = None

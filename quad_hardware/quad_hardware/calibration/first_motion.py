@@ -68,10 +68,7 @@ def check_joint(
     keyboard: Callable[[], AbstractContextManager[Keys]],
     servo: JointServo,
 ) -> None:
-    """Move a joint while the space bar is held, and ask what was seen.
-
-    Args:
-        keyboard: Opens the keyboard for the motion.
+    """Move a joint while the space bar of an opened keyboard is held, and ask what was seen.
 
     Raises:
         CancelledError: The person has ended it.

@@ -105,11 +105,7 @@ class Dialect(ABC):
 
     @abstractmethod
     def command(self, angles: Mapping[int, float]) -> None:
-        """Set the angles that are sent at the next possible moment.
-
-        Args:
-            angles: Servo angles by motor id [deg]; finite.
-        """
+        """Set the finite angles [deg] by motor id that are sent at the next possible moment."""
 
     @abstractmethod
     def torque(self, *, on: bool) -> None:

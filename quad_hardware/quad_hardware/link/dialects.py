@@ -123,11 +123,7 @@ class V1Dialect(Dialect):
     """
 
     def __init__(self, now: float, model: Model = Model.LITE, rate: float = 50.0) -> None:
-        """Begin a conversation.
-
-        Args:
-            rate: Reports a second [Hz].
-        """
+        """Begin a conversation, with a rate of reports [Hz]."""
         super().__init__(V1)
         self.spans = ANGLE_SPANS[model]
         self._period = 1.0 / rate
@@ -333,11 +329,7 @@ class V2Dialect(Dialect):
     """Requests 50 states a second, and again whenever they stop coming."""
 
     def __init__(self, now: float, rate: int = 50) -> None:
-        """Begin a conversation.
-
-        Args:
-            rate: Reports a second [Hz].
-        """
+        """Begin a conversation, with a rate of reports [Hz]."""
         super().__init__(V2)
         requests = (
             Frame(Kind.WRITE, Code.FEEDBACK_RATE, bytes((rate,))),

@@ -46,11 +46,7 @@ class Driver:
         on_change: Callable[[LinkState, str], None],
         on_open: Callable[[Session], None] = lambda _: None,
     ) -> None:
-        """Prepare; :meth:`start` begins.
-
-        Args:
-            on_open: Takes each session that was opened, before it is used.
-        """
+        """Prepare; :meth:`start` begins. ``on_open`` takes each new session before it is used."""
         self._options = options
         self._on_state = on_state
         self._on_change = on_change
@@ -75,11 +71,7 @@ class Driver:
         self._received_at = self._reported_at = -float('inf')
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:
-        """Start the thread, which looks for the robot until it finds it.
-
-        Args:
-            begin: Called first in the thread, which may want a priority.
-        """
+        """Start the thread, which calls ``begin`` and looks for the robot until it finds it."""
         self._begin = begin
         self._thread.start()
 

@@ -110,12 +110,7 @@ def open_session(options: LinkOptions) -> Session:
 
 
 def make_dialect(model: Model | None, now: float, rate: int = 50) -> Dialect:
-    """Return how to talk to a robot.
-
-    Args:
-        model: Whose ranges scale bytes in protocol v1; None speaks v2.
-        rate: Reports a second [Hz].
-    """
+    """Return how to talk to a robot: v1 with the ranges of a model, else v2; reports at [Hz]."""
     return V2Dialect(now, rate) if model is None else V1Dialect(now, model, rate)
 
 
@@ -185,11 +180,7 @@ def is_pseudo_terminal(path: str) -> bool:
 
 
 def silence_cause(path: str) -> str:
-    """Return what to check where there is no answer on a port.
-
-    Args:
-        path: Device file, or a link to one.
-    """
+    """Return what to check where there is no answer on a port."""
     if is_pseudo_terminal(path):
         return (
             'it is a pseudo-terminal: does the simulated robot behind it still start, and is this '

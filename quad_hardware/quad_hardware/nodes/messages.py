@@ -287,11 +287,7 @@ class LinkDiagnostic:
     def describe(
         self, node: str, port: str, status: LinkStatus, recording: str = ''
     ) -> DiagnosticStatus:
-        """Describe the link, and begin to look anew.
-
-        Args:
-            recording: Last file of the black box; empty before one.
-        """
+        """Describe the link and the last file of its black box, and begin to look anew."""
         level, message = _LINK_LEVELS[status.state], status.detail
         parser = status.parser
         frames, damaged = self._since(parser)

@@ -52,11 +52,7 @@ class RobotTopics:
         deviations: Deviations,
         steady: Callable[[float], float] = lambda moment: moment,
     ) -> None:
-        """Make the publishers.
-
-        Args:
-            steady: Returns when a time of the robot's states is, on the monotonic clock [s].
-        """
+        """Make the publishers; ``steady`` turns times of states into the monotonic clock [s]."""
         self.link = LinkDiagnostic()  # what is said of the serial link
         self._node, self._robot = node, robot
         self._frames, self._deviations = frames, deviations

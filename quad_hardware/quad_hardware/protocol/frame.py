@@ -324,11 +324,7 @@ class StreamParser:
     """
 
     def __init__(self, protocol: Protocol, kinds: frozenset[Kind]) -> None:
-        """Begin with an empty buffer.
-
-        Args:
-            kinds: Kinds that the other side sends: ``ROBOT_KINDS`` or ``HOST_KINDS``.
-        """
+        """Begin with an empty buffer; the other side sends ``ROBOT_KINDS`` or ``HOST_KINDS``."""
         self._protocol = protocol
         self._kinds = {int(kind): kind for kind in kinds & protocol.kinds}
         self._buffer = bytearray()

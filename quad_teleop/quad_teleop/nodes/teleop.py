@@ -327,10 +327,7 @@ class TeleopGamepad(TeleopNode):
 
     @destroyed_when_refused
     def __init__(self, devices: InputDevices | None = None) -> None:
-        """Declare the parameters and advertise the topics.
-
-        Args:
-            devices: Where gamepads are; those of this machine when it is None.
+        """Declare the parameters and advertise the topics; devices are those of this machine.
 
         Raises:
             ParameterError: A parameter is misspelt, of another kind or out of its range.
