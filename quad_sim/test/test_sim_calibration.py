@@ -15,7 +15,6 @@ import pytest
 from sim_serial import Line
 
 from operator_input import KeyAction, KeyEvent
-from quad_calibration_script import Script
 from quad_description import movable_joints, robot_urdf
 from quad_hardware import CommandError
 from quad_hardware.calibration.first_motion import check_joint, PERIOD
@@ -23,6 +22,7 @@ from quad_hardware.calibration.servos import calibrate_servos, ServoFit
 from quad_hardware.calibration.wizard import CancelledError, Console
 from quad_hardware.joints import JointServo, servo_of
 from quad_hardware.protocol import Protocol, V1, V2
+from quad_pty_peer import Script
 from quad_sim.plant import parse_servo
 
 pytestmark = pytest.mark.slow
