@@ -63,96 +63,6 @@ BUS_REMEDY = 'another bus with --can'  # what a second bring-up on a bus is advi
 
 
 @dataclass(frozen=True, slots=True)
-class Stack:
-    """What is to be brought up."""
-
-    robot: Robot
-    bus: str  # name of the CAN bus
-    simulate: bool  # with simulated slaves for all devices of the bus
-    start_positions: Mapping[str, float] = field(default_factory=dict)  # if not 0, [rad or m]
-    ready_timeout: float = 30.0  # of each process in [s]
-    master: Executable = MASTER  # what runs the bus
-    master_parameters: Mapping[str, str] = field(default_factory=dict)  # beside the usual ones
-    master_files: Sequence[Path] = ()  # with parameters, beside the usual one
-    ros: RosOptions = field(default_factory=RosOptions)  # of all nodes
-    plan: bool = False  # with move_group, which has the files of the master
-    view: bool = False  # with the page on which the robot is seen
-
-
-def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
-    """Return the processes that make an arm; they start side by side.
-
-    Raises:
-        StartError: An executable is missing.
-    """
-    make = partial(node_process, find=find, ros=stack.ros, ready_timeout=stack.ready_timeout)
-    bus = {'bus_config': str(stack.robot.bus_config), 'can_interface_name': stack.bus}
-    own = {'backend': 'canopen'} if stack.master == MOTION_NODE else {'robot_joint_states': 'true'}
-    files = (parameters, *stack.master_files)
-    processes: list[ProcessSpec | None] = []
-    if stack.simulate:
-        places = {f'positions.{name}': f'{at!r}' for name, at in stack.start_positions.items()}
-        processes.append(make('slaves', SLAVES, values={**bus, **places}, stop_order=SLAVES_LAST))
-    processes += [
-        make(
-            'master',
-            stack.master,
-            values={**bus, **own, **stack.master_parameters},
-            parameters=files,
-            stop_order=MASTER_FIRST,
-        ),
-        state_publisher(  # without it the arm moves without TF
-            parameters, find, stack.ros, ready_timeout=stack.ready_timeout, order=THEN_LISTENERS
-        ),
-    ]
-    if stack.plan:
-        processes.append(make('planner', PLANNER, parameters=files, stop_order=THEN_LISTENERS))
-    if stack.view:
-        timeout = stack.ready_timeout
-        view = view_process(find, stack.ros, ready_timeout=timeout, stop_order=THEN_LISTENERS)
-        processes.append(view)
-    return [spec for spec in processes if spec is not None]
-
-
-def controller_process(
-    files: Sequence[Path],
-    parameters: Path,
-    ready_timeout: float,
-    find: FindExecutable,
-    ros: RosOptions,
-) -> ProcessSpec:
-    """Return the process that moves drives of another process; that one makes /tf, too.
-
-    Raises:
-        StartError: An executable is missing.
-    """
-    return node_process(
-        'controller',
-        MOTION_NODE,
-        find,
-        ros,
-        values={'backend': 'topics'},
-        parameters=(parameters, *files),
-        ready_timeout=ready_timeout,
-        stop_order=MASTER_FIRST,
-    )
-
-
-def choose_master(robot: Robot, find: FindExecutable) -> tuple[Executable, str]:
-    """Choose what runs the bus; return why it offers no motion, too: empty when it does."""
-    if find(MOTION_NODE.package, MOTION_NODE.name) is None:
-        return MASTER, MAKE_MOVE
-    if robot.lacking:
-        return MASTER, f'{robot.name} lacks {robot.lacking} for trajectories and jogging'
-    return MOTION_NODE, ''
-
-
-def enabling_services(drives: Sequence[str], mode_service: str) -> list[list[str]]:
-    """Return the services that enable drives; each group is called side by side, one by one."""
-    return [[f'{drive}/{name}' for drive in drives] for name in ('init', mode_service)]
-
-
-@dataclass(frozen=True, slots=True)
 class Session:
     """An arm that is about to be brought up."""
 
@@ -326,3 +236,93 @@ def session(
         yield Session(
             robot, bus, list(config.joints), ros, mode_service, urdf, f'{start}', processes
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Stack:
+    """What is to be brought up."""
+
+    robot: Robot
+    bus: str  # name of the CAN bus
+    simulate: bool  # with simulated slaves for all devices of the bus
+    start_positions: Mapping[str, float] = field(default_factory=dict)  # if not 0, [rad or m]
+    ready_timeout: float = 30.0  # of each process in [s]
+    master: Executable = MASTER  # what runs the bus
+    master_parameters: Mapping[str, str] = field(default_factory=dict)  # beside the usual ones
+    master_files: Sequence[Path] = ()  # with parameters, beside the usual one
+    ros: RosOptions = field(default_factory=RosOptions)  # of all nodes
+    plan: bool = False  # with move_group, which has the files of the master
+    view: bool = False  # with the page on which the robot is seen
+
+
+def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
+    """Return the processes that make an arm; they start side by side.
+
+    Raises:
+        StartError: An executable is missing.
+    """
+    make = partial(node_process, find=find, ros=stack.ros, ready_timeout=stack.ready_timeout)
+    bus = {'bus_config': str(stack.robot.bus_config), 'can_interface_name': stack.bus}
+    own = {'backend': 'canopen'} if stack.master == MOTION_NODE else {'robot_joint_states': 'true'}
+    files = (parameters, *stack.master_files)
+    processes: list[ProcessSpec | None] = []
+    if stack.simulate:
+        places = {f'positions.{name}': f'{at!r}' for name, at in stack.start_positions.items()}
+        processes.append(make('slaves', SLAVES, values={**bus, **places}, stop_order=SLAVES_LAST))
+    processes += [
+        make(
+            'master',
+            stack.master,
+            values={**bus, **own, **stack.master_parameters},
+            parameters=files,
+            stop_order=MASTER_FIRST,
+        ),
+        state_publisher(  # without it the arm moves without TF
+            parameters, find, stack.ros, ready_timeout=stack.ready_timeout, order=THEN_LISTENERS
+        ),
+    ]
+    if stack.plan:
+        processes.append(make('planner', PLANNER, parameters=files, stop_order=THEN_LISTENERS))
+    if stack.view:
+        timeout = stack.ready_timeout
+        view = view_process(find, stack.ros, ready_timeout=timeout, stop_order=THEN_LISTENERS)
+        processes.append(view)
+    return [spec for spec in processes if spec is not None]
+
+
+def controller_process(
+    files: Sequence[Path],
+    parameters: Path,
+    ready_timeout: float,
+    find: FindExecutable,
+    ros: RosOptions,
+) -> ProcessSpec:
+    """Return the process that moves drives of another process; that one makes /tf, too.
+
+    Raises:
+        StartError: An executable is missing.
+    """
+    return node_process(
+        'controller',
+        MOTION_NODE,
+        find,
+        ros,
+        values={'backend': 'topics'},
+        parameters=(parameters, *files),
+        ready_timeout=ready_timeout,
+        stop_order=MASTER_FIRST,
+    )
+
+
+def choose_master(robot: Robot, find: FindExecutable) -> tuple[Executable, str]:
+    """Choose what runs the bus; return why it offers no motion, too: empty when it does."""
+    if find(MOTION_NODE.package, MOTION_NODE.name) is None:
+        return MASTER, MAKE_MOVE
+    if robot.lacking:
+        return MASTER, f'{robot.name} lacks {robot.lacking} for trajectories and jogging'
+    return MOTION_NODE, ''
+
+
+def enabling_services(drives: Sequence[str], mode_service: str) -> list[list[str]]:
+    """Return the services that enable drives; each group is called side by side, one by one."""
+    return [[f'{drive}/{name}' for drive in drives] for name in ('init', mode_service)]

@@ -44,134 +44,6 @@ from ..page.robot_scene import feet_of, FOOT, LEAST_FEET, RobotScene
 from ..page.style import NEUTRAL, value_of
 from .interfaces import Listening
 
-SOURCES: Mapping[str, str] = {
-    'commanded_height': 'estimated by where they were sent; nothing senses it',
-    'measured_height': 'estimated by joints and attitude; nothing senses it',
-    'physics': 'true: the simulation knows',
-}
-"""In words what quad_msgs/FootContacts has as source."""
-
-
-@dataclass(frozen=True, slots=True)
-class Contacts:
-    """Which feet are on the ground, as it was published."""
-
-    feet: frozenset[str]
-    source: str  # how that is known
-
-    def html(self, found: Support) -> str:
-        """Return it in words."""
-        names = ', '.join(sorted(foot.removesuffix(FOOT) for foot in self.feet)) or 'none'
-        source = SOURCES.get(self.source, self.source or 'nobody says how that is known')
-        margin = found.margin
-        if margin is None:  # the line stays in its place
-            stable = 'centre of mass unknown: the description has no masses'
-            if len(found.corners) < LEAST_FEET:
-                stable = 'no support polygon'
-        else:
-            inside = 'inside' if margin >= 0.0 else 'outside'
-            stable = f'centre of mass {abs(margin) * 1e3:.0f} mm {inside} the support'
-        return (
-            f'<div style="margin:0.3em 1em"><div>feet on the ground: {escape(names)}</div>'
-            f'<div>{stable}</div><div style="opacity:0.7">{escape(source)}</div></div>'
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class Support:
-    """What the feet on the ground span, in the root link in [m]."""
-
-    corners: tuple[Vector, ...]
-    """On the ground below the feet, all round the robot; fewer than three span nothing."""
-    centre: Vector | None  # of mass; None where the description has no masses
-    below: Vector | None  # the place on the ground below it
-    margin: float | None
-    """How far that is inside of the corners; below zero outside, None without a span."""
-
-
-def foot_radius(tree: KinematicTree, foot: str) -> float:
-    """Return the radius of a foot that is a ball in [m]; 0 for others."""
-    balls = (s for s in tree.collisions() if s.link == foot and s.shape == 'sphere')
-    return next((ball.lengths('radius')[0] for ball in balls), 0.0)
-
-
-def support(
-    places: Mapping[str, Vector],
-    on_ground: Collection[str],
-    attitude: Quaternion,
-    centre: Vector | None,
-    radius: float = 0.0,
-) -> Support:
-    """Return what the feet on the ground span, and where the centre of mass is over it.
-
-    Places are in the root link, whose attitude is that in a level frame.
-    """
-    x, y, z, w = attitude
-    back = (-x, -y, -z, w)
-    levelled = {foot: rotate(attitude, places[foot]) for foot in on_ground if foot in places}
-    corners = [
-        (px, py, pz - radius)
-        for px, py, pz in sorted(levelled.values(), key=lambda at: math.atan2(at[1], at[0]))
-    ]
-    if centre is None or not corners:
-        return Support(tuple(rotate(back, corner) for corner in corners), centre, None, None)
-    over_x, over_y, _ = rotate(attitude, centre)
-    ground = sum(corner[2] for corner in corners) / len(corners)
-    return Support(
-        tuple(rotate(back, corner) for corner in corners),
-        centre,
-        rotate(back, (over_x, over_y, ground)),
-        _margin(corners, over_x, over_y) if len(corners) >= LEAST_FEET else None,
-    )
-
-
-def _margin(corners: Sequence[Vector], x: float, y: float) -> float:
-    """Return how far a place is inside of corners that go round counterclockwise [m]."""
-    sides = zip(corners, (*corners[1:], corners[0]), strict=True)
-    return min(
-        ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / (math.hypot(bx - ax, by - ay) or 1.0)
-        for (ax, ay, _), (bx, by, _) in sides
-    )
-
-
-def roll_pitch(attitude: Quaternion) -> tuple[float, float]:
-    """Return roll and pitch in [rad], positive with the right side and the nose down."""
-    x, y, z, w = attitude
-    sine = max(-1.0, min(1.0, 2.0 * (w * y - z * x)))
-    return math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)), math.asin(sine)
-
-
-def horizon_html(attitude: Quaternion | None, battery: str) -> str:
-    """Return an artificial horizon with its numbers, and the battery, of what is measured."""
-    parts = []
-    if attitude is not None:
-        roll, pitch = (math.degrees(angle) for angle in roll_pitch(attitude))
-        # one pixel is a degree; what is seen ahead rises when the nose goes down
-        parts.append(
-            '<svg viewBox="-40 -40 80 80" width="110" height="110" style="border-radius:50%">'
-            f'<g transform="rotate({-roll:.1f}) translate(0 {-pitch:.1f})">'
-            '<rect x="-90" y="-180" width="180" height="180" fill="#74c0fc"/>'
-            '<rect x="-90" y="0" width="180" height="180" fill="#b08968"/>'
-            '<line x1="-90" x2="90" stroke="#fff" stroke-width="1.5"/></g>'
-            '<path d="M-24 0h16l8 7 8-7h16" fill="none" stroke="#212529" stroke-width="2.5"/>'
-            '</svg>'
-            f'<div>roll {roll:+.1f}°, pitch {pitch:+.1f}°</div>'
-        )
-    if battery:
-        parts.append(f'<div>battery {escape(battery)}</div>')
-    return f'<div style="margin:0.3em 1em">{"".join(parts)}</div>'
-
-
-def battery_text(percentage: float, voltage: float) -> str:
-    """Return a charge of 0 to 1 and [V] in words; what is not measured is left out."""
-    parts = []
-    if math.isfinite(percentage):
-        parts.append(f'{100.0 * percentage:.0f} %')
-    if math.isfinite(voltage) and voltage > 0.0:
-        parts.append(f'{voltage:.1f} V')
-    return ', '.join(parts)
-
-
 NOT_MEASURED = -1.0
 """First number of a covariance where nothing is measured (REP 145)."""
 CONTACTS, CONTACTS_TYPE = 'foot_contacts', 'quad_msgs/msg/FootContacts'
@@ -419,3 +291,131 @@ class BodyPanel:
 def _paint(mark: IcosphereHandle, color: tuple[int, int, int]) -> None:
     if tuple(mark.color) != color:
         mark.color = color
+
+
+SOURCES: Mapping[str, str] = {
+    'commanded_height': 'estimated by where they were sent; nothing senses it',
+    'measured_height': 'estimated by joints and attitude; nothing senses it',
+    'physics': 'true: the simulation knows',
+}
+"""In words what quad_msgs/FootContacts has as source."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contacts:
+    """Which feet are on the ground, as it was published."""
+
+    feet: frozenset[str]
+    source: str  # how that is known
+
+    def html(self, found: Support) -> str:
+        """Return it in words."""
+        names = ', '.join(sorted(foot.removesuffix(FOOT) for foot in self.feet)) or 'none'
+        source = SOURCES.get(self.source, self.source or 'nobody says how that is known')
+        margin = found.margin
+        if margin is None:  # the line stays in its place
+            stable = 'centre of mass unknown: the description has no masses'
+            if len(found.corners) < LEAST_FEET:
+                stable = 'no support polygon'
+        else:
+            inside = 'inside' if margin >= 0.0 else 'outside'
+            stable = f'centre of mass {abs(margin) * 1e3:.0f} mm {inside} the support'
+        return (
+            f'<div style="margin:0.3em 1em"><div>feet on the ground: {escape(names)}</div>'
+            f'<div>{stable}</div><div style="opacity:0.7">{escape(source)}</div></div>'
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Support:
+    """What the feet on the ground span, in the root link in [m]."""
+
+    corners: tuple[Vector, ...]
+    """On the ground below the feet, all round the robot; fewer than three span nothing."""
+    centre: Vector | None  # of mass; None where the description has no masses
+    below: Vector | None  # the place on the ground below it
+    margin: float | None
+    """How far that is inside of the corners; below zero outside, None without a span."""
+
+
+def foot_radius(tree: KinematicTree, foot: str) -> float:
+    """Return the radius of a foot that is a ball in [m]; 0 for others."""
+    balls = (s for s in tree.collisions() if s.link == foot and s.shape == 'sphere')
+    return next((ball.lengths('radius')[0] for ball in balls), 0.0)
+
+
+def support(
+    places: Mapping[str, Vector],
+    on_ground: Collection[str],
+    attitude: Quaternion,
+    centre: Vector | None,
+    radius: float = 0.0,
+) -> Support:
+    """Return what the feet on the ground span, and where the centre of mass is over it.
+
+    Places are in the root link, whose attitude is that in a level frame.
+    """
+    x, y, z, w = attitude
+    back = (-x, -y, -z, w)
+    levelled = {foot: rotate(attitude, places[foot]) for foot in on_ground if foot in places}
+    corners = [
+        (px, py, pz - radius)
+        for px, py, pz in sorted(levelled.values(), key=lambda at: math.atan2(at[1], at[0]))
+    ]
+    if centre is None or not corners:
+        return Support(tuple(rotate(back, corner) for corner in corners), centre, None, None)
+    over_x, over_y, _ = rotate(attitude, centre)
+    ground = sum(corner[2] for corner in corners) / len(corners)
+    return Support(
+        tuple(rotate(back, corner) for corner in corners),
+        centre,
+        rotate(back, (over_x, over_y, ground)),
+        _margin(corners, over_x, over_y) if len(corners) >= LEAST_FEET else None,
+    )
+
+
+def _margin(corners: Sequence[Vector], x: float, y: float) -> float:
+    """Return how far a place is inside of corners that go round counterclockwise [m]."""
+    sides = zip(corners, (*corners[1:], corners[0]), strict=True)
+    return min(
+        ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / (math.hypot(bx - ax, by - ay) or 1.0)
+        for (ax, ay, _), (bx, by, _) in sides
+    )
+
+
+def roll_pitch(attitude: Quaternion) -> tuple[float, float]:
+    """Return roll and pitch in [rad], positive with the right side and the nose down."""
+    x, y, z, w = attitude
+    sine = max(-1.0, min(1.0, 2.0 * (w * y - z * x)))
+    return math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)), math.asin(sine)
+
+
+def horizon_html(attitude: Quaternion | None, battery: str) -> str:
+    """Return an artificial horizon with its numbers, and the battery, of what is measured."""
+    parts = []
+    if attitude is not None:
+        roll, pitch = (math.degrees(angle) for angle in roll_pitch(attitude))
+        # one pixel is a degree; what is seen ahead rises when the nose goes down
+        parts.append(
+            '<svg viewBox="-40 -40 80 80" width="110" height="110" style="border-radius:50%">'
+            f'<g transform="rotate({-roll:.1f}) translate(0 {-pitch:.1f})">'
+            '<rect x="-90" y="-180" width="180" height="180" fill="#74c0fc"/>'
+            '<rect x="-90" y="0" width="180" height="180" fill="#b08968"/>'
+            '<line x1="-90" x2="90" stroke="#fff" stroke-width="1.5"/></g>'
+            '<path d="M-24 0h16l8 7 8-7h16" fill="none" stroke="#212529" stroke-width="2.5"/>'
+            '</svg>'
+            f'<div>roll {roll:+.1f}°, pitch {pitch:+.1f}°</div>'
+        )
+    if battery:
+        parts.append(f'<div>battery {escape(battery)}</div>')
+    return f'<div style="margin:0.3em 1em">{"".join(parts)}</div>'
+
+
+def battery_text(percentage: float, voltage: float) -> str:
+    """Return a charge of 0 to 1 and [V] in words; what is not measured is left out."""
+    parts = []
+    if math.isfinite(percentage):
+        parts.append(f'{100.0 * percentage:.0f} %')
+    if math.isfinite(voltage) and voltage > 0.0:
+        parts.append(f'{voltage:.1f} V')
+    return ', '.join(parts)

@@ -29,6 +29,91 @@ from urdf_reader import (
 Message: TypeAlias = Any
 """Messages have no types."""
 
+LINE_POINTS = 80
+"""Of the line that the tip follows."""
+PAUSE = 0.8
+"""Between two showings of a plan in [s]."""
+SHOWINGS = 3
+"""How often a plan is shown."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlanGroup:
+    """A group of joints that motions are planned for."""
+
+    name: str
+    joints: tuple[str, ...]  # its joints, from the base out
+    tip: str  # link that a goal in space is for
+    states: Mapping[str, Mapping[str, float]]
+    """Positions in [rad] or [m] by joint, by the name of the state."""
+
+
+def plan_groups(tree: KinematicTree, semantic: str) -> dict[str, PlanGroup]:
+    """Return the groups of an SRDF that can move, arms first.
+
+    Raises:
+        DescriptionError: It is no SRDF, or none of its groups can move.
+    """
+    description = parse_srdf(semantic)
+    found, reasons = {}, []
+    for name in dict.fromkeys((*description.arms, *description.groups)):
+        try:
+            group = find_group(tree, description, name)
+        except DescriptionError as error:
+            reasons.append(str(error))
+            continue
+        states = {
+            state: {joint: at for joint, at in positions.items() if joint in group.joints}
+            for state, positions in description.poses.get(name, {}).items()
+        }
+        found[name] = PlanGroup(name, group.joints, group.tip, states)
+    if not found:
+        raise DescriptionError('; '.join(reasons) or 'the SRDF has no groups')
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedMotion:
+    """A motion from its start to its goal."""
+
+    joints: tuple[str, ...]  # the joints that move
+    times: tuple[float, ...]  # of its points in [s], increasing
+    points: tuple[tuple[float, ...], ...]  # positions in [rad] or [m], in the order of the joints
+
+    @property
+    def duration(self) -> float:
+        """How long it takes in [s]."""
+        return self.times[-1] if self.times else 0.0
+
+    def at(self, time: float) -> dict[str, float]:
+        """Return where the joints are at a time in [s], which rest before and after the motion."""
+        after = bisect_right(self.times, time)
+        if not 0 < after < len(self.times):
+            ends = self.points[min(after, len(self.points) - 1)] if self.points else ()
+            return dict(zip(self.joints, ends, strict=True)) if ends else {}
+        begin, end = self.times[after - 1 : after + 1]
+        share = (time - begin) / (end - begin)
+        between = zip(self.points[after - 1], self.points[after], strict=True)
+        places = (start + share * (goal - start) for start, goal in between)
+        return dict(zip(self.joints, places, strict=True))
+
+    def shown(self, elapsed: float) -> dict[str, float] | None:
+        """Return where the joints are as it is shown again and again; None when that has ended."""
+        number, time = divmod(elapsed, self.duration + PAUSE)
+        return self.at(time) if number < SHOWINGS else None
+
+
+def tip_line(
+    tree: KinematicTree, tip: str, beside: Mapping[str, float], motion: PlannedMotion
+) -> list[Vector]:
+    """Return the places in the root link where a link passes, in [m]."""
+    step = motion.duration / (LINE_POINTS - 1)
+    return [
+        link_poses(tree, {**beside, **motion.at(number * step)})[tip].translation
+        for number in range(LINE_POINTS)
+    ]
+
+
 PLANNING_TIME = 5.0
 """That is allowed in [s]."""
 JOINT_TOLERANCE, PLACE_TOLERANCE, TURN_TOLERANCE = 1e-3, 1e-3, 1e-2
@@ -228,88 +313,3 @@ def pose_message(pose: Transform) -> Pose:
     """Return a geometry_msgs/Pose."""
     (x, y, z), (a, b, c, d) = pose.translation, pose.rotation
     return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=a, y=b, z=c, w=d))
-
-
-LINE_POINTS = 80
-"""Of the line that the tip follows."""
-PAUSE = 0.8
-"""Between two showings of a plan in [s]."""
-SHOWINGS = 3
-"""How often a plan is shown."""
-
-
-@dataclass(frozen=True, slots=True)
-class PlanGroup:
-    """A group of joints that motions are planned for."""
-
-    name: str
-    joints: tuple[str, ...]  # its joints, from the base out
-    tip: str  # link that a goal in space is for
-    states: Mapping[str, Mapping[str, float]]
-    """Positions in [rad] or [m] by joint, by the name of the state."""
-
-
-def plan_groups(tree: KinematicTree, semantic: str) -> dict[str, PlanGroup]:
-    """Return the groups of an SRDF that can move, arms first.
-
-    Raises:
-        DescriptionError: It is no SRDF, or none of its groups can move.
-    """
-    description = parse_srdf(semantic)
-    found, reasons = {}, []
-    for name in dict.fromkeys((*description.arms, *description.groups)):
-        try:
-            group = find_group(tree, description, name)
-        except DescriptionError as error:
-            reasons.append(str(error))
-            continue
-        states = {
-            state: {joint: at for joint, at in positions.items() if joint in group.joints}
-            for state, positions in description.poses.get(name, {}).items()
-        }
-        found[name] = PlanGroup(name, group.joints, group.tip, states)
-    if not found:
-        raise DescriptionError('; '.join(reasons) or 'the SRDF has no groups')
-    return found
-
-
-@dataclass(frozen=True, slots=True)
-class PlannedMotion:
-    """A motion from its start to its goal."""
-
-    joints: tuple[str, ...]  # the joints that move
-    times: tuple[float, ...]  # of its points in [s], increasing
-    points: tuple[tuple[float, ...], ...]  # positions in [rad] or [m], in the order of the joints
-
-    @property
-    def duration(self) -> float:
-        """How long it takes in [s]."""
-        return self.times[-1] if self.times else 0.0
-
-    def at(self, time: float) -> dict[str, float]:
-        """Return where the joints are at a time in [s], which rest before and after the motion."""
-        after = bisect_right(self.times, time)
-        if not 0 < after < len(self.times):
-            ends = self.points[min(after, len(self.points) - 1)] if self.points else ()
-            return dict(zip(self.joints, ends, strict=True)) if ends else {}
-        begin, end = self.times[after - 1 : after + 1]
-        share = (time - begin) / (end - begin)
-        between = zip(self.points[after - 1], self.points[after], strict=True)
-        places = (start + share * (goal - start) for start, goal in between)
-        return dict(zip(self.joints, places, strict=True))
-
-    def shown(self, elapsed: float) -> dict[str, float] | None:
-        """Return where the joints are as it is shown again and again; None when that has ended."""
-        number, time = divmod(elapsed, self.duration + PAUSE)
-        return self.at(time) if number < SHOWINGS else None
-
-
-def tip_line(
-    tree: KinematicTree, tip: str, beside: Mapping[str, float], motion: PlannedMotion
-) -> list[Vector]:
-    """Return the places in the root link where a link passes, in [m]."""
-    step = motion.duration / (LINE_POINTS - 1)
-    return [
-        link_poses(tree, {**beside, **motion.at(number * step)})[tip].translation
-        for number in range(LINE_POINTS)
-    ]
