@@ -53,8 +53,7 @@ if TYPE_CHECKING:
 ENABLE_TIMEOUT = 60.0  # longest time for all drives to boot and to be enabled in [s]
 BOOT_TIMEOUT = 30.0
 """Longest time in [s] in which drives boot before they are enabled all the same."""
-OPERATIONAL = 'START'
-"""The NMT state of a device that has booted, on its topic ``nmt_state``."""
+OPERATIONAL = 'START'  # the NMT state of a device that has booted, on its topic nmt_state
 AGAIN = 1.0  # pause after a refusal in [s]: a drive that has not booted yet says so
 
 

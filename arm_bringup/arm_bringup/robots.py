@@ -87,8 +87,7 @@ TABLES, WORDS = ('xacro_args', 'packages'), ('tip_link',)
 """Keys of :data:`SETTINGS` that are tables of text, and those that are text."""
 GROUP = 'group'  # key of one group, or of a list
 START_POSITIONS = 'start_positions'  # key of the positions of simulated drives at power-on
-KEYS = (*FILES, *TABLES, *WORDS, GROUP, START_POSITIONS)
-"""All keys of :data:`SETTINGS`."""
+KEYS = (*FILES, *TABLES, *WORDS, GROUP, START_POSITIONS)  # all keys of SETTINGS
 INTERPOLATED_POSITION = 7  # mode of operation (CiA 402-2, 0x6060)
 RELATIVE_MESH = re.compile(r'(<mesh\b[^>]*\bfilename\s*=\s*["\'])(?![a-z]+://|/)([^"\']+)')
 """Meshes beside the description, which the nodes that read it would not find."""

@@ -8,8 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
-SILENCE = 1.0
-"""Without joint states after which the robot counts as out of reach in [s]."""
+SILENCE = 1.0  # without joint states after which the robot counts as out of reach in [s]
 STALE = 3
 """Level of a status that is unknown, as in diagnostic_msgs."""
 DRIVE, LEGS, BUS = ': drive', ': state', ': bus'

@@ -133,8 +133,7 @@ URDF = """
 </robot>
 """
 
-SHAPES = ('/shape0', '/arm/shape1', '/arm/hand/shape3')
-"""Of base, arm and hand, below the base."""
+SHAPES = ('/shape0', '/arm/shape1', '/arm/hand/shape3')  # of base, arm and hand, below the base
 
 
 @pytest.fixture

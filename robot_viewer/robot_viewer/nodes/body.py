@@ -44,11 +44,9 @@ from ..page.robot_scene import feet_of, FOOT, LEAST_FEET, RobotScene
 from ..page.style import NEUTRAL, value_of
 from .interfaces import Listening
 
-NOT_MEASURED = -1.0
-"""First number of a covariance where nothing is measured (REP 145)."""
+NOT_MEASURED = -1.0  # first number of a covariance where nothing is measured (REP 145)
 CONTACTS, CONTACTS_TYPE = 'foot_contacts', 'quad_msgs/msg/FootContacts'
-CONTACTS_AGE = 1.0
-"""After which contacts of feet are not shown any more in [s]."""
+CONTACTS_AGE = 1.0  # after which contacts of feet are not shown any more in [s]
 LEVEL: Quaternion = (0.0, 0.0, 0.0, 1.0)
 RANGES: Mapping[str, float] = {'Roll [deg]': 20.0, 'Pitch [deg]': 17.0, 'Height [mm]': 30.0}
 """Of the sliders to either side; the controller has limits of its own."""
@@ -56,12 +54,9 @@ LEVEL_LABEL = 'Level the body'
 DOWN_COLOR, UP_COLOR, LINE_COLOR = (35, 112, 50), (134, 142, 150), (24, 100, 171)
 MASS_COLOR, OUTSIDE_COLOR = (24, 100, 171), (255, 212, 59)
 """Of the place below the centre of mass: over the support, or outside."""
-FOOT_RADIUS = 0.012
-"""Of the mark of a foot in [m]."""
-MASS_RADIUS = 0.008
-"""Of the mark below the centre of mass in [m]."""
-LINE_WIDTH = 3.0
-"""In [px]."""
+FOOT_RADIUS = 0.012  # of the mark of a foot in [m]
+MASS_RADIUS = 0.008  # of the mark below the centre of mass in [m]
+LINE_WIDTH = 3.0  # in [px]
 
 Pose: TypeAlias = tuple[float, float, float]
 """Roll and pitch in [rad], height in [m], relative to the normal pose."""

@@ -27,17 +27,14 @@ from .interfaces import ActionCall, Listening, of_robot
 STATE_TYPE = 'control_msgs/msg/JointTrajectoryControllerState'
 STATE = '/controller_state'
 COMMAND = '/joint_trajectory'
-NEAR = 0.01
-"""How near to its target in [rad] or [m] a joint has reached it."""
-SETTLING_TIMEOUT = 1.0
-"""Time in [s] after the end of a motion at which it is looked at."""
+NEAR = 0.01  # how near to its target in [rad] or [m] a joint has reached it
+SETTLING_TIMEOUT = 1.0  # time in [s] after the end of a motion at which it is looked at
 
 SILENCE = 1.2
 """Time in [s] without a trajectory before an empty one says that what follows is a new request: a
 controller that was stopped in a stream wants a second."""
 
-Report = Callable[[str, bool], None]
-"""Takes what became of a motion, and whether it failed."""
+Report = Callable[[str, bool], None]  # takes what became of a motion, and whether it failed
 
 
 @dataclass(slots=True)
@@ -214,8 +211,7 @@ def _trajectory(controller: Controller, duration: float) -> Any:  # noqa: ANN401
 
 
 SEND_GOAL = '/_action/send_goal'
-SINGLE_TYPE = 'control_msgs/action/GripperCommand_SendGoal'
-"""Of grippers of one joint."""
+SINGLE_TYPE = 'control_msgs/action/GripperCommand_SendGoal'  # of grippers of one joint
 
 
 @dataclass(frozen=True, slots=True)

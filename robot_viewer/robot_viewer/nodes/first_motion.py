@@ -68,8 +68,7 @@ ANSWER_TIMEOUT, DISABLE_TIMEOUT = 20.0, 5.0
 SETTLE_TIME = 0.7
 """Time in [s] after the last target, until the position is read: the robot's own time-out and its
 ramp are in it."""
-DISTANCE = 1.0
-"""In the unit of people, degrees or millimetres."""
+DISTANCE = 1.0  # in the unit of people, degrees or millimetres
 SPEEDS = {JointKind.TURNS: 0.5, JointKind.SLIDES: 1.0}
 """In the same unit per second: slow enough to let go in time, whatever the scale is by ten."""
 HOLD = 'Hold to move'

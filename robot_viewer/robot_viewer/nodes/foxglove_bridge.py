@@ -51,8 +51,7 @@ from ..page.gate import is_loopback, shown_host
 from .interfaces import serve
 
 NAME = 'foxglove_bridge'
-NICENESS = 10
-"""No viewer takes time that a control loop needs."""
+NICENESS = 10  # no viewer takes time that a control loop needs
 PORT = 8765
 PROTOCOLS = [Subprotocol('foxglove.sdk.v1'), Subprotocol('foxglove.websocket.v1')]
 """Of clients of today, and of those from before foxglove-sdk; what they share is all there is."""
@@ -67,17 +66,13 @@ MESSAGE_DATA, ASSET = 1, 4
 """First byte of a message of a topic, and of an answer to a request for a file."""
 WAITING = 10_000_000
 """Bytes that wait for a slow client; messages of topics beyond are left out for it."""
-LOOK_PERIOD = 1.0
-"""Time between two looks at the graph in [s]."""
+LOOK_PERIOD = 1.0  # time between two looks at the graph in [s]
 UNKNOWN_DEPTH, MAX_DEPTH = 10, 25
 """Depth for a publisher whose depth is unknown, since DDS does not report it, and the greatest of
 a subscription."""
-WARNING, ERROR = 1, 2
-"""Levels of a status of the protocol."""
-ID_END = 2**32
-"""Numbers that clients give are below; messages carry them as uint32."""
-CLOSE_TIMEOUT = 1.0
-"""Time for a client to answer that the connection ends, in [s]."""
+WARNING, ERROR = 1, 2  # levels of a status of the protocol
+ID_END = 2**32  # numbers that clients give are below; messages carry them as uint32
+CLOSE_TIMEOUT = 1.0  # time for a client to answer that the connection ends, in [s]
 
 
 class AssetError(ValueError):

@@ -30,8 +30,7 @@ from node_runner import log_as, notify_ready, spin
 if TYPE_CHECKING:
     from rclpy.action.client import ActionClient
 
-DESCRIPTION = '/robot_description'
-"""What each robot has in its namespace."""
+DESCRIPTION = '/robot_description'  # what each robot has in its namespace
 SET_NMT_TYPE, SET_MODE_TYPE = 'canopen_interfaces/srv/CONmtID', 'quad_msgs/srv/SetMode'
 """Of services that only a master of drives has, and only the controller of a walking robot."""
 
@@ -61,8 +60,7 @@ def stops_robot(node: str, services: Mapping[str, Collection[str]]) -> bool:
 
 
 TRIGGER = 'std_srvs/srv/Trigger'
-Done = Callable[[Any, str], None]
-"""Takes the result of an action, or None and why there is none."""
+Done = Callable[[Any, str], None]  # takes the result of an action, or None and why there is none
 
 
 class Report(Protocol):

@@ -26,13 +26,10 @@ from urdf_reader import (
     Vector,
 )
 
-Message: TypeAlias = Any
-"""Messages have no types."""
+Message: TypeAlias = Any  # messages have no types
 
-LINE_POINTS = 80
-"""Of the line that the tip follows."""
-PAUSE = 0.8
-"""Between two showings of a plan in [s]."""
+LINE_POINTS = 80  # of the line that the tip follows
+PAUSE = 0.8  # between two showings of a plan in [s]
 SHOWINGS = 3
 """How often a plan is shown."""
 
@@ -114,8 +111,7 @@ def tip_line(
     ]
 
 
-PLANNING_TIME = 5.0
-"""That is allowed in [s]."""
+PLANNING_TIME = 5.0  # that is allowed in [s]
 JOINT_TOLERANCE, PLACE_TOLERANCE, TURN_TOLERANCE = 1e-3, 1e-3, 1e-2
 """Of goals in [rad] or [m], in [m] and in [rad]."""
 SHAPES = ('primitives', 'primitive_poses', 'meshes', 'mesh_poses')

@@ -57,19 +57,14 @@ OFFERED = {
     f'{EXECUTE}/_action/send_goal': 'moveit_msgs/action/ExecuteTrajectory_SendGoal',
 }
 """Services that say that there is a move_group."""
-ANSWER_TIME = 2.0
-"""Time in [s] after which an answer counts as lost."""
-STOP = 'stop'
-"""The event that ends every execution."""
-NO_GOAL, DRAGGED = 'none', 'dragged in the view'
-"""Goals that are no states of the SRDF."""
+ANSWER_TIME = 2.0  # time in [s] after which an answer counts as lost
+STOP = 'stop'  # the event that ends every execution
+NO_GOAL, DRAGGED = 'none', 'dragged in the view'  # goals that are no states of the SRDF
 HOLD_EXECUTE = 'Hold to execute'
 GHOST_TINT: Tint = (0.05, 0.52, 0.6, 0.4)
 LINE_COLOR = (24, 100, 171)
-LINE_WIDTH = 3.0
-"""In [px]."""
-GOAL_SIZE = 0.22
-"""Of the arrows by which the goal is dragged in [m]."""
+LINE_WIDTH = 3.0  # in [px]
+GOAL_SIZE = 0.22  # of the arrows by which the goal is dragged in [m]
 
 
 @dataclass(frozen=True, slots=True)

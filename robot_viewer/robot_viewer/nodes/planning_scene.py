@@ -40,17 +40,13 @@ from .motion_plan import (
     transform_of,
 )
 
-WORLD_AND_ATTACHED = 16 | 4
-"""Of moveit_msgs/PlanningSceneComponents."""
-AHEAD = 0.6
-"""How far before the root link a new box comes, in [m]."""
+WORLD_AND_ATTACHED = 16 | 4  # of moveit_msgs/PlanningSceneComponents
+AHEAD = 0.6  # how far before the root link a new box comes, in [m]
 NO_OBJECT = 'none'
 COLOR, ATTACHED_COLOR = (73, 80, 87), (12, 133, 153)
 OPACITY = 0.6
-GIZMO_SIZE = 0.2
-"""Of the arrows by which an object is dragged in [m]."""
-BOX_SIZE = (0.2, 0.2, 0.2)
-"""Of a new box in [m]."""
+GIZMO_SIZE = 0.2  # of the arrows by which an object is dragged in [m]
+BOX_SIZE = (0.2, 0.2, 0.2)  # of a new box in [m]
 
 
 class Say(Protocol):

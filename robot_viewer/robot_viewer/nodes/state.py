@@ -46,17 +46,13 @@ from .interfaces import TRIGGER, TriggerCalls
 if TYPE_CHECKING:
     from ..page.robot_page import RobotPage
 
-STATUS_AGE = 5.0
-"""Time in [s] after which a status that does not come again is unknown."""
+STATUS_AGE = 5.0  # time in [s] after which a status that does not come again is unknown
 STATUS_SILENCE = 3.5
 """Time in [s] without any status after which a robot is out of reach, where no one listens to its
 joint states."""
-MOVES = 0.01
-"""Velocity of a joint in [rad/s] or [m/s] above which it moves."""
-STILL_AFTER = 0.3
-"""Time in [s] after which a joint that was not seen to move again stands."""
-OWN = ': robot'
-"""End of the name of the status that a page publishes of its robot."""
+MOVES = 0.01  # velocity of a joint in [rad/s] or [m/s] above which it moves
+STILL_AFTER = 0.3  # time in [s] after which a joint that was not seen to move again stands
+OWN = ': robot'  # end of the name of the status that a page publishes of its robot
 
 
 class Watch:

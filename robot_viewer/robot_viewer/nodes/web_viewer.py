@@ -70,23 +70,17 @@ NAME = 'web_viewer'
 PORT = 8080
 DRAW_PERIOD = 1.0 / 30.0
 """Time between two pictures, and between two looks at what was done on the page, in [s]."""
-LIST_PERIOD = 0.2
-"""Time between two looks at numbers in [s]."""
-PLOT_PERIOD = 0.5
-"""Time between two drawings of curves in [s]."""
+LIST_PERIOD = 0.2  # time between two looks at numbers in [s]
+PLOT_PERIOD = 0.5  # time between two drawings of curves in [s]
 REST_TIME, REST_TICKS = 1.0, 3
 """Time in [s] without a motion after which every third picture is enough."""
-SEEN = 1e-4
-"""Least motion of a joint that is drawn in [rad] or [m]: what stands is noisy."""
-LIMIT_AGE = 1.0
-"""Time in [s] for which a limit that the servo names is shown."""
+SEEN = 1e-4  # least motion of a joint that is drawn in [rad] or [m]: what stands is noisy
+LIMIT_AGE = 1.0  # time in [s] for which a limit that the servo names is shown
 SCALES = ('command_in_type', 'scale.linear', 'override_velocity_scaling_factor')
 """Parameters of a servo that say how fast the tool is at a share of its speed."""
-MIN_OVERRIDE = 0.01
-"""An override of the velocity below this is none, as in moveit_servo."""
+MIN_OVERRIDE = 0.01  # an override of the velocity below this is none, as in moveit_servo
 SERVO_STATUS_TYPE = 'moveit_msgs/msg/ServoStatus'
-GRAPH_PERIOD = 1.0
-"""Time between two looks at the nodes there are in [s]."""
+GRAPH_PERIOD = 1.0  # time between two looks at the nodes there are in [s]
 SETTLED, SELDOM = 10, 3
 """After that many looks at the same nodes, what they offer is looked at with each third one."""
 DRIVE_SERVICES = (
@@ -103,12 +97,10 @@ DRIVE_SERVICES = (
     'cyclic_position_mode',
 )
 """Services of a drive that the page offers; a node with halt and quick_stop is one."""
-WARN = 30
-"""Level of warnings in rcl_interfaces/Log."""
+WARN = 30  # level of warnings in rcl_interfaces/Log
 ROSOUT = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """It gets what was said in the seconds before the page was opened."""
-STOP = 'stop'
-"""Service of a robot that stops all of it."""
+STOP = 'stop'  # service of a robot that stops all of it
 
 
 class WebViewer(Node):

@@ -37,13 +37,11 @@ from first_motion import (
 
 from ..robot_state import ENABLED
 
-RELEASED_AFTER = 0.15
-"""Time in [s] without a heartbeat after which the button counts as let go."""
+RELEASED_AFTER = 0.15  # time in [s] without a heartbeat after which the button counts as let go
 MAX_STEP_TIME = 0.1
 """Longest time in [s] for which one heartbeat moves the target on: one that is late moves it no
 farther."""
-FRESHNESS = 0.5
-"""Age in [s] from which a position is too old to go on."""
+FRESHNESS = 0.5  # age in [s] from which a position is too old to go on
 NO_POSITION = 'its position does not arrive on joint_states'
 MODES = frozenset({'Cyclic position', 'Interpolated position'})
 """Modes in which targets are positions, and the master halts the axis when they pause."""

@@ -94,8 +94,7 @@ def _outward(version: int) -> str:
 
 
 STOP_PATH = '/stop'
-STOP_HEADER = 'X-Robot-Stop'
-"""What no page of another site can send without being asked."""
+STOP_HEADER = 'X-Robot-Stop'  # what no page of another site can send without being asked
 END = b'</body>'
 ANSWER_TIMEOUT = 30.0
 """Time in [s] that a request for STOP waits for the robot, which may have a long ramp; the page
@@ -169,8 +168,7 @@ def _is_failure(record: logging.LogRecord) -> bool:
     return not (record.exc_info and isinstance(record.exc_info[1], InvalidMessage))
 
 
-LOGGER = logging.getLogger(__name__)
-"""What websockets logs, with a traceback each."""
+LOGGER = logging.getLogger(__name__)  # what websockets logs, with a traceback each
 LOGGER.addFilter(_is_failure)
 
 

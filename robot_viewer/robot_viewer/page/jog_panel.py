@@ -55,8 +55,7 @@ TWISTS: Mapping[str, tuple[str, Twist]] = {
 }
 """Keys of servo_keyboard_input, and shares of the speed of jogging along and about axes."""
 REST: Twist = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-BASE = 'base'
-"""The frame that a command has which names none."""
+BASE = 'base'  # the frame that a command has which names none
 
 
 class Actions(Protocol):
@@ -299,17 +298,12 @@ def joint_texts(
 
 HOLD_TARGET = 'Hold to move to the target'
 TARGET_TINT: Tint = (0.44, 0.28, 0.91, 0.35)
-REACHED = 0.01
-"""How near to the target in [rad] or [m] it is not shown any more."""
-HEIGHT = 170
-"""Of a plot in [px]."""
+REACHED = 0.01  # how near to the target in [rad] or [m] it is not shown any more
+HEIGHT = 170  # of a plot in [px]
 TARGET_COLOR, POSITION_COLOR, ERROR_COLOR = '#7048e8', '#1864ab', '#495057'
-KEPT = 30.0
-"""How long the past is kept in [s]."""
-STEP = 0.1
-"""Least time between two samples in [s]."""
-SHORTEST = 0.3
-"""Shortest motion in [s]."""
+KEPT = 30.0  # how long the past is kept in [s]
+STEP = 0.1  # least time between two samples in [s]
+SHORTEST = 0.3  # shortest motion in [s]
 GREATEST_ACCELERATION = 2.0
 """Of a motion to a target in [rad/s^2] or [m/s^2]: descriptions name none."""
 PEAK, PEAK_ACCELERATION = 15.0 / 8.0, 10.0 / math.sqrt(3.0)

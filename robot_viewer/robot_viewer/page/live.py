@@ -27,12 +27,10 @@ from ..robot_state import ALLOW
 LIVE_PATH = '/live'
 NO_PAGE = 0
 """No page has this number."""
-HEARTBEAT = 1.0 / 30.0
-"""Time between two heartbeats of a held button in [s]."""
+HEARTBEAT = 1.0 / 30.0  # time between two heartbeats of a held button in [s]
 LEAST_GAP = 0.4 * HEARTBEAT
 """Heartbeats that are nearer to each other in [s] were held up: they may be of a button let go."""
-RELEASED_AFTER = 0.3
-"""Silence in [s] after which a button counts as let go."""
+RELEASED_AFTER = 0.3  # silence in [s] after which a button counts as let go
 
 _Press: TypeAlias = tuple[Hashable, Hashable]  # a page and its button
 

@@ -49,10 +49,8 @@ from .style import (
     WARNING,
 )
 
-ARM_SPEED, LEGS_SPEED = 20.0, 30.0
-"""In the beginning, in [%]."""
-PANEL_WIDTH = 400
-"""In [px]."""
+ARM_SPEED, LEGS_SPEED = 20.0, 30.0  # in the beginning, in [%]
+PANEL_WIDTH = 400  # in [px]
 WALKS: Mapping[str, tuple[str, Velocity]] = {
     'Turn left': ('j', (0.0, 0.0, 1.5)),
     'Forward': ('i', (0.3, 0.0, 0.0)),
@@ -78,8 +76,7 @@ MODES: Mapping[str, str] = {
     'Follow policy': 'policy',
 }
 """Modes of a walking robot by their buttons."""
-IN_FAULT = frozenset({'lie', 'relax', 'get_up'})
-"""Those that are possible with a fault."""
+IN_FAULT = frozenset({'lie', 'relax', 'get_up'})  # those that are possible with a fault
 GAITS = ('trot', 'crawl', 'pace')
 DRIVE_GROUPS: Mapping[str, Mapping[str, str]] = {
     '': {'Enable': 'enable', 'Recover': 'recover', 'Halt': 'halt'},
@@ -95,14 +92,11 @@ DRIVE_GROUPS: Mapping[str, Mapping[str, str]] = {
 }
 """Services of a drive by what they are for and their labels; what has a title is folded."""
 DISABLE, SINKS = 'disable', 'Disable: no torque, the arm may sink (hold 1 s)'
-DISABLE_AFTER = 1.0
-"""How long that is held in [s]."""
-MOTIONS = frozenset({'home', 'init'})
-"""Services of a drive that may move it."""
+DISABLE_AFTER = 1.0  # how long that is held in [s]
+MOTIONS = frozenset({'home', 'init'})  # services of a drive that may move it
 BUTTON_COLORS = {'enable': WANTED, 'home': CAUTION, 'quick_stop': CAUTION, 'relax': CAUTION}
 NO_DRIVE, ALL_DRIVES = 'none chosen', 'all drives'
-WORST = (2, 3, 1, 0)
-"""Levels of a status, the worst first."""
+WORST = (2, 3, 1, 0)  # levels of a status, the worst first
 VIEWS: Mapping[str, tuple[str, Velocity]] = {
     'Fit': ('F', (0.52, -0.52, 0.46)),
     'Front': ('X', (0.9, 0.0, 0.16)),

@@ -30,20 +30,15 @@ if TYPE_CHECKING:
     import trimesh
 
 ROOT = '/robot'
-Tint: TypeAlias = tuple[float, float, float, float]
-"""Red, green, blue and opacity from 0 to 1."""
-AXES = (0.1, 0.004)
-"""Length and radius of the axes of joints in [m]."""
-SECTION = 0.5
-"""Between thick lines of the ground in [m]."""
+Tint: TypeAlias = tuple[float, float, float, float]  # red, green, blue and opacity from 0 to 1
+AXES = (0.1, 0.004)  # length and radius of the axes of joints in [m]
+SECTION = 0.5  # between thick lines of the ground in [m]
 
 
-FAULTY: Tint = (0.79, 0.16, 0.16, 1.0)
-"""Of the links of joints whose drives report a fault."""
+FAULTY: Tint = (0.79, 0.16, 0.16, 1.0)  # of the links of joints whose drives report a fault
 PLAIN = (0.7, 0.72, 0.75, 1.0)
 """Color of what the description gives none: red, green, blue and opacity from 0 to 1."""
-FOOT = '_foot'
-"""How the names of the links of feet end."""
+FOOT = '_foot'  # how the names of the links of feet end
 LEAST_FEET = 3
 
 

@@ -20,14 +20,12 @@ Color: TypeAlias = tuple[int, int, int]
 Share = Callable[[], float]
 """Returns the share of the greatest velocity that was chosen, above 0 to 1."""
 
-NEUTRAL: Color = (233, 236, 239)
-"""Of buttons that look, stop or choose."""
+NEUTRAL: Color = (233, 236, 239)  # of buttons that look, stop or choose
 WANTED: Color = (24, 100, 171)
 """Of the action that is wanted next, which gives power or executes what was shown."""
 CAUTION: Color = (255, 212, 59)
 """Of what moves the robot by itself, or takes the torque: it may sink."""
-PRESENT: Color = (52, 58, 64)
-"""Of the mode that the robot is in."""
+PRESENT: Color = (52, 58, 64)  # of the mode that the robot is in
 
 Mark: TypeAlias = tuple[str, str]
 
@@ -39,8 +37,7 @@ PLAIN: Mark = ('·', '#495057')
 """What a line means: an icon and its color, as a color alone is not seen by everyone."""
 LEVEL_MARKS = (GOOD, WARNING, BAD, UNKNOWN)
 """Of the levels of a status: good, warning, error and stale."""
-THREE_COLUMNS = '<b class="rv-pad3"></b>'
-"""Marks a panel whose buttons stand in three columns."""
+THREE_COLUMNS = '<b class="rv-pad3"></b>'  # marks a panel whose buttons stand in three columns
 
 
 def line(text: str, mark: Mark = PLAIN, *, strong: bool = False) -> str:
@@ -96,8 +93,7 @@ DRIVE_ROWS = {
 """Values of the diagnostics of a drive that are shown, and what they are called."""
 BUS_ROWS = {'bus_load': 'bus load [%]', 'frames_lost': 'frames lost', 'jitter_p99': 'jitter [s]'}
 """The same of the bus."""
-KEPT = 200
-"""Number of entries that are kept."""
+KEPT = 200  # number of entries that are kept
 
 
 def drive_html(message: str, values: Mapping[str, str], bus: Mapping[str, str]) -> str:
