@@ -15,16 +15,11 @@ from workspace.process import Runner
 
 @dataclass(frozen=True)
 class FakeRunner(Runner):
-    """Notes what it is to run and, like the real programs, leaves the files behind.
+    """Notes what it is to run and, like the real programs, leaves the files behind."""
 
-    Attributes:
-        seen: What was run so far.
-        fail_at: Number of the run that ends with an exception, 0 for none.
-        effect: Called with the arguments of each run.
-    """
-
-    seen: list[str] = field(default_factory=list)
-    fail_at: int = 0
+    seen: list[str] = field(default_factory=list)  # what was run so far
+    fail_at: int = 0  # number of the run that ends with an exception, 0 for none
+    # called with the arguments of each run
     effect: Callable[[list[str]], None] = lambda _arguments: None
 
     def run(self, what: str, arguments: object, **_options: object) -> None:

@@ -32,19 +32,12 @@ def default_jobs() -> int:
 
 @dataclass(frozen=True, slots=True)
 class Builder:
-    """Knows what colcon's folders hold, and brings them up to date.
+    """Knows what colcon's folders hold, and brings them up to date."""
 
-    Attributes:
-        layout: Where things are.
-        base: Fingerprint of the environment that the packages are built in.
-        kind: Where ROS comes from.
-        jobs: Greatest number of compilers at the same time.
-    """
-
-    layout: Layout
-    base: str
-    kind: UnderlayKind
-    jobs: int
+    layout: Layout  # where things are
+    base: str  # fingerprint of the environment that the packages are built in
+    kind: UnderlayKind  # where ROS comes from
+    jobs: int  # greatest number of compilers at the same time
 
     @property
     def _on_wheels(self) -> bool:

@@ -25,20 +25,13 @@ from .underlay import find_underlay
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What a target needs.
+    """What a target needs."""
 
-    Attributes:
-        dev: Whether the tools for testing, and all that any package imports.
-        build: Whether any package.
-        packages: Which ones; none means all.
-        extras: Requirements files besides, which no package needs by itself.
-        jobs: Greatest number of compilers at the same time.
-    """
-
-    dev: bool = False
-    build: bool = True
-    packages: tuple[str, ...] = ()
-    extras: tuple[str, ...] = ()
+    dev: bool = False  # whether the tools for testing, and all that any package imports
+    build: bool = True  # whether any package
+    packages: tuple[str, ...] = ()  # which ones; none means all
+    extras: tuple[str, ...] = ()  # requirements files besides, which no package needs by itself
+    # greatest number of compilers at the same time
     jobs: int = field(default_factory=default_jobs)
 
 

@@ -44,17 +44,11 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Environment:
-    """The virtual environment as it should be.
+    """The virtual environment as it should be."""
 
-    Attributes:
-        layout: Where things are.
-        underlay: The ROS below the workspace.
-        python: The interpreter to make it from.
-    """
-
-    layout: Layout
-    underlay: Underlay
-    python: str
+    layout: Layout  # where things are
+    underlay: Underlay  # the ROS below the workspace
+    python: str  # the interpreter to make it from
 
     @property
     def requirements(self) -> Path:

@@ -83,17 +83,12 @@ def write_atomically(path: Path, content: str | bytes, *, mode: int = 0o644) -> 
 
 @dataclass(frozen=True, slots=True)
 class EnvironmentState:
-    """What a finished virtual environment holds.
+    """What a finished virtual environment holds."""
 
-    Attributes:
-        base: Fingerprint of all that every target needs.
-        additions: Fingerprint of each further requirements file that was installed, by its name.
-        python: Interpreter that the environment was made from.
-    """
-
-    base: str
+    base: str  # fingerprint of all that every target needs
+    # fingerprint of each further requirements file that was installed, by its name
     additions: dict[str, str]
-    python: str
+    python: str  # interpreter that the environment was made from
 
 
 def read_state(path: Path) -> EnvironmentState | None:

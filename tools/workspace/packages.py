@@ -23,25 +23,15 @@ _SHARED_SETUP = Path(__file__).parents[1] / 'setup_package.py'  # which every se
 
 @dataclass(frozen=True, slots=True)
 class Package:
-    """A colcon package.
+    """A colcon package."""
 
-    Attributes:
-        name: Its name.
-        folder: Where it is.
-        build_type: `ament_cmake` or `ament_python`.
-        dependencies: All packages that it needs to be built and to run.
-        test_dependencies: Those that only its tests need.
-        is_interface: Whether it consists of messages, services and actions.
-        is_copy: Whether it stands in for a public package.
-    """
-
-    name: str
-    folder: Path
-    build_type: str
-    dependencies: frozenset[str]
-    test_dependencies: frozenset[str]
-    is_interface: bool
-    is_copy: bool
+    name: str  # its name
+    folder: Path  # where it is
+    build_type: str  # `ament_cmake` or `ament_python`
+    dependencies: frozenset[str]  # all packages that it needs to be built and to run
+    test_dependencies: frozenset[str]  # those that only its tests need
+    is_interface: bool  # whether it consists of messages, services and actions
+    is_copy: bool  # whether it stands in for a public package
 
     @property
     def modules(self) -> list[Path]:

@@ -60,17 +60,11 @@ def clean_environment(environ: Mapping[str, str]) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class Runner:
-    """Starts programs in a clean environment.
+    """Starts programs in a clean environment."""
 
-    Attributes:
-        environ: Environment to clean and pass on.
-        cwd: Folder to run in.
-        lock: Descriptor of the set-up's lock, held by the programs too.
-    """
-
-    environ: Mapping[str, str]
-    cwd: Path
-    lock: int
+    environ: Mapping[str, str]  # environment to clean and pass on
+    cwd: Path  # folder to run in
+    lock: int  # descriptor of the set-up's lock, held by the programs too
 
     def run(
         self,

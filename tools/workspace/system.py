@@ -53,21 +53,13 @@ SYSTEM_ROS_PACKAGES: tuple[str, ...] = (
 
 @dataclass(frozen=True, slots=True)
 class Interpreter:
-    """A Python interpreter outside of any virtual environment.
+    """A Python interpreter outside of any virtual environment."""
 
-    Attributes:
-        path: The program.
-        version: Major and minor number.
-        machine: Processor architecture, as the kernel names it.
-        has_headers: Whether extensions can be compiled for it.
-        has_venv: Whether it can make virtual environments with pip.
-    """
-
-    path: str
-    version: tuple[int, int]
-    machine: str
-    has_headers: bool
-    has_venv: bool
+    path: str  # the program
+    version: tuple[int, int]  # major and minor number
+    machine: str  # processor architecture, as the kernel names it
+    has_headers: bool  # whether extensions can be compiled for it
+    has_venv: bool  # whether it can make virtual environments with pip
 
     @property
     def name(self) -> str:

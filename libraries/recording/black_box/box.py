@@ -27,19 +27,13 @@ PAUSE_SHARE = 0.75  # of the window
 
 @dataclass(frozen=True, slots=True)
 class BlackBoxSettings:
-    """Settings of a black box; times in [s].
+    """Settings of a black box; times in [s]."""
 
-    Attributes:
-        folder: Folder of its recordings, made with the first one.
-        window: How far back a recording reaches.
-        after: Delay from the fault to the writing, so that the recording covers what follows.
-        kept: Number of recordings in the folder; older ones are removed.
-    """
-
-    folder: Path
-    window: float = WINDOW
+    folder: Path  # folder of its recordings, made with the first one
+    window: float = WINDOW  # how far back a recording reaches
+    # delay from the fault to the writing, so that the recording covers what follows
     after: float = 3.0
-    kept: int = 20
+    kept: int = 20  # number of recordings in the folder; older ones are removed
 
     @property
     def pause(self) -> float:

@@ -121,24 +121,16 @@ _ROOT = 'rosbag2_bagfile_information'
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """A recorded topic.
+    """A recorded topic."""
 
-    Attributes:
-        name: Its absolute name.
-        type: Name of its messages, `package/msg/Name`.
-        definition: Text of their definition with those of all nested types (`ros2msg`); empty
-            where it could not be found.
-        type_hash: Hash of the type, `RIHS01_...`.
-        qos: What its publishers offered.
-        serialization: Format of its messages.
-    """
-
-    name: str
-    type: str
+    name: str  # its absolute name
+    type: str  # name of its messages, `package/msg/Name`
+    # text of their definition with those of all nested types (`ros2msg`); empty where it could not
+    # be found
     definition: str = ''
-    type_hash: str = ''
-    qos: tuple[OfferedQos, ...] = ()
-    serialization: str = 'cdr'
+    type_hash: str = ''  # hash of the type, `RIHS01_...`
+    qos: tuple[OfferedQos, ...] = ()  # what its publishers offered
+    serialization: str = 'cdr'  # format of its messages
 
     def qos_dicts(self) -> list[dict[str, Any]]:
         """The QoS profiles as metadata.yaml has them."""
@@ -165,25 +157,15 @@ class BagFile:
 
 @dataclass(frozen=True, slots=True)
 class BagMetadata:
-    """What a recording has.
+    """What a recording has."""
 
-    Attributes:
-        files: Its files in order.
-        topics: Its topics with their counts.
-        compression_format: `zstd` or empty.
-        compression_mode: `FILE`, `MESSAGE` or empty.
-        distro: The ROS that it was recorded with.
-        custom: What the user wrote down with it.
-        storage: How its files are written.
-    """
-
-    files: tuple[BagFile, ...]
-    topics: tuple[TopicCount, ...]
-    compression_format: str = ''
-    compression_mode: str = ''
-    distro: str = 'jazzy'
-    custom: Mapping[str, str] | None = None
-    storage: str = STORAGE
+    files: tuple[BagFile, ...]  # its files in order
+    topics: tuple[TopicCount, ...]  # its topics with their counts
+    compression_format: str = ''  # `zstd` or empty
+    compression_mode: str = ''  # `FILE`, `MESSAGE` or empty
+    distro: str = 'jazzy'  # the ROS that it was recorded with
+    custom: Mapping[str, str] | None = None  # what the user wrote down with it
+    storage: str = STORAGE  # how its files are written
 
     @property
     def start(self) -> int:

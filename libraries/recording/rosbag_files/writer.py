@@ -44,21 +44,13 @@ class Preset(Enum):
 
 @dataclass(frozen=True, slots=True)
 class WriterOptions:
-    """How to write a recording.
+    """How to write a recording."""
 
-    Attributes:
-        max_size: Size in [byte] from which a new file begins; 0 for no limit.
-        max_duration: Duration in [ns] from which a new file begins; 0 for no limit.
-        preset: How MCAP files are written.
-        distro: The ROS that is recorded.
-        custom: What the user writes down with it.
-    """
-
-    max_size: int = 0
-    max_duration: int = 0
-    preset: Preset = Preset.NONE
-    distro: str = 'jazzy'
-    custom: Mapping[str, str] | None = None
+    max_size: int = 0  # size in [byte] from which a new file begins; 0 for no limit
+    max_duration: int = 0  # duration in [ns] from which a new file begins; 0 for no limit
+    preset: Preset = Preset.NONE  # how MCAP files are written
+    distro: str = 'jazzy'  # the ROS that is recorded
+    custom: Mapping[str, str] | None = None  # what the user writes down with it
 
 
 class BagWriter:

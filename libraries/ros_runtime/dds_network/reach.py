@@ -98,32 +98,23 @@ def source_address(peer: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """A network interface.
+    """A network interface."""
 
-    Attributes:
-        name: Its name, e.g. ``eth0``.
-        address: Its IPv4 address.
-    """
-
-    name: str
-    address: str
+    name: str  # its name, e.g. ``eth0``
+    address: str  # its IPv4 address
 
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """What DDS uses besides loopback.
+    """What DDS uses besides loopback."""
 
-    Attributes:
-        interfaces: Interfaces on which its sockets receive.
-        peers: IPv4 addresses that it announces itself to, for networks without multicast.
-        without_link: Names of interfaces that are left out, as they have no link or no address:
-            Fast DDS does not open them later, either.
-        own_transports: By what a person configures the transports himself; empty when he does not.
-    """
-
-    interfaces: tuple[Interface, ...] = ()
+    interfaces: tuple[Interface, ...] = ()  # interfaces on which its sockets receive
+    # IPv4 addresses that it announces itself to, for networks without multicast
     peers: tuple[str, ...] = ()
+    # names of interfaces that are left out, as they have no link or no address: Fast DDS does not
+    # open them later, either
     without_link: tuple[str, ...] = ()
+    # by what a person configures the transports himself; empty when he does not
     own_transports: str = ''
 
     @property

@@ -47,17 +47,11 @@ FindExecutable = Callable[[str, str], 'Path | None']
 
 @dataclass(frozen=True, slots=True)
 class Executable:
-    """An executable of a ROS package.
+    """An executable of a ROS package."""
 
-    Attributes:
-        package: Name of the package.
-        name: Name of the executable.
-        notifies_ready: It reports that it is ready, as in :class:`.ProcessSpec`.
-    """
-
-    package: str
-    name: str
-    notifies_ready: bool = True
+    package: str  # name of the package
+    name: str  # name of the executable
+    notifies_ready: bool = True  # it reports that it is ready, as in :class:`.ProcessSpec`
 
 
 def find_executable(package: str, name: str) -> Path | None:

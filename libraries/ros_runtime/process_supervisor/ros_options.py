@@ -83,15 +83,10 @@ _NAMESPACE = re.compile(r'/?[A-Za-z_]\w*(?:/[A-Za-z_]\w*)*', re.ASCII)
 
 @dataclass(frozen=True, slots=True)
 class RosOptions:
-    """The options of all nodes of a bring-up.
+    """The options of all nodes of a bring-up."""
 
-    Attributes:
-        namespace: Their namespace without a slash at either end; empty for the root.
-        arguments: What stood behind ``--ros-args``, but for the namespace.
-    """
-
-    namespace: str = ''
-    arguments: tuple[str, ...] = ()
+    namespace: str = ''  # their namespace without a slash at either end; empty for the root
+    arguments: tuple[str, ...] = ()  # what stood behind ``--ros-args``, but for the namespace
 
     @property
     def frame_prefix(self) -> str:

@@ -116,15 +116,10 @@ class ServiceManager:
 
 @dataclass(frozen=True, slots=True)
 class StopStep:
-    """One step of the escalation that stops a process.
+    """One step of the escalation that stops a process."""
 
-    Attributes:
-        signal: The signal that is sent to its process group.
-        timeout: How long it may take to end before the next step, in [s].
-    """
-
-    signal: Signals
-    timeout: float
+    signal: Signals  # the signal that is sent to its process group
+    timeout: float  # how long it may take to end before the next step, in [s]
 
 
 STOP_STEPS = (
@@ -141,31 +136,21 @@ that hangs prints what each of its threads is doing.
 
 @dataclass(frozen=True, slots=True)
 class ProcessSpec:
-    """A process of a bring-up.
+    """A process of a bring-up."""
 
-    Attributes:
-        name: Short name, unique in its bring-up; the prefix of its output.
-        argv: Program and arguments.
-        environment: Variables that it gets beside those of the supervisor.
-        notifies_ready: It reports ``READY=1`` at the socket that ``NOTIFY_SOCKET`` names, as in
-            sd_notify(3), when it is ready. Otherwise it is ready when it is started.
-        ready_timeout: How long it may take to be ready in [s]; infinite for no limit.
-        required: The whole bring-up ends when this process ends.
-        awaited: All is ready only when this process is.
-        stop_order: Those with a lower number are stopped, and gone, before those with a
-            higher one.
-        stop_steps: How it is stopped.
-    """
-
-    name: str
-    argv: tuple[str, ...]
+    name: str  # short name, unique in its bring-up; the prefix of its output
+    argv: tuple[str, ...]  # program and arguments
+    # variables that it gets beside those of the supervisor
     environment: Mapping[str, str] = field(default_factory=dict)
+    # it reports ``READY=1`` at the socket that ``NOTIFY_SOCKET`` names, as in sd_notify(3), when
+    # it is ready. Otherwise it is ready when it is started
     notifies_ready: bool = False
-    ready_timeout: float = 30.0
-    required: bool = True
-    awaited: bool = True
+    ready_timeout: float = 30.0  # how long it may take to be ready in [s]; infinite for no limit
+    required: bool = True  # the whole bring-up ends when this process ends
+    awaited: bool = True  # all is ready only when this process is
+    # those with a lower number are stopped, and gone, before those with a higher one
     stop_order: int = 0
-    stop_steps: tuple[StopStep, ...] = STOP_STEPS
+    stop_steps: tuple[StopStep, ...] = STOP_STEPS  # how it is stopped
 
     def __post_init__(self) -> None:
         """Refuse what would only fail later.

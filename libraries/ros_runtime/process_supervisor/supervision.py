@@ -48,37 +48,23 @@ class Severity(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """A message to the user.
+    """A message to the user."""
 
-    Attributes:
-        severity: How loud.
-        text: What happened, and what to do when there is something to do.
-        process: The process that it is about; empty for none.
-        lasting: It stays true until there is another notice about its process, so a display keeps
-            it in sight.
-    """
-
-    severity: Severity
-    text: str
-    process: str = ''
+    severity: Severity  # how loud
+    text: str  # what happened, and what to do when there is something to do
+    process: str = ''  # the process that it is about; empty for none
+    # it stays true until there is another notice about its process, so a display keeps it in sight
     lasting: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a supervision ended.
+    """How a supervision ended."""
 
-    Attributes:
-        exit_code: 0 when it ended on request.
-        reason: Why it ended.
-        process: The process that ended it, empty when none did.
-        last_lines: What that process wrote last.
-    """
-
-    exit_code: int
-    reason: str
-    process: str = ''
-    last_lines: tuple[str, ...] = ()
+    exit_code: int  # 0 when it ended on request
+    reason: str  # why it ended
+    process: str = ''  # the process that ended it, empty when none did
+    last_lines: tuple[str, ...] = ()  # what that process wrote last
 
 
 @dataclass(slots=True)

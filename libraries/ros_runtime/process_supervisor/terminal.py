@@ -174,17 +174,11 @@ def severity_of(line: str) -> Severity:
 
 @dataclass(frozen=True, slots=True)
 class Painter:
-    """Puts names in front of lines, all as wide as the widest.
+    """Puts names in front of lines, all as wide as the widest."""
 
-    Attributes:
-        own: Name of the supervising program.
-        names: Names of its processes.
-        colour: Use colours.
-    """
-
-    own: str
-    names: Sequence[str]
-    colour: bool
+    own: str  # name of the supervising program
+    names: Sequence[str]  # names of its processes
+    colour: bool  # use colours
 
     def line(self, name: str, text: str) -> str:
         """Format a line of a process."""

@@ -20,17 +20,11 @@ PROGRAM = (sys.executable, '-m', 'ros2_frontend')
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a command left behind.
+    """What a command left behind."""
 
-    Attributes:
-        code: Its exit code.
-        out: What it wrote to stdout.
-        err: What it wrote to stderr.
-    """
-
-    code: int
-    out: str
-    err: str
+    code: int  # its exit code
+    out: str  # what it wrote to stdout
+    err: str  # what it wrote to stderr
 
     @property
     def lines(self) -> list[str]:

@@ -27,17 +27,11 @@ _ESCAPES = ('\\U', '\\N')
 
 @dataclass(frozen=True, slots=True)
 class Abbreviation:
-    """What to leave out of a message.
+    """What to leave out of a message."""
 
-    Attributes:
-        length: Longest array or text that is shown in full; None shows all.
-        no_arrays: Whether arrays are replaced by their type and length.
-        no_texts: Whether texts are replaced by their length.
-    """
-
-    length: int | None = None
-    no_arrays: bool = False
-    no_texts: bool = False
+    length: int | None = None  # longest array or text that is shown in full; None shows all
+    no_arrays: bool = False  # whether arrays are replaced by their type and length
+    no_texts: bool = False  # whether texts are replaced by their length
 
 
 FULL = Abbreviation()
@@ -183,14 +177,10 @@ def parse_mapping(text: str) -> dict[str, Any]:
 
 @dataclass(slots=True)
 class Filler:
-    """Fills messages and remembers the time stamps that were left to the moment of sending.
+    """Fills messages and remembers the time stamps that were left to the moment of sending."""
 
-    Attributes:
-        expand_now: Whether `header: auto` and `stamp: now` mean the time of sending.
-        stamps: One setter for each such stamp; call it with a `builtin_interfaces/msg/Time`.
-    """
-
-    expand_now: bool = False
+    expand_now: bool = False  # whether `header: auto` and `stamp: now` mean the time of sending
+    # one setter for each such stamp; call it with a `builtin_interfaces/msg/Time`
     stamps: list[Callable[[Message], None]] = field(default_factory=list)
 
     def fill(self, message: Message, values: object, path: str = '') -> None:

@@ -169,15 +169,10 @@ _NANO = 1_000_000_000
 
 @dataclass(slots=True)
 class PlayClock:
-    """Which moment of a recording is due.
+    """Which moment of a recording is due."""
 
-    Attributes:
-        rate: How many times faster than it was recorded.
-        paused: Whether it stands still.
-    """
-
-    rate: float
-    paused: bool = False
+    rate: float  # how many times faster than it was recorded
+    paused: bool = False  # whether it stands still
     _moment: float = 0.0  # [ns] of the recording
     _since: float | None = None  # None before the start, and while it stands still
 

@@ -16,14 +16,10 @@ from ..ros.graph import Graph
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """One kind of names in the ROS graph: topics, services or actions.
+    """One kind of names in the ROS graph: topics, services or actions."""
 
-    Attributes:
-        kind: What they name, in the singular.
-        read: Returns names and types; hidden ones, too, when the second argument is true.
-    """
-
-    kind: str
+    kind: str  # what they name, in the singular
+    # returns names and types; hidden ones, too, when the second argument is true
     read: Callable[[Graph, bool], NamesAndTypes]
 
     def list_arguments(self, types: bool = True, hidden: bool = True) -> tuple[Argument, ...]:
