@@ -36,14 +36,7 @@ PERIOD = 0.01
 
 
 class Drives:
-    """Drives that go to their set-points at once.
-
-    Attributes:
-        gateway: Commands to the core that moves them.
-        source: The source under test.
-        axes: State of each drive; to be changed by tests.
-        path: Positions commanded so far, a row for each cycle.
-    """
+    """Drives that go to their set-points at once."""
 
     def __init__(
         self,
@@ -55,15 +48,16 @@ class Drives:
     ) -> None:
         self.now = 100.0
         core = MotionCore(model or robot(name), settings)
+        # commands to the core that moves them
         self.gateway = CommandGateway(core, worker or InlineWorker(), lambda: self.now)
-        self.source = DriveSource(self.gateway)
+        self.source = DriveSource(self.gateway)  # the source under test
         self.axes = [
             AxisFeedback(joint, True, DriveState.OPERATION_ENABLED, 8, at, 0.0, at, True)
             for joint, at in zip(
                 self.gateway.model.joints, begin or ready(name).tolist(), strict=True
             )
-        ]
-        self.path: list[Array] = []
+        ]  # state of each drive; to be changed by tests
+        self.path: list[Array] = []  # positions commanded so far, a row for each cycle
         self.attachments: list[MotionSource] = []
 
     def place(self, positions: Sequence[float]) -> None:
@@ -76,6 +70,12 @@ class Drives:
     def attach(self) -> None:
         """Give the source its drives."""
         self.source.attach(self._attached)
+
+    def following(self, cycles: int = 2) -> Drives:
+        """Give the source its drives, and run some cycles."""
+        self.attach()
+        self.run(cycles)
+        return self
 
     def _attached(self, source: MotionSource) -> Future[None]:
         self.attachments.append(source)
@@ -102,28 +102,19 @@ class Drives:
 
 
 class Elsewhere:
-    """An arm whose drives take set-points, and publish their state.
-
-    Attributes:
-        at: Where it is in [rad].
-        is_published: Whether its state is published.
-        moves: Whether it goes to set-points.
-        delay: How many set-points it is behind.
-        sag: How far it stands below its set-points in [rad].
-        points: All set-points so far.
-    """
+    """An arm whose drives take set-points, and publish their state."""
 
     def __init__(
         self, following: FollowingLimits | None = None, worker: Executor | None = None
     ) -> None:
         model = robot('gp110')
         self.now = 50.0
-        self.at = np.array(ready('gp110'))
-        self.is_published = True
-        self.moves = True
-        self.delay = 0
-        self.sag = 0.0
-        self.points: list[SetPoint] = []
+        self.at = np.array(ready('gp110'))  # where it is in [rad]
+        self.is_published = True  # whether its state is published
+        self.moves = True  # whether it goes to set-points
+        self.delay = 0  # how many set-points it is behind
+        self.sag = 0.0  # how far it stands below its set-points in [rad]
+        self.points: list[SetPoint] = []  # all set-points so far
         self._way: deque[Array] = deque()
         self.gateway = CommandGateway(
             MotionCore(model), worker or InlineWorker(), lambda: self.now

@@ -39,17 +39,12 @@ class _Server:
 
 
 class GoalNode:
-    """What action servers use of a node.
-
-    Attributes:
-        servers: Its action servers.
-        logged: Its log messages.
-    """
+    """What action servers use of a node."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(action_goals, '_Server', _Server)
-        self.servers: list[Any] = []
-        self.logged: list[str] = []
+        self.servers: list[Any] = []  # its action servers
+        self.logged: list[str] = []  # its log messages
         self._timers: list[Callable[[], None]] = []
 
     def get_logger(self) -> Any:
@@ -93,24 +88,15 @@ class GoalNode:
 
 
 class Listener:
-    """The listener without ROS, whose scenes are built when the test says so.
-
-    Attributes:
-        drives: The drives of each arm.
-        errors: What was logged as an error.
-        warnings: What was warned of.
-        publishers: Of scenes for controllers.
-        durability: Of the publisher of another move_group.
-        answers: Of get_planning_scene, to be given by the test; None where it is not offered.
-        made: The listener.
-    """
+    """The listener without ROS, whose scenes are built when the test says so."""
 
     def __init__(self, *drives: Drives) -> None:
-        self.drives = drives
-        self.errors: list[str] = []
-        self.warnings: list[str] = []
-        self.publishers = 0
-        self.durability = LATCHED.durability
+        self.drives = drives  # the drives of each arm
+        self.errors: list[str] = []  # what was logged as an error
+        self.warnings: list[str] = []  # what was warned of
+        self.publishers = 0  # of scenes for controllers
+        self.durability = LATCHED.durability  # of the publisher of another move_group
+        # of get_planning_scene, to be given by the test; None where it is not offered
         self.answers: list[Future[Any]] | None = None
         logger = SimpleNamespace(
             error=lambda text, **_: self.errors.append(text),
@@ -131,6 +117,7 @@ class Listener:
         self._now = 0.0
         self._worker = SteppedWorker()
         gateways = [each.gateway for each in drives]
+        # the listener
         self.made = SceneListener(node, gateways, worker=self._worker, clock=lambda: self._now)
 
     def _call(self, _: object) -> Future[Any]:
@@ -159,27 +146,19 @@ Twist = tuple[str, tuple[float, ...]]
 
 
 class ServoListener:
-    """Listens like a servo node, in a domain of its own.
-
-    Attributes:
-        client: The node behind it, whose name is servo_node.
-        twists: Commands for the tool.
-        jogs: Commands for joints.
-        types: What the command type was switched to.
-        pauses: What pause_servo was asked for.
-    """
+    """Listens like a servo node, in a domain of its own."""
 
     def __init__(self, client: RosClient, urdf: str, srdf: str) -> None:
-        self.client = client
+        self.client = client  # the node behind it, whose name is servo_node
         node = client.node
         node.declare_parameter('robot_description', urdf)
         node.declare_parameter('robot_description_semantic', srdf)
         node.declare_parameter('moveit_servo.command_in_type', 'speed_units')
         node.declare_parameter('moveit_servo.scale.linear', 0.2)
-        self.twists: list[TwistStamped] = []
-        self.jogs: list[JointJog] = []
-        self.types: list[int] = []
-        self.pauses: list[bool] = []
+        self.twists: list[TwistStamped] = []  # commands for the tool
+        self.jogs: list[JointJog] = []  # commands for joints
+        self.types: list[int] = []  # what the command type was switched to
+        self.pauses: list[bool] = []  # what pause_servo was asked for
         node.create_subscription(TwistStamped, '~/delta_twist_cmds', self.twists.append, 10)
         node.create_subscription(JointJog, '~/delta_joint_cmds', self.jogs.append, 10)
         node.create_service(ServoCommandType, '~/switch_command_type', self._switch)

@@ -221,9 +221,7 @@ def test_a_jog_at_full_speed_hands_over_to_a_trajectory(where: str) -> None:
     """As from any client of the nodes: the trajectory takes over, and gets to its end."""
     arm: Drives | Elsewhere = Elsewhere()
     if where == 'drives of this process':
-        arm = Drives()
-        arm.attach()
-    arm.run(2)
+        arm = Drives().following()
     limits = arm.gateway.model.limits
     speeds = dict.fromkeys(limits.names[:1], 0.99 * limits.velocity[0])
     jog(arm.gateway, speeds, arm.now, 1.0)

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from dataclasses import replace
 import threading
 from typing import Any
@@ -41,14 +40,6 @@ pytestmark = pytest.mark.slow
 JOINT = 'panda_joint1'
 
 
-def ready(worker: Executor | None = None) -> Drives:
-    """Return drives that follow."""
-    drives = Drives(worker=worker)
-    drives.attach()
-    drives.run(2)
-    return drives
-
-
 def wave(drives: Drives, count: int) -> TrajectoryGoal:
     """Return a trajectory of many points, 0.05 s apart, that ends where it began."""
     begin = np.array([axis.setpoint for axis in drives.axes])
@@ -72,7 +63,7 @@ def begun(drives: Drives, command: MotionCommand, most: int = 200) -> None:
 
 def test_a_jog_that_ends_while_a_long_goal_is_planned_does_no_harm() -> None:
     """It comes to rest first, and the trajectory begins there: nobody can foresee a jog."""
-    drives = ready()
+    drives = Drives().following()
     goal = wave(drives, 300)
     jog(drives.gateway, {JOINT: 0.4}, drives.now, 0.5)
     drives.run(45)
@@ -91,7 +82,7 @@ def test_a_jog_that_ends_while_a_long_goal_is_planned_does_no_harm() -> None:
 def test_an_arm_that_was_moved_meanwhile_is_planned_for_again(always: bool) -> None:
     """The path from elsewhere is another, and was not checked; at last the goal is refused."""
     worker = SteppedWorker()
-    drives = ready(worker)
+    drives = Drives(worker=worker).following()
     there = wave(drives, 2).points[0].positions
     goal = TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(4.0, there)])
     jog(drives.gateway, {JOINT: 0.5}, drives.now, 60.0 if always else 0.5)
@@ -128,7 +119,7 @@ def test_no_thread_is_started_in_a_cycle(monkeypatch: pytest.MonkeyPatch) -> Non
         start(thread)
 
     worker = start_worker()
-    drives = ready(worker)
+    drives = Drives(worker=worker).following()
     monkeypatch.setattr(threading.Thread, 'start', noted)
     command = move_by(drives.gateway, {JOINT: 0.02})
     drives.run()  # which hands it over
@@ -140,7 +131,7 @@ def test_no_thread_is_started_in_a_cycle(monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_a_displacement_into_contact_is_refused_and_nothing_moves() -> None:
     """The wrist of Panda, turned and folded until its hand would be in the forearm."""
-    drives = ready()
+    drives = Drives().following()
     before = drives.path[-1]
     command = move_by(drives.gateway, {'panda_joint6': -1.4})
     begun(drives, command)
@@ -152,7 +143,7 @@ def test_a_displacement_into_contact_is_refused_and_nothing_moves() -> None:
 
 def test_a_flood_is_refused() -> None:
     """What cannot be carried out in time is not kept for later."""
-    drives = ready()
+    drives = Drives().following()
     commands = [move_by(drives.gateway, {JOINT: 0.0001}) for _ in range(MAX_QUEUED_MOTIONS + 10)]
     assert isinstance(commands[-1].future.exception(0.0), NotReadyError)
     drives.run(2 * len(commands))
@@ -161,7 +152,7 @@ def test_a_flood_is_refused() -> None:
 
 def test_a_zero_is_no_command_to_an_arm_that_does_not_follow() -> None:
     """It is not refused, so it neither shows in the status nor keeps the arm from recovering."""
-    drives = ready()
+    drives = Drives().following()
     drives.source.released(JOINT, Refusal(RefusalCause.SINGLE_TARGET))
     drives.run(3)
     zero = twist(drives.gateway, [0.0] * 6, drives.now)
@@ -172,7 +163,7 @@ def test_a_zero_is_no_command_to_an_arm_that_does_not_follow() -> None:
 
 def test_displacements_by_nothing_change_nothing() -> None:
     """Neither a trajectory, nor a jog, nor a halted drive; what is wrong is reported."""
-    drives = ready()
+    drives = Drives().following()
     command = drives.gateway.request(wave(drives, 20))
     begun(drives, command)
     drives.run(30)
@@ -196,7 +187,7 @@ def test_displacements_by_nothing_change_nothing() -> None:
 def test_a_jog_that_is_refused_ends_nothing() -> None:
     """One that has expired, or one in a pause: what was requested before it begins."""
     worker = SteppedWorker()
-    drives = ready(worker)
+    drives = Drives(worker=worker).following()
     begin = drives.path[-1]
     command = move_by(drives.gateway, {JOINT: 0.1})
     drives.run()
@@ -216,7 +207,7 @@ def test_a_jog_does_not_overtake_a_stop_that_comes_while_its_drives_are_fetched(
     stops: Sequence[StopRequest | PauseRequest],
 ) -> None:
     """The stop was called later: the arm stays where it is, also when a pause is over by then."""
-    drives = ready()
+    drives = Drives().following()
     before = drives.path[-1].tolist()
 
     def stop() -> None:
@@ -233,7 +224,7 @@ def test_a_jog_does_not_overtake_a_stop_that_comes_while_its_drives_are_fetched(
 
 def test_the_time_in_which_drives_are_fetched_is_no_age_of_a_jog() -> None:
     """The cycle did not stand still; the jog itself says how long it counts."""
-    drives = ready()
+    drives = Drives().following()
 
     def fetch() -> None:
         drives.now += 2.0 * MAX_CYCLE_AGE
@@ -247,7 +238,7 @@ def test_the_time_in_which_drives_are_fetched_is_no_age_of_a_jog() -> None:
 
 def test_a_zero_stops_its_jog_however_late_the_cycle_carries_it_out() -> None:
     """A stop is never refused, while the jog before it goes on to count."""
-    drives = ready()
+    drives = Drives().following()
     jog(drives.gateway, {JOINT: 0.4}, drives.now, 30.0)
     drives.run(50)
     zero = jog(drives.gateway, {JOINT: 0.0}, drives.now)
@@ -260,7 +251,7 @@ def test_a_zero_stops_its_jog_however_late_the_cycle_carries_it_out() -> None:
 
 def test_a_displacement_that_the_safety_filter_stops_ends_with_words() -> None:
     """The target state ends, and with it the command, where links would come too near."""
-    drives = ready()
+    drives = Drives().following()
     command = move_by(drives.gateway, {'panda_joint6': -0.4})
     drives.run(5)
     # from elsewhere than where its way was checked
@@ -280,9 +271,7 @@ def test_a_long_trajectory_waits_until_a_fast_jog_has_been_braked() -> None:
     limits = {
         name: {**each, 'has_acceleration_limits': False} for name, each in table('panda').items()
     }
-    drives = Drives(model=RobotModel(*texts('panda'), limits))
-    drives.attach()
-    drives.run(2)
+    drives = Drives(model=RobotModel(*texts('panda'), limits)).following()
     begin = [axis.setpoint for axis in drives.axes]
     jog(drives.gateway, {JOINT: 2.0}, drives.now, 1.5)
     drives.run(150)
@@ -302,7 +291,7 @@ def test_a_stamped_trajectory_keeps_its_times(
 ) -> None:
     """However long its preparation takes: it begins at its stamp, and not that much later."""
     worker = SteppedWorker()
-    drives = ready(worker)
+    drives = Drives(worker=worker).following()
     if before == 'trajectory':
         drives.gateway.request(wave(drives, 40))
         drives.run(2)
@@ -327,7 +316,7 @@ def test_a_long_goal_that_is_refused_at_rest_does_not_end_a_jog(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The jog is held for it, and goes on: where it has come to rest, there is no way any more."""
-    drives = ready()
+    drives = Drives().following()
     plan, attempts = MotionCore.plan, 0
 
     def plan_once(core: MotionCore, request: Any, basis: CommandBasis) -> Motion | None:
@@ -353,7 +342,7 @@ def test_a_long_goal_that_is_refused_at_rest_does_not_end_a_jog(
 @pytest.mark.parametrize('is_wrong', [False, True])
 def test_a_goal_that_is_refused_takes_no_drive_from_anyone(is_wrong: bool) -> None:
     """Others move the arm: it is tried from where the arm stands before they are thrown out."""
-    drives = ready()
+    drives = Drives().following()
     goal = wave(drives, 20)
     if is_wrong:
         beyond = replace(goal.points[-1], positions=[9.0] * 7)
@@ -376,7 +365,7 @@ def test_a_goal_that_is_refused_takes_no_drive_from_anyone(is_wrong: bool) -> No
 def test_a_motion_that_a_stop_made_void_takes_no_drive_from_anyone() -> None:
     """The stop came while it was tried from where the arm stands."""
     worker = SteppedWorker()
-    drives = ready(worker)
+    drives = Drives(worker=worker).following()
     drives.source.released(JOINT, Refusal(RefusalCause.SINGLE_TARGET))
     drives.run(3)
     before = len(drives.attachments)
@@ -390,7 +379,7 @@ def test_a_motion_that_a_stop_made_void_takes_no_drive_from_anyone() -> None:
 
 def test_a_motion_is_tried_from_where_the_arm_is_when_its_turn_comes() -> None:
     """The one before has got the drives back, and leads to where there is room for this one."""
-    drives = ready()
+    drives = Drives().following()
     begin = drives.path[-1][0]
     drives.source.released(JOINT, Refusal(RefusalCause.SINGLE_TARGET))
     drives.run(3)

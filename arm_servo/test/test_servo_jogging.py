@@ -43,9 +43,7 @@ def test_a_jog_in_the_plane_of_the_arm_stays_in_it(axis: str, pause: int) -> Non
 
     A swing would win back the last of the asked speed, and grow from rounding errors.
     """
-    arm = Drives()
-    arm.attach()
-    arm.run(3)
+    arm = Drives().following(3)
     begin = arm.path[-1]
     for cycle in range(300):
         if not pause or (cycle // pause) % 2 == 0:

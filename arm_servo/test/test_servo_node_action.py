@@ -36,14 +36,6 @@ def message(goal: object) -> Any:
     return SimpleNamespace(goal=goal, trajectory=SimpleNamespace(points=[]))
 
 
-def ready(worker: SteppedWorker | None = None) -> Drives:
-    """Return drives that follow."""
-    drives = Drives(worker=worker)
-    drives.attach()
-    drives.run(2)
-    return drives
-
-
 def test_an_unexpected_error_at_the_start_of_a_goal_is_its_result(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -52,7 +44,7 @@ def test_an_unexpected_error_at_the_start_of_a_goal_is_its_result(
     def follow(_goal: TrajectoryGoal, number: int) -> MotionCommand:
         raise ZeroDivisionError(f'no such luck with {number}')
 
-    node = action(monkeypatch, ready(), follow)
+    node = action(monkeypatch, Drives().following(), follow)
     goal = node.send(message(None))
     assert goal.ending == 'aborted'
     assert goal.result.error_code == GoalCode.INVALID_GOAL
@@ -65,7 +57,7 @@ def test_an_unexpected_error_is_the_result_of_a_goal(
     monkeypatch: pytest.MonkeyPatch, when: str
 ) -> None:
     """Rclpy would answer with code 0, which is SUCCESSFUL, or never; the arm comes to rest."""
-    drives = ready()
+    drives = Drives().following()
     node = action(monkeypatch, drives, drives.gateway.request)
     there = [axis.setpoint + 0.5 for axis in drives.axes]
     goal = node.send(message(TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(5.0, there)])))
@@ -93,7 +85,7 @@ def test_an_unexpected_error_of_the_planning_is_its_result(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The next goal is planned as ever."""
-    drives = ready()
+    drives = Drives().following()
     node = action(monkeypatch, drives, drives.gateway.request)
     there = [axis.setpoint + 0.05 for axis in drives.axes]
     goal = TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(2.0, there)])
@@ -114,7 +106,7 @@ def test_a_stop_between_the_request_of_a_goal_and_its_acceptance_counts(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The acceptance is delayed for the client; the next goal moves the arm again."""
-    drives = ready()
+    drives = Drives().following()
     node = action(monkeypatch, drives, drives.gateway.request)
     before = drives.path[-1].tolist()
     there = [axis.setpoint + 0.05 for axis in drives.axes]
@@ -135,7 +127,7 @@ def test_a_cancel_in_the_middle_of_the_planning_ends_the_goal(
 ) -> None:
     """As canceled, and nothing moves."""
     worker = SteppedWorker()
-    drives = ready(worker)
+    drives = Drives(worker=worker).following()
     node = action(monkeypatch, drives, drives.gateway.request)
     before = drives.path[-1].tolist()
     there = [axis.setpoint + 0.05 for axis in drives.axes]
@@ -179,7 +171,7 @@ def test_a_pause_says_what_becomes_of_what_moves_the_arm(
     monkeypatch: pytest.MonkeyPatch, begin: Callable[[Drives], None], paused: str, resumed: str
 ) -> None:
     """Each answer is of what the arm does at the call; a second call changes nothing."""
-    drives, services = ready(), dict[str, Any]()
+    drives, services = Drives().following(), dict[str, Any]()
     monkeypatch.setattr(controller, 'time', SimpleNamespace(monotonic=lambda: drives.now))
     node: Any = SimpleNamespace(
         create_service=lambda _, name, callback: services.update({name: callback})

@@ -199,20 +199,13 @@ def parameter(name: str, value: float) -> Parameter:
 
 
 class Topics:
-    """The servo of drives that follow, and what it gives to the gateway.
-
-    Attributes:
-        prepared: How often the drives were asked for.
-        requests: Jogs so far.
-    """
+    """The servo of drives that follow, and what it gives to the gateway."""
 
     def __init__(self, node: Node, monkeypatch: pytest.MonkeyPatch) -> None:
         self.node = node
-        self.prepared = 0
-        self.requests: list[JogRequest] = []
-        self.drives = Drives(model=HELD)
-        self.drives.attach()
-        self.drives.run(2)
+        self.prepared = 0  # how often the drives were asked for
+        self.requests: list[JogRequest] = []  # jogs so far
+        self.drives = Drives(model=HELD).following()
         gateway = self.drives.gateway
         monkeypatch.setattr(gateway, 'command', self._jog)
         timeout = parameter('incoming_command_timeout', TIMEOUT)

@@ -26,14 +26,6 @@ def swing(drives: Drives, far: float = 0.4, time: float = 2.0) -> MotionCommand:
     return drives.gateway.request(goal)
 
 
-def attached() -> Drives:
-    """Return drives that follow."""
-    drives = Drives()
-    drives.attach()
-    drives.run()
-    return drives
-
-
 def test_it_begins_where_the_set_points_are() -> None:
     """The first set-points are those of the drives, not their measured positions."""
     drives = Drives()
@@ -69,7 +61,7 @@ def test_the_others_stop_on_the_path_when_a_drive_drops_out(
     cause: RefusalCause, code: GoalCode, words: str
 ) -> None:
     """The six others come to rest smoothly on the path; the trajectory names the one cause."""
-    drives = attached()
+    drives = Drives().following(1)
     begin = drives.path[-1]
     command = swing(drives)
     drives.run(60)
@@ -97,7 +89,7 @@ def test_the_others_stop_on_the_path_when_a_drive_drops_out(
 
 def test_a_silent_drive_is_led_to_rest_on_the_path_with_the_others() -> None:
     """Its set-points are still sent: the whole arm stops in step, and the trajectory names it."""
-    drives = attached()
+    drives = Drives().following(1)
     begin = drives.path[-1]
     command = swing(drives)
     drives.run(60)
@@ -116,7 +108,7 @@ def test_a_silent_drive_is_led_to_rest_on_the_path_with_the_others() -> None:
 
 def test_drives_that_are_cut_off_together_are_named_together() -> None:
     """One of them is silent a cycle before the others, whose last TPDOs are nearly as old."""
-    drives = attached()
+    drives = Drives().following(1)
     command = swing(drives)
     drives.run(60)
     silent = Refusal(RefusalCause.SILENT, 'the last is 0.5 s old')
@@ -132,7 +124,7 @@ def test_drives_that_are_cut_off_together_are_named_together() -> None:
 
 def test_a_drive_that_was_taken_away_comes_back_when_attached_again() -> None:
     """Another client's target is left alone until the next attach; then all goes on from there."""
-    drives = attached()
+    drives = Drives().following(1)
     drives.source.released('panda_joint5', Refusal(RefusalCause.SINGLE_TARGET))
     assert drives.run(3) == [None] * 7
     assert 'single target' in drives.gateway.snapshot.blocked
@@ -159,7 +151,7 @@ def test_an_attach_that_failed_is_tried_again() -> None:
 
 def test_a_drive_that_was_faulted_follows_again_when_it_can() -> None:
     """It takes over by itself where nobody took the drive away, at rest."""
-    drives = attached()
+    drives = Drives().following(1)
     whole = drives.axes[1]
     drives.axes[1] = replace(whole, followable=False)
     assert drives.run(3) == [None] * 7
@@ -185,7 +177,7 @@ def test_a_drive_that_is_slower_than_its_limits_is_not_led() -> None:
 
 def test_a_command_that_waited_too_long_is_refused() -> None:
     """After a pause of the cycle an old command moves nothing."""
-    drives = attached()
+    drives = Drives().following(1)
     command = swing(drives)
     drives.now += 1.0
     drives.run()
@@ -195,7 +187,7 @@ def test_a_command_that_waited_too_long_is_refused() -> None:
 
 def test_a_defect_of_the_core_is_reported_and_latched(monkeypatch: pytest.MonkeyPatch) -> None:
     """The bus learns of it and detaches the source, which then has to be attached again."""
-    drives = attached()
+    drives = Drives().following(1)
 
     def broken(*_: object) -> None:
         raise ArithmeticError('no solution')
@@ -254,7 +246,7 @@ def test_drives_with_the_same_trouble_are_named_together() -> None:
 @pytest.mark.parametrize('cause', [RefusalCause.COMMANDED, RefusalCause.MODE_SELECTED])
 def test_before_the_first_command_nothing_is_taken_over(cause: RefusalCause) -> None:
     """Who enables the drives takes them from nobody; later it is named."""
-    drives = attached()
+    drives = Drives().following(1)
     ready = 'are ready; the next command takes them back'
     for moved, words in ((False, ready), (True, ': init; ')):
         if moved:
@@ -287,7 +279,7 @@ def test_a_drive_on_its_way_to_a_single_target_is_waited_for_or_halted() -> None
 
 def test_the_cause_is_reported_and_not_what_followed_from_it() -> None:
     """A master that shuts down disables the drives: that they are disabled is a consequence."""
-    drives = attached()
+    drives = Drives().following(1)
     command = swing(drives)
     drives.run(60)
     for number, axis in enumerate(drives.axes):
@@ -304,7 +296,7 @@ def test_the_cause_is_reported_and_not_what_followed_from_it() -> None:
 
 def test_a_trajectory_ends_at_once_when_no_drive_is_left() -> None:
     """As at the end of the master: there is nothing to be brought to rest on the path."""
-    drives = attached()
+    drives = Drives().following(1)
     command = swing(drives)
     drives.run(60)
     whole = drives.axes

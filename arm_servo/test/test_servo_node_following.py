@@ -106,9 +106,7 @@ def test_no_hand_over_makes_the_set_points_jump(
     A drive that drops out is left alone: its own set-points end there, wherever they are. When it
     comes back before the others rest, it waits for them.
     """
-    drives = Drives()
-    drives.attach()
-    drives.run(2)
+    drives = Drives().following()
     begin = len(drives.path)
     losses = []
     for (kind, numbers), cycles in plan:
@@ -132,9 +130,7 @@ def test_set_points_keep_every_limit(
     name: str, plan: list[tuple[tuple[str, list[float]], int]]
 ) -> None:
     """Velocity, acceleration and jerk of every arm, from any source to any other."""
-    drives = Drives(name)
-    drives.attach()
-    drives.run(2)
+    drives = Drives(name).following()
     states = []
     for (kind, numbers), cycles in [*plan, (('stop', []), 300)]:
         if kind not in {'lose', 'find'}:
@@ -152,9 +148,7 @@ def test_set_points_keep_every_limit(
 @settings(max_examples=10)
 def test_a_refused_command_changes_nothing(numbers: list[float]) -> None:
     """Whatever moves the arm goes on when another command is refused."""
-    drives = Drives()
-    drives.attach()
-    drives.run(2)
+    drives = Drives().following()
     twist(drives.gateway, [0.01, *numbers[1:]], drives.now, 5.0)
     drives.run(5)
     source = drives.gateway.snapshot.source

@@ -28,16 +28,10 @@ JOINT = 'panda_joint1'
 
 
 class Gripper:
-    """The controller without ROS, of drives that stand still where they are blocked.
-
-    Attributes:
-        drives: The drives.
-    """
+    """The controller without ROS, of drives that stand still where they are blocked."""
 
     def __init__(self, clock: Any, *, allow_stalling: bool = False) -> None:
-        self.drives = Drives()
-        self.drives.attach()
-        self.drives.run(2)
+        self.drives = Drives().following()  # the drives
         clock.monotonic = lambda: self.drives.now
         self._node = clock.node
         self._goals: dict[str, Any] = {}
@@ -256,9 +250,7 @@ def test_both_actions_report_an_effort(effort: float) -> None:
 
 def test_a_deactivated_controller_moves_no_gripper() -> None:
     """What is under way comes to rest, and what comes next is refused."""
-    drives = Drives()
-    drives.attach()
-    drives.run(2)
+    drives = Drives().following()
     node = SimpleNamespace(get_name=lambda: 'hand_controller')
     controller = object.__new__(TrajectoryController)
     vars(controller).update(_node=node, _gateway=drives.gateway, active=True)

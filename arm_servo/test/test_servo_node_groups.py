@@ -54,21 +54,16 @@ def texts() -> tuple[str, str, dict[str, dict[str, float]]]:
 
 
 class Robot:
-    """Both arms, and the listener that knows where they are.
-
-    Attributes:
-        arms: Drives of each arm.
-        listener: The listener.
-    """
+    """Both arms, and the listener that knows where they are."""
 
     def __init__(self, left: float = 0.0, right: float = 0.0, gate: float = 1.0) -> None:
-        self.arms = {}
+        self.arms = {}  # drives of each arm
         for side, other, at in (('left', 'right', left), ('right', 'left', right)):
             model = RobotModel(*texts(), side, moved_by_others={other: [other]})
             self.arms[side] = Drives(model=model, begin=[at])
             self.arms[side].attach()
             self.arms[side].run(2)
-        self.listener = Listener(*self.arms.values())
+        self.listener = Listener(*self.arms.values())  # the listener
         self.place_gate(gate)
         self.run(0.3)
 

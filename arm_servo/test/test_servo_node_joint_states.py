@@ -22,9 +22,7 @@ from arm_servo.ros.controller_manager import JointSamples, JointStateBroadcaster
 
 def ready() -> tuple[Drives, JointSamples]:
     """Return drives that follow, and what is published of them."""
-    drives = Drives()
-    drives.attach()
-    drives.run(2)
+    drives = Drives().following()
     return drives, JointSamples(drives.gateway.model.joints, {})
 
 

@@ -38,13 +38,6 @@ def arm() -> Drives:
     return Drives(model=RobotModel(*texts('panda'), table('panda')))
 
 
-def started(drives: Drives) -> Drives:
-    """Make an arm follow."""
-    drives.attach()
-    drives.run(2)
-    return drives
-
-
 def objects(drives: Drives) -> set[str]:
     """Return the names of the objects that count for an arm."""
     return set(drives.gateway.model.scene.objects)
@@ -58,7 +51,7 @@ def test_scenes_count_once_the_arm_is_known_and_a_wrong_one_does_not() -> None:
     listener.take(message('box'))
     listener.run()
     assert not objects(drives)
-    started(drives)
+    drives.following()
     listener.run()
     assert objects(drives) == {'box'}
     listener.take(message('cup', 'nowhere'))
@@ -70,7 +63,7 @@ def test_scenes_count_once_the_arm_is_known_and_a_wrong_one_does_not() -> None:
 
 def test_the_scene_of_another_move_group_counts_where_there_is_no_other() -> None:
     """Where ours is there, its meshes are not even read."""
-    drives = started(arm())
+    drives = arm().following()
     listener = Listener(drives)
     listener.publishers = 1
     listener.made._take_foreign(b'no message')
@@ -82,7 +75,7 @@ def test_the_scene_of_another_move_group_counts_where_there_is_no_other() -> Non
 
 def test_padding_of_a_scene_counts_for_the_arm() -> None:
     """A link is nearer to an object by it, as in the planner; the next scene takes it back."""
-    drives = started(arm())
+    drives = arm().following()
     listener = Listener(drives)
     near = []
     for padding in (0.0, 0.05, 0.0):
@@ -101,7 +94,7 @@ def test_padding_of_a_scene_counts_for_the_arm() -> None:
 
 def test_an_arm_that_nobody_knows_withholds_no_scene_from_others() -> None:
     """It is named once, and gets the scene when it is known at last."""
-    known, unknown = started(arm()), arm()
+    known, unknown = arm().following(), arm()
     listener = Listener(known, unknown)
     listener.take(message('box'))
     listener.run()
@@ -111,14 +104,14 @@ def test_an_arm_that_nobody_knows_withholds_no_scene_from_others() -> None:
         listener.run()
     assert len(listener.warnings) == 1
     assert 'panda_arm: its position is not known' in listener.warnings[0]
-    started(unknown)
+    unknown.following()
     listener.run()
     assert objects(unknown) == {'box'}
 
 
 def test_a_scene_is_not_lost_when_the_position_goes_unknown_before_it_is_built() -> None:
     """It waits, and counts afterwards."""
-    drives = started(arm())
+    drives = arm().following()
     listener = Listener(drives)
     listener.take(message('box'))
     axes = drives.axes
@@ -141,7 +134,7 @@ def test_diffs_change_the_scene_before_and_a_whole_scene_replaces_them() -> None
         scene = message(name)
         scene.is_diff = name != 'box'
         listener.take(scene)
-    started(drives)
+    drives.following()
     for _ in range(3):
         listener.run()
     assert objects(drives) == {'box', 'cup', 'jug'}
@@ -157,7 +150,7 @@ def test_diffs_change_the_scene_before_and_a_whole_scene_replaces_them() -> None
 
 def test_a_diff_before_any_whole_scene_counts_with_a_warning() -> None:
     """What was there before move_group sent it is not known."""
-    drives = started(arm())
+    drives = arm().following()
     listener = Listener(drives)
     diff = message('cup')
     diff.is_diff = True
@@ -170,7 +163,7 @@ def test_a_diff_before_any_whole_scene_counts_with_a_warning() -> None:
 
 def test_the_scene_of_a_move_group_that_began_before_is_requested() -> None:
     """Diffs that came meanwhile count beyond it; where ours publishes, nothing is requested."""
-    drives = started(arm())
+    drives = arm().following()
     listener = Listener(drives)
     listener.answers, listener.publishers = [], 1
     listener.run(2.0)
@@ -194,7 +187,7 @@ def test_the_scene_of_a_move_group_that_began_before_is_requested() -> None:
 
 def test_a_scene_is_requested_until_it_comes() -> None:
     """Where move_group died over the request, or the call failed; diffs before count no more."""
-    drives = started(arm())
+    drives = arm().following()
     listener = Listener(drives)
     listener.answers = []
     listener.run(2.0)
@@ -220,7 +213,7 @@ def test_objects_in_the_world_of_the_srdf_count() -> None:
     urdf, srdf = texts('panda')
     world = '<virtual_joint name="v" type="fixed" parent_frame="world" child_link="panda_link0"/>'
     held = RobotModel(urdf, srdf.replace('</robot>', f'{world}</robot>'), table('panda'))
-    drives = started(Drives(model=held))
+    drives = Drives(model=held).following()
     listener = Listener(drives)
     listener.take(message('box', 'world'))
     listener.run()
@@ -230,7 +223,7 @@ def test_objects_in_the_world_of_the_srdf_count() -> None:
 
 def test_a_whole_scene_that_is_refused_is_requested_again() -> None:
     """It says so, and diffs behind it do not make it whole."""
-    drives = started(arm())
+    drives = arm().following()
     listener = Listener(drives)
     listener.answers = []
     listener.run(2.0)
@@ -249,7 +242,7 @@ def test_a_whole_scene_that_is_refused_is_requested_again() -> None:
 @pytest.mark.parametrize('qos', [LATCHED, 100], ids=['latched', 'volatile'])
 def test_a_scene_of_another_move_group_is_received(isolation: Isolation, qos: Any) -> None:
     """MoveIt's monitor does not latch it; what was latched before counts, too."""
-    drives = started(arm())
+    drives = arm().following()
     with RosClient(isolation.domain_id) as client:
         publisher = client.node.create_publisher(PlanningScene, 'monitored_planning_scene', qos)
         if qos is LATCHED:
@@ -268,7 +261,7 @@ def test_a_scene_of_another_move_group_is_received(isolation: Isolation, qos: An
 
 def test_a_scene_equal_to_the_present_one_changes_nothing() -> None:
     """What is under way is not checked again, what is prepared not prepared again."""
-    drives = started(arm())
+    drives = arm().following()
     listener = Listener(drives)
     listener.take(message('box', 'panda_link0'))
     listener.run()
@@ -283,7 +276,7 @@ def test_a_scene_equal_to_the_present_one_changes_nothing() -> None:
 
 def test_nothing_is_built_in_the_thread_that_receives() -> None:
     """Meshes take long; callbacks and the cycle go on meanwhile."""
-    drives = started(arm())
+    drives = arm().following()
     listener = Listener(drives)
     listener.take(message('cup', 'nowhere'))
     drives.run(5)

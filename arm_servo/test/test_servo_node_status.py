@@ -53,9 +53,7 @@ class Commands:
     """A servo without its ROS node, and the arm behind it."""
 
     def __init__(self) -> None:
-        self.drives = Drives()
-        self.drives.attach()
-        self.drives.run(2)
+        self.drives = Drives().following()
         self.logged: list[str] = []
         servo: Any = object.__new__(Servo)
         logger = SimpleNamespace(error=lambda text, **_: self.logged.append(text))

@@ -33,10 +33,7 @@ JOINT = 'panda_joint1'
 
 def started(worker: Executor | None = None) -> Drives:
     """Return drives of an arm of its own that follow."""
-    drives = Drives(worker=worker, model=RobotModel(*texts('panda'), table('panda')))
-    drives.attach()
-    drives.run(2)
-    return drives
+    return Drives(worker=worker, model=RobotModel(*texts('panda'), table('panda'))).following()
 
 
 def box(turned: float, name: str = 'box') -> CollisionObject:

@@ -243,9 +243,7 @@ class Stick:
     """A client that jogs the first joint of an arm whose drives others may take."""
 
     def __init__(self, client: str = 'stick') -> None:
-        self.drives = Drives()
-        self.drives.attach()
-        self.drives.run(2)
+        self.drives = Drives().following()
         self.client = client
         self.refusals: list[str] = []
 
