@@ -59,7 +59,8 @@ class Frames:
 def converter(scales: Scales, *, about_tip: bool = True) -> CommandConverter:
     """Return what makes commands."""
     parameters = ServoParameters(0.1, about_tip, '', '', '', '', '', 25.0, 0.005, ServoSettings())
-    return CommandConverter(robot('gp110'), Frames(), parameters, scales)
+    frames: Any = Frames()
+    return CommandConverter(robot('gp110'), frames, parameters, scales)
 
 
 def twist(numbers: Sequence[float], frame: str = '') -> TwistStamped:

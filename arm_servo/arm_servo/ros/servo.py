@@ -88,16 +88,17 @@ def status_of(
         return int(StatusCode.NO_WARNING), 'the arm is held; ~/resume of the trajectory controller'
     report = snapshot.set_point.report
     if snapshot.source is not Source.JOG:
-        words = _idle(snapshot.source)
+        words = IDLE_WORDS[snapshot.source]
         return int(code_of(report)), f'{words}; {report}' if report.limiters else words
     words = str(report) if not capped else f'{capped}; {report}'
     return int(code_of(report)), words
 
 
-def _idle(source: Source) -> str:
-    if source is Source.TRAJECTORY:
-        return 'a trajectory moves the arm; a command takes over'
-    return 'moves to a target' if source is Source.TARGET else 'ready'
+IDLE_WORDS = {
+    Source.TRAJECTORY: 'a trajectory moves the arm; a command takes over',
+    Source.TARGET: 'moves to a target',
+    Source.NONE: 'ready',
+}
 
 
 Convert = Callable[[Any, float], JogRequest | DisplacementRequest]
@@ -118,9 +119,12 @@ class ServoModes:
         self._kind: CommandType | None = None
         node.create_service(ServoCommandType, '~/switch_command_type', self._switch)
         node.create_service(SetBool, '~/pause_servo', self._pause)
-        node.create_service(Trigger, '~/start_servo', self._start)
-        node.create_service(Trigger, '~/stop_servo', self._stop)
-        node.create_service(Trigger, '~/unpause_servo', self._start)
+        for name, act in (
+            ('~/start_servo', self._resume),
+            ('~/unpause_servo', self._resume),
+            ('~/stop_servo', self._hold),
+        ):
+            node.create_service(Trigger, name, partial(self._answer, act))
         node.create_service(Empty, '~/reset_servo_status', self._reset)
 
     def admit(self, kind: CommandType) -> None:
@@ -150,16 +154,10 @@ class ServoModes:
         return response
 
     def _pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        response.success = True
-        response.message = self._hold() if request.data else self._resume()
-        return response
+        return self._answer(self._hold if request.data else self._resume, request, response)
 
-    def _start(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success, response.message = True, self._resume()
-        return response
-
-    def _stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success, response.message = True, self._hold()
+    def _answer(self, act: Callable[[], str], _: object, response: Any) -> Any:  # noqa: ANN401
+        response.success, response.message = True, act()
         return response
 
     def _reset(self, _: Empty.Request, response: Empty.Response) -> Empty.Response:

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from rclpy.node import Node
@@ -22,7 +22,7 @@ from arm_model import (
     RobotModel,
     rotation_of,
 )
-from arm_model.ros import xyz, xyzw
+from arm_model.ros import TfListener, xyz, xyzw
 from node_runner import ParameterReader
 
 from ..controllers.jog import JointCommand, PoseCommand, ServoSettings, TwistCommand
@@ -187,16 +187,6 @@ def _declare_scales(node: Node) -> None:
 MAX_DURATION = 60.0  # longest duration of a joint jog in [s]
 
 
-class Frames(Protocol):
-    """Frames of commands: links of the robot, or others whose pose is known."""
-
-    def link(self, frame: str) -> str | None:
-        """Return the link of the robot that a frame is; None for another frame."""
-
-    def pose(self, frame: str) -> Pose:
-        """Return the pose of a frame that is no link in the base; raises CommandError."""
-
-
 class CommandConverter:
     """Makes requests of messages; what is wrong with one is raised before anything moves.
 
@@ -204,7 +194,7 @@ class CommandConverter:
     """
 
     def __init__(
-        self, model: RobotModel, frames: Frames, parameters: ServoParameters, scales: Scales
+        self, model: RobotModel, frames: TfListener, parameters: ServoParameters, scales: Scales
     ) -> None:
         self.scales = scales
         self.capped = ''  # what was cut off the last command, in words; empty when nothing was
