@@ -15,12 +15,7 @@ import pytest
 from arm_canopen import DriveState
 from arm_canopen.cia402.modes.cyclic_position import SetpointProfile
 from arm_canopen.cia402.parameters import ProfileLimits
-from arm_canopen.cia402.state_machine import (
-    Command,
-    fault_reset,
-    next_command,
-    TARGETS,
-)
+from arm_canopen.cia402.state_machine import Command, fault_reset, next_command, TARGETS
 from canopen_core.standard import drive_state
 
 CYCLE = 0.01  # [s]

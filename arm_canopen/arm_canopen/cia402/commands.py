@@ -15,13 +15,7 @@ import math
 from typing import Any, TypeAlias, TypeVar
 
 from canopen_core import DriveError, SdoTimeoutError
-from canopen_core.standard import (
-    DriveState,
-    Index,
-    object_address,
-    OperationMode,
-    TARGET_OBJECTS,
-)
+from canopen_core.standard import DriveState, Index, object_address, OperationMode, TARGET_OBJECTS
 
 from ..config.model.drive import RecoveryPolicy
 from ..master.events import Severity

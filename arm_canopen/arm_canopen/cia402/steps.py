@@ -8,13 +8,7 @@ from collections.abc import Callable
 import contextlib
 
 from canopen_core import CodecError, DriveError, SdoError, SdoTimeoutError
-from canopen_core.standard import (
-    DriveState,
-    Index,
-    object_address,
-    OperationMode,
-    Statusword,
-)
+from canopen_core.standard import DriveState, Index, object_address, OperationMode, Statusword
 
 from ..master.events import Severity
 from ..master.scheduler import Scheduler

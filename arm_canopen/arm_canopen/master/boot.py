@@ -10,13 +10,7 @@ from enum import Enum
 from functools import partial
 from typing import Any, TypeAlias
 
-from canopen_core import (
-    BootError,
-    BusError,
-    SdoAbortError,
-    SdoError,
-    SdoTimeoutError,
-)
+from canopen_core import BootError, BusError, SdoAbortError, SdoError, SdoTimeoutError
 from canopen_core.standard import ALL_NODES, Index, NmtCommand, NmtState
 
 from ..config.model import BusConfig, SdoWrite

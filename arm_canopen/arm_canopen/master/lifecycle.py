@@ -79,8 +79,7 @@ TRANSITIONS: tuple[Transition, ...] = (
 
 WAY_DOWN = ((_S.ACTIVE, Verb.DEACTIVATE), (_S.INACTIVE, Verb.CLEANUP))
 
-MANAGER = 'lifecycle_manager'
-"""Name of the node that brings the others up and down."""
+MANAGER = 'lifecycle_manager'  # name of the node that brings the others up and down
 Work: TypeAlias = Callable[[Verb], Coroutine[Promise[Any], None, None]]
 
 

@@ -30,8 +30,7 @@ from ..config.model.bus import longest_silence, loss_unnoticed
 from .scheduler import completed, Promise
 
 REPEAT_SHARE = 0.5  # of the deadline of an RPDO, after which it is repeated
-IN_THE_IMAGE = completed()
-"""What leaves with the PDOs of this cycle counts as delivered."""
+IN_THE_IMAGE = completed()  # what leaves with the PDOs of this cycle counts as delivered
 
 StartValue: TypeAlias = Callable[[MappedObject], Number]
 Limits: TypeAlias = tuple[Number, Number]

@@ -11,12 +11,7 @@ from typing import Any
 
 from lifecycle_msgs.msg import State, TransitionDescription, TransitionEvent
 from lifecycle_msgs.msg import Transition as TransitionMessage
-from lifecycle_msgs.srv import (
-    ChangeState,
-    GetAvailableStates,
-    GetAvailableTransitions,
-    GetState,
-)
+from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 

@@ -32,8 +32,7 @@ from .bus import BusConfig, Direction, NodeConfig, PdoConfig, TPDO
 from .device_checks import check_drive, check_io_device, check_pdos, Subject
 from .drive_units import axis_units, AxisUnits, check_units
 
-HIGH_LOAD = 0.7
-"""Share of the time above which frames of low priority begin to wait noticeably."""
+HIGH_LOAD = 0.7  # share of the time above which frames of low priority begin to wait noticeably
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,8 +55,7 @@ RATES = {0xC0: NamedUnit(2.0 * math.pi / 60.0, 'rpm')}
 """Units of a velocity that an acceleration has above its unit of time."""
 
 
-RPM = NamedUnit(2.0 * math.pi / 60.0, 'rpm')
-"""What many drives count velocities in."""
+RPM = NamedUnit(2.0 * math.pi / 60.0, 'rpm')  # what many drives count velocities in
 
 
 def position_unit(value: int | None) -> NamedUnit | None:

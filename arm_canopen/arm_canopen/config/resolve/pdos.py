@@ -41,8 +41,7 @@ from ..read.section import block, describe, integer, key_number, listing, read_s
 from ..sections import MAPPING_KEYS, RPDO_KEYS, TPDO_KEYS
 from .sdo_list import find_entry, read_object
 
-PDO_KEYS = {TPDO.name: TPDO_KEYS, RPDO.name: RPDO_KEYS}
-"""The keys of one PDO."""
+PDO_KEYS = {TPDO.name: TPDO_KEYS, RPDO.name: RPDO_KEYS}  # the keys of one PDO
 AUTO, AUTO_ID = 'auto', -1  # a COB-ID from the free range, which is given when all are known
 TRANSMISSION_DEFAULT = 255
 EVENT_TYPES = (254, 255)
