@@ -3,7 +3,7 @@
 """Commands to an axis: coroutines of many cycles, each answered with a sentence.
 
 First what runs and how targets are handed over, then the commands. ``steps.py`` has the steps that
-they are made of, ``stop_commands.py`` those that stop the axis.
+they are made of, ``sequences.py`` those that stop or home it.
 """
 
 from __future__ import annotations
@@ -340,7 +340,7 @@ class AxisCommands:
         self.axis.halt.leave(self._scheduler.now, delivery)  # so that no old one revives
         self.axis.released(Refusal(RefusalCause.SINGLE_TARGET))
 
-    # The commands, beside those of ``stop_commands.py``.
+    # The commands, beside those of ``sequences.py``.
 
     async def init(self) -> str:
         """Reset a fault, enable, home where bus.yml has a method, and select no mode.

@@ -166,7 +166,7 @@ class HomeAction:
         thread: NetworkThread,
         output: OutputThread,
     ) -> None:
-        """Offer the action; arguments as of :class:`.axis_services.AxisServices`."""
+        """Offer the action; arguments as of :class:`AxisServices`."""
         self._node = node
         self._commands = commands
         self._thread = thread
