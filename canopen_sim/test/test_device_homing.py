@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import pytest
 
 from canopen_core.standard import NmtCommand
-from canopen_sim.drive.switches import Switches
+from canopen_sim.drive.axis import Switches
 
 pytestmark = pytest.mark.slow
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-r"""An axis: the motion that is demanded of a motor, and the motor that follows it.
+r"""An axis: the motion that is demanded of a motor, the motor that follows it, and its switches.
 
 The demand goes in phases of constant acceleration. A phase follows from the state at its
 beginning and from the goal (a velocity, or a position to stand at), so a goal can change at any
@@ -28,11 +28,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import auto, Enum
 import math
 from typing import NamedTuple
 
 from ..object_store import NEVER
-from .switches import Switches
 
 LIMITER_STEP = 0.001  # [s] of the rate limiter
 SETTLED = 1e-4  # [inc] a smaller distance is none
@@ -51,6 +51,75 @@ class ServoModel:
 
     lag: float = 0.002  # of the position loop in [s]; the following error is velocity times lag
     coasting: float = 0.03  # of the velocity in [s] when the power stage is off
+
+
+class Switch(Enum):
+    """A switch that homing can look for."""
+
+    NEGATIVE_LIMIT = auto()
+    POSITIVE_LIMIT = auto()
+    HOME = auto()
+
+
+SWITCH_BITS: dict[Switch, int] = {
+    Switch.NEGATIVE_LIMIT: 0x1,
+    Switch.POSITIVE_LIMIT: 0x2,
+    Switch.HOME: 0x4,
+}
+"""Bits of the digital inputs 0x60FD (CiA 402-2)."""
+
+INTERLOCK_BIT = 0x8  # of 0x60FD: safe torque off
+
+
+@dataclass(frozen=True, slots=True)
+class Switches:
+    """Where the switches of an axis are, from its mechanical zero in [inc].
+
+    The mechanical zero is where the motor stood when it was first switched on; homing does not
+    move it. The drive shows limit switches in 0x60FD, and stops at them only during homing.
+    """
+
+    # at and below it the negative limit switch is active; -inf for none
+    negative_limit: float = -4000.0
+    # at and above it the positive limit switch is active; inf for none
+    positive_limit: float = 4000.0
+    # the home switch is active from the first to the second; NaN for none
+    home: tuple[float, float] = (500.0, 700.0)
+    index: float = 100.0  # where one of the index pulses of the encoder is
+    index_period: float = 1000.0  # between two of them; 0 for none
+
+    def active(self, switch: Switch, position: float) -> bool:
+        """Return whether a switch is active at a mechanical position."""
+        match switch:
+            case Switch.NEGATIVE_LIMIT:
+                return position <= self.negative_limit
+            case Switch.POSITIVE_LIMIT:
+                return position >= self.positive_limit
+        return self.home[0] <= position <= self.home[1]
+
+    def limit_ahead(self, direction: int, position: float) -> bool:
+        """Return whether the limit switch is active that lies in a direction."""
+        ahead = Switch.POSITIVE_LIMIT if direction > 0 else Switch.NEGATIVE_LIMIT
+        return self.active(ahead, position)
+
+    def inputs(self, position: float) -> int:
+        """Return the bits of 0x60FD at a mechanical position."""
+        return sum(bit for switch, bit in SWITCH_BITS.items() if self.active(switch, position))
+
+    def edge(self, switch: Switch, side: int) -> float:
+        """Return where a switch changes; of the home switch the edge on a side."""
+        if switch is Switch.HOME:
+            return self.home[side > 0]
+        negative = switch is Switch.NEGATIVE_LIMIT
+        return self.negative_limit if negative else self.positive_limit
+
+    def next_index(self, position: float, direction: int) -> float:
+        """Return the index pulse that comes next in a direction, infinite when there is none."""
+        if self.index_period <= 0.0:
+            return direction * math.inf
+        turns = (position - self.index) / self.index_period
+        whole = math.floor(turns) + 1 if direction > 0 else math.ceil(turns) - 1
+        return self.index + whole * self.index_period
 
 
 class Limits(NamedTuple):

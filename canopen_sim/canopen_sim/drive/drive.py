@@ -18,7 +18,7 @@ from canopen_core.standard import DriveState as State
 from ..deviations import Fault, FaultInjection
 from ..messages import EmcyProducer, SyncConsumer
 from ..object_store import NEVER, ObjectStore, refusal
-from .axis import Axis, ServoModel
+from .axis import Axis, INTERLOCK_BIT, ServoModel, Switches
 from .homing import Homing
 from .modes import Dwell, Mode, NoMode, ProfilePosition, ProfileVelocity, TARGET_REACHED, Velocity
 from .objects import DriveObjects, MILLISECOND, NO_WINDOW
@@ -40,7 +40,6 @@ from .streamed_modes import (
     InterpolatedPosition,
     ProfileTorque,
 )
-from .switches import INTERLOCK_BIT, Switches
 
 MODES: tuple[type[Mode], ...] = (
     NoMode,

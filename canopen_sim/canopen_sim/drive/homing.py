@@ -12,10 +12,9 @@ from canopen_core.standard import Controlword, OperationMode, Statusword
 
 from ..messages import SyncConsumer
 from ..object_store import NEVER
-from .axis import Axis, Limits
+from .axis import Axis, Limits, Switch, Switches
 from .modes import Mode, TARGET_REACHED
 from .objects import DriveObjects
-from .switches import INDEX_METHODS, PRESENT_POSITION_METHODS, REFERENCES, Switches
 
 HOMING_START = int(Controlword.HOMING_START)
 ATTAINED = int(Statusword.HOMING_ATTAINED)
@@ -23,6 +22,45 @@ HOMING_ERROR = int(Statusword.HOMING_ERROR)
 
 NO_HOMING = 0
 STEP = 0.001  # [s] how often the switches are looked at; edges are latched exactly
+
+
+class Reference(NamedTuple):
+    """How a homing method finds home."""
+
+    switch: Switch  # what it looks for
+    side: int  # the edge of the active range that counts: -1 the lower, 1 the upper
+    final: int  # direction in which it passes that edge, and goes on to the index pulse
+    first: int  # direction in which it begins to look; at a limit switch it turns back
+    to_index: bool = True  # home is the index pulse behind the edge, otherwise the edge
+
+
+_NEGATIVE, _POSITIVE, _HOME = Switch.NEGATIVE_LIMIT, Switch.POSITIVE_LIMIT, Switch.HOME
+_WITH_INDEX: dict[int, Reference] = {
+    1: Reference(_NEGATIVE, 1, 1, -1),
+    2: Reference(_POSITIVE, -1, -1, 1),
+    3: Reference(_HOME, -1, -1, 1),
+    4: Reference(_HOME, -1, 1, 1),
+    5: Reference(_HOME, 1, 1, -1),
+    6: Reference(_HOME, 1, -1, -1),
+    7: Reference(_HOME, -1, -1, 1),
+    8: Reference(_HOME, -1, 1, 1),
+    9: Reference(_HOME, 1, -1, 1),
+    10: Reference(_HOME, 1, 1, 1),
+    11: Reference(_HOME, 1, 1, -1),
+    12: Reference(_HOME, 1, -1, -1),
+    13: Reference(_HOME, -1, 1, -1),
+    14: Reference(_HOME, -1, -1, -1),
+}
+REFERENCES: dict[int, Reference] = _WITH_INDEX | {
+    number + 16: reference._replace(to_index=False) for number, reference in _WITH_INDEX.items()
+}
+"""Methods 1 to 14, and 17 to 30 that are the same without index pulse (CiA 402-2, 0x6098)."""
+
+INDEX_METHODS = {33: -1, 34: 1}
+"""The next index pulse in a direction becomes home."""
+
+PRESENT_POSITION_METHODS = frozenset({35, 37})
+"""The present position becomes home."""
 
 
 class Move(NamedTuple):
