@@ -3,8 +3,9 @@
 """The object dictionary at run time: present values, and the rules of reading and writing them.
 
 Inside the device an object is bound once, as a :class:`Variable`, and then read and written
-through its ``value``; only SDOs look it up by index. What an SDO may do is checked here, with
-the abort codes of CiA 301, table 22. Parameters are stored as 7.5.2.13 has it.
+through its ``value``; only SDOs look it up by index. What an SDO may do is checked here: what is
+refused raises SdoAbortError, with the code of CiA 301, table 22. Parameters are stored as 7.5.2.13
+has it.
 """
 
 from __future__ import annotations
@@ -73,11 +74,7 @@ class Variable:
         self.value = default_value(self.entry)
 
     def decoded(self, data: bytes) -> Value:
-        """Return the value of bytes, within the limits of the object.
-
-        Raises:
-            SdoAbortError: The length or the range refuses it.
-        """
+        """Return the value of bytes, within the limits of the object."""
         self.check_length(len(data))
         try:
             value = decode(self.entry.data_type, data)
@@ -87,22 +84,14 @@ class Variable:
         return value
 
     def accept(self, data: bytes) -> Value:
-        """Return the value of bytes that an SDO wants to write.
-
-        Raises:
-            SdoAbortError: The length, the range or the object's own check refuses it.
-        """
+        """Return the value of bytes that an SDO wants to write."""
         value = self.decoded(data)
         if self.check is not None:
             self.check(value)
         return value
 
     def check_length(self, size: int) -> None:
-        """Refuse a transfer of so many [byte] when the type is shorter or longer.
-
-        Raises:
-            SdoAbortError: It is.
-        """
+        """Refuse a transfer of so many [byte] when the type is shorter or longer."""
         expected = self.size
         if expected is None and size > STRING_BYTES_MAX:
             raise refusal(AbortCode.OUT_OF_MEMORY, self.entry)
@@ -183,11 +172,7 @@ class ObjectStore:
         return address in self._variables
 
     def find(self, index: int, subindex: int = 0) -> Variable:
-        """Return a variable that a client names.
-
-        Raises:
-            SdoAbortError: There is no such object or sub-index.
-        """
+        """Return a variable that a client names."""
         variable = self._variables.get((index, subindex))
         if variable is not None:
             return variable
@@ -216,11 +201,7 @@ class ObjectStore:
                     variable.value = self.saved[address]
 
     def read(self, index: int, subindex: int = 0) -> bytes:
-        """Return what an SDO upload yields.
-
-        Raises:
-            SdoAbortError: No such object, write-only, or no data at present.
-        """
+        """Return what an SDO upload yields."""
         variable = self.find(index, subindex)
         if not variable.entry.access.readable:
             raise refusal(AbortCode.WRITE_ONLY, variable.entry)
@@ -230,22 +211,14 @@ class ObjectStore:
         return shown if shown is not None else encode(variable.entry.data_type, variable.value)
 
     def writable(self, index: int, subindex: int = 0) -> Variable:
-        """Return a variable that an SDO may write.
-
-        Raises:
-            SdoAbortError: No such object, or it is read-only.
-        """
+        """Return a variable that an SDO may write."""
         variable = self.find(index, subindex)
         if not variable.entry.access.writable:
             raise refusal(AbortCode.READ_ONLY, variable.entry)
         return variable
 
     def write(self, index: int, subindex: int, data: bytes, now: float) -> None:
-        """Execute an SDO download.
-
-        Raises:
-            SdoAbortError: The object, its length, range or own rules refuse it.
-        """
+        """Execute an SDO download."""
         variable = self.writable(index, subindex)
         variable.value = variable.accept(data)
         if variable.listener is not None:
@@ -266,11 +239,7 @@ FRAME_BITS = COB_ID_EXTENDED | 0x1FFF_FFFF  # bits 0 to 29: the identifier and i
 
 
 def check_can_id(entry: ObjectEntry, value: Value) -> None:
-    """Refuse an identifier for an object that is extended or set aside for other services.
-
-    Raises:
-        SdoAbortError: It is.
-    """
+    """Refuse an identifier for an object that is extended or set aside for other services."""
     can_id = int(value) & FRAME_BITS if isinstance(value, int) else 0
     if can_id > CAN_ID_MASK or any(first <= can_id <= last for first, last in RESTRICTED_CAN_IDS):
         raise refusal(AbortCode.VALUE_RANGE, entry)
@@ -280,9 +249,6 @@ def check_cob_id(variable: Integer, value: Value) -> None:
     """Refuse a COB-ID that the service behind an object cannot take.
 
     An identifier may only be changed while the service does not exist (bit 31 is set).
-
-    Raises:
-        SdoAbortError: The identifier is restricted, extended, or in use.
     """
     word = int(value) if isinstance(value, int) else 0
     if word & COB_ID_INVALID:

@@ -131,11 +131,7 @@ class PdoChannel(ABC):
         )
 
     def _resolve(self, word: int) -> Scalar:
-        """Return the object that a mapping entry names.
-
-        Raises:
-            SdoAbortError: There is none, or it cannot be mapped to this PDO.
-        """
+        """Return the object that a mapping entry names."""
         index, subindex, bits = mapped_place(word)
         variable = self._find(index, subindex)
         entry = variable.entry

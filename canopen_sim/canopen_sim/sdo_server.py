@@ -3,7 +3,7 @@
 """SDO servers of a device: expedited, segmented and block transfers (CiA 301, 7.2.4.3).
 
 One transfer at a time, as the standard has it for one SDO channel: a client that initiates
-another one gives the first up.
+another one gives the first up. What makes no sense at its point raises SdoAbortError.
 """
 
 from __future__ import annotations
@@ -43,11 +43,7 @@ class BlockDownload:
         )
 
     def segment(self, frame: bytes) -> bytes | None:
-        """Receive a segment; after the last one of a block return how far they came in order.
-
-        Raises:
-            SdoAbortError: The sequence number is 0, or the data are longer than announced.
-        """
+        """Receive a segment; after the last one of a block return how far they came in order."""
         number, last = frame[0] & ~sdo.LAST, bool(frame[0] & sdo.LAST)
         if number == 0:
             raise refusal(AbortCode.SEQUENCE_NUMBER, 'SDO block')
@@ -66,11 +62,7 @@ class BlockDownload:
         return struct.pack('<BBB5x', sdo.DOWNLOAD_ACKNOWLEDGED, taken, sdo.BLOCK_SEGMENTS_MAX)
 
     def end(self, request: bytes) -> bytes:
-        """Process the client's end; check length and checksum, and return the answer.
-
-        Raises:
-            SdoAbortError: A check failed, or the client has not sent everything.
-        """
+        """Process the client's end; check length and checksum, and return the answer."""
         if not self._finished:
             raise refusal(AbortCode.COMMAND_SPECIFIER, 'SDO block')
         command, crc = struct.unpack_from('<BH', request)
@@ -88,11 +80,7 @@ class BlockUpload:
     """A block transfer by which a client reads."""
 
     def __init__(self, request: bytes, data: bytes) -> None:
-        """Begin with the client's initiation, for the data of the object.
-
-        Raises:
-            SdoAbortError: The client requests blocks of no length.
-        """
+        """Begin with the client's initiation, for the data of the object."""
         command, self.index, self.subindex, segments = struct.unpack_from('<BHBB', request)
         self.finished = False  # the client has confirmed the end
         self._data = data
@@ -109,11 +97,7 @@ class BlockUpload:
         return struct.pack('<BHBI', command, self.index, self.subindex, len(self._data))
 
     def proceed(self, request: bytes) -> list[bytes]:
-        """Process a frame of the client within the transfer; return the answer.
-
-        Raises:
-            SdoAbortError: It makes no sense at this point.
-        """
+        """Process a frame of the client within the transfer; return the answer."""
         subcommand = request[0] & 0x03
         if subcommand == sdo.START_UPLOAD and not self._sent and not self._position:
             return self._block()

@@ -144,11 +144,7 @@ class Listener:
         self._bus.wake()
 
     def batches(self) -> Iterator[list[Frame]]:
-        """Yield what arrives.
-
-        Raises:
-            BusError: The interface went away.
-        """
+        """Yield what arrives."""
         while not self._stopped and (left := self._end - monotonic()) > 0.0:
             yield self._bus.receive(left)
 
@@ -175,11 +171,7 @@ class Screen:
         self._quiet = quiet
 
     def show(self, frames: Iterable[Frame], bus: str = '') -> bool:
-        """Print frames of a bus; return whether there is room for more.
-
-        Raises:
-            BrokenPipeError: Nobody reads any more.
-        """
+        """Print frames of a bus; return whether there is room for more."""
         lines = []
         describer = self._describers[bus]
         column = f'{bus:<{self._bus_width}}  ' if self._bus_width else ''

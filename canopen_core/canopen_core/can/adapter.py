@@ -36,11 +36,7 @@ class AdapterBus(Bus):
     """
 
     def __init__(self, name: str, interface: str, channel: str, bitrate: int | None) -> None:
-        """Open python-can's interface at the driver's channel; bitrate None leaves the adapter's.
-
-        Raises:
-            BusError: python-can does not know the interface or cannot open it.
-        """
+        """Open an interface of python-can at a channel; bitrate None leaves the adapter's."""
         super().__init__(name)
         self._open = partial(_open_driver, name, interface, channel, bitrate)
         self._bus = self._open()
@@ -54,12 +50,7 @@ class AdapterBus(Bus):
         self._damaged = 0
 
     def send(self, frame: Frame) -> None:
-        """Hand the frame to the adapter.
-
-        Raises:
-            BusError: The adapter refuses it.
-            ValueError: It is no classic CAN frame.
-        """
+        """Hand the frame to the adapter."""
         message = to_message(checked(frame))
         if self._closed:
             raise BusError(f'{self.name} is closed')
@@ -76,11 +67,7 @@ class AdapterBus(Bus):
             raise BusError(f'{self.name} refuses a frame: {error}') from error
 
     def receive(self, timeout: float) -> list[Frame]:
-        """Wait for frames; an adapter that went away is opened again when it is back.
-
-        Raises:
-            BusError: The adapter went away, or delivers damaged messages only.
-        """
+        """Wait for frames; an adapter that went away is opened again when it is back."""
         if self._closed:
             raise BusError(f'{self.name} is closed')
         if self._gone:

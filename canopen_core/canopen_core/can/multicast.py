@@ -66,11 +66,7 @@ for _head in _PLAIN_HEADS:
 
 
 def encode(frame: Frame) -> bytes:
-    """Return the datagram of a frame.
-
-    Raises:
-        ValueError: The identifier or the payload does not fit a classic CAN frame.
-    """
+    """Return the datagram of a frame."""
     can_id, data, _, is_extended, is_remote, is_error, remote_length = checked(frame)
     if is_extended or is_remote or is_error:
         head = _HEAD + _pack(can_id) + _flags(is_extended, is_remote, is_error)
@@ -83,11 +79,7 @@ def encode(frame: Frame) -> bytes:
 
 
 def decode(datagram: bytes, timestamp: float) -> Frame:
-    """Read a datagram; the frame has the steady time in [s], since the one inside is the sender's.
-
-    Raises:
-        CodecError: It is no classic CAN frame.
-    """
+    """Read a datagram that came at a steady time in [s]; the time inside is the sender's."""
     frame = _decode_plain(datagram, timestamp)
     return _decode_any(datagram, timestamp) if frame is None else frame
 
@@ -158,11 +150,7 @@ class MulticastBus(SocketBus):
     """A bus on a multicast group of the loopback interface."""
 
     def __init__(self, name: str, group: str, port: int) -> None:
-        """Join the IPv4 multicast group at a UDP port.
-
-        Raises:
-            BusError: The sockets cannot be opened.
-        """
+        """Join the IPv4 multicast group at a UDP port."""
         sender = _open_sender(name, group, port)
         try:
             receiver = _open_receiver(group, port, sender.getsockname()[0])
@@ -189,15 +177,7 @@ class MulticastBus(SocketBus):
 
 
 def check_group(name: str, group: str) -> None:
-    """Check the address of a multicast group.
-
-    Args:
-        name: Of the bus, as it was given.
-        group: Its address.
-
-    Raises:
-        BusError: It is no IPv4 multicast address.
-    """
+    """Check that the group of a bus is an IPv4 multicast address; else raise BusError."""
     try:
         address = ipaddress.ip_address(group)
     except ValueError as error:

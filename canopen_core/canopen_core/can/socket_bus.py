@@ -270,10 +270,6 @@ class SocketBus(Bus):
 
         A full queue is reported and not waited for: a cyclic frame is outdated by its successor,
         and a request is repeated by who waits for the answer.
-
-        Raises:
-            BusError: The kernel refuses it.
-            ValueError: It is no classic CAN frame.
         """
         sent, datagram = self._sent.get(frame.can_id, (None, b''))
         if sent is not frame:  # an axis at rest gets the same one in each cycle

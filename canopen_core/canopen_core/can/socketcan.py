@@ -107,11 +107,7 @@ class SocketCanBus(SocketBus):
     """A bus on a CAN network interface."""
 
     def __init__(self, name: str) -> None:
-        """Open a raw socket on the interface.
-
-        Raises:
-            BusError: The kernel has no CAN, or the interface is missing or down.
-        """
+        """Open a raw socket on the interface."""
         receiver = _open_socket(name)
         super().__init__(name, receiver, receiver, datagram_reader())
         self._queue_limit = 0
@@ -156,11 +152,7 @@ class SocketCanBus(SocketBus):
 
 
 def pack(frame: Frame) -> bytes:
-    """Return the kernel's struct can_frame.
-
-    Raises:
-        ValueError: It is no classic CAN frame, or an error frame; nobody can send those.
-    """
+    """Return the kernel's struct can_frame."""
     if frame.is_error:
         raise ValueError('an error frame is made by the controller and cannot be sent')
     can_id, data = checked(frame)[:2]

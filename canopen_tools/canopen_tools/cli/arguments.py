@@ -157,11 +157,7 @@ RED, YELLOW, RESET = '\x1b[1;31m', '\x1b[33m', '\x1b[0m'
 
 
 def print_line(text: str = '') -> None:
-    """Write a line of the result.
-
-    Raises:
-        BrokenPipeError: Nobody reads any more.
-    """
+    """Write a line of the result."""
     sys.stdout.write(f'{text}\n')
 
 

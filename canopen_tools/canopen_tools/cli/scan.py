@@ -179,7 +179,7 @@ def _find_silent(session: Session, found: dict[int, Found]) -> None:
     for position, node_id in enumerate(others):
         if beside_master:
             session.await_quiet(node_id)
-        session.send(Frame(CobId.SDO_REQUEST + node_id, request))
+        session.bus.send(Frame(CobId.SDO_REQUEST + node_id, request))
         if position % GROUP == GROUP - 1:
             session.listen(GROUP_PAUSE)
     session.listen(ANSWER)

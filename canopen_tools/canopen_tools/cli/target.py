@@ -73,14 +73,6 @@ class Session:
             self._step(IDLE_WAIT)
         return task.result()
 
-    def send(self, frame: Frame) -> None:
-        """Send a frame.
-
-        Raises:
-            BusError: The interface refuses it.
-        """
-        self.bus.send(frame)
-
     def client(
         self, node_id: int, name: str = '', dictionary: ObjectDictionary | None = None
     ) -> SdoClient:
@@ -92,7 +84,7 @@ class Session:
                 node_id,
                 name,
                 self.scheduler,
-                self.send,
+                self.bus.send,
                 dictionary=dictionary,
                 on_odd=lambda text: warn(f'{name} {text}'),
             )
@@ -102,11 +94,7 @@ class Session:
     def read(
         self, client: SdoClient, index: int, subindex: int, timeout: float, *, block: bool = False
     ) -> bytes:
-        """Read an object of a device.
-
-        Raises:
-            SdoError: The device refuses, or does not answer.
-        """
+        """Read an object of a device."""
 
         async def upload() -> bytes:
             return await client.read(index, subindex, timeout, block=block)
