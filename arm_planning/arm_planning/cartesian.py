@@ -241,7 +241,10 @@ def cartesian_path(
         slides = np.abs(turning).max(axis=0) == 0.0
         kept = _first_jump(positions, jumps, slides)
         if kept < len(positions):
-            positions, reason = positions[:kept], _jump_reason(positions, kept, model.limits)
+            step = np.abs(positions[kept] - positions[kept - 1])
+            joint = int(step.argmax())
+            reason = f'{model.limits.names[joint]} would jump by {step[joint]:.3f}'
+            positions = positions[:kept]
     total = sum(counts)
     fraction = 1.0 if total == 0 else (len(positions) - 1) / total
     if reason:
@@ -309,9 +312,3 @@ def _first_jump(positions: Array, jumps: JumpThresholds, slides: Mask) -> int:
         lengths = np.linalg.norm(steps, axis=1)
         jumped |= lengths > jumps.relative * lengths.mean()
     return int(jumped.argmax()) + 1 if jumped.any() else len(positions)
-
-
-def _jump_reason(positions: Array, kept: int, limits: JointLimits) -> str:
-    step = np.abs(positions[kept] - positions[kept - 1])
-    joint = int(step.argmax())
-    return f'{limits.names[joint]} would jump by {step[joint]:.3f}'

@@ -32,8 +32,7 @@ MAX_SEARCHES = 3
 """Searches at most, of which the shortest path counts. Constraints make a search so slow
 that the first path counts."""
 
-CHEAP = 150
-"""Samples of the search that found a path, below which another one is worth its time."""
+CHEAP = 150  # samples of the search that found a path, below which another one is worth its time
 
 RESTART = 1000
 """Samples after which a search begins anew, twice as many each time: some trees grow into a dead

@@ -147,7 +147,7 @@ class IkSolver:
             if len(free) >= count or starts >= MAX_STARTS or self._clock() >= deadline:
                 break
             end = self._descent(pose, seed)
-            best = min(best, end, key=_size)
+            best = min(best, end, key=lambda each: float(each.error @ each.error))
             starts += 1
         if free:
             return _nearest_first(free, seed)
@@ -258,10 +258,6 @@ def _out_of_reach(link: str, miss: WristMiss) -> str:
     if miss.too_near:
         return f'the wrist would be {miss.distance:.3f} m too near to the shoulder'
     return f'{link} is out of reach by {miss.distance:.3f} m'
-
-
-def _size(end: Descent) -> float:
-    return float(end.error @ end.error)
 
 
 def _known(solution: Array, among: Sequence[Array]) -> bool:

@@ -49,7 +49,7 @@ POSE = 6  # joints that a pose needs: with more of them it does not say where ea
 
 
 class PilzPlanner:
-    """Plans industrial motions of one arm; for one thread."""
+    """Plans PTP, LIN and CIRC of one arm; for one thread."""
 
     def __init__(
         self,

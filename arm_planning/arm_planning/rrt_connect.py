@@ -49,8 +49,11 @@ class MotionCheck:
 
     def clear(self, begin: Array, end: Array) -> bool:
         """Whether a straight motion from a free state is free everywhere."""
-        if self.constraints is not None and not _heeded(self.constraints, begin, end - begin):
-            return False
+        way = end - begin
+        if self.constraints is not None:  # as far as a quick look shows
+            shares = _coarse_first(math.ceil(float(np.abs(way).sum()) / LOOK) + 1)
+            if not all(map(self.constraints.heeds, begin + shares[:, None] * way)):
+                return False
         return self._check.near(begin, end, self.required) is None
 
     def waypoints(self, places: Array) -> Violation | None:
@@ -77,12 +80,6 @@ class MotionCheck:
             return None
         left = float(np.linalg.norm(target - end))
         return end if left < length - MIN_PROGRESS or left == 0.0 else None
-
-
-def _heeded(constraints: ConstraintCheck, begin: Array, way: Array) -> bool:
-    """Whether constraints hold on a straight motion, as far as a quick look shows."""
-    shares = _coarse_first(math.ceil(float(np.abs(way).sum()) / LOOK) + 1)
-    return all(map(constraints.heeds, begin + shares[:, None] * way))
 
 
 @lru_cache(maxsize=1024)

@@ -59,7 +59,8 @@ def apply_scene(snapshot: SceneSnapshot, message: Any, positions: Array) -> Scen
     things = [*message.world.collision_objects, *(each.object for each in bodies)]
     for each in things:
         for mesh in each.meshes:
-            _check_mesh(mesh, f'object {each.id!r}')
+            if problem := _problem(*_arrays(mesh)):
+                raise PlanningError(PlanningCode.FAILURE, f'object {each.id!r}: {problem}')
     try:
         scene = apply_planning_scene(
             before.scene, message, positions, lambda frame: before.frame(frame, positions)
@@ -179,13 +180,6 @@ def _fixed(
     return found
 
 
-def _check_mesh(message: Any, what: str) -> None:  # noqa: ANN401
-    """Make sure that a shape_msgs/Mesh is a body."""
-    problem = _problem(*_arrays(message))
-    if problem:
-        raise PlanningError(PlanningCode.FAILURE, f'{what}: {problem}')
-
-
 def _volumes(message: Any) -> tuple[float, float]:  # noqa: ANN401
     """Return the volumes of a closed shape_msgs/Mesh and of its hull; 0 for an open one."""
     corners, triangles = _arrays(message)
@@ -207,6 +201,7 @@ def _arrays(message: Any) -> tuple[Array, Places]:  # noqa: ANN401
 
 
 def _problem(corners: Array, triangles: Places) -> str:
+    """Return why corners and triangles of a mesh are no body; empty where they are one."""
     if not len(triangles) or not len(corners):
         return f'a mesh of {len(corners)} vertices and {len(triangles)} triangles has no volume'
     if triangles.max() >= len(corners):
