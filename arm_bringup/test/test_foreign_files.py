@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 import os
 from pathlib import Path
 import re
+from typing import Any
 
 import pytest
 from two_arms import ARMS, DRIVES, GRIPPER, write_two_arms
@@ -295,17 +296,23 @@ def test_a_xacro_file_is_expanded_once(folder: Path, monkeypatch: pytest.MonkeyP
     """As bus, groups and nodes of one bring-up all read it; what changed is read anew."""
     expand, expanded = urdf_reader.expand_xacro, list[Path]()
 
-    def counted(path: Path, *rest: Mapping[str, object] | None) -> str:
+    def counted(path: Path, *rest: Any) -> str:
         expanded.append(path)
-        return expand(path, *rest)  # type: ignore[arg-type]
+        return expand(path, *rest)
 
     monkeypatch.setattr(urdf_reader, 'expand_xacro', counted)
     (folder / 'arm.urdf').unlink()
-    for turn, link in enumerate(('base', 'tip'), 1):
-        (folder / 'arm.xacro').write_text(
-            f'<robot name="arm" {XACRO}><link name="{link}"/></robot>'
-        )
-        os.utime(folder / 'arm.xacro', (turn, turn))
+    files = {
+        'arm.xacro': f'<robot name="arm" {XACRO}><xacro:include filename="more.xml"/>'
+        '<link name="%s"/></robot>',
+        'more.xml': '<robot><link name="%s"/></robot>',
+    }
+    for name, text in files.items():
+        (folder / name).write_text(text % name)
+    changes = ('arm.xacro', 'base'), ('arm.xacro', 'tip'), ('more.xml', 'hand')
+    for turn, (name, link) in enumerate(changes, 1):
+        (folder / name).write_text(files[name] % link)
+        os.utime(folder / name, (turn, turn))
         for _ in range(2):
             assert f'<link name="{link}"/>' in read_description(found(folder))
         assert len(expanded) == turn
