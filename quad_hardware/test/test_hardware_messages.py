@@ -45,8 +45,8 @@ from quad_hardware.commander import CommandCounters
 from quad_hardware.estimation import Estimator, EstimatorSettings, UNCHECKED_DEVIATION
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.link import LinkState, LinkStatus
-from quad_hardware.nodes import messages, robot_topics
-from quad_hardware.nodes.messages import command_diagnostic, LinkDiagnostic, robot_diagnostic
+from quad_hardware.nodes import robot_topics
+from quad_hardware.nodes.diagnostics import command_diagnostic, LinkDiagnostic, robot_diagnostic
 from quad_hardware.nodes.parameters import Deviations, Frames
 from quad_hardware.protocol import Fault, LEG_MOTORS, ParserCounters
 from quad_hardware.report import Report
@@ -65,7 +65,7 @@ ROTATIONS = st.builds(from_rpy, *[st.floats(-1.2, 1.2)] * 3)
 @given(ROTATIONS, st.sampled_from([FRAMES, PARENT]))
 def test_both_trees_put_frames_at_the_same_place(rotation: Rotation, frames: Frames) -> None:
     """base_link where odometry has it; base_footprint below it on the ground, level."""
-    template, numbers = messages.transforms(replace(PLACE, rotation=rotation), frames)
+    template, numbers = robot_topics.transforms(replace(PLACE, rotation=rotation), frames)
     first, second = template.message(STAMP, numbers).transforms
     chain = {first.child_frame_id: pose(first.transform)}
     (x, y, z), turn = pose(first.transform)
@@ -94,7 +94,7 @@ def pose(transform: Transform) -> tuple[Vector, Rotation]:
 def test_joints_keep_their_order() -> None:
     """Each velocity stands beside its name; efforts, and joints not measured, are left out."""
     joints = JointSample((0.1, 0.5, 0.2), (1.0, 0.0, 2.0), unmeasured=(1,))
-    template, numbers = messages.joint_states(('b', 'arm', 'a'), joints)
+    template, numbers = robot_topics.joint_states(('b', 'arm', 'a'), joints)
     message = template.message(STAMP, numbers)
     assert message.name == ['b', 'a']
     assert list(message.position) == [0.1, 0.2]
@@ -104,14 +104,14 @@ def test_joints_keep_their_order() -> None:
 
 def imu(sample: ImuSample) -> Imu:
     """The message of a sample."""
-    template, numbers = messages.imu(sample, DEVIATIONS, 'imu_link')
+    template, numbers = robot_topics.imu(sample, DEVIATIONS, 'imu_link')
     message: Imu = template.message(STAMP, numbers)
     return message
 
 
 def odometry(state: OdometryState, frames: Frames) -> Odometry:
     """The message of a place."""
-    template, numbers = messages.odometry(IMU, state, DEVIATIONS, frames)
+    template, numbers = robot_topics.odometry(IMU, state, DEVIATIONS, frames)
     message: Odometry = template.message(STAMP, numbers)
     return message
 
@@ -180,27 +180,29 @@ def test_odometry_is_less_sure_the_farther_it_went() -> None:
     )
     assert 0.0 < near.pose.covariance[0] < far.pose.covariance[0] == 4.0
     assert far.pose.covariance[35] == pytest.approx(near.pose.covariance[35] + 0.01)
-    assert near.twist.covariance[14] == messages.UNUSED
+    assert near.twist.covariance[14] == robot_topics.UNUSED
     assert all(near.pose.covariance[::7] > 0.0)
     level = odometry(PLACE, PARENT)
     assert (level.child_frame_id, level.pose.pose.position.z) == ('base_footprint', 0.0)
 
 
-def joint_template(count: int) -> messages.Template:
+def joint_template(count: int) -> robot_topics.Template:
     """Return the template of joint states."""
-    return messages.joint_states(tuple('abcdefghijkl'[:count]), JointSample((0.0,) * count, ()))[0]
+    return robot_topics.joint_states(
+        tuple('abcdefghijkl'[:count]), JointSample((0.0,) * count, ())
+    )[0]
 
 
 BARE = replace(IMU, angular_velocity=None, acceleration=None)
 FORMS: list[MessageTemplate] = [
     joint_template(1),
     joint_template(12),
-    messages.imu(IMU, DEVIATIONS, 'imu_link')[0],
-    messages.imu(BARE, DEVIATIONS, '')[0],
-    messages.odometry(IMU, PLACE, DEVIATIONS, FRAMES)[0],
-    messages.odometry(BARE, PLACE, DEVIATIONS, replace(FRAMES, base='a longer name'))[0],
-    messages.transforms(PLACE, FRAMES)[0],
-    messages.transforms(PLACE, PARENT)[0],
+    robot_topics.imu(IMU, DEVIATIONS, 'imu_link')[0],
+    robot_topics.imu(BARE, DEVIATIONS, '')[0],
+    robot_topics.odometry(IMU, PLACE, DEVIATIONS, FRAMES)[0],
+    robot_topics.odometry(BARE, PLACE, DEVIATIONS, replace(FRAMES, base='a longer name'))[0],
+    robot_topics.transforms(PLACE, FRAMES)[0],
+    robot_topics.transforms(PLACE, PARENT)[0],
 ]
 
 
@@ -222,15 +224,15 @@ def test_every_form_takes_its_numbers(
 def test_each_source_of_contacts_is_one_of_the_message(source: ContactSource) -> None:
     """By the name of its constant; those who subscribe compare with that."""
     assert getattr(FootContacts, source.name) == source.value
-    template, numbers = messages.foot_contacts(replace(PLACE, contact_source=source))
+    template, numbers = robot_topics.foot_contacts(replace(PLACE, contact_source=source))
     message = template.message(STAMP, numbers)
     assert (message.source, list(message.name)) == (source.value, list(FEET))
 
 
 def test_an_unknown_charge_is_nan() -> None:
     """As the message wants it; a known one is a share."""
-    assert math.isnan(messages.battery(RobotState(), STAMP).percentage)
-    known = messages.battery(RobotState(battery=0.8, voltage=7.4), STAMP)
+    assert math.isnan(robot_topics.battery(RobotState(), STAMP).percentage)
+    known = robot_topics.battery(RobotState(battery=0.8, voltage=7.4), STAMP)
     assert known.percentage == pytest.approx(0.8)
     assert known.voltage == pytest.approx(7.4)
 
@@ -316,7 +318,7 @@ def test_an_orientation_whose_signs_nobody_checked_is_uncertain(checked: bool) -
     """In /imu and /odom, so that nobody levels by it, and in the diagnostics."""
     sample = replace(IMU, deviation=0.0 if checked else UNCHECKED_DEVIATION)
     expected = DEVIATIONS.orientation if checked else math.pi / 2
-    template, numbers = messages.odometry(sample, PLACE, DEVIATIONS, FRAMES)
+    template, numbers = robot_topics.odometry(sample, PLACE, DEVIATIONS, FRAMES)
     pose_covariance = template.message(STAMP, numbers).pose.covariance
     assert pose_covariance[21] == pytest.approx(expected**2)
     assert imu(sample).orientation_covariance[0] == pytest.approx(expected**2)

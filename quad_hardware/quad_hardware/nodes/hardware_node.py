@@ -33,7 +33,7 @@ from ..exceptions import CommandError, HardwareError
 from ..joints import NOMINAL_PERIOD
 from ..link import LinkState
 from ..serial_robot import LINK, SerialRobot
-from .messages import command_diagnostic
+from .diagnostics import command_diagnostic
 from .parameters import declare_parameters
 from .robot_topics import log_link, RobotTopics, WARN_PERIOD
 

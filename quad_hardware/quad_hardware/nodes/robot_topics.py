@@ -1,29 +1,253 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The topics of a robot's state, whether it is on a serial line or in the log of one."""
+"""The state of a robot, on a serial line or in the log of one, as ROS topics (REP 103, 105, 145).
+
+What is published with every report comes as a template, which makes the message, and as the
+numbers that change from one message to the next. Standard deviations are None where a value is
+not measured.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
+import math
 import time
+from typing import Any, TypeAlias
 
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import Point, Quaternion, Transform, TransformStamped, Vector3
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import BatteryState, Imu, JointState
-from std_msgs.msg import Float64, String
+from std_msgs.msg import Float64, Header, String
 from tf2_msgs.msg import TFMessage
 
 from message_templates import FastPublisher
 from node_runner import LATCHED
-from quad_description import RobotState
+from quad_description import FEET, ImuSample, JointSample, OdometryState, RobotState
+from quad_description.rotations import about_z, conjugate, multiply, rotate, yaw_of
+from quad_description.rotations import Quaternion as Rotation
 from quad_msgs.msg import FootContacts
 
 from ..link import LinkState
 from ..serial_robot import ObservedRobot, ROBOT
-from . import messages
-from .messages import LinkDiagnostic, robot_diagnostic
+from .diagnostics import LinkDiagnostic, robot_diagnostic
 from .parameters import Deviations, Frames
+
+NOT_THERE = [-1.0, *([0.0] * 8)]  # covariance of what is not measured (REP 145)
+UNUSED = 1e6  # variance of what is not measured
+VELOCITY_VARIANCE = 0.03**2  # [m²/s²]
+HEIGHT_VARIANCE = 0.01**2  # [m²]
+
+Numbers = Sequence[float]
+Message: TypeAlias = Any
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """What messages that differ by stamp and numbers have in common."""
+
+    make: Callable[..., Message]  # of stamp, numbers, and the arguments
+    count: int  # of the numbers
+    arguments: tuple[Hashable, ...]  # what does not change from one message to the next
+
+    def message(self, stamp: Time, numbers: Numbers) -> Message:
+        """Make a message."""
+        return self.make(stamp, numbers, *self.arguments)
+
+
+def joint_states(names: tuple[str, ...], joints: JointSample) -> tuple[Template, Numbers]:
+    """Return the joints that are measured, of all joints by name; efforts are not known."""
+    columns = joints.positions, joints.velocities or ()
+    if joints.unmeasured:
+        names = tuple(joints.measured(names))
+        left_out = joints.unmeasured
+        numbers = [n for column in columns for i, n in enumerate(column) if i not in left_out]
+        return Template(_joint_states, 2 * len(names), names), numbers
+    return Template(_joint_states, 2 * len(names), names), (*columns[0], *columns[1])
+
+
+def _joint_states(stamp: Time, numbers: Numbers, *names: str) -> JointState:
+    return JointState(
+        header=Header(stamp=stamp),
+        name=list(names),
+        position=numbers[: len(names)],
+        velocity=numbers[len(names) :],
+    )
+
+
+def imu(sample: ImuSample, deviations: Deviations, frame: str) -> tuple[Template, Numbers]:
+    """Return attitude, angular velocity and specific force; zeros for what is not measured."""
+    acceleration = None if sample.acceleration is None else deviations.acceleration
+    known = _tilt(sample, deviations), _rate(sample, deviations), acceleration
+    rate, felt = sample.angular_velocity or _ZERO, sample.acceleration or _ZERO
+    return Template(_imu, 10, (frame, known)), (*sample.orientation, *rate, *felt)
+
+
+def _imu(
+    stamp: Time,
+    numbers: Numbers,
+    frame: str,
+    deviations: tuple[float, float | None, float | None],
+) -> Imu:
+    orientation, rate, acceleration = map(_diagonal3, deviations)
+    return Imu(
+        header=Header(stamp=stamp, frame_id=frame),
+        orientation=_quaternion(numbers[:4]),
+        orientation_covariance=orientation,
+        angular_velocity=_vector(numbers[4:7]),
+        angular_velocity_covariance=rate,
+        linear_acceleration=_vector(numbers[7:]),
+        linear_acceleration_covariance=acceleration,
+    )
+
+
+def odometry(
+    sample: ImuSample, state: OdometryState, deviations: Deviations, frames: Frames
+) -> tuple[Template, Numbers]:
+    """Return the pose in odom and the velocity in base_link (or in the footprint)."""
+    rotation, height = state.rotation, state.height
+    rate = sample.angular_velocity or _ZERO  # in the body
+    child, velocity = frames.base, state.velocity_in_base
+    if frames.footprint_is_parent:
+        child, velocity = frames.footprint, (state.velocity_x, state.velocity_y, 0.0)  # level
+        rate = rotate(_level(rotation), rate)
+        rotation, height = about_z(yaw_of(rotation)), 0.0
+    known = _tilt(sample, deviations), _rate(sample, deviations)
+    place = state.x, state.y, height
+    variances = state.position_variance, known[0] ** 2 + state.yaw_variance
+    numbers = (*place, *rotation, *velocity, *rate, *variances)
+    return Template(_odometry, len(numbers), (frames.odom, child, known)), numbers
+
+
+def _odometry(
+    stamp: Time,
+    numbers: Numbers,
+    frame: str,
+    child: str,
+    deviations: tuple[float, float | None],
+) -> Odometry:
+    tilt, rate = deviations
+    message = Odometry(header=Header(stamp=stamp, frame_id=frame))
+    message.child_frame_id = child
+    x, y, z = numbers[:3]
+    message.pose.pose.position = Point(x=x, y=y, z=z)
+    message.pose.pose.orientation = _quaternion(numbers[3:7])
+    place, yaw = numbers[13:]
+    level = tilt**2
+    message.pose.covariance = _diagonal6((place, place, HEIGHT_VARIANCE, level, level, yaw))
+    message.twist.twist.linear = _vector(numbers[7:10])
+    message.twist.twist.angular = _vector(numbers[10:13])
+    turning = UNUSED if rate is None else rate**2
+    message.twist.covariance = _diagonal6(
+        (VELOCITY_VARIANCE, VELOCITY_VARIANCE, UNUSED, *[turning] * 3)
+    )
+    return message
+
+
+def foot_contacts(state: OdometryState) -> tuple[Template, Numbers]:
+    """Return which feet are taken to stand, and how that is known."""
+    return Template(_foot_contacts, 0, (state.contact_source.value, *state.standing)), ()
+
+
+def _foot_contacts(stamp: Time, _numbers: Numbers, source: str, *contacts: bool) -> FootContacts:
+    return FootContacts(
+        header=Header(stamp=stamp), name=list(FEET), contact=list(contacts), source=source
+    )
+
+
+def transforms(state: OdometryState, frames: Frames) -> tuple[Template, Numbers]:
+    """Return odom to base_link and base_link to base_footprint, or the other way round."""
+    tilt, place = _level(state.rotation), (state.x, state.y)
+    if frames.footprint_is_parent:
+        names = frames.odom, frames.footprint, frames.base
+        heading = about_z(yaw_of(state.rotation))
+        numbers = (*place, 0.0, *heading, 0.0, 0.0, state.height, *tilt)
+    else:
+        names, upright = (frames.odom, frames.base, frames.footprint), conjugate(tilt)
+        below = rotate(upright, (0.0, 0.0, -state.height))
+        numbers = (*place, state.height, *state.rotation, *below, *upright)
+    return Template(_transforms, len(numbers), names), numbers
+
+
+def _transforms(stamp: Time, numbers: Numbers, odom: str, first: str, second: str) -> TFMessage:
+    return TFMessage(
+        transforms=[
+            _transform(odom, first, numbers[:7], stamp),
+            _transform(first, second, numbers[7:], stamp),
+        ]
+    )
+
+
+def battery(state: RobotState, stamp: Time) -> BatteryState:
+    """Return the charge; what is not reported is NaN, as the message wants it."""
+    unknown = math.nan
+    return BatteryState(
+        header=Header(stamp=stamp),
+        voltage=unknown if state.voltage is None else state.voltage,
+        temperature=unknown,
+        current=unknown,
+        charge=unknown,
+        capacity=unknown,
+        design_capacity=unknown,
+        percentage=unknown if state.battery is None else state.battery,
+        power_supply_status=BatteryState.POWER_SUPPLY_STATUS_UNKNOWN,
+        power_supply_health=BatteryState.POWER_SUPPLY_HEALTH_UNKNOWN,
+        power_supply_technology=BatteryState.POWER_SUPPLY_TECHNOLOGY_LION,
+        present=True,
+    )
+
+
+_ZERO = (0.0, 0.0, 0.0)
+
+
+def _tilt(sample: ImuSample, deviations: Deviations) -> float:
+    return max(deviations.orientation, sample.deviation)
+
+
+def _rate(sample: ImuSample, deviations: Deviations) -> float | None:
+    if sample.angular_velocity is None:
+        return None
+    return deviations.rate if sample.rate_differentiated else deviations.gyro
+
+
+def _level(rotation: Rotation) -> Rotation:
+    """Return roll and pitch of a rotation, without its yaw."""
+    return multiply(about_z(-yaw_of(rotation)), rotation)
+
+
+def _transform(parent: str, child: str, pose: Numbers, stamp: Time) -> TransformStamped:
+    return TransformStamped(
+        header=Header(stamp=stamp, frame_id=parent),
+        child_frame_id=child,
+        transform=Transform(translation=_vector(pose[:3]), rotation=_quaternion(pose[3:])),
+    )
+
+
+def _quaternion(numbers: Numbers) -> Quaternion:
+    x, y, z, w = numbers
+    return Quaternion(x=x, y=y, z=z, w=w)
+
+
+def _vector(numbers: Numbers) -> Vector3:
+    x, y, z = numbers
+    return Vector3(x=x, y=y, z=z)
+
+
+def _diagonal3(deviation: float | None) -> list[float]:
+    if deviation is None:
+        return NOT_THERE
+    variance = deviation**2
+    return [variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance]
+
+
+def _diagonal6(variances: Numbers) -> list[float]:
+    covariance = [0.0] * 36
+    covariance[::7] = variances
+    return covariance
+
 
 SENSOR_DEPTH = 10  # reliable, which best-effort subscribers can receive as well
 WARN_PERIOD = 2.0  # [s] between two warnings of the same kind
@@ -79,10 +303,10 @@ class RobotTopics:
             self._servos.publish(String(data=state.servo_problem))
         # what a controller waits for comes first
         if (joints := state.joints) is not None:
-            template, numbers = messages.joint_states(self._robot.names, joints)
+            template, numbers = joint_states(self._robot.names, joints)
             self._joint_states.publish(template, self._stamp(joints.time), numbers)
-        imu, odometry = state.imu, state.odometry
-        if imu is None or odometry is None:
+        measured, way = state.imu, state.odometry
+        if measured is None or way is None:
             self._node.get_logger().error(
                 f'no /imu, /odom, /foot_contacts and transforms: {state.imu_problem}; the joints '
                 'are published, and the robot can lie down',
@@ -91,13 +315,13 @@ class RobotTopics:
             return
         deviations, frames, stamp = self._deviations, self._frames, self._stamp(state.time)
         for publisher, (template, numbers) in (
-            (self._imu, messages.imu(imu, deviations, frames.imu)),
-            (self._odom, messages.odometry(imu, odometry, deviations, frames)),
-            (self._contacts, messages.foot_contacts(odometry)),
+            (self._imu, imu(measured, deviations, frames.imu)),
+            (self._odom, odometry(measured, way, deviations, frames)),
+            (self._contacts, foot_contacts(way)),
         ):
             publisher.publish(template, stamp, numbers)
         if frames.publish:
-            template, numbers = messages.transforms(odometry, frames)
+            template, numbers = transforms(way, frames)
             self._tf.publish(template, stamp, numbers)
 
     def publish_diagnostics(
@@ -127,7 +351,7 @@ class RobotTopics:
             array.status.append(
                 robot_diagnostic(name, port, state, status, gravity_error=error, recording=box)
             )
-            self._battery.publish(messages.battery(state, now))
+            self._battery.publish(battery(state, now))
             if state.joints is not None:
                 self._velocity_error.publish(Float64(data=state.joints.velocity_error))
         self._diagnostics.publish(array)
