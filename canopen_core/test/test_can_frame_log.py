@@ -21,13 +21,7 @@ from hypothesis import strategies as st
 import pytest
 
 from canopen_core import CodecError
-from canopen_core.can import (
-    bus,
-    Frame,
-    LogWriter,
-    read_buses,
-    read_log,
-)
+from canopen_core.can import bus, Frame, LogWriter, read_buses, read_log
 from canopen_core.can.adapter import from_message
 from canopen_core.can.candump_format import log_channel, parse_line, read_lines
 

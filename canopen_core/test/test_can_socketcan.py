@@ -20,14 +20,7 @@ from hypothesis import strategies as st
 import pytest
 
 from canopen_core import BusError
-from canopen_core.can import (
-    Bus,
-    CanInterface,
-    error_text,
-    Frame,
-    missing_interface_text,
-    open_bus,
-)
+from canopen_core.can import Bus, CanInterface, error_text, Frame, missing_interface_text, open_bus
 from canopen_core.can.socketcan import failure_text, pack, SocketCanBus, unpack
 
 _numbers = itertools.count()

@@ -15,13 +15,7 @@ from hypothesis import strategies as st
 import pytest
 
 from canopen_core import CodecError, ConfigError
-from canopen_core.eds import (
-    bytes_from_text,
-    Eds,
-    load_eds,
-    parse_integer,
-    text_from_bytes,
-)
+from canopen_core.eds import bytes_from_text, Eds, load_eds, parse_integer, text_from_bytes
 from canopen_core.eds.ini import BYTE_TYPES, EdsValue, parse_value
 from canopen_core.standard import (
     AccessType,

@@ -7,13 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from canopen_core.can import Frame
-from canopen_core.standard import (
-    AccessType,
-    DataType,
-    Index,
-    ObjectEntry,
-    SYNCHRONOUS_MAX,
-)
+from canopen_core.standard import AccessType, DataType, Index, ObjectEntry, SYNCHRONOUS_MAX
 
 from .object_store import make_variable, NEVER, ObjectStore, Variable
 from .pdo_channel import channel_numbers, PdoChannel, PdoEngine, TRANSMISSION_EVENT

@@ -26,14 +26,7 @@ from types import FrameType
 
 from arm_canopen.config import BusConfig, load_bus
 from canopen_core import CanopenError, CodecError
-from canopen_core.can import (
-    Bus,
-    Frame,
-    LogWriter,
-    open_bus,
-    read_buses,
-    wall_clock_offset,
-)
+from canopen_core.can import Bus, Frame, LogWriter, open_bus, read_buses, wall_clock_offset
 
 from .cli.arguments import split_ros_arguments
 from .monitor import FrameDescriber, FrameFilter

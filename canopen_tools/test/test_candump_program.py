@@ -18,13 +18,7 @@ import pytest
 from tool_environment import ENVIRONMENT, Output, REPOSITORY
 
 from arm_canopen import BusError
-from canopen_core.can import (
-    Bus,
-    Frame,
-    LogWriter,
-    open_bus,
-    read_log,
-)
+from canopen_core.can import Bus, Frame, LogWriter, open_bus, read_log
 from canopen_tools import candump
 
 pytestmark = pytest.mark.slow
