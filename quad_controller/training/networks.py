@@ -75,12 +75,7 @@ def _layers(values: jax.Array, outputs: int, last: float) -> jax.Array:
 
 
 class Normaliser:
-    """Subtracts a mean and divides by a deviation that stay as they are: skrl's preprocessor.
-
-    Attributes:
-        mean: Of the observations.
-        deviation: Of the observations.
-    """
+    """Subtracts a mean and divides by a deviation that stay as they are: skrl's preprocessor."""
 
     def __init__(self, mean: Floats, deviation: Floats) -> None:
         """Take both."""

@@ -112,14 +112,7 @@ class Stance:
 
 
 class Walker:
-    """Stands or trots; one call of :meth:`step` for every set of targets.
-
-    Attributes:
-        stance: How it stands; a host may change it.
-        command: Wanted speed ahead [m/s], to the left [m/s] and turning [rad/s].
-        marking_time: Trots on the spot.
-        lift: Of a foot [m].
-    """
+    """Stands or trots; one call of :meth:`step` for every set of targets."""
 
     def __init__(self, urdf: str) -> None:
         """Stand, as after switching on."""
@@ -128,10 +121,11 @@ class Walker:
 
     def reset(self) -> None:
         """Stand, as after switching on."""
-        self.stance = Stance()
+        self.stance = Stance()  # how it stands; a host may change it
+        # wanted speed ahead [m/s], to the left [m/s] and turning [rad/s]
         self.command: Vector = (0.0, 0.0, 0.0)
-        self.marking_time = False
-        self.lift = LIFT
+        self.marking_time = False  # trots on the spot
+        self.lift = LIFT  # of a foot [m]
         self._speed: Vector = (0.0, 0.0, 0.0)
         self._phase = 0.0
         self._stride = 0.0  # share of the lift, for a soft start and end

@@ -167,12 +167,7 @@ class Truth:
 
 
 class Server:
-    """Lets a robot live in real time; :meth:`run` is its loop, for a thread of its own.
-
-    Attributes:
-        truth: Where the robot was last; may be read from any thread.
-        stopping: Ends :meth:`run` when it is set.
-    """
+    """Lets a robot live in real time; :meth:`run` is its loop, for a thread of its own."""
 
     def __init__(
         self,
@@ -186,7 +181,7 @@ class Server:
         self._actions: deque[tuple[Future[object], Callable[[], object]]] = deque()
         self._wake_read, self._wake_write = os.pipe()
         os.set_blocking(self._wake_read, False)
-        self.stopping = threading.Event()
+        self.stopping = threading.Event()  # ends :meth:`run` when it is set
         self._start = time.monotonic()
         self._watch = watch
         self._look()
@@ -261,5 +256,6 @@ class Server:
     def _look(self) -> None:
         self._looked_at = self.now
         plant = self._plant
+        # where the robot was last; may be read from any thread
         self.truth = Truth(plant.time, plant.base_pose, plant.base_velocity, plant.foot_contacts)
         self._watch()

@@ -58,18 +58,7 @@ class GaitStep:
 
 
 class GaitGenerator:
-    """Walks.
-
-    Attributes:
-        velocity: Velocity that is walked at the moment.
-        goal: Velocity that is approached.
-        limits: How fast the robot may go.
-        clamped: Whether that is less than was requested.
-        pose: Pose of the body over its feet at the moment.
-        gait: The gait at the moment.
-        wanted_gait: The gait that was chosen, which begins at rest.
-        others: Positions of all joints; those that are no legs' are sent as they are [rad].
-    """
+    """Walks: gives targets of all joints, step after step."""
 
     def __init__(
         self, robot: Quadruped, parameters: GaitParameters, others: Sequence[float] | None = None
@@ -83,11 +72,12 @@ class GaitGenerator:
         """
         self._robot = robot
         self._parameters = parameters
+        # of all joints [rad]; those that are no legs' are sent as they are
         self.others: Targets = tuple(others or [0.0] * len(robot.names))
-        self.limits = parameters.velocity_limits
+        self.limits = parameters.velocity_limits  # how fast the robot may go
         self._centre = robot.hip_centre
         self._neutral = parameters.stance(robot, self.others)
-        self.gait = self.wanted_gait = Gait.TROT
+        self.gait = self.wanted_gait = Gait.TROT  # the one that was chosen begins at rest
         self._lifts = {
             gait: SwingLift(robot, self._neutral, self._scheduled(gait), parameters.swing_height)
             for gait in Gait
@@ -105,9 +95,9 @@ class GaitGenerator:
         )
         _ = self.stand_targets  # refuses servos that cannot carry it
         self._unsettled = 0  # steps in which the compensation still sees the end of the gait
-        self.velocity = self.goal = REST
-        self.clamped = False
-        self.pose = UPRIGHT
+        self.velocity = self.goal = REST  # walked at the moment, and approached
+        self.clamped = False  # whether that is less than was requested
+        self.pose = UPRIGHT  # of the body over its feet at the moment
 
     @property
     def standing(self) -> bool:

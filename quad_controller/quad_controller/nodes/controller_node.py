@@ -72,11 +72,7 @@ Reply = TypeVar('Reply', SetMode.Response, Trigger.Response)
 
 
 class ControllerNode(Node):
-    """Subscribes the robot's state and what is asked of it, and publishes joint commands.
-
-    Attributes:
-        failure: Why the loop ended, empty as long as it runs.
-    """
+    """Subscribes the robot's state and what is asked of it, and publishes joint commands."""
 
     @destroyed_when_refused
     def __init__(self, stop: threading.Event) -> None:
@@ -122,7 +118,7 @@ class ControllerNode(Node):
         self._unreported: tuple[str, ...] = ()
         self._title = ''
         self._ready = False
-        self._stop, self.failure = stop, ''
+        self._stop, self.failure = stop, ''  # why the loop ended, empty as long as it runs
         self._commands, self._shadow = (
             FastPublisher(self.create_publisher(JointCommand, topic, COMMAND_QOS))
             for topic in ('joint_command', 'joint_command_shadow')

@@ -272,13 +272,7 @@ FLUSH_PERIOD = 1.0  # [s] after which what was written outlives the process
 
 
 class Recorder:
-    """One recording, from :meth:`start` to :meth:`close`.
-
-    Attributes:
-        folder: Where it is.
-        lost: Steps that were not written, because the disk was too slow or full.
-        failure: Why nothing is written any more; empty as long as it is.
-    """
+    """One recording, from :meth:`start` to :meth:`close`."""
 
     def __init__(self, folder: Path, about: Mapping[str, str], backlog: int = BACKLOG) -> None:
         """Make the folder; at most ``backlog`` steps wait.
@@ -287,7 +281,8 @@ class Recorder:
             ParameterError: It cannot be made.
         """
         self.folder = folder
-        self.lost, self.failure = 0, ''
+        self.lost = 0  # steps that were not written: the disk was too slow or full
+        self.failure = ''  # why nothing is written any more
         try:
             self._writer = BagWriter(folder, WriterOptions(custom=about))
             definition = message_definition(TYPE)

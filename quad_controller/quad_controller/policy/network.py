@@ -27,17 +27,7 @@ FLOAT = 'tensor(float)'  # ONNX Runtime's name of the type
 
 
 class OnnxNetwork:
-    """A network in an ONNX file, run by ONNX Runtime on one thread.
-
-    Attributes:
-        name: Of its file.
-        digest: SHA-256 of its file and of those that its weights lie in.
-        sides: Names of the files that its weights lie in.
-        metadata: What its file has.
-        inputs: Name, type and shape of each input.
-        outputs: The same of each output.
-        warnings: What a person should know of the file.
-    """
+    """A network in an ONNX file, run by ONNX Runtime on one thread."""
 
     def __init__(self, path: Path, *, new_weights: bool = False) -> None:
         """Load it.
@@ -49,10 +39,12 @@ class OnnxNetwork:
             PolicyError: There is no such file, no ONNX Runtime, or it cannot be loaded.
         """
         model = read_model(path)
+        # SHA-256 of the file and of the side files that its weights lie in
         self.name, self.digest, self.sides = path.name, model.digest, tuple(model.sides)
         session = _session(path, model)
         self.metadata: Mapping[str, str] = dict(session.get_modelmeta().custom_metadata_map)
         self.warnings = _check_weights(path, model, {} if new_weights else self.metadata)
+        # name, type and shape of each
         self.inputs = _ports(session.get_inputs())
         self.outputs = _ports(session.get_outputs())
         self._session = session

@@ -33,13 +33,7 @@ class PolicyStep:
 
 
 class PolicyRunner:
-    """A trained policy that fits the robot.
-
-    Attributes:
-        name: How it is called in messages.
-        digest: SHA-256 of its file.
-        contract: What it expects.
-    """
+    """A trained policy that fits the robot."""
 
     def __init__(
         self,

@@ -145,10 +145,6 @@ class SerialArena(Backend):
     """A robot in physics behind its serial line, in another process and in real time.
 
     Its machine may be busy: the robot is waited for, and that is noted.
-
-    Attributes:
-        interruption: What the machine did since the robot stood or was measured; empty for
-            nothing.
     """
 
     def __init__(self, served: ServedRobot, driver: Backend) -> None:
@@ -156,6 +152,7 @@ class SerialArena(Backend):
         self._served, self._driver = served, driver
         self.names, self.period = driver.names, driver.period
         self.backend: Backend = self
+        # what the machine did since the robot stood or was measured; empty for nothing
         self.interruption = ''
         self._stepped_at: float | None = None
 

@@ -132,12 +132,7 @@ def course_for(ranges: CommandRanges | None) -> tuple[Velocity, ...]:
 
 
 class WalkingRobot:
-    """A back end and the controller that walks it.
-
-    Attributes:
-        controller: The controller.
-        observed: What the policy saw so far.
-    """
+    """A back end and the controller that walks it."""
 
     def __init__(
         self,
@@ -160,7 +155,7 @@ class WalkingRobot:
 
     def forget(self) -> None:
         """Count targets and observations from now on."""
-        self.observed: list[Floats] = []
+        self.observed: list[Floats] = []  # what the policy saw so far
         self._targets: list[np.ndarray] = []
         self._bends, self._bend_count = 0.0, 0
 
@@ -233,11 +228,7 @@ class WalkingRobot:
 
 
 class CourseWalker:
-    """Walks courses in an arena, and stands up again after each fall.
-
-    Attributes:
-        interruptions: Walks that the machine cut off, and not the robot.
-    """
+    """Walks courses in an arena, and stands up again after each fall."""
 
     def __init__(
         self,
@@ -247,7 +238,8 @@ class CourseWalker:
         gait: GaitParameters = AS_TUNED,
     ) -> None:
         """Put the robot on its feet, walked by a policy or the gait."""
-        self._arena, self.interruptions = arena, 0
+        self._arena = arena
+        self.interruptions = 0  # walks that the machine cut off, and not the robot
         self._walker = WalkingRobot(arena.backend, robot, policy, arena.stand(), gait)
 
     def walk(

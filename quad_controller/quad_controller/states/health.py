@@ -25,32 +25,22 @@ MAX_PAUSE = 0.1  # [s] that counts of a single step that came late
 
 
 class Health:
-    """The newest measurements, how old they are, and what is wrong.
-
-    Attributes:
-        joints: The newest usable joint states, None before the first.
-        imu: The newest usable attitude, None before the first.
-        battery: The newest charge 0 to 1, None when nothing is known of it.
-        servo_problem: Why the servos may carry the robot no longer; empty while they may.
-        joints_age: Time since the joint states in [s].
-        imu_age: Time since the attitude in [s].
-        refused: How many samples could not be used.
-    """
+    """The newest measurements, how old they are, and what is wrong."""
 
     def __init__(self, count: int, parameters: StateParameters) -> None:
         """Start without a measurement."""
         self._count = count
         self._parameters = parameters
-        self.joints: JointSample | None = None
-        self.imu: ImuSample | None = None
-        self.battery: float | None = None
-        self.servo_problem = ''
-        self.joints_age = self.imu_age = math.inf
+        self.joints: JointSample | None = None  # the newest usable ones
+        self.imu: ImuSample | None = None  # the newest usable attitude
+        self.battery: float | None = None  # the newest charge, 0 to 1
+        self.servo_problem = ''  # why the servos may carry the robot no longer
+        self.joints_age = self.imu_age = math.inf  # time since they were measured in [s]
         self._linear_velocity: Vector | None = None
         self._linear_velocity_age = math.inf
         self._foot_contacts: tuple[bool, ...] | None = None
         self._foot_contacts_age = math.inf
-        self.refused = 0
+        self.refused = 0  # samples that could not be used
         self._refusals: dict[Fault, tuple[str, float]] = {}  # reason, and its age [s]
         self._late = False
         self._falling_for: float | None = None

@@ -122,16 +122,12 @@ class PolicyMotion(Motion):
 
 
 class PolicyChoice:
-    """Which policy the mode ``policy`` follows, or which is only watched in a dry run.
-
-    Attributes:
-        policy: The policy; None for none.
-        dry_run: Whether it is only asked, and never followed.
-    """
+    """Which policy the mode ``policy`` follows, or which is only watched in a dry run."""
 
     def __init__(self, policy: PolicyRunner | None, refusal: str, *, dry_run: bool) -> None:
         """Begin with a policy, or with why there is none."""
-        self.policy, self._refusal, self.dry_run = policy, refusal, dry_run
+        self.policy, self._refusal = policy, refusal
+        self.dry_run = dry_run  # whether it is only asked, and never followed
         self._watched_steps = 0
         self._asked: Asked | None = None
 
@@ -175,13 +171,7 @@ class PolicyChoice:
 
 
 class StateMachine:
-    """Goes from state to state, and knows the motion of each.
-
-    Attributes:
-        state: The state of now.
-        goal: The state that was requested.
-        motion: What moves the joints now.
-    """
+    """Goes from state to state, and knows the motion of each."""
 
     def __init__(
         self,
@@ -197,8 +187,8 @@ class StateMachine:
         self._lie_down: Blend | None = None
         self._reaction: Reaction | None = None
         self._after_standing: State | None = None
-        self.state = self.goal = State.RELAX
-        self.motion: Motion = self._walk
+        self.state = self.goal = State.RELAX  # that of now, and the one requested
+        self.motion: Motion = self._walk  # what moves the joints now
 
     @property
     def title(self) -> str:

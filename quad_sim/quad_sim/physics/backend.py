@@ -112,11 +112,7 @@ class ImuBias:
 
 
 class PhysicsBackend(Backend):
-    """Has a robot followed by ideal sensors: no noise, and its position is known.
-
-    Attributes:
-        robot: The robot, to push it or to look at it.
-    """
+    """Has a robot followed by ideal sensors: no noise, and its position is known."""
 
     def __init__(
         self,

@@ -65,25 +65,20 @@ class _UnfitError(Exception):
 
 
 class _Section:
-    """Takes keys out of a mapping, one after the other; all sections of a contract share findings.
-
-    Attributes:
-        hints: Where a person finds the value of an open key, by its path.
-        open: Keys that are needed and have no value, with what they mean.
-        wrong: What is unknown or senseless.
-        values: What the mapping has.
-    """
+    """Takes keys out of a mapping, one by one; all sections of a contract share findings."""
 
     def __init__(self, values: object, path: str, above: _Section | None = None) -> None:
+        # where a person finds the value of an open key, by its path
         self.hints: Mapping[str, str] = above.hints if above else {}
+        # keys that are needed and have no value, with what they mean
         self.open: list[str] = above.open if above else []
-        self.wrong: list[str] = above.wrong if above else []
+        self.wrong: list[str] = above.wrong if above else []  # what is unknown or senseless
         self._path = path
         self._known: list[str] = []
         if not isinstance(values, Mapping):
             self.wrong.append(f'{path or "the contract"} must be a mapping, not {values!r}')
             values = {}
-        self.values = {str(key): value for key, value in values.items()}
+        self.values = {str(key): value for key, value in values.items()}  # what the mapping has
 
     def path(self, key: str) -> str:
         """Return the whole path of a key."""
