@@ -32,7 +32,13 @@ def test_first(request):
     [
         ('len(runs) == 1', '', 2, '1 passed, 1 rerun', False),
         ('False', '', 2, '1 failed in', False),
-        ('False', "print('the drives got no processor for 1 s')", 2, '1 passed, 1 rerun', False),
+        (
+            'False',
+            "print('the drives got no processor for 1.00 s')",
+            2,
+            '1 passed, 1 rerun',
+            False,
+        ),
         ('True', '', 9, '1 failed, 2 rerun', True),
     ],
 )
