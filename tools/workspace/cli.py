@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The commands behind the Makefile."""
+"""The commands behind the Makefile.
+
+Those that set up plan the steps from what is there to what is wanted, and announce each.
+"""
 
 from __future__ import annotations
 

@@ -171,7 +171,7 @@ class Target:
         return slow_timeout(entry.index, self.timeout)
 
     def entry(self, path: str, data_type: DataType | None = None) -> ObjectEntry:
-        """Find an object by a path of ``standard/object_paths.py``; with a type it needs no file.
+        """Find an object by a path, as :func:`.find_object` does; with a type it needs no file.
 
         Raises:
             UsageError: There is none; the message names similar ones.

@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A process supervisor: starts processes, waits until they are ready, stops them in order.
 
-The decisions are in :mod:`.supervision` and :mod:`.stopping`, which know no process, no clock and
-no signal handler: they get what happened and when, and act through callables.
-:mod:`.runner` does it with real processes; :mod:`.guardian` does it when the runner was killed.
+The decisions are in :mod:`.supervision`, which knows no process, no clock and no signal handler:
+it gets what happened and when, and acts through callables. :mod:`.runner` does it with real
+processes; :mod:`.guardian` stops them in order, also when the runner was killed.
 
 Around it stands what the bring-ups of all robots need: :mod:`.nodes` finds the executables of ROS
-packages, :mod:`.exclusive` keeps a second bring-up away, :mod:`.terminal` and :mod:`.console` show
-what the processes write.
+packages and keeps a second bring-up away, :mod:`.ros_options` reads the arguments that all share,
+:mod:`.terminal` shows what the processes write.
 """
 
 from .nodes import (

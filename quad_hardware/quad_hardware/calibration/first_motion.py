@@ -48,7 +48,7 @@ REMEDIES = {
 
 
 class MovedRobot(Protocol):
-    """A robot that is commanded and reports; :class:`.robot.LimpRobot` is one."""
+    """A robot that is commanded and reports; :class:`.wizard.LimpRobot` is one."""
 
     def angles(self) -> dict[int, float]: ...  # noqa: D102
     def command(self, angles: Mapping[int, float]) -> float: ...  # noqa: D102
