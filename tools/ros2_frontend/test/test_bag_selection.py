@@ -12,7 +12,7 @@ from hypothesis import given, strategies
 import pytest
 
 from ros2_frontend.bag import topic_filter
-from ros2_frontend.ros.qos import for_playing, for_recording, is_compatible
+from ros2_frontend.ros.bag_qos import for_playing, for_recording, is_compatible
 from ros2_frontend.ros.recorder import _Subscribed
 from ros2_frontend.verbs.bag_info import info_text, size_text
 from rosbag_files import BagFile, BagMetadata, OfferedQos, Topic, TopicCount

@@ -132,9 +132,8 @@ T = TypeVar('T')
 _SPIN_TIME = 0.5  # [s] as ros2cli
 _LATE_TIME = 1.0  # [s] while a participant of this host is not known
 _NAME_TIME = 1.5  # [s] until a name is missing: on a machine that is too busy, discovery is late
-_OPEN_SPIN_TIME = (
-    3.2  # [s]; with Fast DDS's own profile, participants announce themselves every 3 s
-)
+# [s]; with Fast DDS's own profile, participants announce themselves every 3 s
+_OPEN_SPIN_TIME = 3.2
 _POLL = 0.01  # [s]; one look costs below 1 ms with 30 topics
 _MAX_POLL = 0.25  # [s]
 _POLL_SHARE = 0.02  # of the time waited so far: a wait of minutes shall not burn a core

@@ -5,95 +5,13 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable
 from functools import partial
 from typing import Any
-
-from rosbag_files import OfferedQos, UNLIMITED
 
 from ..cli.commands import positive_float, unsigned_int
 from ..names import Handle
 from .graph import Graph
-
-RECORD_DEPTH = 10_000  # messages of a topic that may wait for the recorder: ten seconds at 1 kHz
-
-PLAY_DEPTH = 10
-
-_DURATIONS = ('deadline', 'lifespan', 'liveliness_lease_duration')
-_COMMON = ('reliability', 'durability', 'deadline', 'lifespan')
-
-
-def offered(profile: Handle) -> OfferedQos:
-    """Write down what a publisher offers."""
-    policies = {name: getattr(profile, name).name.lower() for name in _POLICIES}
-    durations = {name: getattr(profile, name).nanoseconds for name in _DURATIONS}
-    conventions = profile.avoid_ros_namespace_conventions
-    return OfferedQos(
-        depth=profile.depth, avoid_ros_namespace_conventions=conventions, **policies, **durations
-    )
-
-
-def to_profile(qos: OfferedQos) -> Handle:
-    """Make a profile of rclpy."""
-    from rclpy import qos as rclpy_qos
-    from rclpy.duration import Duration
-
-    policies = {
-        name: getattr(rclpy_qos, f'{name.capitalize()}Policy')[getattr(qos, name).upper()]
-        for name in _POLICIES
-    }
-    durations = {
-        name: Duration(nanoseconds=getattr(qos, name))
-        for name in _DURATIONS
-        if getattr(qos, name) != UNLIMITED
-    }
-    conventions = qos.avoid_ros_namespace_conventions
-    return rclpy_qos.QoSProfile(
-        depth=qos.depth, avoid_ros_namespace_conventions=conventions, **policies, **durations
-    )
-
-
-def for_recording(publishers: Sequence[OfferedQos]) -> OfferedQos:
-    """What connects to all publishers, and gets what they kept where all of them keep."""
-    reliable = all(each.reliability == 'reliable' for each in publishers)
-    latched = all(each.durability == 'transient_local' for each in publishers)
-    return OfferedQos(
-        'keep_last',
-        RECORD_DEPTH,
-        'reliable' if reliable else 'best_effort',
-        'transient_local' if latched and publishers else 'volatile',
-    )
-
-
-def for_playing(publishers: Sequence[OfferedQos]) -> OfferedQos:
-    """What the publishers of a recording offered, where they agreed; else the default."""
-    default = OfferedQos('keep_last', PLAY_DEPTH)
-    if not publishers:
-        return default
-    first = publishers[0]
-    depth = max(PLAY_DEPTH, *(each.depth for each in publishers))
-    common = {
-        name: getattr(first, name)
-        for name in _COMMON
-        if all(getattr(each, name) == getattr(first, name) for each in publishers)
-    }
-    return replace(default, depth=depth, **common)
-
-
-def overridden(qos: OfferedQos, depth: int) -> OfferedQos:
-    """A profile of a file with overrides, with the history that a file may leave out."""
-    if qos.history in {'unknown', 'system_default'}:
-        return replace(qos, history='keep_last', depth=qos.depth or depth)
-    return qos
-
-
-def is_compatible(requested: OfferedQos, publisher: OfferedQos) -> bool:
-    """Whether a subscription gets what a publisher sends."""
-    if requested.reliability == 'reliable' and publisher.reliability == 'best_effort':
-        return False
-    return not (requested.durability == 'transient_local' and publisher.durability == 'volatile')
-
 
 _POLICIES = ('history', 'reliability', 'durability', 'liveliness')
 _FALL_BACK = (

@@ -25,8 +25,8 @@ from ..bag import Accepts
 from ..cli.commands import FrontendError
 from ..index import class_of, Kind
 from ..names import Handle
+from .bag_qos import for_recording, is_compatible, offered, overridden, RECORD_DEPTH, to_profile
 from .graph import Graph
-from .qos import for_recording, is_compatible, offered, overridden, RECORD_DEPTH, to_profile
 
 _NANO = 1_000_000_000
 _TAKE_PERIOD = 0.02  # [s]

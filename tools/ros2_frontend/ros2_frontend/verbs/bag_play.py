@@ -18,10 +18,11 @@ from ..cli.commands import argument, flag, FrontendError, positive_float, unsign
 from ..cli.interrupts import has_keyboard, keys
 from ..index import class_of, Kind
 from ..names import absolute, Handle
+from ..ros.bag_qos import for_playing, overridden, PLAY_DEPTH, to_profile
 from ..ros.graph import Graph, open_session, Session
-from ..ros.qos import for_playing, overridden, PLAY_DEPTH, to_profile
 
 _RIGHT = '\x1b[C'  # the key as a terminal sends it
+_NANO = 1_000_000_000
 
 
 def _remap(text: str) -> tuple[str, str]:
@@ -164,7 +165,6 @@ def _publishing_clock(session: Session, clock: PlayClock, rate: float) -> Iterat
 
 
 _POLL = 0.02  # [s] between two looks at the keyboard
-_NANO = 1_000_000_000
 
 
 @dataclass(slots=True)
