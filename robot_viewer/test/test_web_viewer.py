@@ -40,7 +40,7 @@ from viser import GuiEvent
 
 from node_runner import LATCHED, ParameterError
 from robot_viewer.nodes import controllers as controllers_module
-from robot_viewer.nodes import interfaces, state, web_viewer
+from robot_viewer.nodes import listening, state, web_viewer
 from robot_viewer.nodes.controllers import Controller
 from robot_viewer.nodes.web_viewer import WebViewer
 from robot_viewer.page.jog_panel import TargetPanel
@@ -328,7 +328,7 @@ def test_who_does_not_look_takes_no_messages(
         return [robot.node.count_subscribers(topic) for topic in topics]
 
     robot.spin_until(lambda: listeners() == [2, 1, 1], 'subscriptions')
-    monkeypatch.setattr(interfaces, 'LINGER', 0.1)
+    monkeypatch.setattr(listening, 'LINGER', 0.1)
     opened.append(False)
     robot.spin_until(lambda: listeners() == [1, 0, 1], 'their end')
     robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
@@ -570,7 +570,7 @@ def test_a_robot_that_is_out_of_reach_is_said_to_be(
     robot.node.destroy_publisher(states)  # as a link that was cut for long looks
     robot.spin_until(lambda: not robot.node.count_publishers('joint_states'), 'its end')
     opened.append(False)
-    monkeypatch.setattr(interfaces, 'LINGER', 0.1)
+    monkeypatch.setattr(listening, 'LINGER', 0.1)
     robot.spin_until(lambda: robot.node.count_subscribers('joint_states') == 1, 'a closed page')
     opened.append(True)
     robot.spin_until(gone, 'the words again')

@@ -42,7 +42,7 @@ from viser import (
 from ..page.robot_page import RobotPage
 from ..page.robot_scene import feet_of, FOOT, LEAST_FEET, RobotScene
 from ..page.style import NEUTRAL, value_of
-from .interfaces import Listening
+from .listening import Listening
 
 NOT_MEASURED = -1.0  # first number of a covariance where nothing is measured (REP 145)
 CONTACTS, CONTACTS_TYPE = 'foot_contacts', 'quad_msgs/msg/FootContacts'

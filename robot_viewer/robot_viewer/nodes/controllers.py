@@ -22,7 +22,8 @@ from node_runner.action_goals import GoalClient
 from ..page.jog_panel import History, motion_time
 from ..page.live import RELEASED_AFTER
 from ..page.robot_scene import travel
-from .interfaces import ActionCall, Listening, of_robot
+from .interfaces import ActionCall, of_robot
+from .listening import Listening
 
 STATE_TYPE = 'control_msgs/msg/JointTrajectoryControllerState'
 STATE = '/controller_state'

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What can be planned for, what was planned, and what is in the way, in MoveIt's messages.
 
-The package needs none of these messages where nothing is planned.
+The package needs moveit_msgs only where something is planned.
 """
 
 from __future__ import annotations

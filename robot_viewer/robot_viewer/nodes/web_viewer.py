@@ -49,11 +49,7 @@ from .body import Body
 from .controllers import Controllers, Grippers
 from .first_motion import FirstMotion
 from .interfaces import (
-    BETWEEN_LOOKS,
     Border,
-    frames_of,
-    joints_of,
-    Listening,
     of_robot,
     serve,
     SET_MODE_TYPE,
@@ -63,6 +59,7 @@ from .interfaces import (
     TRIGGER,
     TriggerCalls,
 )
+from .listening import BETWEEN_LOOKS, frames_of, joints_of, Listening
 from .motion_planning import MotionPlanning
 from .state import Judge, Watch
 

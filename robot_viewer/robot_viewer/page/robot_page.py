@@ -145,6 +145,7 @@ class RobotPage:
         gate = Gate(host, Overlay(self._stop, self.live))
         with gate.before(), redirect_stdout(io.StringIO()):  # viser draws its own banner
             self.server = ViserServer(host, port, label='robot', verbose=False)
+        # where it is, with the token where it needs one
         self.url = f'http://{shown_host(host)}:{self.server.get_port()}'
         if gate.token:
             self.url += f'/?token={gate.token}'
@@ -170,6 +171,7 @@ class RobotPage:
         if self._tabs is not None:
             self._tabs.remove()
         self.live.clear()
+        # of the tool or of walking forwards in [m/s], by the share; None where unknown
         self.velocity: Callable[[float], float] | None = None
         self.cancel: Callable[[], object] = lambda: None  # drops what is planned
         gui = self.server.gui
@@ -187,6 +189,7 @@ class RobotPage:
         self._disable: int | None = None
         self._walk_holds: dict[int, Velocity] = {}
         with self._groups['Drive']:
+            # share of the greatest velocity that is chosen, above 0 to 1
             self.speed = add_speed(gui, ARM_SPEED if 'Plan' in groups else LEGS_SPEED)
             gui.add_html(KEYS_MOVE)
         with self._groups['See']:
@@ -200,7 +203,7 @@ class RobotPage:
             self._drive: GuiDropdownHandle[str] | None = None
             self._drive_state: GuiHtmlHandle | None = None
             log = gui.add_folder('Log')
-            self.before_log = log.order - 0.5  # order of a folder
+            self.before_log = log.order - 0.5  # order of a folder before the log
             with log:
                 self._log_html: GuiHtmlHandle = gui.add_html('')
 
