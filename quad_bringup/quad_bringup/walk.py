@@ -83,8 +83,8 @@ class Track:
 
     def __init__(self) -> None:
         self.way, self.stamp = Velocity(), math.nan
-        # angle between the body's z axis and the vertical then in [rad]
-        self.tilt = self.height = math.nan  # height of the body then in [m]
+        self.tilt = math.nan  # angle between the body's z axis and the vertical then in [rad]
+        self.height = math.nan  # of the body then in [m]
         self._pose = (0.0, 0.0, 0.0)  # x, y, yaw
         self._recent: deque[tuple[float, Velocity]] = deque()
 

@@ -36,6 +36,9 @@ from quad_sim.state import FLAT
 
 URDF = robot_urdf()
 MODEL = quadruped(URDF)
+ROBOT = quadruped(urdf())
+STAND = GaitGenerator(ROBOT, GaitParameters()).stand_targets
+PERIOD = 0.02  # [s]
 FIRM = GaitParameters(servo=ServoModel(kp=Servos.FIRM.parameters.stiffness))
 """A gait for servos that hardly give way."""
 
@@ -204,9 +207,7 @@ def joined(values: object) -> str:
     return ','.join(joined(value) for value in values)  # type: ignore[attr-defined]
 
 
-PERIOD = 0.02  # [s]
 UPRIGHT = ImuSample((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81))
-ROBOT = quadruped(urdf())
 ARM_ROBOT = quadruped(urdf(Build(arm=True)))
 FOLDED = tuple([0.1, 1.3, -0.9] * 4)
 LYING = tuple([0.0, 1.48, -1.1] * 4)
@@ -250,9 +251,6 @@ class StillPolicy(PolicyRunner):
         """Answer."""
         self.velocities.append(inputs.velocity)
         return PolicyStep(self.targets, '' if self.targets is not None else 'broken on purpose')
-
-
-STAND = GaitGenerator(ROBOT, GaitParameters()).stand_targets
 
 
 def standing(rig: Rig | None = None, mode: str = 'stand') -> Rig:

@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """From a report of the robot, in the units of the wire, to its state in SI units.
 
+How the IMU sits on the body turns what it reports into base_link. What the robot does not report
+is derived: rates, the way, which feet stand, the height.
+
 Heading is from the attitude; where the body has walked to, from the legs that stand. There are no
 contact switches. A foot is taken to stand where its *commanded* height was the lowest, a servo's
 lag ago; without commands, where its measured height is. Heights are those above the ground that
@@ -57,7 +60,11 @@ POSITIVE: Vector = (1.0, 1.0, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class ImuMounting:
-    """From what the IMU reports to base_link."""
+    """From what the IMU reports to base_link: how it sits on the body, and with which signs.
+
+    With a wrong sign, a controller that levels the body tilts it further and further. In the
+    vendor's own simulation the IMU is turned by 180 degrees about the vertical.
+    """
 
     rotation: Quaternion = IDENTITY  # of the IMU's axes in base_link, (x, y, z, w)
     # of roll, pitch and yaw as they are reported, against REP 103

@@ -34,6 +34,7 @@ from quad_hardware.recording import read_serial_log
 from quad_hardware.serial_robot import RobotSettings, SerialRobot
 from quad_pty_peer import PtyPeer
 
+URDF = robot_urdf('lite')
 STANDING = (0.0, 0.6, -0.3) * 4
 LIFTED = (0.0, 0.9, -0.9)  # of a leg in the air
 TIMEOUT = 30.0  # [s] for a report, on a busy machine
@@ -218,7 +219,6 @@ def test_a_log_that_shows_no_robot_is_refused(
         recorded_in(path, URDF)
 
 
-URDF = robot_urdf('lite')
 JOINTS = JointMap(map(servo_of, movable_joints(URDF)))
 POSE = pose_positions(Pose.STAND)
 STAND = [POSE[name] for name in JOINTS.names]

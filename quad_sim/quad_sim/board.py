@@ -194,9 +194,8 @@ def _stride(phase: float, vx: float, vy: float) -> Vector:
 
 
 TURN_RATE = math.radians(60.0)  # [rad/s]
-TURN_DONE = math.radians(
-    2.0
-)  # [rad] from here on it counts as done: the last stride adds the rest
+# [rad] from here on it counts as done: the last stride adds the rest
+TURN_DONE = math.radians(2.0)
 MAX_DURATION_RATIO = 3.0  # times the time that it should take; a robot that cannot turn gives up
 
 

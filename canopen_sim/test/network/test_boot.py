@@ -69,6 +69,8 @@ DEVICE_VALUES = {
     (0x6060, 0): 0,
 }
 
+WATCHED: dict[str, Any] = {'node_id': 3, 'heartbeat_producer': 0.1, 'heartbeat_timeout': 0.25}
+
 
 def io_config(**changes: object) -> NodeConfig:
     """Return a device with two RPDOs, a TPDO and two objects to be written."""
@@ -472,7 +474,6 @@ TOO_HIGH = 0x0609_0031  # Elmo's answer to 0x1016
 NO_SUBINDEX = 0x0609_0011  # node-canopen's
 READ_ONLY = 0x0601_0002  # ElmoSimplIQ's to 0x1400:01
 OUT_OF_RANGE = 0x0609_0030
-WATCHED: dict[str, Any] = {'node_id': 3, 'heartbeat_producer': 0.1, 'heartbeat_timeout': 0.25}
 WATCHING = io_config(heartbeat_consumer=True)
 WITHOUT_TPDOS = io_config(tpdos=())
 REFUSALS = {

@@ -40,6 +40,7 @@ NODE_ID = 2
 COMMAND_PDO = 0x200 + NODE_ID
 RESTS_AFTER = 0.7  # [s] without a motion; longer than a set-point waits under a halt
 STANDING = 0.02  # [rad/s]
+BRAKING_MAX = 0.15  # [rad] from 1 rad/s at 5 rad/s^2, with the time to see it
 
 
 def running_in(mode: OperationMode, **changes: object) -> VirtualNetwork:
@@ -236,9 +237,6 @@ def test_a_relative_move_after_a_halt_is_refused() -> None:
     net.commands[JOINT].move(Move(0.1, relative=True))
     go(net, 3.0)
     assert net.motor() == pytest.approx(0.6, abs=2e-3)
-
-
-BRAKING_MAX = 0.15  # [rad] from 1 rad/s at 5 rad/s^2, with the time to see it
 
 
 @pytest.mark.parametrize(

@@ -1,14 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What can be tuned of the gait, in CHAMP's words where CHAMP has one; the schedules of its legs.
-
-Set-points can make soft servos be where a firm one would be. A position servo is a spring: it lags
-behind a moving set-point and sags under the robot's weight. The set-point is moved ahead by what
-the spring needs, from the motion of the next step and, for the legs that stand, from their share
-of the weight::
-
-    command = q + (damping / kp) q' + (inertia / kp) q'' - J^T f / kp,   f = m g / standing legs
-"""
+"""What can be tuned of the gait, in CHAMP's words where CHAMP has one; its schedules."""
 
 from __future__ import annotations
 
@@ -29,6 +21,9 @@ class Gait(Enum):
     TROT = 'trot'
     CRAWL = 'crawl'
     PACE = 'pace'
+
+
+LEG_LENGTH = 0.1349  # [m] thigh and calf of the XGO
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +81,6 @@ class Schedule:
         return math.atan2(sine, cosine) / math.tau
 
 
-LEG_LENGTH = 0.1349  # [m] thigh and calf of the XGO
 SCHEDULES = {
     Gait.TROT: Schedule((0.0, 0.5, 0.5, 0.0), 0.1456, 0.52, 0.0, 0.45),
     Gait.CRAWL: Schedule((0.0, 0.5, 0.75, 0.25), 0.8, 0.8, 0.012, 0.06),
@@ -115,7 +109,16 @@ class ServoModel:
 
 
 class ServoCompensation:
-    """Changes joint targets; costs one step of delay, since it looks one step ahead."""
+    """Changes joint targets, so that soft servos are where firm ones would be.
+
+    A position servo is a spring: it lags behind a moving set-point and sags under the robot's
+    weight. The set-point is moved ahead by what the spring needs, from the motion of the next step
+    and, for the legs that stand, from their share of the weight::
+
+        command = q + (damping / kp) q' + (inertia / kp) q'' - J^T f / kp,  f = m g / standing legs
+
+    It costs one step of delay, since it looks one step ahead.
+    """
 
     def __init__(self, robot: Quadruped, servo: ServoModel) -> None:
         """Start without a past."""
@@ -174,6 +177,9 @@ class ServoCompensation:
                 columns = jacobian(leg, (now[hip], now[thigh], now[calf]))
                 for index, column in zip(indices, columns, strict=True):
                     moved[index] -= column[2] * share
+
+
+MIN_DUTY = 0.5  # below it there are moments without a foot on the ground
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,8 +284,6 @@ class GaitParameters:
             speed=self.foot_speed or schedule.speed,
         )
 
-
-MIN_DUTY = 0.5  # below it there are moments without a foot on the ground
 
 AS_TUNED = GaitParameters()
 """The gait as it is when nothing is set."""

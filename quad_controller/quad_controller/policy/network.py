@@ -24,6 +24,8 @@ from .contract.model import RecurrentState
 Floats = npt.NDArray[np.float32]
 Port = tuple[str, str, tuple[object, ...]]
 FLOAT = 'tensor(float)'  # ONNX Runtime's name of the type
+SIDES_KEY = 'weights_sha256'
+"""Metadata key of the digest of the side files that belong to a model."""
 
 
 class OnnxNetwork:
@@ -159,9 +161,6 @@ TENSOR_TYPE, TENSOR_NAME, TENSOR_RAW, TENSOR_EXTERNAL_DATA = 2, 8, 9, 13
 FLOATS = {1: '<f4', 10: '<f2', 11: '<f8'}  # types of tensors
 FLOAT_DATA = {1: 4, 11: 10}  # where numbers of a type stand that are not raw
 ENTRY_KEY, ENTRY_VALUE = 1, 2
-
-SIDES_KEY = 'weights_sha256'
-"""Metadata key of the digest of the side files that belong to a model."""
 
 VARINT, FIXED64, BYTES, FIXED32 = 0, 1, 2, 5  # wire types
 FIXED_SIZES = {FIXED64: 8, FIXED32: 4}

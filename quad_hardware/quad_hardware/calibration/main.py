@@ -107,26 +107,6 @@ def _merged(old: Mapping[str, object], new: Mapping[str, object]) -> Tree:
 DEFAULT_FILE = Path('quad_calibration.yaml')
 
 
-def run_calibrate(argv: Sequence[str], console: Console) -> int:
-    """Calibrate as the command line says; return the exit code."""
-    options = _parser().parse_args(argv)
-    try:
-        _PARTS[options.what](options, console)
-    except KeyboardInterrupt:
-        console.write('cancelled; nothing was written')
-        return 1
-    except (HardwareError, CancelledError) as error:
-        console.write(str(error))
-        return 1
-    if options.what == 'servos':
-        return 0
-    console.write(f'written to {options.output}; use it with:')
-    console.write(
-        f'  ros2 run quad_hardware hardware_node --ros-args --params-file {options.output}'
-    )
-    return 0
-
-
 def main() -> None:
     """Entry point."""
     run_command(lambda argv: run_calibrate(argv, Console()))
@@ -227,6 +207,26 @@ _PARTS = {
     'odometry': _odometry,
     'servos': _servos,
 }
+
+
+def run_calibrate(argv: Sequence[str], console: Console) -> int:
+    """Calibrate as the command line says; return the exit code."""
+    options = _parser().parse_args(argv)
+    try:
+        _PARTS[options.what](options, console)
+    except KeyboardInterrupt:
+        console.write('cancelled; nothing was written')
+        return 1
+    except (HardwareError, CancelledError) as error:
+        console.write(str(error))
+        return 1
+    if options.what == 'servos':
+        return 0
+    console.write(f'written to {options.output}; use it with:')
+    console.write(
+        f'  ros2 run quad_hardware hardware_node --ros-args --params-file {options.output}'
+    )
+    return 0
 
 
 def _parser() -> argparse.ArgumentParser:

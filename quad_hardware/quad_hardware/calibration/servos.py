@@ -47,9 +47,8 @@ _MIN_TRAVEL = 0.2  # [rad] between the ends of what was reported
 _MAX_ERROR = 0.006  # [rad] rms: twice the rounding of protocol v1
 _MAX_DEVIATION = 0.1  # standard deviation of a parameter, as a share of it
 _OUTLIER = 0.004  # [rad] from which on the weight of a position falls
-_MAX_OUTLIERS = (
-    0.25  # share of positions that a busy computer may spoil; the others have the error
-)
+# share of positions that a busy computer may spoil; the others have the error
+_MAX_OUTLIERS = 0.25
 _ITERATIONS = 15
 
 Array = NDArray[np.float64]
@@ -297,7 +296,7 @@ SETTLING = 1.0  # [s]
 
 
 class SwungRobot(Protocol):
-    """A robot that is commanded and reports; :class:`.robot.LimpRobot` is one."""
+    """A robot that is commanded and reports; :class:`.wizard.LimpRobot` is one."""
 
     def angles(self) -> dict[int, float]: ...  # noqa: D102
     def command(self, angles: Mapping[int, float]) -> float: ...  # noqa: D102

@@ -40,6 +40,7 @@ NOT_THERE = [-1.0, *([0.0] * 8)]  # covariance of what is not measured (REP 145)
 UNUSED = 1e6  # variance of what is not measured
 VELOCITY_VARIANCE = 0.03**2  # [m²/s²]
 HEIGHT_VARIANCE = 0.01**2  # [m²]
+_ZERO = (0.0, 0.0, 0.0)
 
 Numbers = Sequence[float]
 Message: TypeAlias = Any
@@ -198,9 +199,6 @@ def battery(state: RobotState, stamp: Time) -> BatteryState:
         power_supply_technology=BatteryState.POWER_SUPPLY_TECHNOLOGY_LION,
         present=True,
     )
-
-
-_ZERO = (0.0, 0.0, 0.0)
 
 
 def _tilt(sample: ImuSample, deviations: Deviations) -> float:
