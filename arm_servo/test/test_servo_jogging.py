@@ -97,6 +97,7 @@ class Jogger:
             self.now += self.period
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ROBOTS)
 @pytest.mark.parametrize('down', [0.0, 0.3])
 @pytest.mark.parametrize(('speed', 'hold'), [(0.2, 0.0), (0.3, 1.5)])
@@ -120,6 +121,7 @@ def test_an_arm_comes_back_from_the_border_on_the_same_side(
     assert side * (jogger.core.state.position[place] - straight) > 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ROBOTS)
 def test_what_is_reported_at_the_border_is_what_happens(name: str) -> None:
     """Pushing on, the tool stands still, and the report says that nothing is left of its speed."""
@@ -135,6 +137,7 @@ def test_what_is_reported_at_the_border_is_what_happens(name: str) -> None:
     assert jogger.report.factor < 0.15
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('elbow', [1.30, 1.37, 1.42])
 @pytest.mark.parametrize(
     'twist',
@@ -152,8 +155,6 @@ def test_pushing_on_at_the_border_the_arm_rests(elbow: float, twist: list[float]
             places.append(core.state.position)
     assert np.ptp(np.array(places), axis=0).max() < 2e-3
 
-
-pytestmark = pytest.mark.slow
 
 SPEED = np.array([0.1] * 3 + [0.3] * 3)  # [m/s], [rad/s]
 
@@ -209,6 +210,7 @@ def moves_or_reports(model: RobotModel, result: Run, twist: Array) -> bool:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ROBOTS)
 @pytest.mark.parametrize('twist', TWISTS, ids=str)
 def test_the_asked_speed_is_the_speed(name: str, twist: Array) -> None:
@@ -223,6 +225,7 @@ def test_the_asked_speed_is_the_speed(name: str, twist: Array) -> None:
         assert any(holds_up(model, state, limiter) for limiter in result.report.limiters)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ROBOTS)
 def test_a_minute_of_rotation_leaves_the_tool_in_place(name: str) -> None:
     """In 60 s of turning to and fro about each axis the tool centre stays within 1 mm."""
@@ -241,6 +244,7 @@ def test_a_minute_of_rotation_leaves_the_tool_in_place(name: str) -> None:
     assert max(away) < 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ROBOTS)
 @pytest.mark.parametrize('twist', TWISTS, ids=str)
 def test_no_trap_in_the_straight_pose(name: str, twist: Array) -> None:
@@ -251,6 +255,7 @@ def test_no_trap_in_the_straight_pose(name: str, twist: Array) -> None:
     kept(model, result)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ROBOTS)
 def test_the_straight_pose_can_be_left(name: str) -> None:
     """From the singular pose the tool gets away in more than half of the directions."""
@@ -262,6 +267,7 @@ def test_the_straight_pose_can_be_left(name: str) -> None:
     assert gone > 6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ROBOTS)
 @pytest.mark.parametrize('twist', TWISTS, ids=str)
 def test_no_trap_at_a_joint_limit(name: str, twist: Array) -> None:
@@ -274,6 +280,7 @@ def test_no_trap_at_a_joint_limit(name: str, twist: Array) -> None:
     kept(model, result)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ROBOTS)
 @pytest.mark.parametrize('sense', [1.0, -1.0])
 def test_beyond_a_limit_the_way_leads_back_only(name: str, sense: float) -> None:
@@ -301,6 +308,7 @@ CONTACTS = {
 """Poses with links in contact."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ROBOTS)
 @pytest.mark.parametrize('twist', TWISTS, ids=str)
 def test_no_trap_in_contact(name: str, twist: Array) -> None:
@@ -315,6 +323,7 @@ def test_no_trap_in_contact(name: str, twist: Array) -> None:
     kept(model, result)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ROBOTS)
 def test_contact_can_be_left(name: str) -> None:
     """With links overlapping there is a direction in which they come apart."""
@@ -324,6 +333,7 @@ def test_contact_can_be_left(name: str) -> None:
     assert max(map(model.clearance, ends)) > model.clearance(start) + 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ROBOTS)
 @pytest.mark.parametrize('twist', TWISTS, ids=str)
 def test_the_way_back_is_open(name: str, twist: Array) -> None:
@@ -336,6 +346,7 @@ def test_the_way_back_is_open(name: str, twist: Array) -> None:
     assert back.moved[axis] / -twist[axis] > 0.05, f'{back.report}; {back.held_up[-1:]}'
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ROBOTS)
 @settings(max_examples=8, deadline=None)
 @given(seed=st.integers(0, 10**6))
@@ -352,6 +363,7 @@ def test_limits_hold_over_random_commands(name: str, seed: int) -> None:
         state = result.states[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('kinds', ['zyy', 'zyyz', 'zyyzy', 'cyyzyz', 'zyzyzyz', 'zyzyzyzy'])
 def test_three_to_eight_joints(kinds: str) -> None:
     """Arms of 3 to 8 joints follow a twist that they can follow, without special cases."""
@@ -364,6 +376,7 @@ def test_three_to_eight_joints(kinds: str) -> None:
     kept(model, result)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ROBOTS)
 def test_a_blocked_axis_does_not_stop_the_other(name: str) -> None:
     """Where one commanded axis is lost the other goes on: only the lost direction slows."""
@@ -378,6 +391,7 @@ def test_a_blocked_axis_does_not_stop_the_other(name: str) -> None:
     kept(model, result)
 
 
+@pytest.mark.slow
 def test_commands_in_the_tools_frame_follow_it() -> None:
     """A twist along a link's axes turns with the link."""
     model = robot('gp110')
@@ -388,6 +402,7 @@ def test_commands_in_the_tools_frame_follow_it() -> None:
     assert result.moved[:3] @ out / 0.05 == pytest.approx(0.05, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_jogged_joint_moves_alone() -> None:
     """Joints that are not commanded stay, and the commanded one has the asked speed."""
     model = robot('panda')
@@ -397,6 +412,7 @@ def test_a_jogged_joint_moves_alone() -> None:
     assert result.states[-1].velocity == pytest.approx(velocity, abs=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ROBOTS)
 @pytest.mark.parametrize('axis', range(6))
 def test_a_twist_that_is_too_fast_keeps_its_direction(name: str, axis: int) -> None:
@@ -413,6 +429,7 @@ def test_a_twist_that_is_too_fast_keeps_its_direction(name: str, axis: int) -> N
     kept(model, result)
 
 
+@pytest.mark.slow
 def test_a_joint_that_is_asked_too_much_says_so() -> None:
     """A joint jogged beyond its speed goes at its speed, and the report names it."""
     model = robot('panda')
@@ -426,6 +443,7 @@ def test_a_joint_that_is_asked_too_much_says_so() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_a_joint_is_braked_in_front_of_its_limit() -> None:
     """A joint that is jogged to its end comes to rest there, and the report names it."""
     model = robot('prbt')
@@ -441,6 +459,7 @@ def test_a_joint_is_braked_in_front_of_its_limit() -> None:
     kept(model, result)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ROBOTS)
 def test_a_pose_is_reached_at_rest(name: str) -> None:
     """A pose target is approached, reached within 0.1 mm, and not overrun."""

@@ -154,8 +154,6 @@ def test_default_pdos_work_as_they_come() -> None:
     assert len(rig.take(0x380 + NODE_ID)) == 1
 
 
-pytestmark = pytest.mark.slow
-
 # python-canopen has no types
 make_node: Any = BaseNode402
 make_network: Any = canopen.Network
@@ -229,6 +227,7 @@ def configure(node: Any) -> None:
             pdo.save()
 
 
+@pytest.mark.slow
 def test_every_object_reads_as_the_eds_says(wire: Wire, node: Any) -> None:
     """All values that the EDS gives arrive, decoded by python-canopen's own dictionary."""
     for entry in drive_dictionary().for_node(NODE_ID):
@@ -241,6 +240,7 @@ def test_every_object_reads_as_the_eds_says(wire: Wire, node: Any) -> None:
         assert value == entry.default, str(entry)
 
 
+@pytest.mark.slow
 def test_block_transfers_of_python_canopen(node: Any) -> None:
     """python-canopen reads a string and writes a number by the block protocol, CRC included."""
     with node.sdo.open(0x1008, 0, 'rb', block_transfer=True) as stream:
@@ -250,6 +250,7 @@ def test_block_transfers_of_python_canopen(node: Any) -> None:
     assert node.sdo.upload(0x6081, 0) == b'\x10\x27\x00\x00'
 
 
+@pytest.mark.slow
 def test_pdos_are_configured_and_exchanged(wire: Wire, node: Any) -> None:
     """python-canopen maps PDOs, sends an RPDO, and reads the answer in the TPDO by name."""
     configure(node)
@@ -318,6 +319,7 @@ def wait(condition: Any) -> None:
         time.sleep(SYNC_PERIOD / 2)
 
 
+@pytest.mark.slow
 def test_state_machine_by_others(drive: Any) -> None:
     """BaseNode402 enables, moves, quick-stops and disables the drive, and resets a fault."""
     drive.op_mode = 'PROFILED POSITION'
@@ -344,6 +346,7 @@ def test_state_machine_by_others(drive: Any) -> None:
     drive.state = 'SWITCH ON DISABLED'
 
 
+@pytest.mark.slow
 def test_fault_reset_by_others(drive: Any) -> None:
     """BaseNode402 sees a fault and brings the drive back to Operation enabled."""
     drive.state = 'OPERATION ENABLED'

@@ -25,8 +25,6 @@ from canopen_core.eds import load_eds
 from canopen_sim import DeviceRunner, Fault, FaultInjection
 from canopen_tools.cli.main import main
 
-pytestmark = pytest.mark.slow
-
 BUS = """\
 master:
   node_id: 1
@@ -100,6 +98,7 @@ def witness(name: str) -> Iterator[Bus]:
         yield bus
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures('runner')
 def test_scan_finds_devices_with_and_without_heartbeat(name: str, capsys: Output) -> None:
     """Each with its state and identity; one without heartbeat by its answer."""
@@ -114,6 +113,7 @@ def test_scan_finds_devices_with_and_without_heartbeat(name: str, capsys: Output
     assert count == '2 devices'
 
 
+@pytest.mark.slow
 def test_scan_compares_with_bus_yml(
     name: str, runner: DeviceRunner, bus_yml: str, capsys: Output
 ) -> None:
@@ -137,6 +137,7 @@ def test_scan_compares_with_bus_yml(
     assert lines[2].endswith('not on the bus')
 
 
+@pytest.mark.slow
 def test_two_devices_with_one_node_id(name: str, runner: DeviceRunner, capsys: Output) -> None:
     """Both answer; what they share is named."""
     left, _ = runner.host.devices
@@ -146,6 +147,7 @@ def test_two_devices_with_one_node_id(name: str, runner: DeviceRunner, capsys: O
     assert 'node 2: several devices answer' in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures('runner', 'master')
 def test_scan_leaves_the_sdo_channels_to_a_master(name: str, witness: Bus, capsys: Output) -> None:
     """Beside a master it only listens, and says so; --query reads, with a warning."""
@@ -169,12 +171,14 @@ def test_scan_leaves_the_sdo_channels_to_a_master(name: str, witness: Bus, capsy
     assert 'a master is on this bus (SYNC), and shares the SDO channel' in captured.err
 
 
+@pytest.mark.slow
 def test_scan_of_an_empty_bus(name: str, capsys: Output) -> None:
     """Nobody there is exit code 1, with what to look at."""
     assert main(['scan', '--can', name, *LISTEN]) == 1
     assert 'powered, wired and terminated' in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures('runner')
 def test_objects_by_name_and_number(name: str, bus_yml: str, capsys: Output) -> None:
     """With a bus.yml by the names of its EDS, for devices by their names."""
@@ -191,6 +195,7 @@ def test_objects_by_name_and_number(name: str, bus_yml: str, capsys: Output) -> 
     assert capsys.readouterr().out == '16\n'
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures('runner')
 def test_objects_without_any_file(name: str, capsys: Output) -> None:
     """What the standards describe has name and type; others have the type that is given."""
@@ -203,6 +208,7 @@ def test_objects_without_any_file(name: str, capsys: Output) -> None:
     assert 'name it with --type' in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('arguments', 'code', 'message'),
     [
@@ -227,6 +233,7 @@ def test_what_does_not_work_is_reported(
     assert message in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('deviation', 'warning'),
     [
@@ -258,6 +265,7 @@ def test_answers_that_deviate_are_read_as_the_master_reads_them(
     assert warning in captured.err
 
 
+@pytest.mark.slow
 def test_a_device_that_holds_something_else_is_reported(
     name: str, witness: Bus, capsys: Output
 ) -> None:
@@ -281,6 +289,7 @@ def test_a_device_that_holds_something_else_is_reported(
     assert 'holds another value than 7' in captured.err
 
 
+@pytest.mark.slow
 def test_a_command_is_not_read_back(name: str, runner: DeviceRunner, capsys: Output) -> None:
     """0x1010 returns what the device can store, not what was written; storing takes its time."""
     slow = FaultInjection(Fault.SDO_DELAY, object=(0x1010, 1), delay=0.7)
@@ -290,6 +299,7 @@ def test_a_command_is_not_read_back(name: str, runner: DeviceRunner, capsys: Out
     assert capsys.readouterr().out.endswith('was written\n')
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures('runner')
 def test_diff_shows_what_bus_yml_has_otherwise(name: str, bus_yml: str, capsys: Output) -> None:
     """Only what differs, with the line of bus.yml; equal when it was written."""
@@ -311,6 +321,7 @@ def test_diff_shows_what_bus_yml_has_otherwise(name: str, bus_yml: str, capsys: 
     assert output.splitlines()[-1].endswith('objects compared, none different')
 
 
+@pytest.mark.slow
 def test_diff_takes_the_entry_of_the_heartbeat_consumer_that_boot_takes(
     name: str, runner: DeviceRunner, bus_yml: str, capsys: Output
 ) -> None:
@@ -326,6 +337,7 @@ def test_diff_takes_the_entry_of_the_heartbeat_consumer_that_boot_takes(
     assert [row.split()[1] for row in rows] == ['0x1016:01']
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures('runner')
 def test_diff_with_an_eds(name: str, capsys: Output) -> None:
     """Without bus.yml the defaults of all objects that can be written count."""
@@ -337,6 +349,7 @@ def test_diff_with_an_eds(name: str, capsys: Output) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures('runner')
 def test_parameters_of_ros_name_bus_and_file(name: str, bus_yml: str, capsys: Output) -> None:
     """The parameters of the nodes work here too."""

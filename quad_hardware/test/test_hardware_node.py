@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import math
 from pathlib import Path
 import re
@@ -65,7 +65,12 @@ def test_a_wrong_parameter_is_refused(argument: str, reason: str) -> None:
         read(argument)
 
 
-pytestmark = [pytest.mark.scenario, pytest.mark.xdist_group('hardware_node')]
+def on_node(test: Callable[..., None]) -> Callable[..., None]:
+    """Mark a test that starts the node, which those of this file share."""
+    marked: Callable[..., None] = pytest.mark.xdist_group('hardware_node')(test)
+    pytest.mark.scenario(marked)
+    return marked
+
 
 HOME = [0.0] * 12
 POSE = [0.0, 0.6, -0.3] * 4
@@ -87,6 +92,7 @@ def rig(shared_rig: NodeRig) -> NodeRig:
     return shared_rig
 
 
+@on_node
 def test_the_topics_of_the_article(rig: NodeRig) -> None:
     """Joints in radians in URDF order, IMU, odometry, battery, transforms; servos follow."""
     rig.peer.behaviour.attitude = (0.0, 0.0, 90.0)
@@ -116,6 +122,7 @@ def test_the_topics_of_the_article(rig: NodeRig) -> None:
     assert rig.largest_step() <= LARGEST_STEP + 0.01
 
 
+@on_node
 def test_wrong_commands_move_nothing_and_are_reported(rig: NodeRig) -> None:
     """NaN, infinity, wrong lengths: refused with the reason, and not a byte is sent."""
     for wrong, reason in (
@@ -132,6 +139,7 @@ def test_wrong_commands_move_nothing_and_are_reported(rig: NodeRig) -> None:
     rig.client.spin_until(lambda: bool(rig.peer.commands), TIMEOUT, 'right command')
 
 
+@on_node
 def test_with_a_dead_imu_the_joints_are_reported_and_follow(rig: NodeRig) -> None:
     """No /imu, /odom and contacts, an error that says so, and a command reaches the servos."""
     rig.peer.behaviour.attitude = (math.nan,) * 3
@@ -145,6 +153,7 @@ def test_with_a_dead_imu_the_joints_are_reported_and_follow(rig: NodeRig) -> Non
     rig.receive('/imu')
 
 
+@on_node
 def test_beyond_limits_is_taken_to_them_and_reported(rig: NodeRig) -> None:
     """The servo ends at the limit of the URDF."""
     rig.stream([2.0, 0.0, 0.0] * 4, 1.0)
@@ -152,6 +161,7 @@ def test_beyond_limits_is_taken_to_them_and_reported(rig: NodeRig) -> None:
     assert rig.peer.angles[13] == pytest.approx(math.degrees(0.5236), abs=0.02)
 
 
+@on_node
 def test_a_servo_beyond_its_limits_is_left_there_and_reported(rig: NodeRig) -> None:
     """A stream that asks it to stay sends exactly where it is."""
     rig.peer.angles[13] = 40.0
@@ -167,6 +177,7 @@ def test_a_servo_beyond_its_limits_is_left_there_and_reported(rig: NodeRig) -> N
     assert rig.largest_step() <= LARGEST_STEP + 0.01
 
 
+@on_node
 def test_joints_that_were_never_checked_do_not_move(rig: NodeRig) -> None:
     """Commands are refused, and the controller receives why the robot must not stand up."""
     problems = rig.client.listen(String, '/servo_problem', LATCHED)
@@ -181,6 +192,7 @@ def test_joints_that_were_never_checked_do_not_move(rig: NodeRig) -> None:
     rig.client.spin_until(lambda: problems[-1].data == '', TIMEOUT, 'no problem')
 
 
+@on_node
 def test_silence_holds_the_servos(rig: NodeRig) -> None:
     """After half a second nothing is sent, diagnostics says so; then the stream begins anew."""
     rig.stream(POSE, 0.8)
@@ -197,6 +209,7 @@ def test_silence_holds_the_servos(rig: NodeRig) -> None:
     assert rig.largest_step() <= LARGEST_STEP + 0.01
 
 
+@on_node
 def test_commands_that_break_off_in_motion_end_in_a_safe_posture(rig: NodeRig) -> None:
     """The legs fold softly and diagnostics is in error, until somebody commands again."""
     rig.swing(7)
@@ -216,6 +229,7 @@ def test_commands_that_break_off_in_motion_end_in_a_safe_posture(rig: NodeRig) -
     rig.wait_for_status('joint commands', DiagnosticStatus.OK, 'received')
 
 
+@on_node
 def test_commands_that_end_at_rest_leave_the_posture(rig: NodeRig) -> None:
     """Nothing moves unasked: not a byte is sent after the last command."""
     rig.stream(POSE, 1.5)
@@ -225,6 +239,7 @@ def test_commands_that_end_at_rest_leave_the_posture(rig: NodeRig) -> None:
     assert len(rig.peer.commands) == count
 
 
+@on_node
 @pytest.mark.parametrize('stall', [0.0, 0.8])
 def test_a_node_that_ends_in_motion_folds_the_legs_first(
     isolation: Isolation, tmp_path: Path, stall: float
@@ -250,6 +265,7 @@ def test_a_node_that_ends_in_motion_folds_the_legs_first(
         )
 
 
+@on_node
 @pytest.mark.parametrize('commanded', [True, False])
 def test_a_timer_that_waited_behind_a_command_counts_nothing(*, commanded: bool) -> None:
     """It goes on, for the end of the commands that may come."""
@@ -266,6 +282,7 @@ def test_a_timer_that_waited_behind_a_command_counts_nothing(*, commanded: bool)
     assert said == ([] if commanded else ['ended', 'lies down', 'begun'])
 
 
+@on_node
 @pytest.mark.parametrize('load', [0.0, 12.0])
 def test_servos_that_still_pull_are_not_said_to_be_without_torque(
     rig: NodeRig, load: float
@@ -279,6 +296,7 @@ def test_servos_that_still_pull_are_not_said_to_be_without_torque(
     assert rig.client.call(SetBool, '/hardware_node/torque', SetBool.Request(data=True)).success
 
 
+@on_node
 def test_the_node_serves_others_while_it_waits_for_servos_to_let_go(rig: NodeRig) -> None:
     """Of two that ask for torque off, and one that wants it back, none waits for another."""
     name, off = '/hardware_node/torque', SetBool.Request(data=False)
@@ -296,6 +314,7 @@ def test_the_node_serves_others_while_it_waits_for_servos_to_let_go(rig: NodeRig
     assert rig.client.call(SetBool, name, SetBool.Request(data=True)).success
 
 
+@on_node
 def test_torque_is_taken_and_given_by_service(rig: NodeRig) -> None:
     """Without torque no command is sent; with it, the servos hold where they were put."""
     answer = rig.client.call(SetBool, '/hardware_node/torque', SetBool.Request(data=False))
@@ -311,6 +330,7 @@ def test_torque_is_taken_and_given_by_service(rig: NodeRig) -> None:
     assert rig.peer.commands[-1][11] == pytest.approx(20.0, abs=0.01)
 
 
+@on_node
 def test_a_controller_that_goes_on_moves_no_servo_that_was_let_go(rig: NodeRig) -> None:
     """Its targets are those of a robot that stood; after a stall, too, until they are near."""
     rig.stream(HOME, 0.5)
@@ -342,6 +362,7 @@ def test_a_controller_that_goes_on_moves_no_servo_that_was_let_go(rig: NodeRig) 
     assert rig.peer.angles[11] != pytest.approx(20.0, abs=1.0)
 
 
+@on_node
 @pytest.mark.parametrize('protocol', [V2, V1], ids=lambda protocol: protocol.name)
 def test_torque_comes_back_where_the_arm_is(
     isolation: Isolation, tmp_path: Path, protocol: Protocol

@@ -46,6 +46,7 @@ def moved(scales: dict[str, float], target: float) -> VirtualNetwork:
     return net
 
 
+@pytest.mark.slow
 def test_a_drive_without_scales_moves_as_far_as_with_ros2_canopen() -> None:
     """1000 increments a unit, whatever its factor group says."""
     defaults = DriveConfig()
@@ -55,6 +56,7 @@ def test_a_drive_without_scales_moves_as_far_as_with_ros2_canopen() -> None:
     assert net.drives[JOINT].view.position == pytest.approx(1.5, abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('scale', 'target'),
     [*((1e-4, target) for target in (1.5, -0.4, 3.2, 12_345.0)), (1.0, 1.5), (2.0, 0.3)],
@@ -67,6 +69,7 @@ def test_a_position_that_would_be_rounded_to_another_one_is_refused(
         moved({'scale_pos_to_dev': scale, 'scale_pos_from_dev': 1 / scale}, target)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('scale', [0.9, 10.0])
 def test_a_path_leads_between_increments(scale: float) -> None:
     """A motion source is not refused somewhere on its way because increments are whole."""
@@ -76,6 +79,7 @@ def test_a_path_leads_between_increments(scale: float) -> None:
     net.drives[JOINT].stream(Setpoint(0.123))
 
 
+@pytest.mark.slow
 def test_a_drive_with_profile_velocity_0_refuses_targets() -> None:
     """It is said at boot and at the call, until somebody writes another one."""
     config = drive_config(JOINT, 2)
@@ -92,6 +96,7 @@ def test_a_drive_with_profile_velocity_0_refuses_targets() -> None:
     assert net.drives[JOINT].view.position == pytest.approx(0.5, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_factor_group_that_the_drive_does_not_have_is_said() -> None:
     """The EDS promised it; without it nobody knows how far a target is."""
     missing = {(index, sub): 0 for index in (0x608F, 0x6092) for sub in (1, 2)}
@@ -107,8 +112,6 @@ def test_a_factor_group_that_the_drive_does_not_have_is_said() -> None:
     assert any('scale_from_factor_group' in text for text in net.reported(Severity.WARNING))
 
 
-pytestmark = pytest.mark.slow
-
 NODE_ID = 2
 
 
@@ -119,6 +122,7 @@ def enabled(config: NodeConfig, mode: OperationMode) -> VirtualNetwork:
     return net
 
 
+@pytest.mark.slow
 def test_limits_that_are_written_through_the_master_hold_at_once() -> None:
     """0x607D and 0x6081, by whatever service: the next target keeps to them."""
     net = enabled(drive_config(JOINT, NODE_ID), OperationMode.CYCLIC_POSITION)
@@ -137,6 +141,7 @@ def test_limits_that_are_written_through_the_master_hold_at_once() -> None:
     assert fastest == pytest.approx(0.2, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_write_that_the_drive_refuses_changes_nothing() -> None:
     """And one of an object that is no limit reads nothing from the drive."""
     net = enabled(drive_config(JOINT, NODE_ID), OperationMode.CYCLIC_POSITION)
@@ -151,6 +156,7 @@ def test_a_write_that_the_drive_refuses_changes_nothing() -> None:
     assert len(net.frames(0x600 + NODE_ID, since=begin)) <= 3
 
 
+@pytest.mark.slow
 def test_limits_are_in_the_units_of_targets() -> None:
     """Where bus.yml scales the two ways differently, what is accepted is what the drive does."""
     writes = (*MOTION_WRITES, sdo_write(0x607D, 1, -5_000), sdo_write(0x607D, 2, 5_000))
