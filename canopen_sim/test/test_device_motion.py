@@ -126,6 +126,17 @@ def test_a_ramp_takes_as_long_as_its_rates_say(
     assert axis.demand_velocity == wanted
 
 
+@given(places, st.floats(1e-3, 10.0))
+def test_a_line_arrives_in_time(target: float, duration: float) -> None:
+    """A line is half way at half time, and stands at its target when its time is over."""
+    axis = axis_at()
+    axis.line(target, duration)
+    axis.advance(axis.time + 0.5 * duration)
+    assert axis.demand == pytest.approx(0.5 * target, rel=1e-6, abs=1e-6)
+    axis.advance(axis.time + 0.500001 * duration)
+    assert (axis.demand, axis.demand_velocity, axis.arrived) == (target, 0.0, True)
+
+
 @given(st.lists(st.floats(0.0, 0.2), max_size=12), st.sampled_from([math.inf, 1000.0]))
 def test_looking_changes_nothing(looks: list[float], speed: float) -> None:
     """How often a motor is looked at has no influence on where it is."""
@@ -169,7 +180,10 @@ def test_the_motor_follows_by_its_definition(target: float, speed: float) -> Non
 @settings(max_examples=50)
 @given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=8), st.floats(100.0, 1e4))
 def test_the_motor_is_never_faster_than_its_speed(targets: list[float], speed: float) -> None:
-    """Whatever jumps the set-points make, the motor keeps its speed, and arrives in the end."""
+    """Whatever jumps the set-points make, the motor keeps its speed, and arrives in the end.
+
+    The limiter works in steps of 1 ms: below 100 inc/s, most of the test would wait for arrivals.
+    """
     axis = axis_at()
     axis.speed = speed
     for target in targets:

@@ -86,13 +86,12 @@ def target_of(mode: OperationMode) -> float:
 
 
 class Arm:
-    """Two drives and their master, or one."""
+    """Two drives and their master."""
 
     def __init__(
         self,
         heartbeat_timeout: float = 0.3,
         *deviations: Deviation | FaultInjection,
-        alone: bool = False,
         **faulty: Any,
     ) -> None:
         """Boot them.
@@ -100,7 +99,6 @@ class Arm:
         Args:
             heartbeat_timeout: Consumer time of both sides in [s].
             *deviations: How the first drive deviates from the standard.
-            alone: There is no witness.
             **faulty: What its configuration has otherwise, as of drive_config().
         """
         watching: dict[str, Any] = {
@@ -110,13 +108,10 @@ class Arm:
             'sdo_writes': (*MOTION_WRITES, sdo_write(0x60C2, 1, round(1000 * CYCLE))),
         }
         faulty['scales'] = watching['scales'] | faulty.get('scales', {})
-        drives = [
-            drive_config(FAULTY, 2, **watching | faulty),
-            drive_config(WITNESS, 3, **watching),
-        ]
         self.net = VirtualNetwork(
             bus_config(
-                *map(every_mode, drives[: 1 if alone else 2]),
+                every_mode(drive_config(FAULTY, 2, **watching | faulty)),
+                every_mode(drive_config(WITNESS, 3, **watching)),
                 heartbeat_producer=0.1,
                 heartbeat_timeout=heartbeat_timeout,
                 sync_period=CYCLE,
@@ -150,7 +145,7 @@ class Arm:
         return self.net.simulated(name).state
 
     def move(self, mode: OperationMode) -> None:
-        """Set the drives in motion in a mode."""
+        """Set both drives in motion in a mode."""
         for name in self.net.drives:
             self.net.enable(mode, name)
         for name in self.net.drives:
@@ -469,7 +464,7 @@ def test_a_stop_is_as_short_as_the_drive_can_whatever_it_counts_in(
     """Enabling moves nothing, targets are where they were said, and no stop is cut or long."""
     deviation, faulty, zero = list(UNITS.values())[number]
     mode = modes[number % len(modes)]
-    arm = Arm(0.3, deviation, alone=True, **faulty)
+    arm = Arm(0.3, deviation, **faulty)
 
     def place() -> float:
         return (arm.net.simulated().position - zero) / SCALE
@@ -506,7 +501,7 @@ def test_a_drive_outside_its_limits_is_led_back_and_stopped(side: int, stop: str
     limits = (sdo_write(0x607D, 1, -10_000), sdo_write(0x607D, 2, 10_000))
     timing = sdo_write(0x60C2, 1, round(1000 * CYCLE))
     outside = FaultInjection(Deviation.ENCODER_SHIFTED, position=side * 13_000)
-    arm = Arm(0.3, outside, alone=True, sdo_writes=(*MOTION_WRITES, timing, *limits))
+    arm = Arm(0.3, outside, sdo_writes=(*MOTION_WRITES, timing, *limits))
     drive = arm.net.drives[FAULTY]
 
     def stream(cycles: int, speed: float) -> None:
@@ -610,8 +605,7 @@ def slow_heartbeat(period: float, **faulty: Any) -> Arm:
     It sends its heartbeat with a ``period`` in [s].
     """
     writes = (*MOTION_WRITES, sdo_write(0x60C2, 1, round(1000 * CYCLE)), sdo_write(0x6007, 0, 0))
-    own = {'heartbeat_producer': period, 'sdo_writes': writes}
-    return Arm(3.0 * period, alone=True, **own, **faulty)
+    return Arm(3.0 * period, heartbeat_producer=period, sdo_writes=writes, **faulty)
 
 
 @pytest.mark.parametrize(
@@ -752,7 +746,7 @@ def commanded(net: VirtualNetwork, command: NmtCommand, node_id: int) -> str:
 
 
 def move_far(arm: Arm, mode: OperationMode) -> None:
-    """Set the drive in a motion that does not end by itself."""
+    """Set both drives in a motion that does not end by itself."""
     arm.move(mode)
     if mode in POSITION_MODES:
         arm.net.commands[FAULTY].set_target(50.0)
