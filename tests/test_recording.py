@@ -274,6 +274,8 @@ def test_all_of_arm_and_quadruped_is_recorded(isolation: Isolation, tmp_path: Pa
         quad.stand()
         quad.walk(DURATION)
         assert recorder.stop(30.0) == 0
+        assert arm.master.stop() == 0, arm.master.output
+        assert arm.slaves.stop() == 0, arm.slaves.output
     assert 'dropped' not in recorder.output
     lost = reported(recorder.output)
     numbers = sequences(folder / 'bag_0.mcap')
