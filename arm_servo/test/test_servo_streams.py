@@ -7,8 +7,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
+import math
 from typing import Any
 
+from control_msgs.action import FollowJointTrajectory
+from control_msgs.msg import JointTolerance
 from isolation import Isolation
 import numpy as np
 import pytest
@@ -23,8 +26,8 @@ from arm_model import JointLimits
 from arm_servo import CoreSettings, ExecutionSettings, JogRequest, JointCommand, Source
 from arm_servo.core.mailbox import by_joint, TOGETHER
 from arm_servo.ros.trajectory import TrajectoryController
-from arm_servo.ros.trajectory_goals import declare_trajectory
-from arm_trajectory import GoalRules
+from arm_servo.ros.trajectory_goals import declare_trajectory, goal_of_action
+from arm_trajectory import GoalCode, GoalError, GoalRules
 
 STEP = 0.004  # how far each trajectory of a stream goes in [rad]
 MOVED = 0.01  # farther than this a stream has moved the arm in [rad]
@@ -119,6 +122,26 @@ def test_the_tolerance_at_the_goal_is_by_the_range_of_the_joint(node: Any) -> No
     limits = JointLimits(names, low, high, one, one, one)
     goal = declare_trajectory(node, names, limits).goal
     assert [goal[name].position for name in names] == pytest.approx([0.01, 0.05, 0.05])
+
+
+@pytest.mark.parametrize('field', ['path_tolerance', 'goal_tolerance'])
+@pytest.mark.parametrize(
+    ('joint', 'position', 'code', 'words'),
+    [
+        ('elbow', 0.1, GoalCode.INVALID_JOINTS, ": no joint 'elbow'; joints: slide, turn"),
+        ('turn', math.nan, GoalCode.INVALID_GOAL, ' of turn is not a number'),
+    ],
+)
+def test_a_tolerance_that_cannot_be_kept_is_refused_when_the_goal_is_read(
+    *, node: Any, field: str, joint: str, position: float, code: GoalCode, words: str
+) -> None:
+    """With the name of the field: before drives are got back or anything else is prepared."""
+    parameters = declare_trajectory(node, ('slide', 'turn'))
+    goal = FollowJointTrajectory.Goal()
+    setattr(goal, field, [JointTolerance(name=joint, position=position)])
+    with pytest.raises(GoalError, match=f'^{field}{words}$') as refused:
+        goal_of_action(goal, 0.0, parameters)
+    assert refused.value.code is code
 
 
 def halts(arm: Arm) -> None:

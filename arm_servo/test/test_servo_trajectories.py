@@ -390,12 +390,12 @@ REFUSED = {
     'tolerance of a stranger': (
         replace(GOOD, path_tolerance={'elbow': JointTolerance(0.1)}),
         -2,
-        "tolerance of 'elbow'",
+        "path_tolerance: no joint 'elbow'; joints: prbt_joint_1, ",
     ),
     'nan tolerance': (
         replace(GOOD, goal_tolerance={'prbt_joint_1': JointTolerance(math.nan)}),
         -1,
-        'not a number',
+        'goal_tolerance of prbt_joint_1 is not a number',
     ),
     'far begin': (
         replace(GOOD, points=[GoalPoint(0.0, tuple(ready('prbt') + 0.3))]),

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from .execution import CatchUpInterpolator, TimerState, TrajectoryTimer
 from .goal import (
+    check_tolerances,
     GoalCode,
     GoalError,
     GoalPoint,
@@ -54,6 +55,7 @@ __all__ = [
     'TrajectoryTimer',
     'brakeable',
     'build_path',
+    'check_tolerances',
     'cubics',
     'farthest_beyond',
     'hard_brake',

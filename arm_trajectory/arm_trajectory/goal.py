@@ -325,8 +325,27 @@ def _distinct(error: float, tolerance: float) -> tuple[str, str]:
     return off, most
 
 
+def check_tolerances(
+    joints: Sequence[str], given: Mapping[str, JointTolerance], what: str
+) -> None:
+    """Check the tolerances of a goal, whose field ``what`` they are.
+
+    Raises:
+        GoalError: A joint is unknown, or a tolerance is not a number.
+    """
+    for name, asked in given.items():
+        if name not in joints:
+            reason = f'{what}: no joint {name!r}; joints: {", ".join(joints)}'
+            raise GoalError(GoalCode.INVALID_JOINTS, reason)
+        if math.isnan(asked.position) or math.isnan(asked.velocity):
+            raise GoalError(GoalCode.INVALID_GOAL, f'{what} of {name} is not a number')
+
+
 def merge_tolerances(
-    limits: JointLimits, given: Mapping[str, JointTolerance] | None, default: JointTolerance
+    limits: JointLimits,
+    given: Mapping[str, JointTolerance] | None,
+    default: JointTolerance,
+    what: str = 'tolerance',
 ) -> Tolerances:
     """Put tolerances together: those of a goal, else the default.
 
@@ -334,18 +353,12 @@ def merge_tolerances(
         given: The goal's tolerances by joint: above 0 counts, 0 keeps the default, below takes it
             away.
         default: The default of each joint; 0 is none.
+        what: Name of the goal's field, for the words of a refusal.
 
     Raises:
         GoalError: A joint is unknown, or a tolerance is not a number.
     """
-    for name, asked in (given or {}).items():
-        if name not in limits.names:
-            known = ', '.join(limits.names)
-            raise GoalError(
-                GoalCode.INVALID_JOINTS, f'tolerance of {name!r}: no such joint; joints: {known}'
-            )
-        if math.isnan(asked.position) or math.isnan(asked.velocity):
-            raise GoalError(GoalCode.INVALID_GOAL, f'tolerance of {name}: it is not a number')
+    check_tolerances(limits.names, given or {}, what)
     rows = [
         (_one(asked.position, default.position), _one(asked.velocity, default.velocity))
         for asked in ((given or {}).get(name, JointTolerance()) for name in limits.names)

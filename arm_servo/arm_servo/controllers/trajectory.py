@@ -104,8 +104,12 @@ class Execution(Controller):
         self._timer = TrajectoryTimer(limits, 1.0 if state.moving else speed_scaling)
         self._begins_at_rest = not state.moving
         self._catch_up = CatchUpInterpolator(limits, generator)
-        self._path_tolerance = merge_tolerances(limits, goal.path_tolerance, settings.path)
-        self._goal_tolerance = merge_tolerances(limits, goal.goal_tolerance, settings.goal)
+        self._path_tolerance = merge_tolerances(
+            limits, goal.path_tolerance, settings.path, 'path_tolerance'
+        )
+        self._goal_tolerance = merge_tolerances(
+            limits, goal.goal_tolerance, settings.goal, 'goal_tolerance'
+        )
         self._goal_time = goal.goal_time or settings.goal_time
         self._settling = 0.0
         self._off = 0.0

@@ -17,6 +17,7 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 from arm_model import JointLimits, ModelError, RobotState
 from arm_model.ros import duration_fields, seconds
 from arm_trajectory import (
+    check_tolerances,
     GoalCode,
     GoalError,
     GoalPoint,
@@ -176,7 +177,7 @@ def goal_of_action(
     """Return the goal that a goal of FollowJointTrajectory is.
 
     Raises:
-        GoalError: It has parts that nothing would follow.
+        GoalError: It has parts that nothing would follow, or tolerances of unknown joints.
     """
     if request.multi_dof_trajectory.points or request.multi_dof_trajectory.joint_names:
         raise GoalError(GoalCode.INVALID_JOINTS, 'multi_dof_trajectory: the arm has none')
@@ -187,8 +188,8 @@ def goal_of_action(
         goal.joints,
         goal.points,
         goal.age,
-        _overridden(parameters.path, request.path_tolerance),
-        _overridden(parameters.goal, request.goal_tolerance),
+        _overridden(parameters.path, request.path_tolerance, 'path_tolerance'),
+        _overridden(parameters.goal, request.goal_tolerance, 'goal_tolerance'),
         seconds(request.goal_time_tolerance),
     )
 
@@ -224,13 +225,14 @@ def _point(point: Any) -> GoalPoint:  # noqa: ANN401
 
 
 def _overridden(
-    defaults: Mapping[str, JointTolerance], asked: Sequence[Any]
+    defaults: Mapping[str, JointTolerance], asked: Sequence[Any], what: str
 ) -> Mapping[str, JointTolerance]:
-    """Return tolerances of the parameters, overridden by those of a goal; planning checks them."""
+    """Return tolerances of the parameters, overridden by those of a goal."""
     merged = dict(defaults)
     for tolerance in asked:
         before = merged.get(tolerance.name, JointTolerance())
         merged[tolerance.name] = JointTolerance(
             tolerance.position or before.position, tolerance.velocity or before.velocity
         )
+    check_tolerances(list(defaults), merged, what)
     return merged
