@@ -269,7 +269,11 @@ def test_several_axes_are_not_made_one(
         (without(*range(0x1800, 0x1806)), [], '0x6041: the EDS has 0 TPDOs that can be mapped'),
         (SAMPLE, ['--turn', 'leg=1'], "no drive 'leg'; drives: arm"),
         (SAMPLE, ['--turn', 'arm=0'], '--turn arm=0: give a number of increments'),
-        (SAMPLE, ['--rpm', 'arm=-3'], '--rpm arm=-3: give turns of the motor'),
+        (
+            SAMPLE,
+            ['--rpm', 'arm=-3'],
+            '--rpm arm=-3: give turns of the motor .*; the sign is that of the increments',
+        ),
         (without(0x6091), ['--rpm', 'arm=100'], 'how far an increment of the joint is'),
         (
             (*SAMPLE, RPM),
@@ -370,7 +374,9 @@ def test_a_person_is_asked_for_what_the_eds_does_not_say(
     given = iter(answers)
     monkeypatch.setattr('builtins.input', lambda asked: next(given) if 'arm' in asked else '')
     assert main(['new', 'arm=drive.eds@2', *options]) == 0
-    asked_again = re.findall("give .*a number .* such as .*, not '(.*)'", capsys.readouterr().out)
+    asked_again = re.findall(
+        "(?m)^give .*a number .* such as .*, not '(.*)'", capsys.readouterr().out
+    )
     assert asked_again == answers[:-1]
     (node,) = load_bus(tmp_path / 'bus.yml').nodes
     assert getattr(node.drive, f'scale_{scale}_to_dev') == pytest.approx(value)

@@ -131,11 +131,11 @@ def _with_choices(options: argparse.Namespace, devices: Sequence[NewDevice]) -> 
     """Return the devices with the units and modes of the command line."""
     drives = [device.name for device in devices if device.is_drive]
     units = {
-        name: _units(option, _number(option, name, value))
+        name: _units(option, _typed(option, name, value))
         for option in ('turn', 'metre')
         for name, value in _pairs(option, getattr(options, option), drives)
     }
-    rpm = {n: _number('rpm', n, value) for n, value in _pairs('rpm', options.rpm, drives)}
+    rpm = {n: _typed('rpm', n, value) for n, value in _pairs('rpm', options.rpm, drives)}
     modes = {n: _mode(n, value) for n, value in _pairs('mode', options.mode, drives)}
     return [
         replace(
@@ -159,15 +159,24 @@ def _pairs(option: str, texts: Iterable[str], drives: Sequence[str]) -> Iterator
         yield name, value
 
 
-def _number(option: str, name: str, text: str) -> float:
+def _typed(option: str, name: str, text: str) -> float:
+    """Read the number of an option on the command line."""
+    try:
+        return _number(option, text)
+    except UsageError as error:
+        raise UsageError(f'--{option} {name}={text}: {error}') from error
+
+
+def _number(option: str, text: str) -> float:
     """Read increments (--turn, --metre) or turns (--rpm, whose sign is that of the increments)."""
     try:
         number = math.prod(float(factor) for factor in text.split('*'))
     except ValueError:
         number = math.nan
     if not math.isfinite(number) or number == 0.0 or (option == 'rpm' and number < 0.0):
-        wanted = TURNS if option == 'rpm' else INCREMENTS
-        raise UsageError(f'--{option} {name}={text}: give {wanted}, not {text!r}')
+        if option == 'rpm':
+            raise UsageError(f'give {TURNS}, not {text!r}; the sign is that of the increments')
+        raise UsageError(f'give {INCREMENTS}, not {text!r}')
     return number
 
 
@@ -215,7 +224,7 @@ def _answer(option: str, device: NewDevice, question: str, options: str) -> floa
             value = 'TURNS' if option == 'rpm' else 'INCREMENTS'
             raise UsageError(f'give {options} {device.name}={value}') from error
         try:
-            return _number(option, device.name, answer)
+            return _number(option, answer)
         except UsageError as error:
             print_line(str(error))
 
