@@ -1,11 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The part of the check that needs kinematics: limits, and the pose that an arm starts from."""
+"""Findings of the check, and the part of it that needs kinematics.
+
+What is wrong is a :class:`Finding` of a :class:`Severity`, in all of ``check.py``. Here are those
+about limits, and about the pose that an arm starts from.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 import difflib
+from enum import Enum
+import textwrap
 from typing import Any, TYPE_CHECKING
 
 from urdf_reader import DescriptionError, find_group, KinematicTree, SemanticDescription
@@ -18,9 +25,6 @@ from .robots import read_semantic, Robot, RobotError, SETTINGS
 if TYPE_CHECKING:
     from arm_canopen.config import AxisUnits
     from arm_model import JointLimits, RobotModel
-from dataclasses import dataclass
-from enum import Enum
-import textwrap
 
 
 class Severity(Enum):

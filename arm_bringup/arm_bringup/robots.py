@@ -36,6 +36,7 @@ from dataclasses import dataclass, field
 import os
 from pathlib import Path
 import re
+import time
 from typing import Any, TYPE_CHECKING
 
 import urdf_reader
@@ -87,9 +88,6 @@ TABLES, WORDS = ('xacro_args', 'packages'), ('tip_link',)
 GROUP = 'group'  # key of one group, or of a list
 START_POSITIONS = 'start_positions'  # key of the positions of simulated drives at power-on
 KEYS = (*FILES, *TABLES, *WORDS, GROUP, START_POSITIONS)  # all keys of SETTINGS
-INTERPOLATED_POSITION = 7  # mode of operation (CiA 402-2, 0x6060)
-RELATIVE_MESH = re.compile(r'(<mesh\b[^>]*\bfilename\s*=\s*["\'])(?![a-z]+://|/)([^"\']+)')
-"""Meshes beside the description, which the nodes that read it would not find."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,12 +288,19 @@ def in_namespace_of_bus(ros: RosOptions, bus: BusConfig) -> RosOptions:
     return ros.within(next(iter(given), ''))
 
 
+INTERPOLATED_POSITION = 7  # mode of operation (CiA 402-2, 0x6060)
+
+
 def stream_mode_service(bus: BusConfig) -> str:
     """Name the service for the mode of streams: what bus.yml asks for, else cyclic position."""
     drives: list[NodeConfig] = [node for node in bus.nodes if node.is_drive]
     if all(drive.drive.position_mode == INTERPOLATED_POSITION for drive in drives):
         return 'interpolated_position_mode'
     return 'cyclic_position_mode'
+
+
+RELATIVE_MESH = re.compile(r'(<mesh\b[^>]*\bfilename\s*=\s*["\'])(?![a-z]+://|/)([^"\']+)')
+"""Meshes beside the description, which the nodes that read it would not find."""
 
 
 def read_description(robot: Robot) -> str:
@@ -336,17 +341,25 @@ class _Expanded:
     changes: Mapping[Path, int]  # when each file that it was made of was changed; 0 for no file
 
 
-_EXPANDED: dict[object, _Expanded] = {}  # by the file, its arguments and packages
+_EXPANDED: dict[object, _Expanded] = {}
+"""By the file, its arguments and packages; the one that was used last is the last one."""
+MAX_EXPANDED = 4  # how many are kept
+STAMP_LAG = 10_000_000  # [ns] by which a time stamp of a file may be behind the clock
 
 
 def _expanded(path: Path, robot: Robot) -> str:
     """Expand a xacro file anew only where one of its files has changed: it takes 0.1 s."""
     key = path, tuple(robot.xacro_args.items()), tuple(robot.packages.items())
-    known = _EXPANDED.get(key)
+    known = _EXPANDED.pop(key, None)
     if known is None or known.changes != _changes(known.changes):
-        files = set[Path]()
+        begun, files = time.time_ns(), set[Path]()
         text = expand_xacro(path, robot.xacro_args, robot.packages, files)
-        known = _EXPANDED[key] = _Expanded(text, _changes(files))
+        known = _Expanded(text, _changes(files))
+        if max(known.changes.values(), default=0) > begun - STAMP_LAG:
+            return text  # a file may have been changed after it was read
+    _EXPANDED[key] = known
+    if len(_EXPANDED) > MAX_EXPANDED:
+        del _EXPANDED[next(iter(_EXPANDED))]
     return known.text
 
 

@@ -43,18 +43,6 @@ from .robots import (
     stream_mode_service,
 )
 
-MASTER = Executable('arm_canopen', 'master')
-"""What runs the bus unless something else is asked for."""
-MOTION_NODE = Executable('arm_servo', 'motion_node')
-"""Trajectories and jogging: with the master in it, or for drives that another process has."""
-PLANNER = Executable('arm_planning', 'move_group')
-"""Motions among obstacles, for clients of MoveIt."""
-SLAVES = Executable('canopen_sim', 'fake_slaves')  # simulated drives
-
-MAKE_MOVE = 'build arm_servo (make build) for trajectories and jogging'
-
-MASTER_FIRST, THEN_LISTENERS, SLAVES_LAST = range(3)
-"""Order of stopping: the master disables the drives, so they must still be there."""
 REAL_BUS = 'can0'
 """Bus without --can on hardware: never one on which only simulated drives could be."""
 SIMULATED_BUS = 'auto'
@@ -236,6 +224,20 @@ def session(
         yield Session(
             robot, bus, list(config.joints), ros, mode_service, urdf, f'{start}', processes
         )
+
+
+MASTER = Executable('arm_canopen', 'master')
+"""What runs the bus unless something else is asked for."""
+MOTION_NODE = Executable('arm_servo', 'motion_node')
+"""Trajectories and jogging: with the master in it, or for drives that another process has."""
+PLANNER = Executable('arm_planning', 'move_group')
+"""Motions among obstacles, for clients of MoveIt."""
+SLAVES = Executable('canopen_sim', 'fake_slaves')  # simulated drives
+
+MAKE_MOVE = 'build arm_servo (make build) for trajectories and jogging'
+
+MASTER_FIRST, THEN_LISTENERS, SLAVES_LAST = range(3)
+"""Order of stopping: the master disables the drives, so they must still be there."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -309,6 +309,7 @@ def test_a_xacro_file_is_expanded_once(folder: Path, monkeypatch: pytest.MonkeyP
     }
     for name, text in files.items():
         (folder / name).write_text(text % name)
+        os.utime(folder / name, (0, 0))
     changes = ('arm.xacro', 'base'), ('arm.xacro', 'tip'), ('more.xml', 'hand')
     for turn, (name, link) in enumerate(changes, 1):
         (folder / name).write_text(files[name] % link)
@@ -316,3 +317,23 @@ def test_a_xacro_file_is_expanded_once(folder: Path, monkeypatch: pytest.MonkeyP
         for _ in range(2):
             assert f'<link name="{link}"/>' in read_description(found(folder))
         assert len(expanded) == turn
+
+
+def test_a_xacro_file_that_is_edited_during_its_expansion_is_read_anew(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An editor saves it in this moment: the next node gets what it says now."""
+    expand, file = urdf_reader.expand_xacro, folder / 'arm.xacro'
+
+    def disturbed(path: Path, *rest: Any) -> str:
+        text = expand(path, *rest)
+        if 'old' in text:
+            file.write_text('<robot name="arm"><link name="new"/></robot>')
+        return text
+
+    monkeypatch.setattr(urdf_reader, 'expand_xacro', disturbed)
+    (folder / 'arm.urdf').unlink()
+    file.write_text('<robot name="arm"><link name="old"/></robot>')
+    os.utime(file, (0, 0))
+    texts = [read_description(found(folder)) for _ in range(3)]
+    assert ['<link name="new"/>' in text for text in texts] == [False, True, True]
