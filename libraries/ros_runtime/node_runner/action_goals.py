@@ -223,7 +223,10 @@ class GoalServer(Generic[GoalT]):
         return [goal for goal in self._goals.values() if not goal.has_ended]
 
     def watch(self, look: Callable[[GoalT], None]) -> None:
-        """Look at each goal that has not ended; one for which that raises is ended and aborted."""
+        """Look at each goal that has not ended; one for which that raises is canceled and aborted.
+
+        It is answered once what was begun for it stands still.
+        """
         for goal in self.running:
             try:
                 if goal.failure is None:
@@ -231,8 +234,15 @@ class GoalServer(Generic[GoalT]):
             except Exception as error:  # noqa: BLE001  # the others are looked at, too
                 goal.failure = error
                 self._end_early(goal.handle)
-            if goal.failure is not None and self._has_stopped(goal):
+            if goal.failure is not None:
+                self._end_failed(goal)
+
+    def _end_failed(self, goal: GoalT) -> None:
+        try:
+            if self._has_stopped(goal):
                 self.end(goal)
+        except Exception as error:  # noqa: BLE001  # it is asked again, and the others meanwhile
+            self._log_defect(error)
 
     def end(self, goal: GoalT) -> None:
         """Answer a goal with what ``conclude`` returns; once, always from the same thread."""

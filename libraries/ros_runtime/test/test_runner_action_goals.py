@@ -33,6 +33,7 @@ def serve(
     start: Callable[[ServedGoal], None],
     ending: Ending | None = Ending.SUCCEEDED,
     accept: Callable[[], ServedGoal] = ServedGoal,
+    has_stopped: Callable[[ServedGoal], bool] = lambda _: True,
 ) -> GoalServer[ServedGoal]:
     """Serve goals of an action; a cancel ends them; without an ending all callbacks raise."""
 
@@ -59,6 +60,7 @@ def serve(
         conclude=conclude,
         fail=fail,
         refusals=(ValueError,),
+        has_stopped=has_stopped,
     )
     return server
 
@@ -125,6 +127,31 @@ def test_a_goal_ends_once_with_the_status_of_its_server(
         client.spin_until(result.done, TIMEOUT, 'a result')
         assert result.result().status == status
         assert not server.running
+        server.destroy()
+
+
+@pytest.mark.slow
+def test_a_goal_that_cannot_say_whether_it_stands_hides_no_other(isolation: Isolation) -> None:
+    """Each is looked at, also behind one whose own look, and question for rest, have raised."""
+    begun: list[ServedGoal] = []
+    looked: list[ServedGoal] = []
+
+    def look(goal: ServedGoal) -> None:
+        looked.append(goal)
+        raise ValueError('lost')
+
+    def has_stopped(_: ServedGoal) -> bool:
+        raise RuntimeError('no measurement')
+
+    with RosClient(isolation.domain_id) as client:
+        server = serve(client.node, begun.append, has_stopped=has_stopped)
+        caller = client.action(LookupTransform, 'look_up')
+        assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
+        for count in (1, 2):
+            caller.send_goal_async(LookupTransform.Goal())  # type: ignore[no-untyped-call]
+            client.spin_until(lambda count=count: len(begun) == count, TIMEOUT, 'the start')
+        server.watch(look)
+        assert looked == begun
         server.destroy()
 
 
