@@ -93,7 +93,7 @@ class JointLimits:
         return len(self.names)
 
     def error(self, wanted: Array, actual: Array) -> Array:
-        """Return wanted less actual positions; of continuous joints half a turn at most."""
+        """Return wanted less actual in [rad]; of continuous joints half a turn at most."""
         error: Array = wanted - actual
         turns = np.where(self.continuous, TURN * np.round(error / TURN), 0.0)
         return error - turns

@@ -243,9 +243,11 @@ class RobotModel:
         return float(distances.min(initial=math.inf))
 
     def least_clearance(self, places: Array, within: float) -> LeastClearance:
-        """Return the two links that come nearest to each other at any of some places (m, n).
+        """Return the two links that come nearest to each other at any of some places.
 
-        Distances beyond the one of interest may be lower bounds.
+        Args:
+            places: Joint positions in [rad] (m, n).
+            within: Distance of interest in [m]; where it is more, a lower bound is good enough.
         """
         least = LeastClearance(within)
         clearances = self._clearances

@@ -105,7 +105,7 @@ class ValidityCheck:
         return None
 
     def waypoints(self, places: Array) -> Violation | None:
-        """Return what is wrong with the straight lines between places; None for nothing."""
+        """Return what is wrong with the straight lines between places in [rad] (m, n), if any."""
         lower, upper = places.min(axis=0), places.max(axis=0)
         if (beyond := self._beyond(lower, upper)) is not None:
             return beyond

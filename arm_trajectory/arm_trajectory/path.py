@@ -162,7 +162,10 @@ class Path:
         return RobotState(powers @ c, first @ c, second @ c)
 
     def derived(self, order: int, places: Places, times: Array) -> Array:
-        """Return a derivative (m, n) of segments (m) at times since their begin in [s] (m)."""
+        """Return a derivative (m, n) of segments (m) at times since their begin in [s] (m).
+
+        Order 0 is the position in [rad].
+        """
         count = self.coefficients.shape[1]
         powers = np.vander(times, count - order, increasing=True)
         factors = [math.perm(power, order) for power in range(order, count)]

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Protocol
 
 from arm_canopen.config import FactorGroup
 from canopen_core.can import Frame
@@ -35,7 +34,7 @@ from .drive.drive import Drive
 from .faults import FaultInjector, FaultLine, Traffic
 from .messages import EmcyProducer, SyncConsumer, TimeConsumer
 from .nmt import ErrorControl, NmtSlave
-from .object_store import ObjectStore, ParameterMemory, ParameterStorage, Scalar, Variable
+from .object_store import ObjectStore, ParameterMemory, ParameterStorage, Scalar, Timed, Variable
 from .pdo import Handler, RpdoEngine, TpdoEngine
 from .sdo_server import SdoServers
 
@@ -44,17 +43,6 @@ RateUnits = Mapping[int, tuple[float, float]]
 SYNC_LENGTH_ERROR = 0x8240
 COMMUNICATION_OBJECTS = (0x1000, 0x1FFF)
 ALL_OBJECTS = (0x0000, 0xFFFF)
-
-
-class Timed(Protocol):
-    """A part of the device that has something to do at a time that it knows."""
-
-    @property
-    def deadline(self) -> float:
-        """Steady time in [s] at which it wants to be advanced."""
-
-    def advance(self, now: float) -> None:
-        """Process what is due at steady time ``now`` in [s]."""
 
 
 class Device:

@@ -15,6 +15,7 @@ from functools import partial
 import json
 import logging
 from pathlib import Path
+from typing import Protocol
 
 from canopen_core import CodecError, SdoAbortError
 from canopen_core.standard import (
@@ -40,8 +41,19 @@ from canopen_core.standard import (
     Value,
 )
 
-NEVER = float('inf')  # [s] the deadline of a part of the device that waits for nothing
 STRING_BYTES_MAX = 65_536  # [byte] longest string or domain that a client may write
+NEVER = float('inf')  # [s] the deadline of a part of the device that waits for nothing
+
+
+class Timed(Protocol):
+    """A part of the device that has something to do at a time that it knows."""
+
+    @property
+    def deadline(self) -> float:
+        """Steady time in [s] at which it wants to be advanced; :data:`NEVER` for none."""
+
+    def advance(self, now: float) -> None:
+        """Process what is due at steady time ``now`` in [s]."""
 
 
 def refusal(code: AbortCode, place: object) -> SdoAbortError:

@@ -84,7 +84,7 @@ class Axis:
         self.node = node  # the device
         self.config = config or node.config.drive  # settings of the axis
         self.view = AxisState(node, scheduler, self.config, self.warn)  # its state
-        # that of the device, of its channel for one with several axes
+        # the name is that of the device, of its channel for one with several axes
         self.name, at = self.view.name, self.view.at
         # called with the cause when a motion source loses the drive
         self.released: Callable[[Refusal], None] = lambda refusal: None
@@ -104,9 +104,10 @@ class Axis:
         self.resetting = False  # send fault resets while the drive is faulted
         self.motions = 0  # that were begun by targets, moves and motion sources
         self.period = 0.0  # length of the last cycle in [s]
-        # set-point that was sent before the last position was measured, minus that position
+        # set-point that was sent before the last position was measured, minus that position, in
+        # user units
         self.following_error = 0.0
-        # mode in which it was enabled when its device was lost
+        # mode in which it was enabled when its device was lost, None otherwise
         self.interrupted: OperationMode | None = None
         image = node.image
         self.feed_forward = FeedForward(  # the offsets of a motion source

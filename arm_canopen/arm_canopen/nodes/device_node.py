@@ -147,7 +147,7 @@ class DeviceNode(Node):
         self.offer(ReadObject, '~/read_object', self._read_object, self._answer_read_object)
         self.offer(WriteObject, '~/write_object', self._write_object, self._answer_write_object)
         self.offer(CORead, '~/sdo_read', self._read, partial(answer_read, self))
-        self.offer(COWrite, '~/sdo_write', self._write, partial(answer_write, self))
+        self.offer(COWrite, '~/sdo_write', self._write, partial(answer_success, self))
 
     def offer(
         self,
@@ -292,14 +292,14 @@ class DeviceNode(Node):
 
 def answer_read(node: Node, response: Any, future: Future[int]) -> Any:  # noqa: ANN401
     """Fill in success and data; a failure, for which there is no field, is logged."""
-    answer_write(node, response, future)
+    answer_success(node, response, future)
     if response.success:
         response.data = future.result()
     return response
 
 
-def answer_write(node: Node, response: Any, future: Future[Any]) -> Any:  # noqa: ANN401
-    """Fill in success; a failure, for which there is no field, is logged."""
+def answer_success(node: Node, response: Any, future: Future[Any]) -> Any:  # noqa: ANN401
+    """Fill in success, of a write or another command; a failure, which has no field, is logged."""
     error = future.exception()
     response.success = error is None
     if isinstance(error, (CanopenError, SdoError)):

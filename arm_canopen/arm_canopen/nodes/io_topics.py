@@ -38,7 +38,7 @@ from ..config.model import NodeConfig
 from ..master.process_image import InputReader, ReceivedTpdo
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
-from .device_node import answer_write, DeviceNode
+from .device_node import answer_success, DeviceNode
 from .joint_state_publisher import DriveJointStates
 
 
@@ -224,7 +224,7 @@ class EncoderTopics:
         self._node, self._thread = node, thread
         self._state = EncoderState(node.device, thread)
         self.joint_states = DriveJointStates(node, [self._state])
-        node.offer(COTargetDouble, '~/preset', self._preset, partial(answer_write, node))
+        node.offer(COTargetDouble, '~/preset', self._preset, partial(answer_success, node))
 
     def diagnostics(self) -> dict[str, str]:
         """Return position and velocity."""

@@ -31,7 +31,7 @@ from ..master.lifecycle import (
 )
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
-from .device_node import answer_write, DeviceNode
+from .device_node import answer_success, DeviceNode
 from .output_thread import OutputThread
 
 BOOT_ATTEMPTS = 3  # boot time-outs that an activation waits, as ros2_canopen does
@@ -111,7 +111,7 @@ class LifecycleServices:
             ChangeState,
             '~/change_state',
             self._change,
-            partial(answer_write, node),
+            partial(answer_success, node),
             post=output.post,
         )
         node.create_service(GetState, '~/get_state', self._get_state)

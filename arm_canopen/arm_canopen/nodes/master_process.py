@@ -46,7 +46,7 @@ from ..master.scheduler import Promise
 from .axis_services import BusFile, offer_drive
 from .device_node import (
     answer_read,
-    answer_write,
+    answer_success,
     bytes_from_raw,
     DeviceNode,
     log_bus_event,
@@ -80,8 +80,8 @@ class MasterServices:
         self._thread = thread
         for kind, name, begin, respond in (
             (COReadID, '~/sdo_read', self._read, answer_read),
-            (COWriteID, '~/sdo_write', self._write, answer_write),
-            (CONmtID, '~/set_nmt', self._set_nmt, answer_write),
+            (COWriteID, '~/sdo_write', self._write, answer_success),
+            (CONmtID, '~/set_nmt', self._set_nmt, answer_success),
         ):
             fill = partial(respond, node)
             create_deferred_service(node, kind, name, begin, fill, post=output.post)

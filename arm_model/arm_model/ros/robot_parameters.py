@@ -59,7 +59,11 @@ def declare_description(node: Node, limits: Mapping[str, Any] | None = None) -> 
 
 
 def declare_robot(node: Node) -> RobotModel:
-    """Declare what describes an arm, and build it."""
+    """Declare what describes an arm, and build it.
+
+    Raises:
+        ModelError: A parameter is missing, or they do not make an arm.
+    """
     urdf, srdf, limits, group, tip = _given(node)
     table = load_limits(Path(limits))
     with limits_refused(limits):
@@ -115,7 +119,11 @@ def _given(node: Node, *, needs_limits: bool = True) -> tuple[str, str, str, str
 
 
 def same_robot(node: Node, model: RobotModel) -> None:
-    """Declare what describes an arm on a further node, and refuse another group or tip."""
+    """Declare what describes an arm on a further node, where clients ask for it too.
+
+    Raises:
+        ModelError: The node is given another group or tip.
+    """
     _urdf, _srdf, _limits, group, tip = _declare(node)
     if group not in {'', model.group} or tip not in {'', model.tip}:
         raise ModelError(

@@ -302,7 +302,11 @@ class LinkPairs:
 
 @description_refused()
 def sample_link_pairs(urdf: str, samples: int, folder: Path | None = None) -> LinkPairs:
-    """Find out which links of a robot touch always, at times and never."""
+    """Find out which links of a robot touch always, at times and never.
+
+    Raises:
+        ModelError: The description makes no robot.
+    """
     tree = read_urdf(urdf)
     kinematics = Kinematics(tree, [each.name for each in tree.joints if each.independent])
     shapes = link_shapes(tree, folder)

@@ -403,8 +403,12 @@ class MotionQueue:
             with self._lock:
                 self._waiting.appendleft(
                     MotionCommand(
-                        *(each.request, each.number, each.requested, each.get_ready),
-                        *(each.stream, each.before),
+                        each.request,
+                        each.number,
+                        each.requested,
+                        each.get_ready,
+                        each.stream,
+                        each.before,
                     )
                 )
         self._end(command)

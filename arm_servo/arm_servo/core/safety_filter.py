@@ -29,10 +29,6 @@ from arm_trajectory import hard_brake, OnlineTrajectoryGenerator, Plan
 
 from ..controllers.controller import Cause, Limiter
 
-MIN_LOOKS, MAX_LOOKS = 4, 12
-"""Into how many parts two stops are cut at first, at least and at most."""
-
-
 LeastOnStop = Callable[[Plan, float, float], LeastClearance]
 """Measures a stop, of its begin in [s] and the distance of interest in [m]."""
 
@@ -296,6 +292,9 @@ def _mixed(mask: Mask, one: RobotState, other: RobotState) -> RobotState:
         np.where(mask, one.acceleration, other.acceleration),
     )
 
+
+MIN_LOOKS, MAX_LOOKS = 4, 12
+"""Into how many parts two stops are cut at first, at least and at most."""
 
 MAX_PART_STRIDE = 0.15  # way of all joints in such a part in [rad]
 

@@ -5,7 +5,8 @@
 A supervisor that gets SIGKILL (or is the victim of the memory killer) cannot stop anybody, and its
 processes would go on: a master with enabled drives. So the supervisor starts this process first
 and keeps one end of a pipe to it. When the pipe ends without ``bye``, the supervisor is gone,
-and the guardian stops the processes in the same order and by the same signals.
+and the guardian stops the processes in the same order and by the same signals: both do so by
+:class:`StopSequence`.
 
 It runs ``python -I -S``, so it needs the standard library only and starts in a few milliseconds,
 in its own session, so that no Ctrl-C reaches it.

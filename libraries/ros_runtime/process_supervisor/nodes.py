@@ -27,13 +27,6 @@ from .spec import ProcessSpec, StartError, StopStep
 
 DOMAIN_MAX = 232  # highest ROS domain whose UDP ports exist
 
-LOG_FORMAT = {
-    'RCUTILS_CONSOLE_OUTPUT_FORMAT': '[{severity}] [{name}]: {message}',
-    'RCUTILS_COLORIZED_OUTPUT': '0',
-    'PYTHONUNBUFFERED': '1',
-}
-"""Short lines without colours: a bring-up adds its own, and searches in them."""
-
 ANY_NODE = '/**'
 EVERY_NODE = f'{ANY_NODE}{ANY_NODE}'
 """All nodes, in files of our own. rcl keeps one entry per spelling, and a later entry counts more:
@@ -300,6 +293,14 @@ def bring_up_place(package: str, ros: RosOptions) -> Iterator[Path]:
         tempfile.TemporaryDirectory(prefix=f'{package}-') as folder,
     ):
         yield Path(folder)
+
+
+LOG_FORMAT = {
+    'RCUTILS_CONSOLE_OUTPUT_FORMAT': '[{severity}] [{name}]: {message}',
+    'RCUTILS_COLORIZED_OUTPUT': '0',
+    'PYTHONUNBUFFERED': '1',
+}
+"""Short lines without colours: a bring-up adds its own, and searches in them."""
 
 
 def node_process(

@@ -1,6 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Processes of a bring-up: how each is started, reports that it is ready, and is stopped."""
+"""Processes of a bring-up: how each is started, reports that it is ready, and is stopped.
+
+The errors of the package are here, too::
+
+    SupervisorError
+    ├── StartError (OSError)   a process cannot be started
+    ├── CallError              what runs refused something, or did not answer in time
+    └── GivenUpError           what is waited for is no longer wanted
+"""
 
 from __future__ import annotations
 

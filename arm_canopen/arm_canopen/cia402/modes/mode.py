@@ -68,7 +68,8 @@ class Mode(ABC):
     halts_by_bit = True  # bit 8 of the controlword stops it; else the master brakes its set-points
     cyclic = False  # its target acts on the drive in each cycle
     by_sdo = False  # its target goes by SDO, because no RPDO carries it
-    setpoint: float | None = None  # position commanded last; None in a mode that commands none
+    # position commanded last in user units; None in a mode that commands none
+    setpoint: float | None = None
 
     @abstractmethod
     def preload(self, actual: Actual) -> Promise[None]:
