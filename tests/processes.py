@@ -16,13 +16,13 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from typing_extensions import Self
-
 from ament_index_python.packages import get_package_prefix
 import psutil
 
 from process_supervisor.spec import ReadinessSocket, VARIABLE
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 ENDING_TIMEOUT = 45.0
 """Time in [s] for its end; a bring-up gives its master 24 s, and its own threads 10 s."""

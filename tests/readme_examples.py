@@ -18,9 +18,19 @@ import sys
 
 CHECKOUT = Path(__file__).parents[1]
 READMES = (
-    *('arm_canopen', 'arm_model', 'arm_planning', 'arm_servo', 'arm_trajectory', 'canopen_core'),
-    *('canopen_sim', 'canopen_tools', 'quad_controller', 'quad_description', 'quad_hardware'),
-    *('quad_sim', 'robot_viewer'),
+    'arm_canopen',
+    'arm_model',
+    'arm_planning',
+    'arm_servo',
+    'arm_trajectory',
+    'canopen_core',
+    'canopen_sim',
+    'canopen_tools',
+    'quad_controller',
+    'quad_description',
+    'quad_hardware',
+    'quad_sim',
+    'robot_viewer',
 )
 """Packages that are libraries without ROS, too."""
 PORT = '/dev/ttyAMA0'  # of the robot, in the READMEs

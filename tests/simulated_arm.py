@@ -5,26 +5,18 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+import json
 from pathlib import Path
 import time
-from typing import TYPE_CHECKING
-
-from ament_index_python.packages import get_package_share_directory
-from processes import executable, RunningProcess
-from ros_client import RosClient
-from std_srvs.srv import Trigger
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from isolation import Isolation
-    from typing_extensions import Self
-import json
 from typing import Any, TYPE_CHECKING
 
 from action_msgs.msg import GoalStatus
+from ament_index_python.packages import get_package_share_directory
 from canopen_interfaces.srv import COTargetDouble
 from control_msgs.action import FollowJointTrajectory
+from processes import executable, RunningProcess
+from ros_client import RosClient
+from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_bringup.robots import expand_xacro
@@ -35,6 +27,7 @@ if TYPE_CHECKING:
 
     from isolation import Isolation
     from rclpy.action.client import ActionClient
+    from typing_extensions import Self
 
 JOINTS = [f'panda_joint{number}' for number in range(1, 8)]
 

@@ -121,7 +121,7 @@ class PtyPeer:
     """One robot.
 
     Attributes:
-        link: Where its port is found, through every :meth:`replug`.
+        link: Where its port is found, also after :meth:`unplug` and :meth:`plug`.
         protocol: What it speaks.
         firmware: What it answers when it is asked.
         behaviour: How it behaves.
