@@ -147,9 +147,9 @@ def test_a_goal_that_cannot_say_whether_it_stands_hides_no_other(isolation: Isol
         server = serve(client.node, begun.append, has_stopped=has_stopped)
         caller = client.action(LookupTransform, 'look_up')
         assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
-        for count in (1, 2):
+        for _ in range(2):
             caller.send_goal_async(LookupTransform.Goal())  # type: ignore[no-untyped-call]
-            client.spin_until(lambda count=count: len(begun) == count, TIMEOUT, 'the start')
+        client.spin_until(lambda: len(begun) == 2, TIMEOUT, 'the start')
         server.watch(look)
         assert looked == begun
         server.destroy()
