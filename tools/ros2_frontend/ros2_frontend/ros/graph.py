@@ -41,7 +41,12 @@ _LONGEST_WAIT = 0.1  # [s]
 
 
 class Session:
-    """A node and the executor that serves it.
+    """One ROS context with one hidden node, for the life of one command.
+
+    The signal handlers of rclpy stay out: a command ends by `KeyboardInterrupt`, with a context
+    that still works (`action send_goal` cancels its goal then), and always takes its participant
+    out of the graph. Executor: `SingleThreadedExecutor`; the multi-threaded one hands callbacks
+    out repeatedly, and the unbounded spin of the events executor burns a core (rclpy 7.1.6).
 
     Attributes:
         node: The node.
@@ -197,9 +202,11 @@ class Graph:
         _wait(lambda: self._knows_this_host() or None, self._late)
 
     def _knows_this_host(self) -> bool:
-        # each participant of ROS publishes this topic, whichever vendor's DDS it uses
+        # each participant of ROS publishes this topic, whichever vendor's DDS it uses; the names
+        # of its nodes come by it, a little later
         known = self._node.get_publishers_info_by_topic('ros_discovery_info', no_mangle=True)
-        return len(known) >= participants_on_this_host(self._node.context.get_domain_id())
+        participants = participants_on_this_host(self._node.context.get_domain_id())
+        return len(self.nodes(hidden=True)) >= len(known) >= participants
 
     def wait_for(self, look: Callable[[], T | None], timeout: float = math.inf) -> T | None:
         """Return what `look` finds; None when it is missing for sure, or after `timeout` [s]."""
