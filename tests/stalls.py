@@ -4,9 +4,12 @@
 
 A process of its own sleeps all the time, so that it waits for a processor as little as any. When
 it wakes up late, simulated drives, master and test were not computed in time, either. A test that
-failed in such a time says nothing, and is run again; the closing line counts it as a rerun. So is
-one whose simulated drives report that they got no processor: a kernel that shares the processor
-among sessions can starve a busy session while one that sleeps wakes up in time.
+failed in such a time says nothing, and is run again; the closing line counts it as a rerun.
+
+A kernel that shares the processor among sessions can starve busy processes while one that sleeps
+wakes up in time. So a test is run again, too, where simulated drives report that they got no
+processor, or where its own process, which is client, driver or robot in many tests, waited for
+one.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Generator
 from contextlib import suppress
 import os
+from pathlib import Path
 import re
 import subprocess
 import sys
@@ -22,6 +26,7 @@ import time
 import pytest
 
 LATE = 0.1  # [s] reports of a robot count as missing after that; drives wait for 0.1 to 0.5 s
+WAITED_MAX = 0.5  # [s] that the process of a test may wait for a processor, all in all
 RERUNS = 2  # of a test, at most
 STARVED = re.compile(r'got no processor for (\d+\.\d+) s')  # as simulated drives report it
 WAKE = 0.05  # [s] until it has written of a stall that has ended
@@ -75,7 +80,20 @@ class StallWatch:
 
 WATCH = pytest.StashKey[StallWatch]()
 BEGIN = pytest.StashKey[float]()  # of a test, on the monotonic clock [s]
-DRIVES_STARVED = pytest.StashKey[bool]()
+WAITED = pytest.StashKey[float]()  # by this process for a processor, when a test began [s]
+STARVED_IN = pytest.StashKey[bool]()  # drives or this process, when a test failed
+
+
+def waited() -> float:
+    """Return how long the threads of this process have waited for a processor so far [s].
+
+    Source: kernel documentation, scheduler/sched-stats, /proc/<pid>/schedstat, the second number.
+    """
+    total = 0
+    for thread in Path('/proc/self/task').iterdir():
+        with suppress(OSError):  # it ended meanwhile
+            total += int((thread / 'schedstat').read_text().split()[1])
+    return total * 1e-9
 
 
 def stalls_in(item: pytest.Item) -> list[float]:
@@ -93,7 +111,7 @@ def pytest_itemcollected(item: pytest.Item) -> None:
     """Mark each test; the condition is asked when it has failed."""
 
     def stood_still() -> bool:
-        return item.stash.get(DRIVES_STARVED, False) or bool(stalls_in(item))
+        return item.stash.get(STARVED_IN, False) or bool(stalls_in(item))
 
     item.add_marker(pytest.mark.flaky(reruns=RERUNS, condition=stood_still))
 
@@ -102,7 +120,8 @@ def pytest_itemcollected(item: pytest.Item) -> None:
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Note when a test begins."""
     item.stash[BEGIN] = time.monotonic()
-    item.stash[DRIVES_STARVED] = False
+    item.stash[WAITED] = waited()
+    item.stash[STARVED_IN] = False
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)  # around what adds the outputs of processes
@@ -113,8 +132,10 @@ def pytest_runtest_makereport(
     report = yield
     if report.failed:
         said = '\n'.join([report.longreprtext, *(text for _, text in report.sections)])
-        starved = map(float, STARVED.findall(said))
-        item.stash[DRIVES_STARVED] |= max(starved, default=0.0) > LATE
+        starved = max(map(float, STARVED.findall(said)), default=0.0)
+        own = waited() - item.stash.get(WAITED, 0.0)
+        item.stash[STARVED_IN] |= starved > LATE or own > WAITED_MAX
+        report.sections.append(('waited for a processor', f'{own:.2f} s'))
     if report.failed and (stalls := stalls_in(item)):
         durations = ', '.join(f'{stall:.2f} s' for stall in stalls)
         report.sections.append(('this computer stood still', durations))

@@ -12,9 +12,13 @@ import sys
 import pytest
 
 FAILS_ONCE = """
-import os, signal, time
+import hashlib, os, signal, threading, time
 from stalls import WATCH
 runs = []
+def work():
+    end = time.monotonic() + 1.0
+    while time.monotonic() < end:
+        hashlib.sha256(bytes(10_000_000))
 def test_first(request):
     runs.append(1)
     if {stalls}:
@@ -25,6 +29,14 @@ def test_first(request):
     {says}
     assert len(runs) == {passes}
 """
+
+STARVES = """if len(runs) == 1:
+        os.sched_setaffinity(0, [min(os.sched_getaffinity(0))])
+        threads = [threading.Thread(target=work) for _ in range(4)]
+        [thread.start() for thread in threads]
+        work()
+        [thread.join() for thread in threads]"""
+"""Five threads that compute without the interpreter's lock share a processor for a while."""
 
 
 @pytest.mark.parametrize(
@@ -39,6 +51,7 @@ def test_first(request):
             '1 passed, 1 rerun',
             False,
         ),
+        ('False', STARVES, 2, '1 passed, 1 rerun', False),
         ('True', '', 9, '1 failed, 2 rerun', True),
     ],
 )

@@ -34,11 +34,12 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     return clock
 
 
-def view(known: int, spin_time: float | None = None) -> Graph:
-    """Return a graph in which some participants are known as those of ROS."""
+def view(known: int, spin_time: float | None = None, nodes: int = 2) -> Graph:
+    """Return a graph in which some participants are known as those of ROS, and some nodes."""
     node = SimpleNamespace(
         context=SimpleNamespace(get_domain_id=lambda: 7),
         get_publishers_info_by_topic=lambda topic, **_: [topic] * known,
+        get_node_names_and_namespaces=lambda: [('node', '/')] * nodes,
     )
     return Graph(SimpleNamespace(node=node), spin_time)  # type: ignore[arg-type]
 
@@ -48,6 +49,7 @@ def view(known: int, spin_time: float | None = None) -> Graph:
     [
         ((2, None), True, (0.5, 1.5)),
         ((1, None), True, (1.0, 1.5)),  # a node is late, or the other participant is not of ROS
+        ((2, None, 1), True, (1.0, 1.5)),  # the other one has not named its nodes
         ((2, None), False, (3.2, 3.2)),
         ((2, 2.0), True, (2.0, 2.0)),
         ((1, 0.2), False, (0.2, 0.2)),
@@ -56,7 +58,7 @@ def view(known: int, spin_time: float | None = None) -> Graph:
 def test_a_command_waits_as_its_user_and_the_reach_of_dds_want(
     clock: Clock,
     monkeypatch: pytest.MonkeyPatch,
-    seen: tuple[int, float | None],
+    seen: tuple[int, float | None] | tuple[int, float | None, int],
     here: bool,
     waits: tuple[float, float],
 ) -> None:
