@@ -44,9 +44,9 @@ for longer than ``ANSWER_DELAY`` between sending and noting. A client that has i
 requests a result drops the repeats with a warning.
 """
 
-RESULT_PACE, LONGEST_DELAY = 4.0, 0.5
+RESULT_RATIO, LONGEST_DELAY = 4.0, 0.5
 """A result leaves so many times later than its request as that came after its goal, less the
-delay; [s] at most. Nothing shows that a result was noted; this pace shows how long threads pause.
+delay; [s] at most. Nothing shows that a result was noted; this ratio shows how long threads pause.
 """
 
 
@@ -90,7 +90,7 @@ class _Server(ActionServer):
     async def _execute_get_result_request(self, request: Any) -> None:  # noqa: ANN401
         now = time.monotonic()
         came = self._came_at.pop(bytes(request[1].goal_id.uuid), now)
-        paced = RESULT_PACE * (now - came - ANSWER_DELAY)
+        paced = RESULT_RATIO * (now - came - ANSWER_DELAY)
         await self._delay(min(max(ANSWER_DELAY, paced), LONGEST_DELAY))
         await super()._execute_get_result_request(request)
 
@@ -225,7 +225,7 @@ class GoalServer(Generic[GoalT]):
     def watch(self, look: Callable[[GoalT], None]) -> None:
         """Look at each goal that has not ended; one for which that raises is canceled and aborted.
 
-        It is answered once what was begun for it stands still.
+        It is answered once what was begun for it stands still, or cannot be asked whether it does.
         """
         for goal in self.running:
             try:
@@ -239,10 +239,12 @@ class GoalServer(Generic[GoalT]):
 
     def _end_failed(self, goal: GoalT) -> None:
         try:
-            if self._has_stopped(goal):
-                self.end(goal)
-        except Exception as error:  # noqa: BLE001  # it is asked again, and the others meanwhile
+            is_due = self._has_stopped(goal)
+        except Exception as error:  # noqa: BLE001  # the others are looked at, too
             self._log_defect(error)
+            is_due = True  # it cannot be asked: the client is not left without an answer
+        if is_due:
+            self.end(goal)
 
     def end(self, goal: GoalT) -> None:
         """Answer a goal with what ``conclude`` returns; once, always from the same thread."""

@@ -33,12 +33,16 @@ def serve(
     start: Callable[[ServedGoal], None],
     ending: Ending | None = Ending.SUCCEEDED,
     accept: Callable[[], ServedGoal] = ServedGoal,
-    has_stopped: Callable[[ServedGoal], bool] = lambda _: True,
+    has_stopped: Callable[[ServedGoal], bool] | None = None,
 ) -> GoalServer[ServedGoal]:
-    """Serve goals of an action; a cancel ends them; without an ending all callbacks raise."""
+    """Serve goals of an action; without an ending all callbacks raise.
+
+    A cancel ends a goal, but where ``has_stopped`` says when.
+    """
 
     def cancel(goal: ServedGoal) -> None:
-        server.end(goal)
+        if has_stopped is None:
+            server.end(goal)
         if ending is None:
             raise RuntimeError('no cancel')
 
@@ -60,7 +64,7 @@ def serve(
         conclude=conclude,
         fail=fail,
         refusals=(ValueError,),
-        has_stopped=has_stopped,
+        has_stopped=has_stopped or (lambda _: True),
     )
     return server
 
@@ -152,6 +156,7 @@ def test_a_goal_that_cannot_say_whether_it_stands_hides_no_other(isolation: Isol
         client.spin_until(lambda: len(begun) == 2, TIMEOUT, 'the start')
         server.watch(look)
         assert looked == begun
+        assert all(goal.has_ended for goal in begun)  # neither stays without an answer
         server.destroy()
 
 
