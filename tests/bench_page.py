@@ -54,7 +54,7 @@ def measure(variant: str) -> None:
         client.spin_until(lambda: moves(states), TIMEOUT, 'motion')
         diagnostics = client.listen(DiagnosticArray, '/diagnostics')
         if variant == 'page open':
-            page = browser.open_page(stack.enter_context(browser.browser()), url)
+            page = browser.open_page(stack.enter_context(browser.browser()), url, drawn=True)
             for process in browser.processes():
                 process.nice(19)
             page.locator('canvas').first.wait_for()

@@ -36,7 +36,7 @@ OPTIONS = [
     '--enable-unsafe-swiftshader',
     '--ignore-gpu-blocklist',
 ]
-POLITE = ('nice', '-n', '2')
+POLITE = ('nice', '-n', '5')
 """It draws without a graphics card; the robots that it shows come first."""
 UNPRIVILEGED = ('setpriv', '--bounding-set=-sys_nice')
 """As root a browser would have the process that draws at nice -8, before the robots."""
@@ -50,6 +50,19 @@ const draw = window.requestAnimationFrame.bind(window);
 window.requestAnimationFrame = (act) => setTimeout(() => draw(act), 200);
 """
 """A page draws a few times a second: without a graphics card the robot needs the processor."""
+DRAWN_ON_DEMAND = """
+for (const kind of [WebGLRenderingContext, WebGL2RenderingContext])
+  for (const name of ['clear', 'drawArrays', 'drawElements', 'drawArraysInstanced',
+                      'drawElementsInstanced', 'drawRangeElements', 'blitFramebuffer']) {
+    const real = kind.prototype[name];
+    if (real) kind.prototype[name] = function (...values) {
+      if (window.drawn) real.apply(this, values);
+    };
+  }
+"""
+"""Pixels of the scene are drawn where a test looks at them: one picture costs a core a second."""
+TWO_PICTURES = """() => new Promise(
+  (done) => requestAnimationFrame(() => requestAnimationFrame(done)))"""
 PICTURES = Path(__file__).parents[1] / 'build' / 'screenshots'
 """Where pictures of the tests are kept, to be looked at."""
 PANEL = 410  # [px] width of the controls at the right
@@ -168,11 +181,22 @@ def asleep() -> Iterator[None]:
             process.send_signal(signal.SIGCONT)
 
 
-def open_page(browser: Browser, url: str, *, robot: str = '.', **options: object) -> Page:
-    """Open a page and wait until it shows its groups, and the name of a robot that matches."""
+def open_page(
+    browser: Browser, url: str, *, robot: str = '.', drawn: bool = False, **options: object
+) -> Page:
+    """Open a page and wait until it shows its groups, and the name of a robot that matches.
+
+    Args:
+        browser: The browser.
+        url: Of the page.
+        robot: Regular expression.
+        drawn: The scene is drawn all the time, not only where a test looks at it.
+        options: Of playwright.
+    """
     page = browser.new_page(**({'viewport': SIZE} | options))  # type: ignore[arg-type]
     page.set_default_timeout(PAGE_TIMEOUT)
-    page.add_init_script(FEW_PICTURES)
+    page.add_init_script(FEW_PICTURES + DRAWN_ON_DEMAND)
+    page.add_init_script(f'window.drawn = {str(drawn).lower()}')
     page.goto(url)
     # viser's own warning of a software renderer covers the scene
     page.add_style_tag(content='.mantine-Notifications-root { display: none }')
@@ -195,14 +219,28 @@ def picture(page: Page, name: str) -> None:
     """Keep a picture of the whole page, where SCREENSHOTS is set: one takes seconds."""
     if os.environ.get('SCREENSHOTS'):
         PICTURES.mkdir(parents=True, exist_ok=True)
-        page.screenshot(path=PICTURES / f'{name}.png', timeout=3 * PAGE_TIMEOUT)
+        with drawn(page):
+            page.screenshot(path=PICTURES / f'{name}.png', timeout=3 * PAGE_TIMEOUT)
+
+
+@contextmanager
+def drawn(page: Page) -> Iterator[None]:
+    """Draw the scene meanwhile."""
+    before = page.evaluate('window.drawn')
+    page.evaluate('window.drawn = true')
+    page.evaluate(TWO_PICTURES)
+    try:
+        yield
+    finally:
+        page.evaluate(f'window.drawn = {str(before).lower()}')
 
 
 def colors_of_scene(page: Page) -> int:
     """Count the pixels of the scene that have a colour: floor and sky are grey."""
     from PIL import Image
 
-    png = page.screenshot(timeout=3 * PAGE_TIMEOUT)
+    with drawn(page):
+        png = page.screenshot(timeout=3 * PAGE_TIMEOUT)
     image = Image.open(io.BytesIO(png)).convert('HSV')
     width, height = image.size
     scene = image.crop((0, TOP, width - PANEL, height - BELOW))  # without STOP and the panel
@@ -290,11 +328,12 @@ def drag_arrow(page: Page, color: str, way: int) -> None:
     """
     channel = ('red', 'green').index(color)
     deadline = time.monotonic() + PAGE_TIMEOUT / 1000.0
-    before, place = None, _leftmost(page, channel)
-    while place is None or place != before:  # a canvas says nothing of what it draws
-        if time.monotonic() > deadline:
-            raise AssertionError(f'nothing {color} stands still in the scene')
-        before, place = place, _leftmost(page, channel)
+    with drawn(page):
+        before, place = None, _leftmost(page, channel)
+        while place is None or place != before:  # a canvas says nothing of what it draws
+            if time.monotonic() > deadline:
+                raise AssertionError(f'nothing {color} stands still in the scene')
+            before, place = place, _leftmost(page, channel)
     x, y = place[0] + 4, place[1]
     page.mouse.move(x, y)
     page.mouse.down()

@@ -52,7 +52,9 @@ def take(demo: tuple[str, ...], views: dict[str, tuple[str, dict[str, int]]]) ->
 def take_one(browser: Browser, url: str, group: str, size: dict[str, int], path: Path) -> None:
     """Take one picture."""
     phone = size is PHONE
-    page = chromium.open_page(browser, url, viewport=size, has_touch=phone, is_mobile=phone)
+    page = chromium.open_page(
+        browser, url, drawn=True, viewport=size, has_touch=phone, is_mobile=phone
+    )
     chromium.show(page, group)
     page.wait_for_timeout(1e3 * MOVING)
     page.screenshot(path=path, timeout=3 * chromium.PAGE_TIMEOUT)

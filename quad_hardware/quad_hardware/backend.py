@@ -261,7 +261,7 @@ class SerialBackend(Backend):
             seen = self._count
             arrived = self._arrived.wait_for(lambda: self._running and self._count > seen, timeout)
             if not arrived:
-                raise NoAnswerError(self._robot.status().detail)
+                raise NoAnswerError(self._robot.status().reason(f'no report for {timeout} s'))
             return self.observe()
 
     # -- in the thread of the driver

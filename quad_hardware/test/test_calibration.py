@@ -356,6 +356,18 @@ def test_servos_are_measured_of_joints_that_were_checked(
     assert 'no such device' in script.said[-1]
 
 
+def test_a_command_that_does_not_leave_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not the state of a line that is well again."""
+    monkeypatch.setattr('quad_hardware.calibration.wizard.SEND_TIMEOUT', 0.0)
+    monkeypatch.chdir(tmp_path)
+    with PtyPeer(tmp_path / 'port') as peer:
+        script = Script('')
+        assert run_calibrate(['servos', '--port', str(peer.link)], script) == 1
+    assert script.said[-1] == 'a command did not leave within 0.0 s'
+
+
 def test_a_file_keeps_what_it_had(tmp_path: Path) -> None:
     """New values go beside old ones, also within a joint; other files are refused."""
     path = tmp_path / 'p.yaml'

@@ -17,7 +17,7 @@ from quad_description.rotations import from_rpy, normalized, roll_pitch_yaw, Vec
 
 from ..exceptions import CommandError, NoAnswerError
 from ..joints import JointServo
-from ..link import Driver, LinkOptions, LinkState, Session
+from ..link import Driver, LinkOptions, LinkState, Session, STALE_TIME
 from ..protocol import Span
 from ..report import Report
 
@@ -90,12 +90,13 @@ class LimpRobot:
             NoAnswerError: They were not sent; the message has the reason.
         """
         begun = time.monotonic()
-        if self.driver.command(angles):
-            while time.monotonic() < begun + SEND_TIMEOUT:
-                if self.driver.commanded_at >= begun:
-                    return self.driver.commanded_at
-                time.sleep(0.001)
-        raise NoAnswerError(self.driver.status().detail)
+        if not self.driver.command(angles):
+            raise self._no_answer(f'reports had not arrived for {STALE_TIME} s; they do again')
+        while time.monotonic() < begun + SEND_TIMEOUT:
+            if self.driver.commanded_at >= begun:
+                return self.driver.commanded_at
+            time.sleep(0.001)
+        raise self._no_answer(f'a command did not leave within {SEND_TIMEOUT} s')
 
     def rounded(self, motor: int, angle: float) -> float:
         """Return an angle [deg] as the line brings it to a motor."""
@@ -118,7 +119,7 @@ class LimpRobot:
             NoAnswerError: The robot does not report; the message has the reason.
         """
         if not self.driver.torque(on=False):
-            raise NoAnswerError(self.driver.status().detail)
+            raise self._no_answer(f'reports had not arrived for {STALE_TIME} s; they do again')
         self.angles()  # by then it has gone out
         try:
             yield
@@ -133,8 +134,11 @@ class LimpRobot:
             way = tuple(self._reports)
             self._reports.clear()
             if not self._changed.wait_for(lambda: len(self._reports) >= SAMPLES, REPORT_TIMEOUT):
-                raise NoAnswerError(self.driver.status().detail)
+                raise self._no_answer(f'no {SAMPLES} reports within {REPORT_TIMEOUT} s')
             return way, tuple(self._reports)
+
+    def _no_answer(self, otherwise: str) -> NoAnswerError:
+        return NoAnswerError(self.driver.status().reason(otherwise))
 
     def _opened(self, session: Session) -> None:
         self._spans = session.dialect.spans

@@ -63,6 +63,10 @@ class LinkStatus:
     parser: ParserCounters = field(default_factory=ParserCounters)
     dialect: DialectCounters = field(default_factory=DialectCounters)
 
+    def reason(self, otherwise: str) -> str:
+        """Return why it is not running; another reason where it runs again by now."""
+        return otherwise if self.state is LinkState.RUNNING else self.detail
+
 
 @dataclass(frozen=True, slots=True)
 class Step:
