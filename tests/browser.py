@@ -69,6 +69,7 @@ PANEL = 410  # [px] width of the controls at the right
 TOP = 80  # [px] height of STOP and state
 BELOW = 100  # [px] height of views and messages
 STANDS = 200  # [ms] in one place
+NEAR = 0.02  # share of a slider's way from where it was dragged to
 GROUPS = 4  # tabs of each page
 
 
@@ -235,12 +236,18 @@ def drawn(page: Page) -> Iterator[None]:
         page.evaluate(f'window.drawn = {str(before).lower()}')
 
 
-def colors_of_scene(page: Page) -> int:
-    """Count the pixels of the scene that have a colour: floor and sky are grey."""
+def wait_for_colors(page: Page, count: int) -> None:
+    """Wait until so many pixels of the scene have a colour: floor and sky are grey."""
+    deadline = time.monotonic() + PAGE_TIMEOUT / 1000.0
+    with drawn(page):
+        while (found := _colors_of_scene(page)) < count:
+            assert time.monotonic() < deadline, f'{found} pixels have a colour'
+
+
+def _colors_of_scene(page: Page) -> int:
     from PIL import Image
 
-    with drawn(page):
-        png = page.screenshot(timeout=3 * PAGE_TIMEOUT)
+    png = page.screenshot(timeout=3 * PAGE_TIMEOUT)
     image = Image.open(io.BytesIO(png)).convert('HSV')
     width, height = image.size
     scene = image.crop((0, TOP, width - PANEL, height - BELOW))  # without STOP and the panel
@@ -304,6 +311,11 @@ def drag(page: Page, slider: int, share: float) -> None:
     page.mouse.down()
     page.mouse.move(track['x'] + share * track['width'], box['y'] + box['height'] / 2, steps=4)
     page.mouse.up()
+    low, high = (float(thumb.get_attribute(f'aria-value{end}') or 'nan') for end in ('min', 'max'))
+    deadline = time.monotonic() + PAGE_TIMEOUT / 1000.0
+    while not abs(slider_value(page, slider) - low - share * (high - low)) < NEAR * (high - low):
+        assert time.monotonic() < deadline, 'the slider does not follow the mouse'
+        page.wait_for_timeout(STANDS)
 
 
 def slider_value(page: Page, slider: int) -> float:

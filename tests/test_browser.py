@@ -231,6 +231,8 @@ def seen() -> Iterator[Seen]:
 def one_page(seen: Seen) -> Iterator[None]:
     """Close what a test that failed leaves open: it would draw, and hold control."""
     seen.heal()
+    for box in objects(seen):
+        change_scene(seen, CollisionObject(id=box.id, operation=CollisionObject.REMOVE))
     yield
     seen.page.mouse.up()
     seen.page.set_default_timeout(chromium.PAGE_TIMEOUT)
@@ -271,6 +273,14 @@ def remove(page: Page, name: str) -> None:
     page.get_by_text(f'{name} is removed').wait_for()
 
 
+def objects(seen: Seen) -> Sequence[CollisionObject]:
+    """Return the objects of move_group's scene."""
+    request = GetPlanningScene.Request()
+    request.components.components = request.components.WORLD_OBJECT_GEOMETRY
+    answer = seen.client.call(GetPlanningScene, '/get_planning_scene', request)
+    return cast('Sequence[CollisionObject]', answer.scene.world.collision_objects)
+
+
 def change_scene(seen: Seen, box: CollisionObject) -> None:
     """Change the scene of move_group, as any client does."""
     scene = PlanningScene(is_diff=True)
@@ -307,11 +317,7 @@ def test_a_dragged_goal_and_a_box(seen: Seen) -> None:
     page.get_by_text('box1 is added').wait_for()
     chromium.drag_arrow(page, 'red', 30)
     page.get_by_text('box1 is moved').wait_for()
-    request = GetPlanningScene.Request()
-    request.components.components = request.components.WORLD_OBJECT_GEOMETRY
-    (box,) = seen.client.call(
-        GetPlanningScene, '/get_planning_scene', request
-    ).scene.world.collision_objects
+    (box,) = objects(seen)
     assert box.pose != Pose(position=Point(x=0.6, z=0.1)), 'moved or turned'
     remove(page, 'box1')
 
@@ -364,7 +370,7 @@ def test_a_target_moves_the_arm_while_its_button_is_held(seen: Seen) -> None:
     """Its slider moves no joint; another page sees who drives, and only its STOP works."""
     page, other = seen.show('Drive', 'Target'), chromium.open_page(seen.browser, seen.url)
     chromium.picture(page, 'arm')
-    assert chromium.colors_of_scene(page) > 100
+    chromium.wait_for_colors(page, 100)
     start = seen.position()
     chromium.drag(page, JOINT1, 0.65 if start < 0.0 else 0.35)
     wanted = chromium.slider_value(page, JOINT1)
