@@ -37,6 +37,7 @@ for _setup in [*_ROOT.glob('*/setup.py'), *_ROOT.glob('libraries/*/setup.py')]:
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 restrict_dds(os.environ)  # of this process; those that it starts inherit it
+os.environ.setdefault('PIP_COMPILE', '0')  # of what tests install little is imported
 
 # how long an example takes says more about the machine than about the code
 settings.register_profile('workspace', deadline=None)
