@@ -46,6 +46,7 @@ LARGEST_SLOPE = 1.0
 NOISE = 0.1
 """Growth in [MB] that is too little to count, as long as the run is short."""
 MEGABYTE = 1e6
+ANONYMOUS = re.compile(r'^Anonymous: +(\d+) kB$', re.MULTILINE)
 FIRST_NODE = 2
 WAY_TIME = 3.0
 """Of a trajectory in [s]."""
@@ -67,14 +68,15 @@ class Sample:
     """What a process uses."""
 
     time: float  # on the steady clock in [s]
-    memory: float  # that no other process shares, in [MB]
+    memory: float  # of no file, in [MB]: who shares the pages of libraries changes meanwhile
     threads: int  # their number
     descriptors: int  # number of open files and sockets
 
     @classmethod
     def of(cls, process: psutil.Process) -> Sample:
         """Look at a process."""
-        memory = process.memory_full_info().uss / MEGABYTE
+        rollup = Path(f'/proc/{process.pid}/smaps_rollup').read_text()
+        memory = int(ANONYMOUS.findall(rollup)[0]) * 1024 / MEGABYTE
         return cls(time.monotonic(), memory, process.num_threads(), process.num_fds())
 
 
