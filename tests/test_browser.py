@@ -115,12 +115,13 @@ class Seen:
         page.locator('body:not(.rv-stopped)').wait_for()
 
     def heal(self) -> None:
-        """Recover drives that a busy machine has let lose their master."""
+        """Recover drives that have lost their master on a busy machine; wait until it is ready."""
         state, action = (self.page.locator(f'#rv-{name}') for name in ('state b', 'do'))
         deadline = time.monotonic() + REACTION
-        while state.inner_text() not in {'READY', 'STOPPED'} and time.monotonic() < deadline:
-            if action.inner_text().startswith('Recover'):
-                chromium.act(self.page, 'Recover')
+        while (shown := state.inner_text()) not in {'READY', 'STOPPED'}:
+            assert time.monotonic() < deadline, f'the arm stays in {shown}'
+            if offered := action.inner_text():  # to recover, or to allow motion
+                chromium.act(self.page, offered)
             self.page.wait_for_timeout(chromium.STANDS)
 
     def box(self, slider: int) -> Locator:
@@ -229,7 +230,7 @@ def seen() -> Iterator[Seen]:
 
 @pytest.fixture(autouse=True)
 def one_page(seen: Seen) -> Iterator[None]:
-    """Close what a test that failed leaves open: it would draw, and hold control."""
+    """Begin with an arm that is ready and an empty scene; close pages that a test leaves open."""
     seen.heal()
     for box in objects(seen):
         change_scene(seen, CollisionObject(id=box.id, operation=CollisionObject.REMOVE))

@@ -247,7 +247,7 @@ class SerialBackend(Backend):
         """
         with self._arrived:
             if self._state is None:
-                raise NoAnswerError(self._robot.status().detail)
+                raise NoAnswerError(self._robot.status().reason('no report has come yet'))
             return self._state
 
     def close(self) -> None:

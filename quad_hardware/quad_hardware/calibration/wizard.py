@@ -25,6 +25,7 @@ SAMPLES = 15  # reports that one reading is the median of
 MAX_REPORTS = 6000  # reports between two readings, the newest; two minutes
 SEND_TIMEOUT = 2.0  # [s] for a command to leave
 REPORT_TIMEOUT = 4.0  # [s] for a robot to report
+REPORTS_BROKE_OFF = f'reports had not arrived for {STALE_TIME} s; they do again'
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +92,7 @@ class LimpRobot:
         """
         begun = time.monotonic()
         if not self.driver.command(angles):
-            raise self._no_answer(f'reports had not arrived for {STALE_TIME} s; they do again')
+            raise self._no_answer(REPORTS_BROKE_OFF)
         while time.monotonic() < begun + SEND_TIMEOUT:
             if self.driver.commanded_at >= begun:
                 return self.driver.commanded_at
@@ -119,7 +120,7 @@ class LimpRobot:
             NoAnswerError: The robot does not report; the message has the reason.
         """
         if not self.driver.torque(on=False):
-            raise self._no_answer(f'reports had not arrived for {STALE_TIME} s; they do again')
+            raise self._no_answer(REPORTS_BROKE_OFF)
         self.angles()  # by then it has gone out
         try:
             yield
