@@ -118,10 +118,10 @@ class Seen:
         """Recover drives that have lost their master on a busy machine; wait until it is ready."""
         state, action = (self.page.locator(f'#rv-{name}') for name in ('state b', 'do'))
         deadline = time.monotonic() + REACTION
-        while (shown := state.inner_text()) not in {'READY', 'STOPPED'}:
+        while (shown := state.inner_text()) != 'READY' and action.inner_text() != ALLOW:
             assert time.monotonic() < deadline, f'the arm stays in {shown}'
-            if offered := action.inner_text():  # to recover, or to allow motion
-                chromium.act(self.page, offered)
+            if action.inner_text().startswith('Recover'):
+                chromium.act(self.page, 'Recover')
             self.page.wait_for_timeout(chromium.STANDS)
 
     def box(self, slider: int) -> Locator:
