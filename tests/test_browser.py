@@ -109,10 +109,16 @@ class Seen:
         return self.page
 
     def allow(self, page: Page) -> None:
-        """Allow motion where there was a STOP before."""
+        """Allow motion where there was a STOP before, and take control where another page has it.
+
+        A page keeps it until it is closed, whatever test has held a button there.
+        """
         if page.locator('#rv-do').inner_text() == ALLOW:
             chromium.act(page, ALLOW)
         page.locator('body:not(.rv-stopped)').wait_for()
+        if page.locator('#rv-take').is_visible():
+            page.locator('#rv-take').click(force=True)
+            page.locator('body:not(.rv-other)').wait_for()
 
     def heal(self) -> None:
         """Recover drives that have lost their master on a busy machine; wait until it is ready."""
@@ -138,9 +144,6 @@ class Seen:
     def jog(self, page: Page) -> None:
         """Turn the tool about the base's axis; back, as at its limit the joint would not move."""
         self.allow(page)
-        if page.locator('#rv-take').is_visible():
-            page.locator('#rv-take').click(force=True)
-            page.locator('body:not(.rv-other)').wait_for()
         chromium.show(page, 'Drive', 'Tool')
         chromium.choose(page, 'Along axes of', BASE)
         chromium.hold(page, TURN if self.position(WRIST) > self.wrist else TURN_BACK)
