@@ -36,7 +36,6 @@ from quad_controller.policy_check.course import (
     CourseFigures,
     CourseWalker,
     Passage,
-    WalkingRobot,
 )
 from quad_controller.policy_check.findings import (
     against_gait,
@@ -53,8 +52,8 @@ from quad_controller.policy_check.trial import Candidate, chain_duration, run_tr
 from quad_description import robot_urdf, RobotState
 from quad_gait_rig import metadata, ROBOT, write_policy
 from quad_hardware import NoAnswerError
-from quad_sim import CommandTiming, ServedRobot
-from quad_sim.physics import Metered, PhysicsBackend, Robot
+from quad_sim import CommandTiming, ServedRobot, Watched
+from quad_sim.physics import PhysicsBackend, Robot
 
 DEADLINE = 90.0  # [s]
 STAND_TARGETS = GaitGenerator(ROBOT, GaitParameters()).stand_targets
@@ -193,25 +192,21 @@ def test_a_robot_that_is_silent_for_a_while_is_waited_for() -> None:
 def test_the_gait_walks_through_the_whole_chain() -> None:
     """Servos, board, line, driver, estimator: it gets on, and its commands are timed."""
     with serial_arena(RobotChoice()) as arena:
-        walker = WalkingRobot(arena.backend, ROBOT, None, arena.stand())
+        walker = CourseWalker(arena, ROBOT, None)
         end = time.monotonic() + DEADLINE
         measured = walk_on(arena, walker, end)
-        while measured[0].x < 0.1:
+        while measured.metered.x < 0.1:
             assert time.monotonic() < end, measured
             measured = walk_on(arena, walker, end)
-        metered, timing = measured
-        assert timing is not None
-        assert metered.energy > 0.0
-        assert 0.0 < timing.latency(0.5) < timing.latency(1.0)
+        assert measured.metered.energy > 0.0
+        assert 0.0 < measured.timing.latency(0.5) < measured.timing.latency(1.0)
         walker.run(0.5, REST)
 
 
-def walk_on(
-    arena: SerialArena, walker: WalkingRobot, end: float
-) -> tuple[Metered, CommandTiming | None]:
+def walk_on(arena: SerialArena, walker: CourseWalker, end: float) -> Watched:
     """Walk for a second, from standing where a busy machine has brought the robot down."""
     if walker.is_down:
-        walker.restart(arena.stand())
+        walker.restart()
         walker.stand_up()
         arena.begin()
     for _ in range(50):
@@ -324,13 +319,13 @@ def test_the_report_has_a_row_for_each_command_of_each_walker() -> None:
     """With what was tried, commanded and measured; what was not measured is empty."""
     turn = replace(FAIR, commanded=Velocity(yaw=1.0), went=Velocity(yaw=0.9))
     pair = Compared('in a test', course(FAIR, turn), course(FAIR, turn))
-    walked = Velocity(0.3), Velocity(0.25), 0.2
+    walked = course(replace(FAIR, went=Velocity(0.25)))
     file = io.StringIO()
     write_csv(file, Findings(courses=[pair], walks=[walked]))
     walk, forward, turned, *others = rows_of(file.getvalue())
     assert walk['tried'] == 'walk'
     assert float(walk['went x [m/s]']) == 0.25
-    assert walk['falls'] == forward['latency p50 [s]'] == ''
+    assert (walk['falls'], forward['latency p50 [s]']) == ('0', '')
     assert (forward['walker'], forward['axis'], turned['axis']) == ('policy', 'forward', 'turn')
     assert float(turned['commanded yaw [rad/s]']) == 1.0
     assert float(forward['cost of transport']) == FAIR.cost_of_transport

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 import multiprocessing
 from multiprocessing.connection import Connection
@@ -42,7 +42,12 @@ class Watched:
     """What was seen of a robot since :meth:`ServedRobot.begin`."""
 
     metered: Metered  # where it went, and what that cost
-    timing: CommandTiming  # when its commands came
+    # when its commands came; nothing without real clocks
+    timing: CommandTiming = field(default_factory=CommandTiming)
+
+    def __add__(self, other: Watched) -> Watched:
+        """Return both together."""
+        return Watched(self.metered + other.metered, self.timing + other.timing)
 
 
 class ServedRobot:

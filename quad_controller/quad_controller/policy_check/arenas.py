@@ -16,8 +16,8 @@ from quad_description import Backend, robot_urdf, RobotState
 from quad_hardware import CommandError, HardwareError, NoAnswerError
 from quad_hardware.backend import JointBytes, robot_at
 from quad_hardware.protocol import Model, V2
-from quad_sim import CommandTiming, parse_servo, ServedRobot, SimulationError, Terrain
-from quad_sim.physics import Meter, Metered, PhysicsBackend, Robot, Variation
+from quad_sim import parse_servo, ServedRobot, SimulationError, Terrain, Watched
+from quad_sim.physics import Meter, PhysicsBackend, Robot, Variation
 
 from ..exceptions import CheckError
 from ..gait.parameters import GaitParameters, ServoModel
@@ -131,9 +131,9 @@ class PhysicsArena:
         """Measure from now on."""
         self._meter.begin()
 
-    def read(self) -> tuple[Metered, CommandTiming | None]:
+    def read(self) -> Watched:
         """Return what was measured."""
-        return self._meter.read(), None
+        return Watched(self._meter.read())
 
     @property
     def interruption(self) -> str:
@@ -211,10 +211,9 @@ class SerialArena(Backend):
         self._served.begin()
         self.interruption = ''
 
-    def read(self) -> tuple[Metered, CommandTiming | None]:
+    def read(self) -> Watched:
         """Return what was measured."""
-        watched = self._served.read()
-        return watched.metered, watched.timing
+        return self._served.read()
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from quad_description import Backend, Quadruped, RobotState
+from quad_description import Quadruped
 
 from ..exceptions import CheckError, QuadControllerError
 from ..gait.parameters import AS_TUNED, GaitParameters
@@ -28,15 +28,13 @@ from ..states.controller import Controller
 from ..states.modes import State, StateParameters
 
 if TYPE_CHECKING:
-    from quad_sim import CommandTiming
-    from quad_sim.physics import Metered
+    from quad_sim import CommandTiming, Watched
 
     from .arenas import PhysicsArena, SerialArena
 
 STAND_TIME = 2.5  # [s] to stand up, and for the policy to take over
 STAND_TIMEOUT = 8.0  # [s]
 SETTLE_TIME = 1.0  # [s] to take up speed
-WALK_SETTLE_TIME = 1.5  # [s] the same before a single walk
 FALLEN = math.radians(60.0)
 REST_TIME = 1.0  # [s] at the end, to come to rest on all feet
 PUSH_INTERVAL = 2.0  # [s]
@@ -131,24 +129,27 @@ def course_for(ranges: CommandRanges | None) -> tuple[Velocity, ...]:
     return tuple(commands)
 
 
-class WalkingRobot:
-    """A back end and the controller that walks it."""
+class CourseWalker:
+    """Walks courses in an arena, and stands up again after each fall."""
 
     def __init__(
         self,
-        backend: Backend,
+        arena: PhysicsArena | SerialArena,
         robot: Quadruped,
         policy: PolicyRunner | None,
-        state: RobotState,
         gait: GaitParameters = AS_TUNED,
     ) -> None:
-        """Begin with a robot on the ground, walked by a policy or the gait."""
-        self._backend, self._robot, self._policy, self._gait = backend, robot, policy, gait
-        self.restart(state)
+        """Put the robot on its feet, walked by a policy or the gait."""
+        self._arena, self._backend = arena, arena.backend
+        self._robot, self._policy, self._gait = robot, policy, gait
+        self._mode = State.WALK if policy is None else State.POLICY
+        self.interruptions = 0  # walks that the machine cut off, and not the robot
+        self.failure = ''  # why it fell last in a course; empty if it did not
+        self.restart()
 
-    def restart(self, state: RobotState) -> None:
-        """Begin anew, with a new controller."""
-        self._state, self._dt = state, self._backend.period
+    def restart(self) -> None:
+        """Put the robot on its feet, with a new controller."""
+        self._state, self._dt = self._arena.stand(), self._backend.period
         states = StateParameters(period=self._backend.period)
         self.controller = Controller(self._robot, self._gait, states, policy=self._policy)
         self.forget()
@@ -165,16 +166,11 @@ class WalkingRobot:
         return math.sqrt(self._bends / self._bend_count) if self._bend_count else 0.0
 
     @property
-    def mode(self) -> State:
-        """The state in which it walks."""
-        return State.WALK if self._policy is None else State.POLICY
-
-    @property
     def is_down(self) -> bool:
         """Whether it fell, or does not walk any more."""
         imu = self._state.imu
         fallen = imu is not None and imu.tilt > FALLEN
-        return fallen or self.controller.status.state is not self.mode
+        return fallen or self.controller.status.state is not self._mode
 
     @property
     def trouble(self) -> str:
@@ -182,8 +178,8 @@ class WalkingRobot:
         status = self.controller.status
         if status.faults:
             return '; '.join(status.faults)
-        if status.state is not self.mode:
-            return f'{self.mode.value} was left for {status.title}'
+        if status.state is not self._mode:
+            return f'{self._mode.value} was left for {status.title}'
         return ''
 
     def stand_up(self) -> None:
@@ -193,7 +189,7 @@ class WalkingRobot:
             QuadControllerError: It does not come to that; the message has the reason.
         """
         self.step(REST)  # modes are refused before the robot is known
-        answer = self.controller.set_mode(self.mode.value)
+        answer = self.controller.set_mode(self._mode.value)
         self.run(STAND_TIME, REST)
         for _ in range(round((STAND_TIMEOUT - STAND_TIME) / self._backend.period)):
             if not self.trouble:
@@ -218,6 +214,7 @@ class WalkingRobot:
             self.observed.append(output.asked.answer.observation[0])
         if output.targets is not None:
             self._add_targets(np.array(output.targets))
+        self._arena.watch()
 
     def _add_targets(self, targets: np.ndarray) -> None:
         self._targets = [*self._targets[-2:], targets]
@@ -226,57 +223,58 @@ class WalkingRobot:
             self._bends += float(np.mean((third - 2.0 * second + first) ** 2))
             self._bend_count += 1
 
-
-class CourseWalker:
-    """Walks courses in an arena, and stands up again after each fall."""
-
-    def __init__(
-        self,
-        arena: PhysicsArena | SerialArena,
-        robot: Quadruped,
-        policy: PolicyRunner | None,
-        gait: GaitParameters = AS_TUNED,
-    ) -> None:
-        """Put the robot on its feet, walked by a policy or the gait."""
-        self._arena = arena
-        self.interruptions = 0  # walks that the machine cut off, and not the robot
-        self._walker = WalkingRobot(arena.backend, robot, policy, arena.stand(), gait)
-
     def walk(
-        self, commands: Sequence[Velocity], duration: float, *, push: float = 0.0, seed: int = 1
+        self,
+        commands: Sequence[Velocity],
+        duration: float,
+        *,
+        push: float = 0.0,
+        seed: int = 1,
+        max_falls: int = MAX_FALLS,
     ) -> CourseFigures:
         """Walk as commanded, pushed to any side every two seconds by so much [m/s]."""
         random = np.random.default_rng(seed)
-        passages = [self._passage(command, duration, push, random) for command in commands]
-        self._walker.run(REST_TIME, REST)
+        self.failure = ''
+        passages = [
+            self._passage(command, duration, push, random, max_falls) for command in commands
+        ]
+        self.seen = np.array(self.observed)  # what a policy saw last, a row for each step
+        self.run(REST_TIME, REST)
         return CourseFigures(tuple(passages))
 
     def _passage(
-        self, command: Velocity, duration: float, push: float, random: np.random.Generator
+        self,
+        command: Velocity,
+        duration: float,
+        push: float,
+        random: np.random.Generator,
+        max_falls: int,
     ) -> Passage:
-        walker, period = self._walker, self._arena.backend.period
+        period = self._backend.period
         total, between = round(duration / period), round(PUSH_INTERVAL / period)
-        most = MAX_FALLS + (total // between if push else 0)
+        most = max_falls + (total // between if push else 0)
         falls, steps, bends = 0, 0, 0.0
-        parts: list[tuple[Metered, CommandTiming | None]] = []
+        parts: list[Watched] = []
         while steps < total and falls < most:
-            ready, began = not walker.is_down or self._stand_again(), steps
+            ready, began = not self.is_down or self._stand_again(), steps
             fell = not ready or not self._settle(command)
             self._arena.begin()
-            walker.forget()
+            self.forget()
             while not fell and steps < total:
                 steps += 1
-                self._step(command)
-                fell = walker.is_down
+                self.step(command)
+                fell = self.is_down
                 if push and steps % between == 0:
                     angle = random.uniform(0.0, math.tau)
                     self._arena.kick(push * math.cos(angle), push * math.sin(angle))
             if fell and self._excused():
                 steps = began
                 continue
+            if fell and ready:
+                self.failure = self.trouble or 'it fell'
             if steps > began:
                 parts.append(self._arena.read())
-                bends = max(bends, walker.smoothness)
+                bends = max(bends, self.smoothness)
             falls += fell
             if not ready:
                 break
@@ -284,9 +282,9 @@ class CourseWalker:
 
     def _settle(self, command: Velocity) -> bool:
         """Accelerate; return whether it did not fall."""
-        for _ in range(round(SETTLE_TIME / self._arena.backend.period)):
-            self._step(command)
-            if self._walker.is_down:
+        for _ in range(round(SETTLE_TIME / self._backend.period)):
+            self.step(command)
+            if self.is_down:
                 return False
         return True
 
@@ -302,89 +300,39 @@ class CourseWalker:
             )
         return True
 
-    def _step(self, command: Velocity) -> None:
-        self._walker.step(command)
-        self._arena.watch()
-
     def _stand_again(self) -> bool:
         """Return whether it is ready to walk again."""
-        self._walker.restart(self._arena.stand())
+        self.restart()
         try:
-            self._walker.stand_up()
-        except QuadControllerError:  # it falls at once, or its watchdogs do not let it walk
+            self.stand_up()
+        except QuadControllerError as error:  # it falls at once, or is not allowed to walk
+            self.failure = str(error)
             return False
         return True
 
 
-@dataclass(frozen=True, slots=True)
-class Walked:
-    """How a single walk went."""
-
-    velocity: Velocity  # mean velocity in the robot's own frame
-    tilt: float  # largest angle between the body's z axis and up in [rad]
-    trouble: str  # why it ended early; empty when it did not
-    observed: Floats  # what the policy saw, an observation in each row
-
-
-def walk(
-    arena: PhysicsArena,
-    robot: Quadruped,
-    policy: PolicyRunner,
-    velocity: Velocity,
-    duration: float,
-) -> Walked:
-    """Walk once with a policy that has been checked, from lying on the ground."""
-    walker = WalkingRobot(arena.backend, robot, policy, arena.backend.reset())
-    try:
-        walker.stand_up()
-    except QuadControllerError as error:
-        return Walked(REST, 0.0, str(error), np.array(walker.observed))
-    walker.run(WALK_SETTLE_TIME, velocity)
-    walker.observed.clear()
-    arena.begin()
-    for _ in range(round(duration / arena.backend.period)):
-        walker.step(velocity)
-        arena.watch()
-    way, _ = arena.read()
-    went = Velocity(way.x, way.y, way.yaw).scaled(1.0 / duration)
-    return Walked(went, way.tilt, walker.trouble, np.array(walker.observed))
-
-
 def _passage_of(
-    command: Velocity,
-    parts: Sequence[tuple[Metered, CommandTiming | None]],
-    falls: int,
-    smoothness: float,
+    command: Velocity, parts: Sequence[Watched], falls: int, smoothness: float
 ) -> Passage:
     """Return what came of the parts of a way between two falls."""
-    walked = [metered for metered, _ in parts]
-    time = sum(each.time for each in walked)
-    if not time:
-        nothing = math.nan
+    nothing = math.nan
+    if not parts:
         lost = Velocity(nothing, nothing, nothing)
         return Passage(command, lost, 0.0, falls, nothing, nothing, nothing, nothing, nothing)
-
-    def mean(name: str) -> float:
-        return float(sum(getattr(each, name) * each.time for each in walked)) / time
-
-    path = sum(each.path for each in walked)
-    over_ground = bool(command.x or command.y)
-    work = sum(each.energy / each.weight for each in walked)
+    whole = functools.reduce(operator.add, parts)
+    way = whole.metered
+    over_ground = bool(command.x or command.y) and way.path > 0.0
     return Passage(
         commanded=command,
-        went=Velocity(
-            sum(each.x for each in walked) / time,
-            sum(each.y for each in walked) / time,
-            sum(each.yaw for each in walked) / time,
-        ),
-        time=time,
+        went=Velocity(way.x, way.y, way.yaw).scaled(1.0 / way.time),
+        time=way.time,
         falls=falls,
-        tilt=max(each.tilt for each in walked),
-        torque_saturation=mean('torque_saturation'),
-        speed_saturation=mean('speed_saturation'),
+        tilt=way.tilt,
+        torque_saturation=way.torque_saturation,
+        speed_saturation=way.speed_saturation,
         smoothness=smoothness,
-        cost_of_transport=work / path if over_ground and path > 0.0 else math.nan,
-        timing=_together([timing for _, timing in parts]),
+        cost_of_transport=way.energy / way.weight / way.path if over_ground else nothing,
+        timing=whole.timing if whole.timing.latencies else None,
     )
 
 

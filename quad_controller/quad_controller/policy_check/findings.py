@@ -16,7 +16,7 @@ from ..gait.velocity import Velocity
 from ..policy.contract.model import PolicyContract, Source
 from ..policy.network import Floats, OnnxNetwork
 from ..policy.observation import observed_places
-from .course import AXES, axis_of, CourseFigures, Passage
+from .course import AXES, CourseFigures, Passage
 
 MAX_LACK, MAX_EXCESS = 0.5, 0.2
 """Shares of what is commanded along an axis that may be missing, and be too much."""
@@ -148,8 +148,7 @@ class Findings:
     """All that was found of a policy."""
 
     courses: list[Compared] = field(default_factory=list)  # courses that policy and gait walked
-    # single walks: commanded, went in [m/s] and [rad/s], largest tilt in [rad]
-    walks: list[tuple[Velocity, Velocity, float]] = field(default_factory=list)
+    walks: list[CourseFigures] = field(default_factory=list)  # those of a policy alone
     reasons: list[str] = field(default_factory=list)  # why it does not stand up
     notes: list[str] = field(default_factory=list)  # what else is to be known
 
@@ -217,12 +216,12 @@ def write_csv(file: TextIO, findings: Findings) -> None:
     """Write a row for each command that policy or gait walked; what was not measured is empty."""
     writer = csv.writer(file, lineterminator='\n')
     writer.writerow(CSV_COLUMNS)
-    for commanded, went, tilt in findings.walks:
-        row = 'walk', POLICY, axis_of(commanded), *commanded, *went, tilt
-        writer.writerow([*row, *[''] * (len(CSV_COLUMNS) - len(row))])
+    courses = [('walk', POLICY, figures) for figures in findings.walks]
     for compared in findings.courses:
-        for who, course in ((POLICY, compared.policy), (GAIT, compared.gait)):
-            writer.writerows(_csv_row(compared.title, who, each) for each in course.passages)
+        courses += [(compared.title, POLICY, compared.policy)]
+        courses += [(compared.title, GAIT, compared.gait)]
+    for title, who, course in courses:
+        writer.writerows(_csv_row(title, who, each) for each in course.passages)
 
 
 def _csv_row(title: str, who: str, passage: Passage) -> list[str | float]:

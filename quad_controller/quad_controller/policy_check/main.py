@@ -24,7 +24,7 @@ from ..policy.load import find_policy, load_policy, LoadedPolicy
 from ..policy.network import OnnxNetwork
 from ..policy.options import GravitySource, ImuFrame, PolicyOptions, table_text
 from ..states.modes import StateParameters
-from .course import course_for, walk
+from .course import course_for, CourseWalker
 from .findings import (
     against_gait,
     astray,
@@ -175,19 +175,21 @@ def _walk(
 ) -> None:
     velocity, duration = Velocity(*options.walk), options.duration or WALK_DURATION
     robot = quadruped(robot_urdf(options.preset, arm=options.arm))
-    walked = walk(arena, robot, loaded.runner, velocity, duration)
-    found.walks.append((velocity, walked.velocity, walked.tilt))
+    walker = CourseWalker(arena, robot, loaded.runner)
+    figures = walker.walk([velocity], duration, max_falls=1)
+    found.walks.append(figures)
+    (walked,) = figures.passages
     _print(
-        f'walked with {options.servo} servos for {duration:g} s: commanded '
-        f'{velocity_text(velocity)}, went {velocity_text(walked.velocity)}, '
+        f'walked with {options.servo} servos for {walked.time:.3g} s: commanded '
+        f'{velocity_text(velocity)}, went {velocity_text(walked.went)}, '
         f'tilt at most {math.degrees(walked.tilt):.1f} deg'
     )
-    if trouble := walked.trouble or '; '.join(astray(walked.velocity, velocity)):
+    if trouble := walker.failure or '; '.join(astray(walked.went, velocity)):
         found.reasons.append(trouble)
         _print(f'it did not go well: {trouble}')
     elif not loaded.contract.recurrence:
         network = OnnxNetwork(find_policy(options.policy))
-        found.notes += unseen_terms(network, loaded.contract, walked.observed)
+        found.notes += unseen_terms(network, loaded.contract, walker.seen)
 
 
 def _verdict(name: str, reasons: Sequence[str]) -> str:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 import math
 
 import numpy as np
@@ -13,7 +13,6 @@ import numpy as np
 from quad_description import Backend, ImuSample, JointSample, movable_joints, RobotState
 from quad_description.rotations import from_rpy, Quaternion, Vector
 
-from ..state import BasePose
 from .robot import Robot
 
 SATURATED = 0.98  # share of a limit from which on a servo is at it
@@ -21,19 +20,37 @@ SATURATED = 0.98  # share of a limit from which on a servo is at it
 
 @dataclass(frozen=True, slots=True)
 class Metered:
-    """What a robot did in some time."""
+    """What a robot did in some time; one time and another one make a sum."""
 
-    time: float  # how long in [s]
-    x: float  # way ahead, in the robot's own frame, in [m]
-    y: float  # way to the left in [m]
-    yaw: float  # turning in [rad]
-    path: float  # length of the way over the ground in [m]
-    tilt: float  # largest tilt in [rad]
-    energy: float  # mechanical work of the servos in [J]: the sum of all joints' absolute power
-    weight: float  # of the robot in [N]
-    # share of the time that a servo is at its largest torque, mean of all
-    torque_saturation: float
-    speed_saturation: float  # share of the time that a joint is at its largest speed, mean of all
+    time: float = 0.0  # how long in [s]
+    x: float = 0.0  # way ahead, in the robot's own frame, in [m]
+    y: float = 0.0  # way to the left in [m]
+    yaw: float = 0.0  # turning in [rad]
+    path: float = 0.0  # length of the way over the ground in [m]
+    tilt: float = 0.0  # largest tilt in [rad]
+    energy: float = 0.0  # mechanical work of the servos: sum of all joints' absolute power, in [J]
+    weight: float = 0.0  # of the robot in [N]
+    torque_time: float = 0.0  # with a servo at its largest torque, mean of all, in [s]
+    speed_time: float = 0.0  # with a joint at its largest speed, mean of all, in [s]
+
+    def __add__(self, other: Metered) -> Metered:
+        """Return both together."""
+        both = {
+            each.name: (getattr(self, each.name), getattr(other, each.name))
+            for each in fields(self)
+        }
+        sums = {name: sum(pair) for name, pair in both.items()}
+        return Metered(**sums | {name: max(both[name]) for name in ('tilt', 'weight')})
+
+    @property
+    def torque_saturation(self) -> float:
+        """Share of the time that a servo is at its largest torque, mean of all."""
+        return self.torque_time / self.time if self.time else 0.0
+
+    @property
+    def speed_saturation(self) -> float:
+        """Share of the time that a joint is at its largest speed, mean of all."""
+        return self.speed_time / self.time if self.time else 0.0
 
 
 class Meter:
@@ -49,11 +66,8 @@ class Meter:
 
     def begin(self) -> None:
         """Begin anew; also after a reset of the robot."""
-        self._start = self._time = self._robot.time
-        self._pose: BasePose = self._robot.base_pose
-        self._way = np.zeros(3)
-        self._path = self._tilt = self._energy = 0.0
-        self._torque_time = self._speed_time = 0.0
+        self._time, self._pose = self._robot.time, self._robot.base_pose
+        self._sum = Metered(weight=9.81 * self._robot.mass)
 
     def sample(self) -> None:
         """Sample the robot."""
@@ -63,31 +77,22 @@ class Meter:
         dx, dy = (b - a for a, b in zip(before.position[:2], after.position[:2], strict=True))
         heading, turned = before.roll_pitch_yaw[2], after.roll_pitch_yaw[2]
         cos, sin = math.cos(heading), math.sin(heading)
-        yaw = math.remainder(turned - heading, math.tau)
-        self._way += (dx * cos + dy * sin, dy * cos - dx * sin, yaw)
-        self._path += math.hypot(dx, dy)
-        self._tilt = max(self._tilt, after.tilt)
         torques, speeds = np.abs(robot.joint_torques), np.abs(robot.joint_velocities)
-        self._energy += passed * float(torques @ speeds)
-        self._torque_time += passed * float(np.mean(torques >= SATURATED * self._efforts))
-        self._speed_time += passed * float(np.mean(speeds >= SATURATED * self._speeds))
+        self._sum += Metered(
+            time=passed,
+            x=dx * cos + dy * sin,
+            y=dy * cos - dx * sin,
+            yaw=math.remainder(turned - heading, math.tau),
+            path=math.hypot(dx, dy),
+            tilt=after.tilt,
+            energy=passed * float(torques @ speeds),
+            torque_time=passed * float(np.mean(torques >= SATURATED * self._efforts)),
+            speed_time=passed * float(np.mean(speeds >= SATURATED * self._speeds)),
+        )
 
     def read(self) -> Metered:
         """Return what came together since :meth:`begin`."""
-        time = self._time - self._start
-        x, y, yaw = self._way.tolist()
-        return Metered(
-            time=time,
-            x=x,
-            y=y,
-            yaw=yaw,
-            path=self._path,
-            tilt=self._tilt,
-            energy=self._energy,
-            weight=9.81 * self._robot.mass,
-            torque_saturation=self._torque_time / time if time > 0.0 else 0.0,
-            speed_saturation=self._speed_time / time if time > 0.0 else 0.0,
-        )
+        return self._sum
 
 
 PERIOD = 0.02  # [s]
