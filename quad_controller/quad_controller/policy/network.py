@@ -2,15 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """The network behind a policy: numbers in, numbers out; its ONNX file with weights and metadata.
 
-An ONNX file is a message of protocol buffers (onnx.proto): weights may lie in other files beside
-it (``external_data``), and metadata are entries of a repeated field, so that one more entry is
-some bytes at the end. The package onnx, 20 MB, would do the same; a robot does not need it.
+An ONNX file is a message of protocol buffers (onnx.proto), which ONNX Runtime brings: weights may
+lie in other files beside it (``external_data``), and metadata are entries of a repeated field. The
+package onnx, 20 MB, would do the same; a robot does not need it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+import functools
 import hashlib
 from pathlib import Path
 from typing import Any
@@ -152,18 +153,58 @@ def _session(path: Path, model: OnnxModel) -> Any:  # noqa: ANN401  # ONNX Runti
         raise PolicyError(f'policy {path} is not an ONNX model that runs: {error}') from error
 
 
-# numbers of fields in onnx.proto
-MODEL_GRAPH, MODEL_METADATA = 7, 14
-GRAPH_NODE, GRAPH_INITIALIZER = 1, 5
-NODE_ATTRIBUTE = 5
-ATTRIBUTE_TENSOR, ATTRIBUTE_GRAPH, ATTRIBUTE_TENSORS, ATTRIBUTE_GRAPHS = 5, 6, 10, 11
-TENSOR_TYPE, TENSOR_NAME, TENSOR_RAW, TENSOR_EXTERNAL_DATA = 2, 8, 9, 13
+# what is read of onnx.proto: number and type of each field, those with a * repeated
+ONNX: Mapping[str, Mapping[str, tuple[int, str]]] = {
+    'Entry': {'key': (1, 'string'), 'value': (2, 'string')},
+    'Tensor': {
+        'data_type': (2, 'int32'),
+        'float_data': (4, 'float*'),
+        'name': (8, 'string'),
+        'raw_data': (9, 'bytes'),
+        'double_data': (10, 'double*'),
+        'external_data': (13, 'Entry*'),
+    },
+    'Attribute': {
+        't': (5, 'Tensor'),
+        'g': (6, 'Graph'),
+        'tensors': (10, 'Tensor*'),
+        'graphs': (11, 'Graph*'),
+    },
+    'Node': {'attribute': (5, 'Attribute*')},
+    'Graph': {'node': (1, 'Node*'), 'initializer': (5, 'Tensor*')},
+    'Model': {'graph': (7, 'Graph'), 'metadata_props': (14, 'Entry*')},
+}
 FLOATS = {1: '<f4', 10: '<f2', 11: '<f8'}  # types of tensors
-FLOAT_DATA = {1: 4, 11: 10}  # where numbers of a type stand that are not raw
-ENTRY_KEY, ENTRY_VALUE = 1, 2
 
-VARINT, FIXED64, BYTES, FIXED32 = 0, 1, 2, 5  # wire types
-FIXED_SIZES = {FIXED64: 8, FIXED32: 4}
+
+@functools.cache
+def _model_class() -> Any:  # noqa: ANN401  # made of the table
+    """Return the class of a model; it keeps what the table does not have."""
+    from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+
+    file = descriptor_pb2.FileDescriptorProto(name='onnx.proto', package='onnx')
+    for name, fields in ONNX.items():
+        message = file.message_type.add(name=name)
+        for field, (number, kind) in fields.items():
+            repeated, plain = kind.endswith('*'), kind.rstrip('*')
+            made = message.field.add(name=field, number=number, label=3 if repeated else 1)
+            made.type = made.Type.Value('TYPE_' + ('MESSAGE' if plain in ONNX else plain.upper()))
+            if plain in ONNX:
+                made.type_name = f'.onnx.{plain}'
+            made.options.packed = plain in {'float', 'double'}
+    pool = descriptor_pool.DescriptorPool()
+    pool.Add(file)
+    return message_factory.GetMessageClass(pool.FindMessageTypeByName('onnx.Model'))
+
+
+def _parsed(data: bytes) -> Any:  # noqa: ANN401  # made of the table
+    """Return a model; an empty one for what is no ONNX, as ONNX Runtime says so better."""
+    from google.protobuf.message import DecodeError
+
+    try:
+        return _model_class().FromString(data)
+    except DecodeError:
+        return _model_class()()
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,33 +234,20 @@ class OnnxModel:
 
     def not_finite(self) -> list[str]:
         """Name the tensors with a weight that is not finite."""
-        try:
-            return [
-                name
-                for tensor in _tensors(memoryview(self.data))
-                for name, weights in [self._weights(tensor)]
-                if not np.isfinite(weights).all()
-            ]
-        except (IndexError, ValueError):
-            return []  # no ONNX; ONNX Runtime says so better
+        tensors = _tensors(_parsed(self.data).graph)
+        return [each.name for each in tensors if not np.isfinite(self._weights(each)).all()]
 
-    def _weights(self, tensor: memoryview) -> tuple[str, npt.NDArray[Any]]:
-        fields = [(number, content) for number, _, content, _ in _fields(tensor)]
-        parts = dict(fields)
-        kind, _ = _varint(parts[TENSOR_TYPE], 0)
-        name = bytes(parts.get(TENSOR_NAME, b'')).decode()
-        if kind not in FLOATS:
-            return name, np.zeros(0)
-        if TENSOR_EXTERNAL_DATA in parts:
-            place = dict(_entry(content) for number, content in fields
-                         if number == TENSOR_EXTERNAL_DATA)  # fmt: skip
+    def _weights(self, tensor: Any) -> npt.NDArray[Any]:  # noqa: ANN401  # made of the table
+        kind = FLOATS.get(tensor.data_type)
+        if kind is None:
+            return np.zeros(0)
+        raw = tensor.raw_data
+        if tensor.external_data:
+            place = {entry.key: entry.value for entry in tensor.external_data}
             start, side = int(place.get('offset', 0)), self.sides[place['location']]
             raw = side[start : start + int(place.get('length', len(side)))]
-        else:
-            raw = bytes(
-                parts.get(TENSOR_RAW) or parts.get(FLOAT_DATA.get(kind, 0), memoryview(b''))
-            )
-        return name, np.frombuffer(raw, FLOATS[kind])
+        numbers = [*tensor.float_data, *tensor.double_data]
+        return np.frombuffer(raw, kind) if raw else np.array(numbers)
 
 
 def read_model(path: Path) -> OnnxModel:
@@ -240,10 +268,8 @@ def side_files(path: Path, data: bytes) -> dict[str, Path]:
     Raises:
         PolicyError: A name leads out of the folder of the model.
     """
-    try:
-        names = sorted(set(_locations(memoryview(data))))
-    except (IndexError, ValueError):
-        return {}  # no ONNX; ONNX Runtime says so better
+    entries = (entry for each in _tensors(_parsed(data).graph) for entry in each.external_data)
+    names = sorted({entry.value for entry in entries if entry.key == 'location'})
     files = {}
     for name in names:
         if Path(name).is_absolute() or '..' in Path(name).parts:
@@ -254,97 +280,22 @@ def side_files(path: Path, data: bytes) -> dict[str, Path]:
 
 
 def with_metadata(data: bytes, key: str, value: str) -> bytes:
-    """Return a model with one entry of its metadata set; all else stays byte by byte."""
-    kept = bytearray()
-    view = memoryview(data)
-    for number, start, content, end in _fields(view):
-        if number == MODEL_METADATA and _entry(content)[0] == key:
-            continue
-        kept += view[start:end]
-    entry = _field(ENTRY_KEY, key.encode()) + _field(ENTRY_VALUE, value.encode())
-    return bytes(kept) + _field(MODEL_METADATA, entry)
+    """Return a model with one entry of its metadata set; all else stays."""
+    model = _parsed(data)
+    kept = {entry.key: entry.value for entry in model.metadata_props}
+    del model.metadata_props[:]
+    for each, text in {**kept, key: value}.items():
+        model.metadata_props.add(key=each, value=text)
+    serialized: bytes = model.SerializeToString()
+    return serialized
 
 
-def _locations(model: memoryview) -> Iterator[str]:
-    for tensor in _tensors(model):
-        for entry in _each(tensor, TENSOR_EXTERNAL_DATA):
-            key, value = _entry(entry)
-            if key == 'location':
-                yield value
-
-
-def _tensors(model: memoryview) -> Iterator[memoryview]:
-    for graph in _each(model, MODEL_GRAPH):
-        yield from _graph_tensors(graph)
-
-
-def _graph_tensors(graph: memoryview) -> Iterator[memoryview]:
-    yield from _each(graph, GRAPH_INITIALIZER)
-    for node in _each(graph, GRAPH_NODE):
-        for attribute in _each(node, NODE_ATTRIBUTE):
-            for number in (ATTRIBUTE_TENSOR, ATTRIBUTE_TENSORS):
-                yield from _each(attribute, number)
-            for number in (ATTRIBUTE_GRAPH, ATTRIBUTE_GRAPHS):
-                for inner in _each(attribute, number):
-                    yield from _graph_tensors(inner)
-
-
-def _each(message: memoryview, wanted: int) -> Iterator[memoryview]:
-    for number, _, content, _ in _fields(message):
-        if number == wanted:
-            yield content
-
-
-def _entry(entry: memoryview) -> tuple[str, str]:
-    texts = {number: bytes(content).decode() for number, _, content, _ in _fields(entry)}
-    return texts.get(ENTRY_KEY, ''), texts.get(ENTRY_VALUE, '')
-
-
-def _fields(message: memoryview) -> Iterator[tuple[int, int, memoryview, int]]:
-    """Yield number, start, content and end of each field."""
-    place = 0
-    while place < len(message):
-        start = place
-        tag, place = _varint(message, place)
-        number, kind = tag >> 3, tag & 7
-        content = message[place:]
-        if kind == VARINT:
-            _, place = _varint(message, place)
-        elif kind == BYTES:
-            size, place = _varint(message, place)
-            content = message[place : place + size]
-            place += size
-        elif kind in FIXED_SIZES:
-            place += FIXED_SIZES[kind]
-        else:
-            raise ValueError(f'wire type {kind}')
-        if place > len(message):
-            raise IndexError('a field ends behind its message')
-        yield number, start, content, place
-
-
-def _varint(message: memoryview, place: int) -> tuple[int, int]:
-    value = shift = 0
-    while True:
-        byte = message[place]
-        place += 1
-        value |= (byte & 0x7F) << shift
-        if byte < 0x80:
-            return value, place
-        shift += 7
-
-
-def _field(number: int, content: bytes) -> bytes:
-    return _number(number << 3 | BYTES) + _number(len(content)) + content
-
-
-def _number(value: int) -> bytes:
-    encoded = bytearray()
-    while value >= 0x80:
-        encoded.append(value & 0x7F | 0x80)
-        value >>= 7
-    encoded.append(value)
-    return bytes(encoded)
+def _tensors(graph: Any) -> Iterator[Any]:  # noqa: ANN401  # made of the table
+    yield from graph.initializer
+    for attribute in (each for node in graph.node for each in node.attribute):
+        yield from (attribute.t, *attribute.tensors)
+        for inner in (attribute.g, *attribute.graphs):
+            yield from _tensors(inner)
 
 
 def _read(path: Path, remedy: str = '') -> bytes:
