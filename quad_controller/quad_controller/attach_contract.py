@@ -27,7 +27,8 @@ def run(arguments: Sequence[str]) -> int:
     try:
         model = find_policy(options.model)
         document = _document(model, options.file, options.set)
-        _print_table(document)
+        rows = [('contract', 'value', 'from'), *document.rows()]
+        sys.stdout.write(f'{table_text(rows, widest=60)}\n')
         for row in scale_rows(build_contract(document), document):
             sys.stdout.write(f'{row.verdict.value}: {row.subject} {row.found}\n')
         if options.dry_run:
@@ -77,11 +78,6 @@ def _write(model: Path, target: Path, document: ContractDocument) -> None:
     part = target.with_name(f'{target.name}.part')
     part.write_bytes(data)
     part.replace(target)
-
-
-def _print_table(document: ContractDocument) -> None:
-    rows = [('contract', 'value', 'from'), *document.rows()]
-    sys.stdout.write(f'{table_text(rows, widest=60)}\n')
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -24,7 +24,7 @@ from quad_controller import (
 )
 from quad_controller.gait.velocity import REST
 from quad_controller.policy.contract.mjlab import VENDOR
-from quad_controller.policy.load import LoadedPolicy, validate_policy
+from quad_controller.policy.load import LoadedPolicy
 from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy.observation import gravity, Situation
 from quad_controller.policy.options import GravitySource, ImuFrame
@@ -53,7 +53,7 @@ MJLAB_TERMS = 'base_ang_vel,projected_gravity,command,phase,joint_pos,joint_vel,
 
 def check(network: FakeNetwork, options: PolicyOptions | None = None) -> LoadedPolicy:
     """Check a network as a policy of the test's robot."""
-    return validate_policy(network, ROBOT, STAND, options or PolicyOptions(), PERIOD)
+    return load_policy(network, ROBOT, STAND, options or PolicyOptions(), PERIOD)
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_a_policy_runs_at_the_rate_of_its_training_only(rate: float) -> None:
         report = ''
         try:
             network = FakeNetwork(metadata(**changes))
-            validate_policy(network, ROBOT, STAND, PolicyOptions(), 1.0 / rate)
+            load_policy(network, ROBOT, STAND, PolicyOptions(), 1.0 / rate)
         except PolicyError as refusal:
             report = refusal.reason
         assert report == (
@@ -320,7 +320,7 @@ def test_joints_that_the_policy_lacks_stay() -> None:
     """An arm that the policy does not know keeps the targets that it had."""
     network = FakeNetwork(metadata())
     options = PolicyOptions()
-    loaded = validate_policy(network, ARM_ROBOT, (*STAND, 0.7), options, PERIOD)
+    loaded = load_policy(network, ARM_ROBOT, (*STAND, 0.7), options, PERIOD)
     loaded.runner.reset((*STAND, 0.7))
     joints = JointSample((*STAND, 0.1), (0.0,) * 13)
     targets = loaded.runner.step(Situation(joints, UPRIGHT, REST), PERIOD).targets

@@ -73,9 +73,11 @@ def check_contract(
         yield Row('weights', 'in the file', warning, Verdict.WARN)
     yield from _recurrent(network, contract)
     metadata = network.metadata
-    yield from _sizes('observation', mjlab.observation_sizes(metadata), contract.width)
-    yield from _sizes('action', mjlab.action_sizes(metadata), count)
-    yield from _rates(contract, mjlab.step_periods(metadata), document, period)
+    yield from _sizes(
+        'observation', mjlab.numbers_of(metadata, mjlab.OBSERVATION_SIZE_KEYS), contract.width
+    )
+    yield from _sizes('action', mjlab.numbers_of(metadata, mjlab.ACTION_SIZE_KEYS, -1), count)
+    yield from _rates(contract, mjlab.numbers_of(metadata, mjlab.STEP_KEYS), document, period)
     yield from _joints(contract.joint_names, robot, hold_missing=hold_missing)
     yield from _defaults(contract, robot, stand)
     largest = max((abs(scale) for scale in contract.action.scale), default=0.0)

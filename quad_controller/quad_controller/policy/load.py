@@ -16,8 +16,8 @@ from ..gait.velocity import REST
 from .check import check_answers, check_contract
 from .contract.build import build_contract
 from .contract.configs import read_playground, read_rl_sar
-from .contract.document import ContractDocument, document_of, Values
-from .contract.isaac_lab import load_tagged, read_deploy, read_env
+from .contract.document import ContractDocument, document_of, known, load_yaml, Values
+from .contract.isaac_lab import read_deploy, read_env
 from .contract.mjlab import CONTRACT_KEY, read_metadata
 from .contract.model import PolicyContract, Source
 from .network import Floats, OnnxNetwork
@@ -42,7 +42,7 @@ def read_contract_file(path: Path, joints: Sequence[str] = ()) -> ContractDocume
         text = path.read_text(encoding='utf-8')
     except (OSError, UnicodeDecodeError) as error:
         raise PolicyError(f'contract {path}: {error}') from error
-    values = load_tagged(text, path.name)
+    values = load_yaml(text, path.name)
     try:
         return _read(values, path, joints)
     except (AttributeError, IndexError, KeyError, TypeError, ValueError, re.error) as error:
@@ -110,40 +110,28 @@ def document_for(network: OnnxNetwork, options: PolicyOptions) -> ContractDocume
 def _settings(document: ContractDocument, options: PolicyOptions) -> ContractDocument:
     """Return what parameters set of terms."""
     terms = document.values.get('observation', {}).get('terms', {})
-    values: dict[str, dict[str, object]] = {
-        Source.ANGULAR_VELOCITY.value: {},
-        Source.PHASE.value: {},
-    }
+    values: dict[str, dict[str, object]] = {}
     if options.imu_frame is not ImuFrame.AUTO:
         values[Source.ANGULAR_VELOCITY.value] = {'frame': options.imu_frame.value}
     if options.phase_period:
         values[Source.PHASE.value] = {'phase_period': options.phase_period}
-    found = {name: values.get(str(term.get('source')), {}) for name, term in terms.items()}
-    set_terms = {name: each for name, each in found.items() if each}
-    if not set_terms:
-        return ContractDocument({})
-    return document_of({'observation': {'terms': set_terms}}, 'parameter')
+    found = {name: values.get(str(term.get('source'))) for name, term in terms.items()}
+    return document_of(known(observation=known(terms=known(**found))), 'parameter')
 
 
 def load_policy(
-    path: Path, robot: Quadruped, stand: Targets, options: PolicyOptions, period: float
+    policy: Path | OnnxNetwork,
+    robot: Quadruped,
+    stand: Targets,
+    options: PolicyOptions,
+    period: float,
 ) -> LoadedPolicy:
     """Load a policy and check it.
 
     Raises:
         PolicyError: It cannot be loaded or does not fit; the message has the table.
     """
-    return validate_policy(OnnxNetwork(path), robot, stand, options, period)
-
-
-def validate_policy(
-    network: OnnxNetwork,
-    robot: Quadruped,
-    stand: Targets,
-    options: PolicyOptions,
-    period: float,
-) -> LoadedPolicy:
-    """Check a network as a policy, as :func:`load_policy` does."""
+    network = policy if isinstance(policy, OnnxNetwork) else OnnxNetwork(policy)
     document = document_for(network, options)
     contract = build_contract(document)
     fit = check_contract(

@@ -70,19 +70,6 @@ class Situation:
     pose: BodyPose = UPRIGHT  # pose of the body that is requested
 
 
-@dataclass(frozen=True, slots=True)
-class Observed:
-    """What is measured and commanded in one step, joints in the order of the policy."""
-
-    positions: Floats  # of the joints in [rad]
-    velocities: Floats  # of the joints in [rad/s]
-    imu: ImuSample  # attitude and turning
-    velocity: Velocity  # velocity that is requested
-    previous: Floats  # the last action
-    linear_velocity: Vector | None  # as in the situation
-    foot_contacts: tuple[bool, ...] | None  # as in the situation
-
-
 def _in_frame(vector: Vector | None, frame: BodyFrame) -> Vector:
     x, y, z = vector or (0.0, 0.0, 0.0)
     return (-x, -y, z) if frame is BodyFrame.YAWED else (x, y, z)
@@ -98,19 +85,8 @@ def _in_order(contacts: tuple[bool, ...] | None, feet: Sequence[str]) -> tuple[f
     return tuple(float(seen.get(foot, False)) for foot in feet)
 
 
-MEASURED: Mapping[Source, Callable[[Observed, ObservationTerm], npt.ArrayLike]] = {
-    Source.LINEAR_VELOCITY: lambda seen, term: _in_frame(seen.linear_velocity, term.frame),
-    Source.ANGULAR_VELOCITY: lambda seen, term: _in_frame(seen.imu.angular_velocity, term.frame),
-    Source.ORIENTATION: lambda seen, term: _quaternion(seen.imu, term.quaternion),
-    Source.COMMAND: lambda seen, _: (seen.velocity.x, seen.velocity.y, seen.velocity.yaw),
-    Source.JOINT_POSITIONS: lambda seen, _: seen.positions,
-    Source.JOINT_VELOCITIES: lambda seen, _: seen.velocities,
-    Source.LAST_ACTION: lambda seen, _: seen.previous,
-    Source.FOOT_CONTACTS: lambda seen, term: _in_order(seen.foot_contacts, term.feet),
-    Source.HEIGHT_SCAN: lambda _, term: term.values,
-    Source.CONSTANT: lambda _, term: term.values,
-}
-"""Numbers of the terms that need nothing but what is measured and declared."""
+Reader = Callable[[Situation, ImuSample], npt.ArrayLike]
+"""Gives one step of a term, before clip and scale."""
 
 ROUNDING = 1e-6  # [m/s] of a velocity in a recording
 
@@ -121,6 +97,9 @@ class ObservationBuilder:
     def __init__(self, contract: PolicyContract, source: GravitySource) -> None:
         """Prepare it."""
         self._defaults: Floats = np.array(contract.default_positions, np.float32)
+        # of the joints in the order of the policy, in [rad] and [rad/s], and the last action
+        self.positions, self.previous = self._defaults.copy(), np.zeros_like(self._defaults)
+        self.velocities = np.zeros_like(self._defaults)
         widths = [term.width for term in contract.terms]
         ends = np.cumsum([0, *widths]).tolist()
         self._terms = [
@@ -156,13 +135,13 @@ class ObservationBuilder:
         """Advance the clocks by a duration in [s]."""
         self._time += dt
 
-    def build(self, observed: Observed) -> Floats:
+    def build(self, seen: Situation, imu: ImuSample) -> Floats:
         """Return the observation; the history goes on by one step."""
         past, frame = self._history[1:], self._history[0]
         if len(past):
             past[:] = self._history[:-1]
         for read, place in self._terms:
-            frame[place] = read(observed)
+            frame[place] = read(seen, imu)
         if self._clips:
             _clip(frame, self._lowest, self._highest)
         if self._scales:
@@ -182,18 +161,23 @@ class ObservationBuilder:
             row = self._history.ravel()[self._places][np.newaxis, :]
         return row
 
-    def _reader(
-        self, term: ObservationTerm, source: GravitySource
-    ) -> Callable[[Observed], npt.ArrayLike]:
+    def _reader(self, term: ObservationTerm, source: GravitySource) -> Reader:
         """Return what gives one step of a term, before clip and scale."""
-        if term.source is Source.GRAVITY:
-            return lambda seen: gravity(seen.imu, source)
-        if term.source is Source.PHASE:
-            return lambda seen: self._phase(term, seen.velocity)
         if term.source is Source.JOINT_POSITIONS and term.relative:
-            return lambda seen: seen.positions - self._defaults
-        measured = MEASURED[term.source]
-        return lambda seen: measured(seen, term)
+            return lambda *_: self.positions - self._defaults
+        readers: Mapping[Source, Reader] = {
+            Source.LINEAR_VELOCITY: lambda seen, _: _in_frame(seen.linear_velocity, term.frame),
+            Source.ANGULAR_VELOCITY: lambda _, imu: _in_frame(imu.angular_velocity, term.frame),
+            Source.GRAVITY: lambda _, imu: gravity(imu, source),
+            Source.ORIENTATION: lambda _, imu: _quaternion(imu, term.quaternion),
+            Source.COMMAND: lambda seen, _: seen.velocity,
+            Source.PHASE: lambda seen, _: self._phase(term, seen.velocity),
+            Source.JOINT_POSITIONS: lambda *_: self.positions,
+            Source.JOINT_VELOCITIES: lambda *_: self.velocities,
+            Source.LAST_ACTION: lambda *_: self.previous,
+            Source.FOOT_CONTACTS: lambda seen, _: _in_order(seen.foot_contacts, term.feet),
+        }
+        return readers.get(term.source, lambda *_: term.values)
 
     def _phase(self, term: ObservationTerm, velocity: Velocity) -> tuple[float, float]:
         # a recording rounds to 32 bits, and a replay has to find the same

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 import numpy as np
@@ -15,7 +15,7 @@ from ..exceptions import PolicyError
 from ..gait.velocity import Velocity
 from .contract.model import PolicyContract, Source
 from .network import Floats, OnnxNetwork
-from .observation import ObservationBuilder, Observed, Situation
+from .observation import ObservationBuilder, Situation
 from .options import PolicyOptions
 
 TOLERANCE = 1.1  # share of its noise that velocities may have: the period of reports jitters
@@ -72,9 +72,6 @@ class PolicyRunner:
         self._builder = ObservationBuilder(contract, options.gravity_source)
         self._decimation = max(round(contract.period / period), 1)
         self._waits = 0
-        self._previous: Floats = np.zeros(len(contract.joint_names), np.float32)
-        self._positions = self._defaults.copy()
-        self._velocities = np.zeros_like(self._defaults)
         self._others: Targets = ()
         self._wanted: Floats | None = None
         self._filtered: Floats | None = None
@@ -119,7 +116,7 @@ class PolicyRunner:
             others: Positions of all joints, for those that the policy does not move [rad].
         """
         self._others = others
-        self._previous[:] = 0.0
+        self._builder.previous[:] = 0.0
         self._filtered = self._wanted = None
         self._waits = 0
         self._builder.reset()
@@ -137,20 +134,11 @@ class PolicyRunner:
         if joints is None or imu is None:
             raise ValueError('a policy observes joints and attitude')
         # joints that only the policy has keep their defaults
-        self._positions[self._policy_places] = np.array(joints.positions)[self._robot_places]
+        builder, own, there = self._builder, self._policy_places, self._robot_places
+        builder.positions[own] = np.array(joints.positions)[there]
         if joints.velocities is not None:
-            self._velocities[self._policy_places] = np.array(joints.velocities)[self._robot_places]
-        return self._builder.build(
-            Observed(
-                self._positions,
-                self._velocities,
-                imu,
-                self._command(inputs.velocity),
-                self._previous,
-                inputs.linear_velocity,
-                inputs.foot_contacts,
-            )
-        )
+            builder.velocities[own] = np.array(joints.velocities)[there]
+        return builder.build(replace(inputs, velocity=self._command(inputs.velocity)), imu)
 
     def step(self, inputs: Situation, dt: float) -> PolicyStep:
         """Advance by some [s]; a slower policy is asked in one of several steps."""
@@ -179,7 +167,7 @@ class PolicyRunner:
         """Return the protected targets that an action means; it is the last one now."""
         if self._clip is not None:
             action = np.clip(action, *self._clip)
-        self._previous[:] = action
+        self._builder.previous[:] = action
         self._waits = self._decimation - 1
         target = self._offset + self._scale * action
         self._wanted = np.minimum(np.maximum(target, self._lower), self._upper)

@@ -120,19 +120,39 @@ def document_of(
     return ContractDocument(values, origins, hints or {}, tuple(refusals))
 
 
-def read_yaml(text: str, origin: str) -> ContractDocument:
-    """Read a document from YAML.
+class _Loader(yaml.SafeLoader):
+    """Reads the tags of Python that Isaac Lab writes as plain values; nothing is executed."""
+
+
+def _plain(loader: yaml.SafeLoader, _suffix: str, node: yaml.Node) -> object:
+    if isinstance(node, yaml.SequenceNode):
+        return loader.construct_sequence(node, deep=True)
+    if isinstance(node, yaml.MappingNode):
+        return loader.construct_mapping(node, deep=True)
+    return node.value
+
+
+_Loader.add_multi_constructor('tag:yaml.org,2002:python/', _plain)
+
+
+def load_yaml(text: str, origin: str) -> Values:
+    """Read YAML, also with tags of Python in it.
 
     Raises:
         PolicyError: It is no YAML, or no mapping.
     """
     try:
-        values = yaml.safe_load(text)
+        values = yaml.load(text, _Loader)  # noqa: S506  # a SafeLoader; tags become plain values
     except yaml.YAMLError as error:
         raise PolicyError(f'{origin} is not valid YAML: {error}') from error
     if not isinstance(values, dict):
         raise PolicyError(f'{origin} is not a mapping of keys to values')
-    return document_of(values, origin)
+    return values
+
+
+def read_yaml(text: str, origin: str) -> ContractDocument:
+    """Read a document from YAML, as :func:`load_yaml` does."""
+    return document_of(load_yaml(text, origin), origin)
 
 
 def setting(text: str) -> ContractDocument:

@@ -14,8 +14,6 @@ import math
 import re
 from typing import Any
 
-import yaml
-
 from ...exceptions import PolicyError
 from .document import ContractDocument, document_of, known, Values
 from .model import ISAAC_LAB, Source
@@ -25,36 +23,6 @@ PER_TERM = {'layout': 'per_term', 'newest': 'last', 'start': 'repeat'}
 FRAMES = {'layout': 'frames', 'newest': 'last', 'start': 'repeat'}
 POSITION_ACTION = 'JointPositionAction'
 RANGES = {'lin_vel_x': 'x', 'lin_vel_y': 'y', 'ang_vel_z': 'yaw'}
-
-
-class _Loader(yaml.SafeLoader):
-    """Reads the tags of Python that Isaac Lab writes as plain values; nothing is executed."""
-
-
-def _plain(loader: yaml.SafeLoader, _suffix: str, node: yaml.Node) -> object:
-    if isinstance(node, yaml.SequenceNode):
-        return loader.construct_sequence(node, deep=True)
-    if isinstance(node, yaml.MappingNode):
-        return loader.construct_mapping(node, deep=True)
-    return node.value
-
-
-_Loader.add_multi_constructor('tag:yaml.org,2002:python/', _plain)
-
-
-def load_tagged(text: str, origin: str) -> Values:
-    """Read YAML with tags of Python in it.
-
-    Raises:
-        PolicyError: It is no YAML, or no mapping.
-    """
-    try:
-        values = yaml.load(text, _Loader)  # noqa: S506  # a SafeLoader; tags become plain values
-    except yaml.YAMLError as error:
-        raise PolicyError(f'{origin} is not valid YAML: {error}') from error
-    if not isinstance(values, dict):
-        raise PolicyError(f'{origin} is not a mapping of keys to values')
-    return values
 
 
 def read_deploy(values: Mapping[str, Any], origin: str) -> ContractDocument:
@@ -68,21 +36,14 @@ def read_deploy(values: Mapping[str, Any], origin: str) -> ContractDocument:
         'period': values.get('step_dt'),
         'default_positions': values.get('default_joint_pos'),
         'observation': {'terms': terms},
-        'action': {},
+        'commands': _ranges(values),
     }
     if _has_history(terms):
         contract['observation']['history'] = dict(FRAMES if frames else PER_TERM)
-    actions = _mapping(values, 'actions')
-    refusals = _one_action(actions, origin)
-    for action in actions.values():
-        contract['action'] = known(
-            scale=action.get('scale'), offset=action.get('offset'), target_clip=action.get('clip')
-        )
+    contract['action'], refusals = _action(values, (), origin)
     contract['gains'] = known(
         **{name: _uniform(values.get(name)) for name in ('stiffness', 'damping')}
     )
-    commands = _mapping(values, 'commands')
-    contract['commands'] = _ranges(_mapping(commands, 'base_velocity').get('ranges'))
     hints = {'joints': JOINTS_HINT}
     if 'stiffness' in values and not contract['gains']:
         hints['gains.stiffness'] = 'in the order of the motors in the file'
@@ -121,24 +82,14 @@ def read_env(values: Mapping[str, Any], origin: str, joints: Sequence[str]) -> C
         'default_positions': defaults,
         'period': period,
         'observation': {'terms': terms},
-        'commands': _ranges(_mapping(_mapping(values, 'commands'), 'base_velocity').get('ranges')),
+        'commands': _ranges(values),
     }
     if _has_history(terms):
         contract['observation']['history'] = dict(PER_TERM)
         if group.get('flatten_history_dim') is False:
             refusals.append(f'{origin}: observations.policy.flatten_history_dim must be true')
-    actions = {
-        name: each for name, each in _mapping(values, 'actions').items()
-        if isinstance(each, Mapping)
-    }  # fmt: skip
-    refusals += _one_action(actions, origin)
-    for action in actions.values():
-        offset = _matched(action.get('offset'), joints, 0.0)
-        contract['action'] = known(
-            scale=_matched(action.get('scale'), joints, 1.0),
-            offset=None if action.get('use_default_offset') else offset,
-            target_clip=_matched(action.get('clip'), joints, [-math.inf, math.inf]),
-        )
+    contract['action'], refused = _action(values, joints, origin)
+    refusals += refused
     hints = {'joints': JOINTS_HINT}
     if not joints:
         hints['default_positions'] = 'found by the names of the joints'
@@ -180,11 +131,17 @@ def _noise(group: Mapping[str, Any], term: Mapping[str, Any]) -> float | None:
     return deviation if isinstance(deviation, (int, float)) else None
 
 
-def _one_action(actions: Mapping[str, Any], origin: str) -> list[str]:
-    """Return why the actions are not absolute positions of all joints in their order."""
+def _action(
+    values: Mapping[str, Any], joints: Sequence[str], origin: str
+) -> tuple[Values, list[str]]:
+    """Return the action, and why it is not absolute positions of all joints in their order."""
+    actions = {
+        name: each for name, each in _mapping(values, 'actions').items()
+        if isinstance(each, Mapping)
+    }  # fmt: skip
     if len(actions) != 1:
         names = ', '.join(actions) or 'none'
-        return [f'{origin}: one action of joint positions can be run here, not {names}']
+        return {}, [f'{origin}: one action of joint positions can be run here, not {names}']
     (name, action), *_ = actions.items()
     kind = re.split(r'[.:]', str(action.get('class_type', name)))[-1]
     refusals = []
@@ -192,7 +149,12 @@ def _one_action(actions: Mapping[str, Any], origin: str) -> list[str]:
         refusals.append(f'{origin}: actions.{name} is a {kind}; {POSITION_ACTION} can be run here')
     if action.get('joint_ids') is not None or action.get('preserve_order'):
         refusals.append(f'{origin}: actions.{name} has an order of joints of its own')
-    return refusals
+    offset = _matched(action.get('offset'), joints, 0.0)
+    return known(
+        scale=_matched(action.get('scale'), joints, 1.0),
+        offset=None if action.get('use_default_offset') else offset,
+        target_clip=_matched(action.get('clip'), joints, [-math.inf, math.inf]),
+    ), refusals
 
 
 def _matched(value: object, joints: Sequence[str], default: object) -> object:
@@ -218,14 +180,10 @@ def _uniform(value: object) -> object:
     return value[0] if value and all(each == value[0] for each in value) else None
 
 
-def _ranges(ranges: object) -> Values:
-    if not isinstance(ranges, Mapping):
-        return {}
-    return {
-        axis: list(ranges[key])
-        for key, axis in RANGES.items()
-        if isinstance(ranges.get(key), (list, tuple))
-    }
+def _ranges(values: Mapping[str, Any]) -> Values:
+    ranges = _mapping(_mapping(_mapping(values, 'commands'), 'base_velocity'), 'ranges')
+    found = {axis: ranges.get(key) for key, axis in RANGES.items()}
+    return {axis: list(span) for axis, span in found.items() if isinstance(span, (list, tuple))}
 
 
 def _mapping(values: Mapping[str, Any], key: str) -> Mapping[str, Any]:

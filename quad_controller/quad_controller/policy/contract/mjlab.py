@@ -38,10 +38,13 @@ FILE = 'metadata'
 STEP_KEYS = ('step_dt', 'control_dt', 'policy_dt')
 """Time between two steps in [s]."""
 
-OBSERVATION_SIZE_KEYS = ('obs_dim', 'observation_dim', 'input_dim', 'num_obs', 'num_observations')
-ACTION_SIZE_KEYS = ('action_dim', 'act_dim', 'output_dim', 'num_actions', 'num_joints', 'num_dofs')
-SIZES_KEY = 'dims'
-"""Both sizes: the first number is the observation's, the last one the action's."""
+OBSERVATION_SIZE_KEYS = (
+    *('obs_dim', 'observation_dim', 'input_dim', 'num_obs', 'num_observations'),
+    'dims',  # of both: the first number is the observation's, the last one the action's
+)
+ACTION_SIZE_KEYS = (
+    *('action_dim', 'act_dim', 'output_dim', 'num_actions', 'num_joints', 'num_dofs', 'dims'),
+)
 
 KNOWN_KEYS = frozenset(
     {
@@ -50,7 +53,6 @@ KNOWN_KEYS = frozenset(
         'observation_terms_clip',
         'observation_terms_history_length',
         'observation_terms_flatten_history_dim',
-        SIZES_KEY,
         *STEP_KEYS,
         *OBSERVATION_SIZE_KEYS,
         *ACTION_SIZE_KEYS,
@@ -98,7 +100,11 @@ def _mjlab(values: Mapping[str, str]) -> Values:
     def numbers(key: str) -> list[float] | None:
         return _numbers(values, key) if key in values else None
 
-    joints, scale, steps = values.get('joint_names'), numbers('action_scale'), step_periods(values)
+    joints, scale, steps = (
+        values.get('joint_names'),
+        numbers('action_scale'),
+        numbers_of(values, STEP_KEYS),
+    )
     contract = known(
         default_positions=numbers('default_joint_pos'),
         joints=None if joints is None else [_base_name(word) for word in _words(joints)],
@@ -219,21 +225,6 @@ def _base_name(name: str) -> str:
     return name.rpartition('/')[2]
 
 
-def step_periods(values: Mapping[str, str]) -> dict[str, float]:
-    """Return the time between two steps in [s], by key; NaN for no number."""
-    return {key: (_numbers_in(values[key]) or [math.nan])[0] for key in STEP_KEYS if key in values}
-
-
-def observation_sizes(values: Mapping[str, str]) -> dict[str, float]:
-    """Return the width of the observation, by key; NaN for no number."""
-    return _ends(values, (*OBSERVATION_SIZE_KEYS, SIZES_KEY), 0)
-
-
-def action_sizes(values: Mapping[str, str]) -> dict[str, float]:
-    """Return the number of actions, by key; NaN for no number."""
-    return _ends(values, (*ACTION_SIZE_KEYS, SIZES_KEY), -1)
-
-
 def changing(values: Mapping[str, str]) -> dict[str, str]:
     """Return the keys that would change observations or actions, with their texts."""
     return {
@@ -252,8 +243,9 @@ def not_understood(values: Mapping[str, str]) -> dict[str, str]:
     }
 
 
-def _ends(values: Mapping[str, str], keys: Iterable[str], end: int) -> dict[str, float]:
-    return {key: (_numbers_in(values[key]) or [math.nan])[end] for key in keys if key in values}
+def numbers_of(values: Mapping[str, str], keys: Iterable[str], place: int = 0) -> dict[str, float]:
+    """Return the number at a place in the texts of some keys; NaN where there is none."""
+    return {key: (_numbers_in(values[key]) or [math.nan])[place] for key in keys if key in values}
 
 
 def _numbers_in(text: str) -> list[float]:
