@@ -73,7 +73,7 @@ def test_levelling_is_bounded_and_fades(roll: float, pitch: float) -> None:
         assert abs(pose.pitch) <= 0.2
     for _ in range(200):
         pose = leveller.step(None, UPRIGHT, 0.02)
-    assert pose.parts == pytest.approx(UPRIGHT.parts, abs=1e-6)
+    assert pose == pytest.approx(UPRIGHT, abs=1e-6)
 
 
 def test_a_tilt_that_was_asked_for_is_no_error() -> None:
@@ -90,7 +90,7 @@ def test_body_moves_slowly_and_within_limits(present: BodyPose, target: BodyPose
     limits = BodyLimits()
     goal = limits.clamp(target)
     after = limits.approach(present, goal, 0.02)
-    change = np.abs(np.subtract(after.parts, present.parts))
+    change = np.abs(np.subtract(after, present))
     assert (change[:3] <= limits.speed * 0.02 + 1e-12).all()
     assert (change[3:] <= limits.turn_speed * 0.02 + 1e-12).all()
     assert limits.clamp(goal) == goal

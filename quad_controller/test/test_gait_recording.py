@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 import shutil
+import threading
 
 import numpy as np
 import pytest
@@ -32,7 +33,7 @@ from quad_description import JointSample, RobotState
 from quad_gait_rig import FIRM, firm, MODEL, PERIOD, ROBOT, STANDING, UPRIGHT
 from quad_msgs.msg import ControllerStep
 from quad_sim.physics import PhysicsBackend
-from rosbag_files import BagReader, METADATA_FILE
+from rosbag_files import BagReader, BagWriter, METADATA_FILE
 
 FORWARD = Velocity(0.15)
 TIMES = 1_700_000_000_123_456_789, 0.0201, 0.0007, None
@@ -64,7 +65,6 @@ def walk(folder: Path, seconds: float, *, options: PolicyOptions = AS_SHIPPED) -
         state = backend.step(output.targets)
         if step == 0:
             assert controller.set_mode('policy').accepted
-    recorder.start()
     recorder.close()
     assert not recorder.lost
     assert not recorder.failure
@@ -107,14 +107,18 @@ def test_a_step_is_read_as_it_was_written(tmp_path: Path) -> None:
             unpack(definition, message.data[:size])
 
 
-def test_steps_that_find_no_place_are_counted(tmp_path: Path) -> None:
-    """The queue is bounded, and the control loop never waits."""
+def test_steps_that_find_no_place_are_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a slow disk the backlog is bounded, and the control loop never waits."""
+    slow, write = threading.Event(), BagWriter.write
+    monkeypatch.setattr(BagWriter, 'write', lambda *step: slow.wait() and write(*step))
     recorder = Recorder(tmp_path / 'full', {}, backlog=3)
     output = Output(None, None, 'relax', False, ())
     for _ in range(5):
         recorder.offer(output, *TIMES)
     assert recorder.lost == 2
-    recorder.start()
+    slow.set()
     recorder.close()
     assert len(read_recording(tmp_path / 'full')) == 3
 

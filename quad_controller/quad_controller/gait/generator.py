@@ -150,9 +150,7 @@ class GaitGenerator:
         walked = self._stepper.walking
         feet = self._stepper.step(self._within_schedule(self.limits.bound(course)), dt)
         moved = self._leveller.step(attitude, self.pose, dt)
-        sway = self._stepper.sway
-        if sway:
-            moved = BodyPose(moved.x, moved.y + sway, moved.z, moved.roll, moved.pitch, moved.yaw)
+        moved = moved._replace(y=moved.y + self._stepper.sway)
         solutions = self._robot.solve(feet_in_body(feet, moved, self._centre))
         targets = self._robot.place(solutions, self.others)
         contacts = self._stepper.contacts

@@ -86,8 +86,7 @@ def approach(value: float, target: float, most: float) -> float:
     return target if abs(target - value) <= most else value + math.copysign(most, target - value)
 
 
-@dataclass(frozen=True, slots=True)
-class BodyPose:
+class BodyPose(NamedTuple):
     """A pose of the body relative to its normal one over the feet."""
 
     x: float = 0.0  # forward in [m]
@@ -100,12 +99,7 @@ class BodyPose:
     @property
     def finite(self) -> bool:
         """Whether all parts are numbers."""
-        return all(map(math.isfinite, self.parts))
-
-    @property
-    def parts(self) -> tuple[float, float, float, float, float, float]:
-        """All six numbers."""
-        return self.x, self.y, self.z, self.roll, self.pitch, self.yaw
+        return all(map(math.isfinite, self))
 
 
 UPRIGHT = BodyPose()
@@ -127,22 +121,15 @@ class BodyLimits:
         """Return the nearest pose within the limits."""
         most = (self.shift, self.shift, self.height, self.roll, self.pitch, self.yaw)
         return BodyPose(
-            *(min(max(part, -limit), limit) for part, limit in zip(pose.parts, most, strict=True))
+            *(min(max(part, -limit), limit) for part, limit in zip(pose, most, strict=True))
         )
 
     def approach(self, pose: BodyPose, target: BodyPose, dt: float) -> BodyPose:
         """Return the pose after a step of motion towards a target."""
         if pose == target:
             return pose
-        move, turn = self.speed * dt, self.turn_speed * dt
-        return BodyPose(
-            approach(pose.x, target.x, move),
-            approach(pose.y, target.y, move),
-            approach(pose.z, target.z, move),
-            approach(pose.roll, target.roll, turn),
-            approach(pose.pitch, target.pitch, turn),
-            approach(pose.yaw, target.yaw, turn),
-        )
+        most = (*[self.speed * dt] * 3, *[self.turn_speed * dt] * 3)
+        return BodyPose(*map(approach, pose, target, most))
 
 
 def feet_in_body(feet: Sequence[Vector], pose: BodyPose, centre: Vector) -> list[Vector]:
@@ -191,9 +178,7 @@ class Leveller:
         share = 1.0 - math.exp(-self._rate * dt)
         self._roll += share * (self._bounded(roll) - self._roll)
         self._pitch += share * (self._bounded(pitch) - self._pitch)
-        return BodyPose(
-            pose.x, pose.y, pose.z, pose.roll + self._roll, pose.pitch + self._pitch, pose.yaw
-        )
+        return pose._replace(roll=pose.roll + self._roll, pitch=pose.pitch + self._pitch)
 
     def _bounded(self, error: float) -> float:
         return min(max(-self._gain * error, -self._most), self._most)

@@ -49,7 +49,7 @@ from ..policy.runner import PolicyRunner
 from ..recording import PolicyRun
 from ..states.controller import Controller
 from ..states.machine import NO_POLICY
-from ..states.modes import Answer, EventKind, Fault, Output, Status
+from ..states.modes import Answer, EventKind, Fault, Output
 from . import messages
 from .control_loop import ControlLoop
 from .messages import OtherTypeSubscription, Recorder
@@ -146,7 +146,7 @@ class ControllerNode(Node):
         )
         self._gait = settings.gait
         self.add_on_set_parameters_callback(self._tune)
-        self.create_timer(settings.diagnostics_period, self._diagnose)
+        self.create_timer(settings.diagnostics_period, self._publish_diagnostics)
         self._types = self.create_timer(TYPE_PERIOD, self._check_for_stamped)
         robot = settings.robot
         self.get_logger().info(
@@ -156,7 +156,6 @@ class ControllerNode(Node):
     def begin(self) -> None:
         """Start the control loop."""
         if self._recorder is not None:
-            self._recorder.start()
             self.get_logger().info(f'records to {self._recorder.folder}')
         priority = self._settings.thread_priority
         self._loop.start(lambda: raise_thread_priority(self, priority, 'the control loop'))
@@ -399,13 +398,6 @@ class ControllerNode(Node):
             self._gait = gait
         return SetParametersResult(successful=answer.accepted, reason=answer.message)
 
-    def _diagnose(self) -> None:
-        self._publish_diagnostics(self._status())
-
-    def _status(self) -> Status:
-        with self._loop.lock:
-            return self._controller.status
-
     # --- out: in the thread of the loop
 
     def _publish(self, output: Output) -> None:
@@ -434,10 +426,12 @@ class ControllerNode(Node):
         if output.title != self._title:
             self._title = output.title
             self._state.publish(String(data=output.title))
-            self._publish_diagnostics(self._status())
+            self._publish_diagnostics()
 
-    def _publish_diagnostics(self, status: Status) -> None:
+    def _publish_diagnostics(self) -> None:
         name = self.get_name()
+        with self._loop.lock:
+            status = self._controller.status
         array = DiagnosticArray()
         array.header.stamp = self.get_clock().now().to_msg()
         array.status = [

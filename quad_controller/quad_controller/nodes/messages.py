@@ -6,11 +6,11 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 import math
 from pathlib import Path
-import queue
 import threading
 import time
 from typing import Any
@@ -272,7 +272,7 @@ FLUSH_PERIOD = 1.0  # [s] after which what was written outlives the process
 
 
 class Recorder:
-    """One recording, from :meth:`start` to :meth:`close`."""
+    """One recording, until :meth:`close`."""
 
     def __init__(self, folder: Path, about: Mapping[str, str], backlog: int = BACKLOG) -> None:
         """Make the folder; at most ``backlog`` steps wait.
@@ -289,13 +289,9 @@ class Recorder:
             self._writer.set_topic(Topic(TOPIC, TYPE, definition, qos=(OfferedQos(),)))
         except (BagError, DefinitionError) as error:
             raise ParameterError(f'record: {error}') from error
-        self._steps: queue.Queue[tuple[Output, int, float, float, float]] = queue.Queue(backlog)
-        self._closing = threading.Event()
-        self._thread = threading.Thread(target=self._run, name='recorder', daemon=True)
-
-    def start(self) -> None:
-        """Begin to write."""
-        self._thread.start()
+        self._places = threading.BoundedSemaphore(backlog)
+        self._writing = ThreadPoolExecutor(1, thread_name_prefix='recorder')
+        self._flushed = time.monotonic()
 
     def offer(
         self, output: Output, stamp: int, dt: float, computing: float, latency: float | None
@@ -308,57 +304,35 @@ class Recorder:
             computing: Time from its begin to the command in [s].
             latency: Time from the joint states to the command in [s]; None without.
         """
-        latency = math.nan if latency is None else latency
-        try:
-            self._steps.put_nowait((output, stamp, dt, computing, latency))
-        except queue.Full:
+        if not self._places.acquire(blocking=False):
             self.lost += 1
+            return
+        latency = math.nan if latency is None else latency
+        self._writing.submit(self._write, output, stamp, dt, computing, latency)
 
     def close(self) -> None:
         """Write what waits, and finish the recording."""
-        self._closing.set()
-        if self._thread.is_alive():
-            self._thread.join()
-        else:
-            self._drain()
+        self._writing.shutdown()
         try:
             self._writer.close()
         except BagError as error:
             self.failure = self.failure or str(error)
 
-    def _run(self) -> None:
-        flushed = time.monotonic()
-        while not self._closing.is_set():
-            self._write_next()
-            if time.monotonic() - flushed > FLUSH_PERIOD:
-                flushed = time.monotonic()
-                self._guarded_flush()
-        self._drain()
-
-    def _drain(self) -> None:
-        while not self._steps.empty():
-            self._write_next()
-
-    def _write_next(self) -> None:
+    def _write(self, output: Output, stamp: int, *times: float) -> None:
         try:
-            output, stamp, *times = self._steps.get(timeout=0.1)
-        except queue.Empty:
-            return
-        if self.failure:
-            self.lost += 1
-            return
-        step = serialize_message(_message(output, stamp, *times))
-        try:
+            self.lost += bool(self.failure)
+            if self.failure:
+                return
+            step = serialize_message(_message(output, stamp, *times))
             self._writer.write(TOPIC, step, stamp, stamp)
-        except BagError as error:
+            if time.monotonic() - self._flushed > FLUSH_PERIOD:
+                self._flushed = time.monotonic()
+                self._writer.flush()
+        except Exception as error:  # noqa: BLE001  # whatever it is, the robot walks on
             self.failure = str(error)
             self.lost += 1
-
-    def _guarded_flush(self) -> None:
-        try:
-            self._writer.flush()
-        except BagError as error:
-            self.failure = str(error)
+        finally:
+            self._places.release()
 
 
 def _message(

@@ -186,26 +186,6 @@ WITH_AN_ARM = (
 )
 
 
-class StillnessWatch:
-    """How long the body has not turned; by its attitude, as not every IMU has a gyro."""
-
-    def __init__(self) -> None:
-        """Begin in motion."""
-        self._reference: Vector | None = None
-        self.time = 0.0
-
-    def reset(self) -> None:
-        """Begin in motion again."""
-        self._reference, self.time = None, 0.0
-
-    def step(self, down: Vector, dt: float) -> None:
-        """Process the direction of gravity in the body after a duration in [s]."""
-        if self._reference is None or _angle(self._reference, down) > STILL_ANGLE:
-            self._reference, self.time = down, 0.0
-        else:
-            self.time += dt
-
-
 def stands(imu: ImuSample | None) -> bool:
     """Return whether the body of a robot is upright; also when nobody knows."""
     return imu is None or imu.is_uncertain or imu.tilt < LEVEL
@@ -255,45 +235,34 @@ class GetUp(Motion):
         self._motion: Motion = Hold(last, math.inf)
         self._deadline = REST_DEADLINE
         self._time = self._blind = 0.0
-        self._still = StillnessWatch()
+        self._still_down: Vector | None = None  # where gravity was when the body came to rest
+        self._still_time = 0.0  # [s] since then; by the attitude, as not every IMU has a gyro
         self._lying, self._tilt = Lying.BELLY, 0.0
         self._tries: Counter[Lying] = Counter()
-        self._finished, self._failure, self._rises = False, '', False
+        self.finished = False
+        self.rises = False  # whether its legs are being straightened below it
         self._stages = self._script()
         self.text = 'waits until it is at rest'  # what it is doing, for people
         next(self._stages)
 
-    @property
-    def finished(self) -> bool:
-        """Whether it stands."""
-        return self._finished
-
-    @property
-    def failure(self) -> str:
-        """Why it does not get up: where it lies, what was tried and what to do."""
-        return self._failure
-
-    @property
-    def rises(self) -> bool:
-        """Whether its legs are being straightened below it."""
-        return self._rises
-
     def step(self, situation: Situation, dt: float) -> Targets:
         """Return the next targets; the last ones while the attitude is not known."""
         imu = situation.imu
-        if self._finished or self._failure:
+        if self.finished or self.failure:
             return self._last
         if imu is None or imu.is_uncertain:
             self._blind += dt
             if self._blind > BLIND_DEADLINE:
-                self._failure = f'nobody measures how it lies; look at /imu, or {BY_HAND}'
+                self.failure = f'nobody measures how it lies; look at /imu, or {BY_HAND}'
             return self._last
         self._blind = 0.0
         self._time += dt
         self._last = self._motion.step(situation, dt)
-        if not self._motion.finished:
-            self._still.reset()
-        self._still.step(imu.down, dt)
+        reference = self._still_down if self._motion.finished else None
+        if reference is None or _angle(reference, imu.down) > STILL_ANGLE:
+            self._still_down, self._still_time = imu.down, 0.0
+        else:
+            self._still_time += dt
         if self._is_over():
             self._lying, self._tilt = lying_on(imu.down), imu.tilt
             next(self._stages, None)
@@ -305,7 +274,7 @@ class GetUp(Motion):
             return True
         if isinstance(self._motion, Swing):
             return self._motion.finished
-        return self._motion.finished and self._still.time >= STILL_TIME
+        return self._motion.finished and self._still_time >= STILL_TIME
 
     def _script(self) -> Iterator[None]:
         """Begin one stage after another, each when the one before is over."""
@@ -315,14 +284,14 @@ class GetUp(Motion):
             self._tries[lying] += 1
             if lying is not Lying.BELLY:
                 yield from self._turn_over(lying)
-                if self._failure:
+                if self.failure:
                     return
                 continue
             yield from self._stand_up()
-            if self._finished:
+            if self.finished:
                 return
         tried = ', '.join(f'{side.value} {count}' for side, count in self._tries.items())
-        self._failure = (
+        self.failure = (
             f'it lies {self._lying.value}, tilted by {math.degrees(self._tilt):.0f} deg, after '
             f'{MAX_TRIES} tries ({tried}); look for what hinders its legs, and {BY_HAND}'
         )
@@ -330,20 +299,20 @@ class GetUp(Motion):
     def _turn_over(self, lying: Lying) -> Iterator[None]:
         """Try one of the recoveries from a side, the next one when that was tried before."""
         if lying is Lying.BACK and self._robot.others:
-            self._failure = WITH_AN_ARM
+            self.failure = WITH_AN_ARM
             return
         recoveries = RECOVERIES[lying]
         stages = recoveries[(self._tries[lying] - 1) % len(recoveries)]
         swings = any(stage.duration is not None for stage in stages)
         if swings and not self._swings:
-            self._failure = ON_ITS_BACK
+            self.failure = ON_ITS_BACK
             return
         how = 'throws itself over at full speed, stand clear' if swings else 'turns over'
         for stage in stages:
             targets = self._robot.with_legs(stage.legs, self._last)
             reached = self._robot.clamp(targets)
             if max(abs(a - b) for a, b in zip(reached, targets, strict=True)) > REACH_TOLERANCE:
-                self._failure = f'the joints of this robot do not reach the poses; {BY_HAND}'
+                self.failure = f'the joints of this robot do not reach the poses; {BY_HAND}'
                 return
             self._start_stage(reached, stage.speed, stage.duration)
             self.text = f'lies {lying.value}; {how}, try {self._tries[lying]}'
@@ -358,11 +327,11 @@ class GetUp(Motion):
         yield
         if self._lying is not Lying.BELLY:
             return
-        self.text, self._rises = 'stands up', True
+        self.text, self.rises = 'stands up', True
         self._start_stage(self._standing, STAND_SPEED)
         yield
-        self._rises = False
-        self._finished = self._lying is Lying.BELLY and self._tilt < LEVEL
+        self.rises = False
+        self.finished = self._lying is Lying.BELLY and self._tilt < LEVEL
 
     def _start_stage(
         self, targets: Targets, speed: float, swing_time: float | None = None

@@ -87,17 +87,11 @@ class PolicyMotion(Motion):
         self._time = 0.0
         self._rest_time = 0.0
         self._bad_steps = 0
-        self._failure = ''
 
     @property
     def settled(self) -> bool:
         """Whether the robot has had time to stop, or the policy is of no use any more."""
         return self._rest_time >= WIND_DOWN or bool(self.failure)
-
-    @property
-    def failure(self) -> str:
-        """Why it was given up; empty while it works."""
-        return self._failure
 
     def step(self, situation: Situation, dt: float) -> Targets:
         """Return the next targets; the last ones when there is nothing to go by."""
@@ -110,7 +104,7 @@ class PolicyMotion(Motion):
         if step.targets is None:
             self._bad_steps += 1
             if self._bad_steps >= MAX_BAD_STEPS:
-                self._failure = step.reason
+                self.failure = step.reason
             return self._last
         self._bad_steps = 0
         self._time += dt

@@ -69,20 +69,13 @@ class Motion(ABC):
     soon as it is :attr:`settled`.
     """
 
+    finished = True  # whether it has come to where it leads
+    failure = ''  # why it is of no use any more; empty while it works
+
     @property
     def settled(self) -> bool:
         """Whether the robot is at rest on its feet, or was not walking in the first place."""
         return True
-
-    @property
-    def finished(self) -> bool:
-        """Whether it has come to where it leads."""
-        return True
-
-    @property
-    def failure(self) -> str:
-        """Why it is of no use any more; empty while it works."""
-        return ''
 
     @abstractmethod
     def step(self, situation: Situation, dt: float) -> Targets:
@@ -120,16 +113,12 @@ class Blend(Motion):
         way = max(abs(b - a) for a, b in zip(start, end, strict=True))
         # a cosine is pi / 2 times as fast in its middle as on average
         self.duration = max(least, way * math.pi / 2 / speed)  # how long it takes in [s]
-        self._time = 0.0
-
-    @property
-    def finished(self) -> bool:
-        """Whether it is there."""
-        return self._time >= self.duration
+        self._time, self.finished = 0.0, False
 
     def step(self, situation: Situation, dt: float) -> Targets:
         """Return the next targets."""
         self._time += dt
+        self.finished = self._time >= self.duration
         if self.finished:
             return self._end
         share = 0.5 * (1.0 - math.cos(math.pi * self._time / self.duration))
@@ -142,16 +131,12 @@ class Swing(Motion):
     def __init__(self, start: Targets, end: Targets, speed: float, duration: float) -> None:
         """Plan it: each joint at a speed [rad/s]; what is not there in time is left short."""
         self._targets, self._end, self._speed = start, end, speed
-        self._left = duration
-
-    @property
-    def finished(self) -> bool:
-        """Whether its time is over."""
-        return self._left < 1e-6
+        self._left, self.finished = duration, False
 
     def step(self, situation: Situation, dt: float) -> Targets:
         """Return the next targets."""
         self._left -= dt
+        self.finished = self._left < 1e-6
         most = self._speed * dt
         self._targets = tuple(
             a + min(max(b - a, -most), most) for a, b in zip(self._targets, self._end, strict=True)
