@@ -19,7 +19,7 @@ import numpy as np
 from quad_controller import PolicyOptions, Velocity
 from quad_controller.policy.contract.document import ContractDocument, document_of
 from quad_controller.policy.contract.mjlab import read_metadata
-from quad_controller.policy.contract.model import PolicyContract
+from quad_controller.policy.contract.model import PolicyContract, Source
 from quad_controller.policy.network import Floats, OnnxNetwork
 from quad_controller.policy.observation import Situation
 from quad_controller.policy.runner import PolicyRunner
@@ -58,9 +58,25 @@ def contract_of(path: Path, kind: str) -> ContractDocument:
     Raises:
         PolicyError: The file cannot be read.
     """
-    gains = {'stiffness': SERVO.stiffness, 'damping': SERVO.velocity_gain}
-    own = document_of({'kind': kind, 'gains': gains}, 'training')
-    return own.over(read_metadata(OnnxNetwork(path).metadata))
+    start = read_metadata(OnnxNetwork(path).metadata)
+    own = {
+        'kind': kind,
+        'gains': {'stiffness': SERVO.stiffness, 'damping': SERVO.velocity_gain},
+        'observation': {
+            'terms': {
+                name: {'noise': v1_velocity_error()}
+                for name, term in start.values['observation']['terms'].items()
+                if term['source'] == Source.JOINT_VELOCITIES.value
+            }
+        },
+    }
+    return document_of(own, 'training').over(start)
+
+
+def v1_velocity_error() -> float:
+    """Return the error of joint velocities that are estimated of the bytes of v1 [rad/s rms]."""
+    rest = [0.0] * len(quadruped(robot_urdf()).names)
+    return JointBytes(robot_urdf()).read(rest, 0.0).velocity_error
 
 
 class NoNetwork(OnnxNetwork):
