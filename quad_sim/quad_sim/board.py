@@ -266,7 +266,6 @@ class Board:
         self.walker = Walker(urdf)  # the board's own gait
         self.model = model  # whose ranges scale bytes
         self.firmware = firmware or FIRMWARE[model]  # version as the board reports it
-        self.lost_time = 0.0  # time that was skipped because the process was held up [s]
         self.imu_failed = False  # whether the attitude is not finite
         self._plant = plant
         self._efforts = [joint.limits.effort for joint in joints]
@@ -292,7 +291,6 @@ class Board:
     def advance(self, now: float) -> None:
         """Advance the robot to a time [s]."""
         if now - self._now > MAX_LAG:
-            self.lost_time += now - self._now - MAX_LAG
             self._now = now - MAX_LAG
         while self._now < now:
             until = min(now, max(self._gait_at, self._now), max(self._power_at, self._now))

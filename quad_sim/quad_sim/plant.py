@@ -256,19 +256,10 @@ class KinematicRobot:
         self.joint_names = tuple(joint.name for joint in joints)
         self._noise = noise
         self._ramp = TargetRamp(joints, TIMESTEP, np.zeros(len(joints)))
-        self.reset(pose=pose, seed=seed)
-
-    def reset(self, *, pose: Mapping[str, float] | None = None, seed: int = 0) -> None:
-        """Begin anew.
-
-        Raises:
-            SetupError: The pose names joints that the robot lacks.
-        """
         self._random = np.random.default_rng(seed)
         self._on = dict.fromkeys(self.joint_names, True)
         self._missed: dict[str, float] = {}  # targets that came without torque
         self._steps, self._remaining_steps = 0, 0.0
-        self._ramp.jump(np.zeros(len(self.joint_names)))
         try:
             self._ramp.approach(pose or {}, 0.0)
         except TargetError as error:
@@ -359,11 +350,9 @@ class KinematicRobot:
         values = self.joint_targets
         level = (0.0, 0.0, 0.0)
         truth = Measurement(
-            time=self.time,
             imu=Imu((0.0, 0.0, GRAVITY), level, level),
             positions=values,
             velocities=(values - self._before) / TIMESTEP,
             torques=np.zeros(len(values)),
-            foot_forces=np.zeros(_FEET),
         )
         return disturb(truth, self._noise, self._random)

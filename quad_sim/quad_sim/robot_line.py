@@ -23,15 +23,6 @@ from .faults import Fault, FaultKind, FaultPlan
 BITS_PER_BYTE = 10  # 8N1: start, eight data bits, stop
 
 
-@dataclass(slots=True)
-class LineCounters:
-    """What went over one direction of a line."""
-
-    bytes: int = 0  # bytes put in
-    dropped: int = 0  # bytes that a fault swallowed
-    flipped: int = 0  # bytes that a fault damaged
-
-
 @dataclass(frozen=True, slots=True)
 class Arrival:
     """Bytes at the end of a line."""
@@ -46,7 +37,6 @@ class Wire:
 
     def __init__(self, faults: FaultPlan, muted_by: FaultKind, seed: int, *, slow: bool) -> None:
         """Lay a wire that one of the faults mutes."""
-        self.counters = LineCounters()
         self._faults = faults
         self._muted_by = muted_by
         self._random = random.Random(seed)  # noqa: S311  for tests, not for secrets
@@ -59,7 +49,6 @@ class Wire:
         seconds = BITS_PER_BYTE / baud
         end = max(now, self._free_at) + len(data) * seconds
         self._free_at = end
-        self.counters.bytes += len(data)
         if self._faults.active(self._muted_by, now) is not None:
             return
         slow = self._faults.active(FaultKind.SLOW, now) if self._slow else None
@@ -89,15 +78,12 @@ class Wire:
             data = bytes(map(self._flip, data, [flip['rate']] * len(data)))
         drop = self._faults.active(FaultKind.DROP, now)
         if drop is not None:
-            whole = len(data)
             data = bytes(byte for byte in data if self._random.random() >= drop['rate'])
-            self.counters.dropped += whole - len(data)
         return data
 
     def _flip(self, byte: int, rate: float) -> int:
         if self._random.random() >= rate:
             return byte
-        self.counters.flipped += 1
         return byte ^ (1 << self._random.randrange(8))
 
 

@@ -160,7 +160,6 @@ TRUTH_PERIOD = 0.02  # [s] between two looks at where it is
 class Truth:
     """Where the robot really is."""
 
-    time: float  # of the robot [s]
     pose: BasePose  # of base_link in the world
     velocity: BaseVelocity  # of base_link
     foot_contacts: tuple[bool, ...]  # which feet touch the ground, in the order of the legs
@@ -257,5 +256,5 @@ class Server:
         self._looked_at = self.now
         plant = self._plant
         # where the robot was last; may be read from any thread
-        self.truth = Truth(plant.time, plant.base_pose, plant.base_velocity, plant.foot_contacts)
+        self.truth = Truth(plant.base_pose, plant.base_velocity, plant.foot_contacts)
         self._watch()

@@ -59,12 +59,10 @@ class Imu:
 class Measurement:
     """What the board has measured, noise and encoder steps included."""
 
-    time: float  # of the measurement, since the start [s]
     imu: Imu  # what the IMU measures
     positions: Array  # of the joints [rad], of the gripper [m]; in the order of the URDF
     velocities: Array  # [rad/s], [m/s]
     torques: Array  # [N m], [N]
-    foot_forces: Array  # normal force on each foot, in the order of the legs [N]
 
 
 ENCODER_STEP = 2 * math.pi / 4096  # [rad] the servos' magnetic encoder has 12 bits

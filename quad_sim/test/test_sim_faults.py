@@ -47,10 +47,10 @@ def test_a_healthy_wire_delays_and_changes_nothing(chunks: list[tuple[bytes, flo
 
 
 @given(st.binary(min_size=200, max_size=2000), st.integers(0, 5), st.floats(0, 1))
-def test_damage_is_repeatable_and_counted(data: bytes, seed: int, rate: float) -> None:
-    """Equal seeds damage equal bytes; the counters say how many."""
+def test_damage_is_repeatable(data: bytes, seed: int, rate: float) -> None:
+    """Equal seeds damage equal bytes, and lose about as many as the rate says."""
 
-    def received(seed: int) -> tuple[bytes, int, int]:
+    def received(seed: int) -> bytes:
         wire = plain_wire(
             LineFault(FaultKind.DROP, values={'rate': rate}),
             LineFault(FaultKind.FLIP, values={'rate': rate}),
@@ -58,11 +58,11 @@ def test_damage_is_repeatable_and_counted(data: bytes, seed: int, rate: float) -
         )
         wire.put(data, 0.0, 115200)
         (arrival,) = wire.take(10.0)
-        return arrival.data, wire.counters.dropped, wire.counters.flipped
+        return arrival.data
 
-    first, dropped, _ = received(seed)
-    assert received(seed)[0] == first
-    assert len(first) == len(data) - dropped
+    first = received(seed)
+    assert received(seed) == first
+    assert len(first) == pytest.approx((1.0 - rate) * len(data), abs=5.0 * math.sqrt(len(data)))
 
 
 def test_a_flip_inverts_one_bit() -> None:

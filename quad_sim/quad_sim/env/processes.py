@@ -18,7 +18,7 @@ from multiprocessing.context import SpawnProcess
 from multiprocessing.sharedctypes import RawArray
 import os
 import signal
-from typing import Any, NamedTuple
+from typing import Any
 
 import gymnasium
 from gymnasium import spaces
@@ -35,31 +35,17 @@ Seed = int | list[int | None] | None
 JOIN_TIME = 5.0  # [s] until a process that was asked to end is ended
 
 
-class _Arrays(NamedTuple):
-    """What all processes see; one row for each environment."""
-
-    observations: Floats
-    actions: Floats
-    rewards: Floats
-    terminated: NDArray[np.bool_]
-    truncated: NDArray[np.bool_]
+Rows = NDArray[np.void]
+"""What all processes see; one row for each environment."""
+_Memory = tuple[Any, np.dtype[np.void]]
+"""Where it lies, and what a row has."""
 
 
-_Memory = tuple[int, tuple[Any, ...]]
-"""Number of environments, and the shared memory of each array."""
-
-
-def _memory(count: int, observation: int, action: int) -> _Memory:
-    sizes = (('f', observation), ('f', action), ('f', 1), ('b', 1), ('b', 1))
-    return count, tuple(RawArray(kind, count * size) for kind, size in sizes)
-
-
-def _arrays(memory: _Memory) -> _Arrays:
-    """Return views of the memory."""
-    count, parts = memory
-    kinds = (np.float32, np.float32, np.float32, np.bool_, np.bool_)
-    views: list[NDArray[Any]] = list(map(np.frombuffer, parts, kinds))
-    return _Arrays(views[0].reshape(count, -1), views[1].reshape(count, -1), *views[2:])
+def _row(observation: int, action: int) -> np.dtype[np.void]:
+    """Return what a row has, for observations and actions of so many numbers."""
+    numbers = [('observations', 'f4', (observation,)), ('actions', 'f4', (action,))]
+    ends = [('rewards', 'f4'), ('terminated', '?'), ('truncated', '?')]
+    return np.dtype([*numbers, *ends], align=True)
 
 
 class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
@@ -98,8 +84,9 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         self.single_observation_space, self.single_action_space = observed, acted
         self.observation_space = batch_space(observed, num_envs)
         self.action_space = batch_space(acted, num_envs)
-        memory = _memory(num_envs, math.prod(observed.shape), math.prod(acted.shape))
-        self._arrays = _arrays(memory)
+        row = _row(math.prod(observed.shape), math.prod(acted.shape))
+        memory = RawArray('b', num_envs * row.itemsize), row
+        self._rows: Rows = np.frombuffer(*memory)
         ends = np.linspace(0, num_envs, workers + 1).round().astype(int).tolist()
         self._workers: list[_Worker] = []
         try:
@@ -118,7 +105,7 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         for worker in self._workers:
             worker.order('reset', [seeds[index] for index in worker.indices], options)
         infos = self._infos(self._answers())
-        return self._arrays.observations.copy(), infos
+        return self._rows['observations'].copy(), infos
 
     def step(
         self, actions: Floats
@@ -128,18 +115,14 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         Raises:
             SimulationError: One of them failed, or a process died.
         """
-        arrays = self._arrays
-        arrays.actions[:] = actions
+        self._rows['actions'][:] = actions
         for worker in self._workers:
             worker.order('step')
         infos = self._infos(self._answers())
-        return (
-            arrays.observations.copy(),
-            arrays.rewards.copy(),
-            arrays.terminated.copy(),
-            arrays.truncated.copy(),
-            infos,
-        )
+        rows = self._rows.copy()
+        names = 'observations', 'rewards', 'terminated', 'truncated'
+        observations, rewards, fallen, over = (rows[name] for name in names)
+        return observations, rewards, fallen, over, infos
 
     def call(self, name: str, *arguments: Any, **keywords: Any) -> tuple[Any, ...]:  # noqa: ANN401
         """Call a method of each of them; return what they return."""
@@ -223,7 +206,7 @@ class _Worker:
 def _serve(pipe: Connection, make: Callable[[], Env], memory: _Memory, indices: range) -> None:
     """Do what is asked for until the other end of the pipe is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one that started it ends it
-    batch = _Batch(_arrays(memory), indices)
+    batch = _Batch(np.frombuffer(*memory), indices)
     try:
         batch.envs += [make() for _ in indices]
         pipe.send([])
@@ -241,21 +224,20 @@ def _serve(pipe: Connection, make: Callable[[], Env], memory: _Memory, indices: 
 class _Batch:
     """The environments of a process."""
 
-    def __init__(self, arrays: _Arrays, indices: range) -> None:
-        self._arrays, self._indices = arrays, indices
+    def __init__(self, rows: Rows, indices: range) -> None:
+        self._rows, self._indices = rows, indices
         self.envs: list[Env] = []
 
     def step(self) -> Answer:
-        answers, arrays = [], self._arrays
+        answers, rows = [], self._rows
         for index, env in zip(self._indices, self.envs, strict=True):
-            observation, reward, fallen, over, info = env.step(arrays.actions[index])
+            observation, reward, fallen, over, info = env.step(rows['actions'][index])
             if fallen or over:
                 info = {'final_obs': observation, 'final_info': info}
                 observation, begun = env.reset()
                 info |= begun
-            arrays.observations[index] = observation
-            arrays.rewards[index] = reward
-            arrays.terminated[index], arrays.truncated[index] = fallen, over
+            rows['observations'][index], rows['rewards'][index] = observation, reward
+            rows['terminated'][index], rows['truncated'][index] = fallen, over
             if info:
                 answers.append((index, info))
         return answers
@@ -263,7 +245,7 @@ class _Batch:
     def reset(self, seeds: list[int | None], options: dict[str, Any] | None) -> Answer:
         answers = []
         for index, env, seed in zip(self._indices, self.envs, seeds, strict=True):
-            self._arrays.observations[index], info = env.reset(seed=seed, options=options)
+            self._rows['observations'][index], info = env.reset(seed=seed, options=options)
             answers.append((index, info))
         return answers
 

@@ -34,29 +34,7 @@ from ..physics import ImuBias, Robot
 from ..physics.model import Variation
 from ..physics.robot import TIMESTEP
 from ..plant import ServoModel, ServoParameters
-from ..state import Array, BaseVelocity, BOARD, FLAT, Noise, NONE, Terrain
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Motion:
-    """What a step brought about."""
-
-    velocity: BaseVelocity  # how base_link moves
-    tilt: float  # angle between its z axis and up in [rad]
-    down: Vector  # direction of gravity in base_link
-    torques: Array  # of the joints in [N m]
-    velocities: Array  # of the joints in [rad/s]
-    target_speed: Array  # of the targets since the step before in [rad/s]
-
-    @property
-    def power(self) -> float:
-        """Of the servos' torques, before the damping of their motors, in [W]."""
-        return float(abs(self.torques * self.velocities).sum())
-
-    @property
-    def action_rate(self) -> float:
-        """Square of the speed of the targets in [rad2/s2]."""
-        return float((self.target_speed * self.target_speed).sum())
+from ..state import Array, BOARD, FLAT, Noise, NONE, Terrain
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,21 +60,27 @@ class RewardWeights:
                 raise SetupError(f'{field.name} {value}: give a finite number, a width above 0')
 
     def terms(
-        self, motion: Motion, commanded: Vector, period: float, *, fallen: bool
+        self, robot: Robot, target_speed: Array, commanded: Vector, period: float, *, fallen: bool
     ) -> dict[str, float]:
-        """Return what each term is worth in one step; commanded are x, y [m/s] and yaw [rad/s]."""
-        (x, y, up), (roll, pitch, yaw) = motion.velocity.linear, motion.velocity.angular
+        """Return what each term is worth in one step.
+
+        Args:
+            target_speed: That of the targets since the step before in [rad/s].
+            commanded: x and y in [m/s], yaw in [rad/s].
+        """
+        velocity, down = robot.base_velocity, down_in_body(robot.base_pose.orientation)
+        (x, y, up), (roll, pitch, yaw) = velocity.linear, velocity.angular
         wanted_x, wanted_y, wanted_yaw = commanded
         off = math.hypot(x - wanted_x, y - wanted_y)
-        tilt = motion.down[0] ** 2 + motion.down[1] ** 2
+        power = float(abs(robot.joint_torques * robot.joint_velocities).sum())
         rates = {
             'tracking': self.tracking * _nearness(off, self.tracking_width),
             'turning': self.turning * _nearness(yaw - wanted_yaw, self.turning_width),
             'vertical': self.vertical * up * up,
             'rolling': self.rolling * (roll * roll + pitch * pitch),
-            'level': self.level * tilt,
-            'power': self.power * motion.power,
-            'action_rate': self.action_rate * motion.action_rate,
+            'level': self.level * (down[0] ** 2 + down[1] ** 2),
+            'power': self.power * power,
+            'action_rate': self.action_rate * float((target_speed * target_speed).sum()),
         }
         worth = {name: period * rate for name, rate in rates.items()}
         return worth | {'fall': self.fall if fallen else 0.0}
@@ -348,9 +332,9 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
             TargetError: A number is not finite, or there are too many or few.
             SimulationError: The physics blew up.
         """
-        motion = self._move(np.asarray(action, np.float32))
-        fallen = motion.tilt > MAX_TILT
-        terms = self._weights.terms(motion, self.command, self.period, fallen=fallen)
+        speed = self._move(np.asarray(action, np.float32))
+        fallen = self.robot.base_pose.tilt > MAX_TILT
+        terms = self._weights.terms(self.robot, speed, self.command, self.period, fallen=fallen)
         self._steps += 1
         for name, value in terms.items():
             self._sums[name] += value
@@ -380,8 +364,8 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         self._command_steps = max(round(self._commands.time / self.period), 1)
         self._steps, self._sums = 0, dict.fromkeys(self._weights.names, 0.0)
 
-    def _move(self, wanted: Floats) -> Motion:
-        """Send targets, let a period pass, and sense; return what the step brought about."""
+    def _move(self, wanted: Floats) -> Array:
+        """Send targets, let a period pass, and sense; return the targets' speed [rad/s]."""
         if wanted.shape != self.stand.shape or not np.isfinite(wanted).all():
             raise TargetError(
                 f'action {wanted}: give a finite number for each of {len(self.stand)} joints'
@@ -392,17 +376,9 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
             robot.kick((*random.uniform(*ranges.kick, 2).tolist(), 0.0))
         robot.set_targets((self.stand + wanted).astype(np.float64))
         robot.step(self.period)
-        pose = robot.base_pose
-        motion = Motion(
-            velocity=robot.base_velocity,
-            tilt=pose.tilt,
-            down=down_in_body(pose.orientation),
-            torques=robot.joint_torques,
-            velocities=robot.joint_velocities,
-            target_speed=(wanted.astype(np.float64) - self._action) / self.period,
-        )
+        speed: Array = (wanted.astype(np.float64) - self._action) / self.period
         self._action, self.state = wanted, self._sense()
-        return motion
+        return speed
 
     def _sense(self) -> RobotState:
         measured, time = self.robot.measure(), self.robot.time

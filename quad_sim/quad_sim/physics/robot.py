@@ -400,12 +400,10 @@ class Robot:
     def measure(self) -> Measurement:
         """Return what the sensors measure, with the noise that the robot was made with."""
         truth = Measurement(
-            time=self.time,
             imu=self.imu,
             positions=self.joint_positions,
             velocities=self.joint_velocities,
             torques=self.joint_torques,
-            foot_forces=self.foot_forces,
         )
         return disturb(truth, self._noise, self._random)
 
