@@ -11,8 +11,6 @@ from control_msgs.action import FollowJointTrajectory, GripperCommand, ParallelG
 from control_msgs.msg import JointJog, JointTrajectoryControllerState
 from controller_manager_msgs.srv import ListControllers
 from isolation import Isolation, reserve
-from moveit_msgs.action import ExecuteTrajectory
-from moveit_msgs.msg import RobotTrajectory
 from processes import RunningProcess
 import pytest
 from ros_client import RosClient
@@ -37,7 +35,6 @@ class Robot:
     """The robot, brought up with its drives enabled."""
 
     def __init__(self, client: RosClient) -> None:
-        """Listen to its joints."""
         self.client = client  # the test's own node
         self.at: dict[str, float] = {}  # newest position of each joint
         client.node.create_subscription(JointState, '/joint_states', self._take, 10)
@@ -183,17 +180,3 @@ def test_the_panda_with_its_gripper_grips(isolation: Isolation) -> None:
             assert (hand.status, hand.result.reached_goal) == (SUCCEEDED, True)
             assert [robot.at[name] for name in fingers] == pytest.approx([place] * 2, abs=2e-3)
         assert bringup.stop(30.0) == 0, bringup.output
-
-
-def test_a_trajectory_of_arm_and_gripper_is_split(robot: Robot) -> None:
-    """move_group has the arm follow it, and the gripper close where it ends."""
-    moved, target = [*ARMS['left'], GRIPPER], [*TARGETS['left'], 0.03]
-    trajectory = JointTrajectory(joint_names=moved)
-    for places, seconds in (([robot.at[name] for name in moved], 0), (target, 2)):
-        point = JointTrajectoryPoint(positions=places)
-        point.time_from_start.sec = seconds
-        trajectory.points.append(point)
-    goal = ExecuteTrajectory.Goal(trajectory=RobotTrajectory(joint_trajectory=trajectory))
-    (done,) = robot.results([robot.send(ExecuteTrajectory, '/execute_trajectory', goal)])
-    assert done.status == SUCCEEDED, done.result.error_code
-    assert [robot.at[name] for name in moved] == pytest.approx(target, abs=1e-3)

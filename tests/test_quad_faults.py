@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-import math
 import signal
 import time
 from typing import TYPE_CHECKING
@@ -19,7 +18,6 @@ from ros_client import RosClient
 from sensor_msgs.msg import JointState
 from simulated_quad import LEANING, SimulatedQuad, UPRIGHT
 from std_msgs.msg import String
-from std_srvs.srv import SetBool
 from tf2_msgs.msg import TFMessage
 
 from node_runner import LATCHED
@@ -136,19 +134,6 @@ def test_a_controller_killed_in_mid_trot_leaves_no_leg_in_the_air(quad: Simulate
     check_upright(quad)
 
 
-def test_a_controller_that_was_frozen_moves_nothing_until_it_is_asked(quad: SimulatedQuad) -> None:
-    """It wakes when the bridge has folded the legs: the robot stays down, a fault says why."""
-    freeze_in_mid_trot(quad)
-    wait_until_lying(quad)
-    quad.processes['controller'].signal(signal.SIGCONT)
-    woken = time.monotonic()
-    quad.processes['controller'].wait_for('fault, pause')
-    quad.spin(1.5)
-    check_upright(quad)
-    wait_until_lying(quad)
-    assert quad.tap.largest_step(since=woken) < RESUMED
-
-
 def test_a_killed_bridge_is_reported_and_its_successor_goes_on_smoothly(
     quad: SimulatedQuad,
 ) -> None:
@@ -165,48 +150,6 @@ def test_a_killed_bridge_is_reported_and_its_successor_goes_on_smoothly(
     assert quad.tap.largest_step(since=killed) < LARGEST_STEP
     quad.set_mode('walk')
     quad.walk(1.0)
-    check_upright(quad)
-
-
-def test_a_robot_that_was_let_go_does_not_rise_when_its_servos_hold_again(
-    quad: SimulatedQuad,
-) -> None:
-    """It stood, and its controller streams that; `relax`, then `stand` brings it up."""
-
-    def give(on: bool) -> None:
-        request = SetBool.Request(data=on)
-        assert quad.client.call(SetBool, '/hardware_node/torque', request).success
-
-    give(False)
-    quad.spin(1.0)
-    sunk = quad.truth[-1].pose.pose.position.z
-    give(True)
-    quad.spin(0.1)
-    held, given = quad.joints[-1].position, time.monotonic()
-    quad.spin(2.0)
-    assert quad.state == 'stand'
-    assert list(quad.joints[-1].position) == pytest.approx(list(held), abs=0.05)
-    assert quad.truth[-1].pose.pose.position.z == pytest.approx(sunk, abs=0.005)
-    quad.processes['hardware'].wait_for('the servos were let go, and ')
-    quad.reach('relax')
-    quad.spin(0.5)
-    quad.stand()
-    quad.spin(0.5)
-    assert quad.tilt < UPRIGHT
-    assert quad.truth[-1].pose.pose.position.z > sunk + 0.02
-    assert quad.tap.largest_step(since=given) < LARGEST_STEP
-
-
-def test_nonsense_on_joint_command_reaches_no_servo(quad: SimulatedQuad) -> None:
-    """NaN and wrong lengths, beside the controller's own commands; each with its reason."""
-    publisher = quad.client.node.create_publisher(JointCommand, '/joint_command', 1)
-    quad.client.spin_until(lambda: publisher.get_subscription_count() > 0, 20.0, 'the bridge')
-    bridge = quad.processes['hardware']
-    for position in ([math.nan] * 12, [0.0] * 11, [0.0] * 13, [math.inf] + [0.0] * 11):
-        publisher.publish(JointCommand(position=position))
-        quad.spin(0.2)
-    bridge.wait_for('joint command refused')
-    assert quad.tap.largest_step() < LARGEST_STEP
     check_upright(quad)
 
 

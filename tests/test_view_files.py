@@ -13,11 +13,7 @@ import re
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from isolation import Isolation
-from processes import RunningProcess
 import pytest
-from ros_client import RosClient
-from tf2_msgs.msg import TFMessage
 from urdf_reader import read_urdf
 import yaml
 
@@ -25,7 +21,6 @@ from arm_bringup.robots import find_robot, read_description, read_semantic
 from arm_canopen.master.remote_node import BootPhase
 from arm_servo.teleop.keyboard_teleop import TOOL
 from canopen_core.standard import DriveState, OperationMode
-from node_runner import LATCHED
 from quad_controller import MODES as QUAD_MODES
 from quad_controller.states.modes import MOVING_STATES
 from quad_description import movable_joints, robot_urdf
@@ -50,9 +45,6 @@ LAYOUTS = [*(ROBOTS / name / 'foxglove.json' for name in ARMS), DOG / 'foxglove.
 RVIZ = [ROBOTS / name / file for name in ARMS for file in (f'{name}.rviz', 'moveit.rviz')]
 RVIZ.append(DOG / 'quad.rviz')
 CURVES = [*(ROBOTS / name / 'plotjuggler.xml' for name in ARMS), DOG / 'plotjuggler.xml']
-STARTING = 120.0
-"""Longest time in [s] until all is ready on a busy machine."""
-
 PANELS = {'3D', 'DiagnosticSummary', 'Plot', 'RosOut', 'StateTransitions'}
 """Of Foxglove and Lichtblick alike: packages/suite-base/src/panels of the latter."""
 CLASSES = {
@@ -285,53 +277,30 @@ def test_a_layout_of_plotjuggler_has_its_parts(file: Path) -> None:
             assert len(names) == len(set(names))
 
 
-def missing(client: RosClient, named: Named, frames: set[str]) -> list[str]:
-    """Return what a file names and the running robot has not."""
-    topics = dict(client.node.get_topic_names_and_types())
-    lacking = [f'topic {name}' for name in named.topics if name not in topics]
-    lacking += [f'frame {name}' for name in named.frames if name not in frames]
-    for topic, path in named.fields:
-        if topic in topics:
-            assert type_of(class_of(topics[topic][0], 'msg'), path), f'{topic}.{path}'
-    return lacking
+NO_PART = ('arm_servo servo_', 'quad_teleop', 'robot_viewer web_viewer')
+"""Programs of docs/reference/nodes.md that no robot needs."""
 
 
-def check(client: RosClient, files: list[Named]) -> None:
-    """Wait until all that files name is there."""
-    frames: set[str] = set()
-    moving = client.listen(TFMessage, '/tf', 100)
-    static = client.listen(TFMessage, '/tf_static', LATCHED)
-
-    def all_there() -> bool:
-        for message in (*moving, *static):
-            for each in message.transforms:
-                frames.update((each.header.frame_id, each.child_frame_id))
-        return not any(missing(client, named, frames) for named in files)
-
-    try:
-        client.spin_until(all_there, STARTING, '')
-    except AssertionError:
-        raise AssertionError([missing(client, each, frames) for each in files]) from None
+def declared() -> dict[str, str]:
+    """Return the topics of the Panda and of the dog with their types."""
+    text = (CHECKOUT / 'docs' / 'reference' / 'nodes.md').read_text('utf-8')
+    programs = [part for part in text.split('\n## ')[1:] if not part.startswith(NO_PART)]
+    rows = re.findall(r'\| (?:publishes|subscribes) \| `(.+?)` \| `(.+?)`', ''.join(programs))
+    found = {name.replace('<group>', 'panda_arm'): kind for name, kind in rows}
+    return found | {'/rosout': 'rcl_interfaces/msg/Log'}
 
 
-@pytest.mark.scenario
-@pytest.mark.timeout(300)
-@pytest.mark.parametrize('robot', ['arm', 'quadruped'])
-def test_a_running_robot_has_all(isolation: Isolation, robot: str) -> None:
-    """Topics, fields and frames that the files of the Panda and the dog name."""
-    arm = ['arm_bringup', 'bringup', 'panda', '--simulate', '--plan', '--can', isolation.bus]
-    dog = ['quad_bringup', 'bringup', '--simulate']
-    folder = ROBOTS / 'panda' if robot == 'arm' else DOG
-    plotted = folder / 'plotjuggler.xml'
+@pytest.mark.parametrize('folder', [ROBOTS / 'panda', DOG], ids=lambda folder: folder.name)
+def test_a_robot_has_all(folder: Path) -> None:
+    """Topics and fields are those of the page that is compared with running robots."""
+    plotted, topics = folder / 'plotjuggler.xml', declared()
+    frames = {'odom', *read_urdf(robot_urdf()).links} if folder == DOG else links(folder.name)
     files = [layout(folder / 'foxglove.json'), plotjuggler(plotted, joints_of(plotted))]
-    files += [rviz(file) for file in folder.glob('*.rviz')]
-    command = ['ros2', 'run', *(arm if robot == 'arm' else dog)]
-    with (
-        RunningProcess(command, isolation.env) as bringup,
-        RosClient(isolation.domain_id) as client,
-    ):
-        bringup.wait_for('all is ready', STARTING)
-        check(client, files)
+    for named in [*files, *map(rviz, folder.glob('*.rviz'))]:
+        assert named.topics <= topics.keys()
+        assert named.frames <= frames
+        for topic, path in named.fields:
+            assert type_of(class_of(topics[topic], 'msg'), path), f'{topic}.{path}'
 
 
 ENDS = {BootPhase.WAITING, BootPhase.OPERATIONAL, BootPhase.FAILED}
