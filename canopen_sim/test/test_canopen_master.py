@@ -16,6 +16,7 @@ import subprocess
 import sys
 import threading
 import time
+from typing import Any
 
 from can_addresses import free_multicast
 import canopen
@@ -177,23 +178,6 @@ def test_a_drive_is_enabled_moved_and_read(
         assert not is_enabled(statusword(network, 3))  # joint2 was not requested
 
 
-def test_cyclic_modes_move_too(master: CanopenMaster) -> None:
-    """A single target of mode 8 is led there by the master's own profile."""
-    drive = master.drive('joint2')
-    drive.enable()
-    drive.select_mode(OperationMode.CYCLIC_POSITION)
-    drive.move_to(0.2)
-    assert drive.mode is OperationMode.CYCLIC_POSITION
-    assert drive.position == pytest.approx(0.2, abs=0.001)
-
-
-@pytest.mark.parametrize('mode', ['position', 5, -3])
-def test_an_unknown_mode_is_refused(master: CanopenMaster, mode: object) -> None:
-    """With the modes that there are, as every other error of the package."""
-    with pytest.raises(DriveError, match=r'mode of operation .*PROFILE_POSITION \(1\), '):
-        master.drive('joint1').select_mode(mode)  # type: ignore[arg-type]
-
-
 def test_objects_are_read_and_written(master: CanopenMaster) -> None:
     """By number and name, typed by the EDS; what is wrong says so, before a frame where it can."""
     sdo = master.sdo('joint1')
@@ -212,12 +196,16 @@ def test_objects_are_read_and_written(master: CanopenMaster) -> None:
         sdo.write('Statusword', 0)
 
 
-def test_names_that_are_none_are_answered_with_those_that_are(master: CanopenMaster) -> None:
-    """Of drives and of devices, which have numbers besides."""
+def test_what_there_is_not_is_answered_with_what_there_is(master: CanopenMaster) -> None:
+    """Drives, devices, which have numbers besides, and modes."""
     with pytest.raises(KeyError, match=r'elbow.*joint1, joint2'):
         master.drive('elbow')
     with pytest.raises(KeyError, match=r'9.*joint1 \(2\)'):
         master.sdo(9)
+    modes: Any = ('position', 5, -3)
+    for mode in modes:
+        with pytest.raises(DriveError, match=r'mode of operation .*PROFILE_POSITION \(1\), '):
+            master.drive('joint1').select_mode(mode)
 
 
 def test_a_late_motion_is_halted(master: CanopenMaster) -> None:
@@ -405,43 +393,6 @@ def test_nothing_is_commanded_to_a_drive_while_the_master_ends(
     assert source.again is not None
     with pytest.raises(BusError, match='the CANopen master is ending'):
         source.again.result(TIMEOUT)
-
-
-class Ramp:
-    """A motion source that goes up by 0.1 and stays there."""
-
-    axes = ('joint1',)
-
-    def __init__(self) -> None:
-        self.start: float | None = None
-        self.there = threading.Event()
-
-    def update(
-        self, now: float, period: float, feedback: Sequence[AxisFeedback]
-    ) -> list[float | None]:
-        """Lead the axis once it follows."""
-        axis = feedback[0]
-        if not axis.followable:
-            return [None]
-        self.start = axis.setpoint if self.start is None else self.start
-        position = min(axis.setpoint + 0.2 * period, self.start + 0.1)
-        if axis.position >= self.start + 0.0999:
-            self.there.set()
-        return [position]
-
-    def released(self, axis: str, refusal: Refusal) -> None:
-        """Lose it at the end."""
-
-
-def test_a_motion_source_leads_in_the_cycle(master: CanopenMaster) -> None:
-    """As in the process of the ROS node."""
-    drive, ramp = master.drive('joint1'), Ramp()
-    drive.enable()
-    drive.select_mode(OperationMode.CYCLIC_POSITION)
-    master.attach(ramp)
-    assert ramp.there.wait(TIMEOUT)
-    master.detach(ramp)
-    assert drive.position == pytest.approx(0.1, abs=0.002)
 
 
 def test_a_cycle_that_ends_by_a_defect_has_sent_a_quick_stop(

@@ -44,14 +44,6 @@ def duration_of(axis: Axis) -> float:
     raise AssertionError('the demand does not arrive')
 
 
-def shortest(distance: float, bounds: Limits) -> float:
-    """Return the time from rest to rest at best: that of the trapezoid."""
-    top, up, down = bounds
-    peak = min(top, math.sqrt(2.0 * distance * up * down / (up + down)))
-    ramps = peak / up + peak / down
-    return ramps + (distance - 0.5 * peak * ramps) / peak
-
-
 @given(places, velocities, places, limits, st.lists(st.floats(0.0, 1.0), max_size=6))
 def test_a_move_keeps_its_limits_and_ends_at_its_target(
     start: float, velocity: float, target: float, bounds: Limits, looks: list[float]
@@ -99,44 +91,6 @@ def test_a_move_ends_on_a_clock_of_months(
     assert (axis.demand, axis.demand_velocity) == (target, 0.0)
 
 
-@given(st.floats(-1e6, 1e6).filter(lambda value: abs(value) > 1e-2), limits)
-def test_a_move_from_rest_is_time_optimal(distance: float, bounds: Limits) -> None:
-    """From rest to rest no motion within the limits is faster than the trapezoid."""
-    axis = axis_at()
-    axis.move(distance, bounds)
-    assert duration_of(axis) == pytest.approx(shortest(abs(distance), bounds), rel=1e-3, abs=1e-9)
-
-
-@given(velocities, velocities, limits)
-def test_a_ramp_takes_as_long_as_its_rates_say(
-    velocity: float, target: float, bounds: Limits
-) -> None:
-    """Also through a change of direction; then the velocity is kept."""
-    axis = axis_at(0.0, velocity)
-    axis.ramp(target, bounds)
-    wanted = math.copysign(min(abs(target), bounds.velocity), target)
-    _, up, down = bounds
-    if velocity * wanted < 0.0:
-        best = abs(velocity) / down + abs(wanted) / up
-    else:
-        change = abs(wanted) - abs(velocity)
-        best = change / up if change > 0.0 else -change / down
-    assert duration_of(axis) == pytest.approx(best, abs=1e-9)
-    axis.advance(axis.time + 10.0)
-    assert axis.demand_velocity == wanted
-
-
-@given(places, st.floats(1e-3, 10.0))
-def test_a_line_arrives_in_time(target: float, duration: float) -> None:
-    """A line is half way at half time, and stands at its target when its time is over."""
-    axis = axis_at()
-    axis.line(target, duration)
-    axis.advance(axis.time + 0.5 * duration)
-    assert axis.demand == pytest.approx(0.5 * target, rel=1e-6, abs=1e-6)
-    axis.advance(axis.time + 0.500001 * duration)
-    assert (axis.demand, axis.demand_velocity, axis.arrived) == (target, 0.0, True)
-
-
 @given(st.lists(st.floats(0.0, 0.2), max_size=12), st.sampled_from([math.inf, 1000.0]))
 def test_looking_changes_nothing(looks: list[float], speed: float) -> None:
     """How often a motor is looked at has no influence on where it is."""
@@ -175,28 +129,6 @@ def test_the_motor_follows_by_its_definition(target: float, speed: float) -> Non
             axis.advance(begin + (number + 1) * step)
             # one step of the limiter, 1 ms at 1000 inc/s
             assert axis.position == pytest.approx(motor, abs=0.1 if math.isinf(speed) else 1.0)
-
-
-@settings(max_examples=50)
-@given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=8), st.floats(100.0, 1e4))
-def test_the_motor_is_never_faster_than_its_speed(targets: list[float], speed: float) -> None:
-    """Whatever jumps the set-points make, the motor keeps its speed, and arrives in the end.
-
-    The limiter works in steps of 1 ms: below 100 inc/s, most of the test would wait for arrivals.
-    """
-    axis = axis_at()
-    axis.speed = speed
-    for target in targets:
-        axis.line(target, 0.01)
-        for _ in range(5):
-            before = axis.position
-            axis.advance(axis.time + 0.004)
-            assert abs(axis.velocity) <= speed * (1.0 + 1e-6)
-            assert abs(axis.position - before) <= speed * 0.004 * (1.0 + 1e-6) + 1e-6
-    axis.advance(axis.time + 1e4 / speed)
-    assert axis.settled
-    assert axis.position == pytest.approx(targets[-1], abs=1e-3)
-    assert not axis.speed_limited
 
 
 def test_lag_coasting_and_stops() -> None:

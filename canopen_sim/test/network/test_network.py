@@ -203,25 +203,6 @@ def test_a_state_that_somebody_commanded_is_left_alone(command: NmtCommand, ours
     assert node.nmt_state is NmtState.OPERATIONAL
 
 
-def test_a_start_that_got_lost_is_sent_again() -> None:
-    """The device goes on to say that it is pre-operational: it is booted again."""
-    net = network('a')
-    lost: list[Frame] = []
-
-    def loses(sender: str, frame: Frame) -> bool:
-        start = frame.can_id == 0 and frame.data == nmt_frame(NmtCommand.START, 2)
-        if start and not lost:
-            lost.append(frame)
-            return True
-        return False
-
-    net.wire.loses = loses
-    net.start()
-    net.run_until(lambda: net.network.nodes['a'].nmt_state is NmtState.OPERATIONAL)
-    assert lost
-    assert 'left Operational by itself' in net.story()
-
-
 @pytest.mark.parametrize(
     ('overflow', 'counters'),
     [(0, [b''] * 8), (5, [b'\1', b'\2', b'\3', b'\4', b'\5', b'\1', b'\2', b'\3'])],
@@ -513,24 +494,6 @@ def test_pauses_of_a_busy_computer_are_summed_up() -> None:
     assert 'taken it for dead' not in str(lines)
     net.network.note_pause(0.6, 25.0)
     assert 'taken it for dead' in net.reported(Severity.WARNING)[-1]
-
-
-def test_devices_do_not_miss_a_master_that_has_taken_its_leave() -> None:
-    """After the watch is ended there is no EMCY when the heartbeat stops."""
-    net = VirtualNetwork(
-        bus_config(
-            drive_config('a', 2, heartbeat_consumer=True),
-            heartbeat_producer=0.1,
-            heartbeat_timeout=0.3,
-        )
-    )
-    net.boot()
-    net.run(0.5)
-    node = net.network.nodes['a']
-    net.result(net.network.scheduler.spawn(node.unwatch()))
-    net.wire.loses = lambda sender, frame: sender == 'master'
-    net.run(2.0)
-    assert 'EMCY' not in net.story()
 
 
 CONTROLLER = 0x204  # a controller problem, with counters
@@ -1051,7 +1014,6 @@ class SharedBus(VirtualBus):
     """A bus on which somebody else sends a frame again and again, whenever it is read."""
 
     def __init__(self, frame: Frame) -> None:
-        """Connect both."""
         wire = VirtualWire()
         super().__init__('here', wire)
         self._other = VirtualBus('there', wire)

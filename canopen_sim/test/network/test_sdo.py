@@ -42,7 +42,6 @@ class Line:
     """A client whose device is the test."""
 
     def __init__(self) -> None:
-        """Connect the client."""
         self.scheduler = Scheduler()
         self.defects: list[BaseException] = []
         self.scheduler.on_defect = self.defects.append
@@ -507,22 +506,17 @@ def test_transfers_that_a_master_leaves_in_the_queue_are_no_lost_coroutines(
 
 
 class BlockLine:
-    """A client and a server with a line between that may lose and change frames.
-
-    Attributes:
-        frames: All frames that went over the line, as (from the client, data).
-        spoil: Changes a frame on its way; None loses it.
-        room: How many frames of the client may wait for the line; it refuses others.
-    """
+    """A client and a server with a line between that may lose and change frames."""
 
     def __init__(self) -> None:
-        """Connect both."""
         blob = ObjectEntry(BLOB, 0, 'Blob', DataType.DOMAIN)
         self.scheduler = Scheduler()
         self.store = ObjectStore(ObjectDictionary([blob]))
+        # all frames that went over the line, as (from the client, data)
         self.frames: list[tuple[bool, bytes]] = []
+        # changes a frame on its way; None loses it
         self.spoil: Callable[[bytes], bytes | None] = lambda data: data
-        self.room = 1000
+        self.room = 1000  # how many frames of the client may wait for the line; it refuses others
         self._to_client: list[bytes] = []
         self._to_server: list[bytes] = []
         self._server = SdoServer(REQUEST, RESPONSE, self.store, self._answer)
@@ -708,16 +702,3 @@ def test_a_reset_in_the_pause_between_two_bursts_ends_the_transfer() -> None:
     value = line.client.read(BLOB, 0, TIMEOUT)
     line.run()
     assert value.error is None
-
-
-def test_a_value_survives_a_round_trip_with_the_simulated_device() -> None:
-    """The client and the server of this package agree, too."""
-    for value in (b'', b'1', b'01234', bytes(range(100))):
-        line = BlockLine()
-        written = line.client.write(BLOB, 0, value, TIMEOUT)
-        line.run()
-        assert written.error is None
-        assert line.value == value
-        back = line.client.read(BLOB, 0, TIMEOUT)
-        line.run()
-        assert back.result() == value
