@@ -60,7 +60,6 @@ class BusRecorder:
     """Keeps every frame from its start on."""
 
     def __init__(self, bus: str) -> None:
-        """Listen."""
         self.frames: list[Frame] = []
         self._bus = open_bus(bus)
         self._stopping = False

@@ -81,12 +81,10 @@ class ArmWatch:
     Laws: a set-point is within the position limits, or leads back into them; it is no further from
     the one before than a cycle at the greatest speed, or it is where the drive is; a drive is
     where a command leads it, and without one where it stands.
-
-    Attributes:
-        violations: What was against a law, with the drive and what led there.
     """
 
     def __init__(self, nodes: Mapping[int, str], limits: JointLimits) -> None:
+        # what was against a law, with the drive and what led there
         self.violations: list[str] = []
         self._begin = time.monotonic()
         self._lock = threading.Lock()

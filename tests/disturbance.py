@@ -55,16 +55,12 @@ class Event:
 
 @dataclass
 class Report:
-    """What a chaos run has found.
+    """What a chaos run has found."""
 
-    Attributes:
-        events: Disturbances so far, counted by what they were.
-        outcomes: How the motions ended, counted.
-        violations: What should not have happened, with the event it came after.
-    """
-
+    # disturbances so far, counted by what they were
     events: Counter[str] = field(default_factory=Counter)
-    outcomes: Counter[str] = field(default_factory=Counter)
+    outcomes: Counter[str] = field(default_factory=Counter)  # how the motions ended, counted
+    # what should not have happened, with the event it came after
     violations: list[str] = field(default_factory=list)
 
 

@@ -43,30 +43,18 @@ _SEED = 1
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """What a link does to frames.
+    """What a link does to frames."""
 
-    Attributes:
-        delay: Of each frame, one way, in [s].
-        jitter: Greatest further delay, evenly distributed, in [s]; frames keep their order.
-        loss: Share of the frames that are lost.
-        multicast: Whether multicast gets through.
-        cut: Whether nothing does.
-    """
-
-    delay: float = 0.0
+    delay: float = 0.0  # of each frame, one way, in [s]
+    # greatest further delay, evenly distributed, in [s]; frames keep their order
     jitter: float = 0.0
-    loss: float = 0.0
-    multicast: bool = True
-    cut: bool = False
+    loss: float = 0.0  # share of the frames that are lost
+    multicast: bool = True  # whether multicast gets through
+    cut: bool = False  # whether nothing does
 
 
 class Link:
-    """The link; it carries frames within a ``with`` statement.
-
-    Attributes:
-        names: Names of its two devices, to be moved to the hosts.
-        condition: What it does to frames from now on; may be replaced at any time.
-    """
+    """The link; it carries frames within a ``with`` statement."""
 
     def __init__(self, mark: str) -> None:
         """Make the devices.
@@ -77,7 +65,9 @@ class Link:
         Raises:
             OSError: This machine does not allow it.
         """
+        # what it does to frames from now on; may be replaced at any time
         self.condition = Condition()
+        # names of its two devices, to be moved to the hosts
         self.names = (f'tap-{mark}a', f'tap-{mark}b')
         self._random = random.Random(_SEED)  # no secrets
         with ExitStack() as stack:

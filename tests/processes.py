@@ -69,15 +69,11 @@ def forget_ended() -> None:
 
 
 class RunningProcess:
-    """A child process in a session of its own.
-
-    Attributes:
-        command: Program and arguments as one text.
-        lines: What it has printed so far, standard output and error together.
-    """
+    """A child process in a session of its own."""
 
     def __init__(self, arguments: Sequence[str], env: Mapping[str, str]) -> None:
-        self.command = ' '.join(arguments)
+        self.command = ' '.join(arguments)  # program and arguments as one text
+        # what it has printed so far, standard output and error together
         self.lines: list[str] = []
         self._changed = threading.Condition()
         self._readiness = ReadinessSocket()

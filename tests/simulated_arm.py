@@ -191,7 +191,6 @@ class GoalRun:
     def __init__(
         self, client: RosClient, goal: FollowJointTrajectory.Goal, controller: str = CONTROLLER
     ) -> None:
-        """Send it and wait until it is accepted."""
         self.feedback: list[Any] = []  # what was fed back so far
         self._client = client
         action = trajectory_client(client, controller)

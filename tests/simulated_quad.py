@@ -65,14 +65,7 @@ class Target:
 
 
 class SerialTap:
-    """Sits between the bridge and the robot's port; the bridge opens :attr:`link`.
-
-    Attributes:
-        link: Path of the bridge's end.
-        targets: What the bridge sent to the servos so far (the protocol that pushes states).
-        reports: Steady times in [s] at which the robot's states had come in.
-        noise: Share of the bytes, of both directions, in which a bit is inverted from now on.
-    """
+    """Sits between the bridge and the robot's port; the bridge opens :attr:`link`."""
 
     def __init__(self, link: Path, robot: Path) -> None:
         """Connect the ends.
@@ -81,9 +74,12 @@ class SerialTap:
             link: Where the bridge shall find its end.
             robot: The robot's port.
         """
-        self.link = link
+        self.link = link  # path of the bridge's end
+        # what the bridge sent to the servos so far (the protocol that pushes states)
         self.targets: list[Target] = []
+        # steady times in [s] at which the robot's states had come in
         self.reports: list[float] = []
+        # share of the bytes, of both directions, in which a bit is inverted from now on
         self.noise = 0.0
         self._chance = random.Random(0)
         self._host, self._pushed = (StreamParser(V2, k) for k in (HOST_KINDS, ROBOT_KINDS))

@@ -43,15 +43,12 @@ while not select.select([sys.stdin], [], [], 0.02)[0]:
 
 
 class StallWatch:
-    """Notes stalls from its start on.
-
-    Attributes:
-        process: The one that sleeps.
-    """
+    """Notes stalls from its start on."""
 
     def __init__(self) -> None:
         command = [sys.executable, '-S', '-c', _WATCH]
         self._pipe, end = os.pipe()
+        # the one that sleeps
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=end)
         os.close(end)
         self._lines = os.read(self._pipe, 1 << 20)  # it has begun

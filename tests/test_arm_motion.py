@@ -221,15 +221,9 @@ def _names_the_lost_drives(arm: MovingArm) -> None:
 
 
 class Jogger:
-    """Publishes commands again and again until something is seen.
-
-    Attributes:
-        states: Messages of the trajectory controller.
-        words: Messages of the servo's status.
-    """
+    """Publishes commands again and again until something is seen."""
 
     def __init__(self, arm: MovingArm) -> None:
-        """Advertise and listen."""
         self.arm = arm
         node = arm.client.node
         self._clock = node.get_clock()
@@ -238,9 +232,11 @@ class Jogger:
             JointJog: node.create_publisher(JointJog, '/servo_node/delta_joint_cmds', 10),
             PoseStamped: node.create_publisher(PoseStamped, '/servo_node/pose_target_cmds', 10),
         }
+        # messages of the trajectory controller
         self.states = arm.client.listen(
             JointTrajectoryControllerState, f'{CONTROLLER}/controller_state'
         )
+        # messages of the servo's status
         self.words = arm.client.listen(ServoStatus, '/servo_node/status')
 
     @property

@@ -117,7 +117,6 @@ class ActionRun:
     """A goal of an action."""
 
     def __init__(self, arm: MovingArm, kind: Any, name: str, goal: Any) -> None:
-        """Send it; it is accepted."""
         self.states: list[str] = []
         self._client = arm.client
         client = arm.client.action(kind, name)
@@ -343,7 +342,6 @@ class Observer:
     """Looks on from beside move_group: where the joints were, and whether they touched a box."""
 
     def __init__(self, arm: MovingArm) -> None:
-        """Listen from now on."""
         self._client = arm.client
         self._states = arm.client.listen(JointState, '/joint_states')
 

@@ -73,29 +73,18 @@ JOINT1 = 1
 
 @dataclass
 class Seen:
-    """An arm, its page in a browser, and what it really does.
+    """An arm, its page in a browser, and what it really does."""
 
-    Attributes:
-        bringup: The programs of the arm.
-        viewer: The program that serves its page.
-        browser: The browser.
-        url: Of the page.
-        page: It, opened once, before there was a robot: drawing it without a graphics card costs
-            time.
-        client: A ROS node of the test.
-        states: The last joint states with the time of their arrival.
-        wrist: Where that joint was in the beginning in [rad].
-        ready: Where all were, which is the state of the SRDF of that name.
-    """
-
-    bringup: RunningProcess
-    viewer: RunningProcess
-    browser: Browser
-    url: str
+    bringup: RunningProcess  # the programs of the arm
+    viewer: RunningProcess  # the program that serves its page
+    browser: Browser  # the browser
+    url: str  # of the page
+    # it, opened once, before there was a robot: drawing it without a graphics card costs time
     page: Page
-    client: RosClient
-    states: deque[tuple[float, JointState]]
-    wrist: float = field(init=False)
+    client: RosClient  # a ROS node of the test
+    states: deque[tuple[float, JointState]]  # the last joint states with the time of their arrival
+    wrist: float = field(init=False)  # where that joint was in the beginning in [rad]
+    # where all were, which is the state of the SRDF of that name
     ready: Sequence[float] = field(init=False)
 
     def __post_init__(self) -> None:

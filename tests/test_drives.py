@@ -70,7 +70,6 @@ class HomingRun:
     """A goal of the homing action."""
 
     def __init__(self, arm: SimulatedArm, method: int) -> None:
-        """Send the goal, and wait until it is accepted."""
         self.phases: list[str] = []  # phases of its feedback
         self._client = arm.client
         client = arm.client.action(Home, f'{JOINT}/home')

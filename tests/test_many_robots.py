@@ -50,7 +50,6 @@ class Robot:
     ending = ''
 
     def __init__(self, name: str, isolation: Isolation, client: RosClient, *command: str) -> None:
-        """Start the bring-up."""
         self.name, self.client = name, client
         program = [executable(self.package, 'bringup'), *command, '--simulate']
         arguments = ['--namespace', name, '--timeout', f'{STARTING:g}']
@@ -103,7 +102,6 @@ class Dog(Robot):
     cycles = ('hardware_node', 'controller_node')
 
     def __init__(self, name: str, isolation: Isolation, client: RosClient, _: Path) -> None:
-        """Find its mode and where its body is, in physics."""
         super().__init__(name, isolation, client)
         topic = f'/{name}/fake_xgo/ground_truth'
         self._truth = client.listen(Odometry, topic, qos_profile_sensor_data)

@@ -70,7 +70,6 @@ class Rig:
         power: bool = True,
         rate_units: tuple[float, float] = (1.0, 1.0),
     ) -> None:
-        """Connect a device, and switch it on."""
         self.now = 100.0  # virtual time in [s]
         self.node_id = node_id
         self.sent: list[tuple[float, Frame]] = []  # frames of the device with the time of each

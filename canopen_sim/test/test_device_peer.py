@@ -170,7 +170,6 @@ class Wire:
     """python-can's side of a bus that ends in a device in virtual time."""
 
     def __init__(self, rig: Rig) -> None:
-        """Send to a device."""
         self.rig = rig
         self.network = make_network()
         self.network.bus = self
@@ -393,7 +392,6 @@ class Stranger:
     """A LocalNode of python-canopen as a station of the virtual network, and its bus."""
 
     def __init__(self, network: VirtualNetwork) -> None:
-        """Connect it."""
         self._network = network
         self._periodic: list[Heartbeat] = []
         make_network: Any = canopen.Network  # python-canopen has no types

@@ -159,7 +159,6 @@ class StoringRig(Rig):
     """A drive that can store."""
 
     def __init__(self, memory: ParameterMemory | None = None) -> None:
-        """Switch it on."""
         super().__init__(storing_dictionary(), power=False)
         self.device = Device(NODE_ID, storing_dictionary(), self._sent, memory=memory)
         self.device.advance(self.now)

@@ -98,19 +98,15 @@ class Sent:
 
 @dataclass
 class VirtualWire:
-    """Carries one frame at a time, to everybody but its sender.
+    """Carries one frame at a time, to everybody but its sender."""
 
-    Attributes:
-        log: Every frame that was sent, also those that got lost.
-        loses: Returns of a frame and its sender whether it gets lost.
-        alters: Gives what arrives of a frame of a sender.
-        refuses: Why the interface of the master takes no frames, empty while it does.
-    """
-
+    # every frame that was sent, also those that got lost
     log: list[Sent] = field(default_factory=list)
+    # returns of a frame and its sender whether it gets lost
     loses: Callable[[str, Frame], bool] = lambda sender, frame: False
+    # gives what arrives of a frame of a sender
     alters: Callable[[str, Frame], Frame] = lambda sender, frame: frame
-    refuses: str = ''
+    refuses: str = ''  # why the interface of the master takes no frames, empty while it does
     _way: deque[tuple[float, str, Frame]] = field(default_factory=deque)
     _free_at: float = 0.0
 
@@ -542,7 +538,6 @@ class SetPoints:
     """Makes another kind of drive, in mode 1, of the first one, which takes set-points always."""
 
     def __init__(self, net: VirtualNetwork, kind: SetPointKind) -> None:
-        """Alter its controlwords and statuswords from now on."""
         self._kind = kind
         node_id = net.network.config.nodes[0].node_id
         self._status, self._command = 0x180 + node_id, 0x200 + node_id

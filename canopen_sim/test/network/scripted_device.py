@@ -25,18 +25,13 @@ COMMAND_SPECIFIER = 0x0504_0001
 
 @dataclass
 class SdoByteServer:
-    """Answers requests of 8 bytes from values of bytes.
+    """Answers requests of 8 bytes from values of bytes."""
 
-    Attributes:
-        values: The objects by index and sub-index; what is written is kept there.
-        announces_size: Initiate responses of uploads carry the length.
-        expedites: Uploads of up to 4 bytes fit into the initiate response.
-        refuses: Abort codes by index and sub-index.
-    """
-
+    # the objects by index and sub-index; what is written is kept there
     values: dict[tuple[int, int], bytes] = field(default_factory=dict)
-    announces_size: bool = True
-    expedites: bool = True
+    announces_size: bool = True  # initiate responses of uploads carry the length
+    expedites: bool = True  # uploads of up to 4 bytes fit into the initiate response
+    # abort codes by index and sub-index
     refuses: dict[tuple[int, int], int] = field(default_factory=dict)
     _address: tuple[int, int] = (0, 0)
     _rest: bytes = b''
@@ -128,43 +123,28 @@ def object_bytes(values: Mapping[tuple[int, int], int]) -> dict[tuple[int, int],
 
 @dataclass
 class ScriptedDevice:
-    """A device; it has every object that is written, and those of ``values``.
+    """A device; it has every object that is written, and those of ``values``."""
 
-    Attributes:
-        node_id: Its node id.
-        send: Takes its frames.
-        values: Its objects.
-        refuses: Abort codes by index and sub-index.
-        announces: It sends a boot-up message after a reset.
-        answers: It answers SDOs.
-        beats: It sends heartbeats when 0x1017 says so.
-        deaf_to_reset: It misses the resets.
-        guarded: It answers node guarding.
-        answer_time: How long it thinks about an SDO in [s].
-        state: Its NMT state.
-        commands: NMT commands that it got.
-        writes: What was written by expedited downloads, as index, sub-index and number.
-        on_request: Called with each SDO request before it is answered.
-        relapses_after: Time in Operational before it falls back by itself in [s].
-        last_words: EMCY that it sends then.
-    """
-
-    node_id: int
-    send: Callable[[Frame], None]
-    values: dict[tuple[int, int], bytes] = field(default_factory=dict)
+    node_id: int  # its node id
+    send: Callable[[Frame], None]  # takes its frames
+    values: dict[tuple[int, int], bytes] = field(default_factory=dict)  # its objects
+    # abort codes by index and sub-index
     refuses: dict[tuple[int, int], int] = field(default_factory=dict)
-    announces: bool = True
-    answers: bool = True
-    beats: bool = True
-    answer_time: float = 0.0005
-    state: NmtState = NmtState.PRE_OPERATIONAL
-    commands: list[int] = field(default_factory=list)
+    announces: bool = True  # it sends a boot-up message after a reset
+    answers: bool = True  # it answers SDOs
+    beats: bool = True  # it sends heartbeats when 0x1017 says so
+    answer_time: float = 0.0005  # how long it thinks about an SDO in [s]
+    state: NmtState = NmtState.PRE_OPERATIONAL  # its NMT state
+    commands: list[int] = field(default_factory=list)  # NMT commands that it got
+    # what was written by expedited downloads, as index, sub-index and number
     writes: list[tuple[int, int, int]] = field(default_factory=list)
+    # called with each SDO request before it is answered
     on_request: Callable[[bytes], None] = lambda request: None
-    guarded: bool = False
-    deaf_to_reset: bool = False
+    guarded: bool = False  # it answers node guarding
+    deaf_to_reset: bool = False  # it misses the resets
+    # time in Operational before it falls back by itself in [s]
     relapses_after: float | None = None
-    last_words: bytes = b''
+    last_words: bytes = b''  # EMCY that it sends then
     _relapse_due: float | None = None
     _toggle: int = 0
     _answers_due: list[tuple[float, bytes]] = field(default_factory=list)

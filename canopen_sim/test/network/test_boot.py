@@ -96,14 +96,7 @@ def io_config(**changes: object) -> NodeConfig:
 
 
 class Scene:
-    """A master and scripted devices.
-
-    Attributes:
-        net: The network.
-        devices: The devices by name.
-        device: The first one.
-        node: How the master sees it.
-    """
+    """A master and scripted devices."""
 
     def __init__(
         self,
@@ -128,16 +121,17 @@ class Scene:
             places = [(NODE, *key.split('.')) for key in ('node_id', *keys)]
             locations = {place: Place(line=7, key='.'.join(place[1:])) for place in places}
             bus = replace(bus, locations=locations)
-        self.net = VirtualNetwork(bus, absent=[config.name for config in configs])
+        self.net = VirtualNetwork(bus, absent=[config.name for config in configs])  # the network
+        # the devices by name
         self.devices = {
             config.name: ScriptedDevice(
                 config.node_id, partial(self.net.send_as, config.name), object_bytes(DEVICE_VALUES)
             )
             for config in configs
         }
-        self.device = self.devices[configs[0].name]
+        self.device = self.devices[configs[0].name]  # the first one
         self.device.refuses.update(refuses or {})
-        self.node: RemoteNode = self.net.network.nodes[configs[0].name]
+        self.node: RemoteNode = self.net.network.nodes[configs[0].name]  # how the master sees it
         if there:
             for name, device in self.devices.items():
                 self.net.connect(name, device)

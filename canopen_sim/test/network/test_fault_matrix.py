@@ -239,26 +239,17 @@ def nothing(arm: Arm) -> None:
 
 @dataclass(frozen=True)
 class Fault:
-    """A row of the matrix.
+    """A row of the matrix."""
 
-    Attributes:
-        name: What happens.
-        happen: Makes it happen.
-        reports: What the master reports as an error of every drive that is met, or of the bus.
-        state: States in one of which the drive ends; None when it is gone.
-        cause: Why targets are refused meanwhile.
-        emcy: Code of the EMCY that the master has received, None when it need not have one.
-        cure: Removes the cause.
-        way: What brings the drive back.
-    """
-
-    name: str
-    happen: Callable[[Arm], None]
+    name: str  # what happens
+    happen: Callable[[Arm], None]  # makes it happen
+    # what the master reports as an error of every drive that is met, or of the bus
     reports: EventKind
-    state: DriveState | None
-    cause: RefusalCause
-    cure: Callable[[Arm], None]
-    way: Way
+    state: DriveState | None  # states in one of which the drive ends; None when it is gone
+    cause: RefusalCause  # why targets are refused meanwhile
+    cure: Callable[[Arm], None]  # removes the cause
+    way: Way  # what brings the drive back
+    # code of the EMCY that the master has received, None when it need not have one
     emcy: int | None = None
 
     @property

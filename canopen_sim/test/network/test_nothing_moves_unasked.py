@@ -339,14 +339,10 @@ def rest(net: VirtualNetwork) -> None:
 
 @dataclass
 class Reader:
-    """What the frames of the master say of one drive, cycle by cycle.
+    """What the frames of the master say of one drive, cycle by cycle."""
 
-    Attributes:
-        rpdos: Its RPDOs.
-        values: Values of the objects when the cycle before ended.
-    """
-
-    rpdos: tuple[PdoConfig, ...]
+    rpdos: tuple[PdoConfig, ...]  # its RPDOs
+    # values of the objects when the cycle before ended
     values: dict[int, int] = field(default_factory=dict)
 
     def violations(self, log: list[Sent]) -> Iterator[str]:

@@ -143,31 +143,19 @@ Step: TypeAlias = tuple[Any, ...]
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of drive.
+    """A kind of drive."""
 
-    Attributes:
-        deviations: How it deviates from the standard.
-        set_points: Which set-points of mode 1 it sees.
-        transmission: Transmission type of its PDOs.
-        velocity: 0x606C is in a PDO.
-        by_sdo: No RPDO carries a target, so that they go by SDO.
-        options: Option codes by index.
-        slow: Its quick stop takes a minute.
-        home_method: That of bus.yml (0x6098), 0 for none.
-        recovery: What becomes of it when its device comes back.
-        switching_state: In which its mode is switched.
-    """
-
-    deviations: tuple[Fault, ...] = ()
-    set_points: SetPointKind = SetPointKind.ALWAYS
-    transmission: int = 1
-    velocity: bool = True
-    by_sdo: bool = False
-    options: tuple[tuple[int, int], ...] = ()
-    slow: bool = False
-    home_method: int = 0
+    deviations: tuple[Fault, ...] = ()  # how it deviates from the standard
+    set_points: SetPointKind = SetPointKind.ALWAYS  # which set-points of mode 1 it sees
+    transmission: int = 1  # transmission type of its PDOs
+    velocity: bool = True  # 0x606C is in a PDO
+    by_sdo: bool = False  # no RPDO carries a target, so that they go by SDO
+    options: tuple[tuple[int, int], ...] = ()  # option codes by index
+    slow: bool = False  # its quick stop takes a minute
+    home_method: int = 0  # that of bus.yml (0x6098), 0 for none
+    # what becomes of it when its device comes back
     recovery: RecoveryPolicy = RecoveryPolicy.MANUAL
-    switching_state: DriveState = DriveState.OPERATION_ENABLED
+    switching_state: DriveState = DriveState.OPERATION_ENABLED  # in which its mode is switched
 
     @property
     def config(self) -> NodeConfig:
@@ -288,7 +276,6 @@ class Run:
     """A scenario that runs, and what of it is against the laws."""
 
     def __init__(self, scenario: Scenario) -> None:
-        """Boot the drive."""
         self._scenario, self._kind = scenario, scenario.kind
         self.net = net = VirtualNetwork(
             bus_config(

@@ -39,14 +39,7 @@ STANDING = 0.03  # [rad/s]
 
 
 class MovingDrive:
-    """A drive at 1 rad/s with a slow quick stop ramp.
-
-    Attributes:
-        net: The network.
-        states: States of the simulated drive since it began to move, without repetitions.
-        fastest: Greatest speed at which it was without power since then in [rad/s].
-        began: Steady time at which that began in [s].
-    """
+    """A drive at 1 rad/s with a slow quick stop ramp."""
 
     def __init__(
         self,
@@ -71,7 +64,7 @@ class MovingDrive:
         config = replace(config, axes=(replace(config.axes[0], recovery=recovery),))
         if kept_alive:
             config = replace(config, reset_communication=False)
-        self.net = VirtualNetwork(bus_config(config))
+        self.net = VirtualNetwork(bus_config(config))  # the network
         self.net.allows_defects = True
         self.net.boot()
         self.net.enable(mode)
@@ -79,9 +72,10 @@ class MovingDrive:
         self.net.target(1.0 if velocity else 50.0)
         self.net.run(0.6)
         assert self.device.velocity / SCALE == pytest.approx(1.0, rel=0.05)
+        # states of the simulated drive since it began to move, without repetitions
         self.states = [DriveState.OPERATION_ENABLED]
-        self.fastest = 0.0
-        self.began = self.net.now
+        self.fastest = 0.0  # greatest speed at which it was without power since then in [rad/s]
+        self.began = self.net.now  # steady time at which that began in [s]
 
     @property
     def device(self) -> SimulatedDrive:

@@ -16,20 +16,14 @@ PERIOD = 0.01  # [s] of the entries
 
 
 class Recorded:
-    """A replay that keeps what was played to it.
-
-    Attributes:
-        entries: The entries, and when they happened by the log [s].
-        now: Time of the log [s].
-        restarts: How often the log has begun again.
-        on_entry: Called with each entry.
-    """
+    """A replay that keeps what was played to it."""
 
     def __init__(self) -> None:
+        # the entries, and when they happened by the log [s]
         self.entries: list[tuple[int, float]] = []
-        self.now = 0.0
-        self.restarts = 0
-        self.on_entry: Callable[[int], None] = lambda entry: None
+        self.now = 0.0  # time of the log [s]
+        self.restarts = 0  # how often the log has begun again
+        self.on_entry: Callable[[int], None] = lambda entry: None  # called with each entry
 
     def take(self, entry: int, now: float) -> None:
         """Record an entry; time never goes back."""

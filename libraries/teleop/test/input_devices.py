@@ -38,7 +38,6 @@ class InjectedDevice(InputDevice):
         vendor: int = 0,
         path: str = '/dev/input/event7',
     ) -> None:
-        """Describe it."""
         self.info = DeviceInfo(path, name, vendor, frozenset(keys), dict(axes or {}))
         self.keys: set[int] = set()
         self.axes = {

@@ -22,15 +22,7 @@ _SEQUENCES = re.compile(rb'\x1b\[\?u|\x1b\[c|\x1b\[>(\d+)u|\x1b\[<u|\x1b\[5n|\x1
 
 
 class ScriptedTerminal:
-    """Answers requests of a program, as a terminal with or without the Kitty keyboard protocol.
-
-    Attributes:
-        path: Device that the program opens.
-        flags: Stack of the protocol's flags.
-        modes: DEC private modes that are on.
-        written: All that the program wrote.
-        answered: How many answers have been sent.
-    """
+    """Answers requests of a program, as a terminal with or without the Kitty keyboard protocol."""
 
     def __init__(
         self, *, kitty: bool, supported: int = 31, answers: bool = True, delay: float = 0.0
@@ -44,11 +36,11 @@ class ScriptedTerminal:
             delay: How long an answer is on its way [s].
         """
         self._master, self._slave = pty.openpty()
-        self.path = os.ttyname(self._slave)
-        self.flags: list[int] = []
-        self.modes: set[int] = set()
-        self.written = b''
-        self.answered = 0
+        self.path = os.ttyname(self._slave)  # device that the program opens
+        self.flags: list[int] = []  # stack of the protocol's flags
+        self.modes: set[int] = set()  # DEC private modes that are on
+        self.written = b''  # all that the program wrote
+        self.answered = 0  # how many answers have been sent
         self._kitty = kitty
         self._supported = supported
         self._answers = answers

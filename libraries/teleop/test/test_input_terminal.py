@@ -70,7 +70,6 @@ class Paper:
     """Remembers what was written."""
 
     def __init__(self, columns: int) -> None:
-        """Set the width."""
         self.text = ''
         self.columns = columns
 

@@ -26,7 +26,6 @@ class Counter(Node):
     """Offers the action `/count`."""
 
     def __init__(self) -> None:
-        """Start offering it."""
         super().__init__('counter')
         self._ticks: list[Future] = []
         self.create_timer(0.01, self._tick)

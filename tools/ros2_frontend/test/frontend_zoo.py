@@ -33,7 +33,6 @@ class Talker(Node):
     """Publishes on topics of several kinds and offers services."""
 
     def __init__(self) -> None:
-        """Make everything."""
         super().__init__('talker')
         self._count = 0
         self._received = ''
