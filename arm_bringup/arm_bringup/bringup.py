@@ -251,18 +251,18 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _arm(arguments: argparse.Namespace, ros: RosOptions) -> int:
-    master, no_motion = MASTER, '--drives-only'
+    master, no_motion, robot = MASTER, '--drives-only', locate(arguments)
     if not arguments.drives_only:
-        master, no_motion = choose_master(locate(arguments), find_executable)
+        master, no_motion = choose_master(robot, find_executable)
     files, controllers = no_files, dict[str, str]()
     if not no_motion:
-        robot = locate(arguments)
         groups = moved_groups(robot)
         files = partial(planning_files if arguments.plan else motion_files, groups=groups)
         controllers = controller_names(robot, groups)
     elif arguments.plan:
         raise RobotError(f'--plan: nothing would execute a plan: {no_motion}')
     with session(
+        robot,
         arguments,
         ros,
         simulate=arguments.simulate,

@@ -53,6 +53,8 @@ class MovedGroups:
     arms: tuple[str, ...]
     """Groups that are jogged and follow trajectories; the first is the main one."""
     tools: tuple[str, ...] = ()  # groups of end effectors
+    joints: Mapping[str, Sequence[str]] = field(default_factory=dict, compare=False)
+    """Joints of each group, by its name."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -70,19 +72,6 @@ def moved_groups(robot: Robot) -> MovedGroups:
     try:
         semantic = parse_srdf(read_semantic(robot))
         return choose_groups(robot, semantic, read_urdf(read_description(robot)), drives)
-    except (DescriptionError, urdf_reader.DescriptionError) as error:
-        raise RobotError(f'{robot.folder}: {error}') from error
-
-
-def joints_of_groups(robot: Robot, groups: MovedGroups) -> dict[str, Sequence[str]]:
-    """Return the joints of each group that is moved.
-
-    Raises:
-        RobotError: A group is not in the description, or a file cannot be read.
-    """
-    try:
-        tree, semantic = read_urdf(read_description(robot)), parse_srdf(read_semantic(robot))
-        return {name: find_group(tree, semantic, name).joints for name in groups.names}
     except (DescriptionError, urdf_reader.DescriptionError) as error:
         raise RobotError(f'{robot.folder}: {error}') from error
 
@@ -122,7 +111,7 @@ def choose_groups(
     chosen = _disjoint([*arms, *tools], joints)
     if shared := [name for name in arms if name not in chosen]:
         raise RobotError(f'group {shared[0]} shares joints with {chosen[0]}; {hint}')
-    return MovedGroups(arms, chosen[len(arms) :])
+    return MovedGroups(arms, chosen[len(arms) :], {name: joints[name] for name in chosen})
 
 
 def _arms_named_as_tools(
@@ -198,12 +187,8 @@ def motion_files(
 def planning_files(
     robot: Robot, folder: Path, ros: RosOptions, groups: MovedGroups
 ) -> Sequence[Path]:
-    """Write the parameter files of :func:`motion_files`, and that of move_group's controllers.
-
-    Raises:
-        RobotError: A group is not in the description, or a file cannot be read.
-    """
-    joints = joints_of_groups(robot, groups)
+    """Write the parameter files of :func:`motion_files`, and that of move_group's controllers."""
+    joints = groups.joints
     names = controller_names(robot, groups)
     manager: dict[str, object] = {'controller_names': list(names.values())}
     manager |= {names[group]: {'joints': list(joints[group])} for group in groups.arms}

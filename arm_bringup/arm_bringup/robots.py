@@ -31,12 +31,11 @@ What cannot be started, or refuses, raises the errors of ``process_supervisor``.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 import os
 from pathlib import Path
 import re
-import time
 from typing import Any, TYPE_CHECKING
 
 import urdf_reader
@@ -109,6 +108,8 @@ class Robot:
     tip_link: str = ''  # that is moved; empty takes the end of the first group
     start_positions: Mapping[str, float] | str = field(default_factory=dict)
     """Of simulated drives at power-on, by name, in [rad or m]; or a pose of the SRDF."""
+    expanded: dict[Path, str] = field(default_factory=dict, init=False, repr=False, compare=False)
+    """Its xacro files as XML text, each once: it takes 0.1 s."""
 
     @property
     def folder(self) -> Path:
@@ -146,9 +147,6 @@ def robot_names(folder: Path) -> list[str]:
 
 def find_robot(wanted: str, folder: Path) -> Robot:
     """Find a robot by its name in a folder of robots, or by a path, which has a slash.
-
-    Returns:
-        The robot, its files checked to be there.
 
     Raises:
         RobotError: There is no such robot, a file is missing, or robot.yaml cannot be used.
@@ -255,11 +253,9 @@ def _word(path: Path, key: str, value: object) -> str:
 def read_bus(robot: Robot) -> BusConfig:
     """Read the bus.yml of a robot, and so find its mistakes before anything is started.
 
-    Returns:
-        Its bus, with one drive at least.
-
     Raises:
-        RobotError: The file, or an EDS that it names, is wrong; the message says where and what.
+        RobotError: The file, or an EDS that it names, is wrong, or it has no drive; the message
+            says where and what.
     """
     from arm_canopen import CanopenError, load_bus
 
@@ -309,7 +305,9 @@ def read_description(robot: Robot) -> str:
     Raises:
         DescriptionError: The file cannot be read or expanded.
     """
-    urdf = _located(_read(robot.description, robot), robot.packages)
+    urdf = _read(robot.description, robot)
+    for name, folder in robot.packages.items():  # only this robot folder knows them
+        urdf = urdf.replace(f'package://{name}/', f'{folder.as_uri()}/')
     return RELATIVE_MESH.sub(
         lambda found: found[1] + (robot.description.parent / found[2]).resolve().as_uri(), urdf
     )
@@ -326,77 +324,30 @@ def read_semantic(robot: Robot) -> str:
 
 def _read(path: Path, robot: Robot) -> str:
     if path.suffix == '.xacro':
-        return _expanded(path, robot)
+        if path not in robot.expanded:
+            robot.expanded[path] = expand_xacro(path, robot.xacro_args, robot.packages)
+        return robot.expanded[path]
     try:
         return path.read_text(encoding='utf-8')
     except (OSError, UnicodeDecodeError) as error:
         raise DescriptionError(f'{path}: {error}') from error
 
 
-@dataclass(frozen=True, slots=True)
-class _Expanded:
-    """A xacro file as XML text."""
-
-    text: str
-    changes: Mapping[Path, int]  # when each file that it was made of was changed; 0 for no file
-
-
-_EXPANDED: dict[object, _Expanded] = {}
-"""By the file, its arguments and packages; the one that was used last is the last one."""
-MAX_EXPANDED = 4  # how many are kept
-STAMP_LAG = 10_000_000  # [ns] by which a time stamp of a file may be behind the clock
-
-
-def _expanded(path: Path, robot: Robot) -> str:
-    """Expand a xacro file anew only where one of its files has changed: it takes 0.1 s."""
-    key = path, tuple(robot.xacro_args.items()), tuple(robot.packages.items())
-    known = _EXPANDED.pop(key, None)
-    if known is None or known.changes != _changes(known.changes):
-        begun, files = time.time_ns(), set[Path]()
-        text = expand_xacro(path, robot.xacro_args, robot.packages, files)
-        known = _Expanded(text, _changes(files))
-        if max(known.changes.values(), default=0) > begun - STAMP_LAG:
-            return text  # a file may have been changed after it was read
-    _EXPANDED[key] = known
-    if len(_EXPANDED) > MAX_EXPANDED:
-        del _EXPANDED[next(iter(_EXPANDED))]
-    return known.text
-
-
-def _changes(files: Iterable[Path]) -> dict[Path, int]:
-    return {each: each.stat().st_mtime_ns if each.is_file() else 0 for each in files}
-
-
-def _located(urdf: str, packages: Mapping[str, Path]) -> str:
-    """Replace ``package://`` of packages that only this robot folder knows by their folders."""
-    for name, folder in packages.items():
-        urdf = urdf.replace(f'package://{name}/', f'{folder.as_uri()}/')
-    return urdf
-
-
 def expand_xacro(
     path: Path,
     arguments: Mapping[str, str] | None = None,
     packages: Mapping[str, Path] | None = None,
-    files: set[Path] | None = None,
 ) -> str:
-    """Expand a xacro file.
+    """Expand a xacro file to XML text.
 
-    Args:
-        path: The xacro file.
-        arguments: Values for its xacro arguments.
-        packages: Folders of packages that are not in AMENT_PREFIX_PATH, by name.
-        files: Gets all files that were read: this one, and what it includes or loads.
-
-    Returns:
-        What it makes, as XML text.
+    ``packages`` are folders of packages that are not in AMENT_PREFIX_PATH, by name.
 
     Raises:
         DescriptionError: The file cannot be expanded; the message is xacro's own, or names the
             package or argument that is missing and the remedy.
     """
     try:
-        return urdf_reader.expand_xacro(path, arguments, packages, files)
+        return urdf_reader.expand_xacro(path, arguments, packages)
     except urdf_reader.XacroError as error:
         remedy = ''
         if error.package:

@@ -32,13 +32,9 @@ class ServiceClient(GraphClient):
         return bool(self._clients[service].service_is_ready())
 
     def call(self, services: list[str], timeout: float) -> dict[str, str]:
-        """Call services side by side.
+        """Call services that were prepared side by side, each once its node knows this client.
 
-        Each is called once, when its node knows this client.
-
-        Args:
-            services: Names that were prepared.
-            timeout: Longest time in [s] for all together.
+        All together may take so long in [s].
 
         Returns:
             What each answered.

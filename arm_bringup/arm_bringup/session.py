@@ -175,6 +175,7 @@ def _first_free(names: Iterator[str], stack: contextlib.ExitStack) -> str:
 
 @contextlib.contextmanager
 def session(
+    robot: Robot,
     arguments: argparse.Namespace,
     ros: RosOptions,
     *,
@@ -189,13 +190,12 @@ def session(
     Args as in :class:`Stack`; ``master_files`` makes files in a folder that lasts as long.
 
     Raises:
-        RobotError: The robot folder is unknown or incomplete.
+        RobotError: Its bus.yml is wrong.
         DescriptionError: Its xacro file cannot be expanded.
         StartError: An executable or a network is missing, or another bring-up is on this bus or
             in this namespace of the domain.
     """
     apply_network(arguments)
-    robot = locate(arguments)
     config = read_bus(robot)
     ros = in_namespace_of_bus(ros, config)
     with (

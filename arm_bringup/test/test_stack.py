@@ -233,21 +233,12 @@ def test_move_group_has_what_the_master_has(tmp_path: Path) -> None:
 def test_move_group_knows_the_controller_by_its_name(tmp_path: Path) -> None:
     """Also where controllers.yaml gives it another one than that of the group."""
     robot = my_robot(tmp_path)
-    joint = '<limit lower="-1" upper="1" velocity="1" effort="1"/>'
-    robot.description.write_text(
-        '<robot name="my"><link name="a"/><link name="b"/><joint name="j" type="revolute">'
-        f'<parent link="a"/><child link="b"/>{joint}</joint><link name="c"/>'
-        f'<joint name="f" type="prismatic"><parent link="b"/><child link="c"/>{joint}</joint>'
-        '</robot>'
-    )
-    robot.semantic.write_text(
-        '<robot name="my"><group name="arm"><joint name="j"/></group>'
-        '<group name="hand"><joint name="f"/></group></robot>'
-    )
+    robot.semantic.write_text('<robot name="my"/>')
     manager = {'controller_name': 'mine'}
     robot.controllers.write_text(json.dumps({'controller_manager': {'ros__parameters': manager}}))
     ros = RosOptions('left')
-    *_, file = planning_files(robot, tmp_path, ros, MovedGroups(('arm',), ('hand',)))
+    groups = MovedGroups(('arm',), ('hand',), {'arm': ('j',), 'hand': ('f',)})
+    *_, file = planning_files(robot, tmp_path, ros, groups)
     (values,) = yaml.safe_load(file.read_text()).values()
     assert values['ros__parameters'] == {
         'moveit_simple_controller_manager': {

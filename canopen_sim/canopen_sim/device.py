@@ -67,11 +67,9 @@ class Device:
         """Build a device that is switched off.
 
         Args:
-            node_id: CANopen node id, 1 to 127.
             dictionary: Its objects, as load_eds reads them.
             send: Takes the frames that it sends.
             boot_time: How long its start takes in [s].
-            servo: Time constants of the motor.
             handlers_changed: Called when :attr:`handlers` is another mapping.
             memory: Its non-volatile memory; by default one that lasts as long as the object.
             rate_units: Units of the axes that do not have those of the EDS.

@@ -368,10 +368,8 @@ def simulated_devices(
 ) -> Iterator[DeviceRunner]:
     """Simulate the devices of a bus.yml on a bus, in a thread that ends with the context.
 
-    Args:
-        bus_config: The bus.yml.
-        bus: Name of the bus, as for :func:`canopen_core.can.open_bus`.
-        positions: Where drives stand at the start, by name, in the units of bus.yml [rad or m].
+    The bus is named as for :func:`canopen_core.can.open_bus`. Positions are where drives stand at
+    the start, by name, in the units of bus.yml [rad or m].
 
     Yields:
         What runs them; ``runner.call`` gets at ``runner.host.devices``.

@@ -300,27 +300,19 @@ Address = tuple[int, int]
 
 
 class ParameterMemory:
-    """Non-volatile memory that lasts as long as the process."""
-
-    def __init__(self) -> None:
-        # saved objects as an SDO would transmit them, by index and sub-index
-        self.values: dict[Address, bytes] = {}
-
-    def commit(self) -> None:
-        """Make the present content last."""
-
-
-class ParameterFile(ParameterMemory):
-    """Non-volatile memory in a file.
+    """Non-volatile memory in a file; without one it lasts as long as the process.
 
     A file that cannot be read counts as empty memory, as a device with a broken EEPROM starts
     with its defaults; that is logged.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path | None = None) -> None:
         """Read the file, if there is one."""
-        super().__init__()
+        # saved objects as an SDO would transmit them, by index and sub-index
+        self.values: dict[Address, bytes] = {}
         self._path = path
+        if path is None:
+            return
         try:
             self._load(json.loads(path.read_text(encoding='utf-8')))
         except FileNotFoundError:
@@ -331,6 +323,8 @@ class ParameterFile(ParameterMemory):
 
     def commit(self) -> None:
         """Write the file: all of it, or nothing."""
+        if self._path is None:
+            return
         content = {
             'version': VERSION,
             'values': {

@@ -22,7 +22,7 @@ from canopen_core.standard import (
     ObjectEntry,
 )
 from canopen_sim import Device, Fault
-from canopen_sim.object_store import LOAD, ParameterFile, ParameterMemory, SAVE
+from canopen_sim.object_store import LOAD, ParameterMemory, SAVE
 
 EMCY = 0x080 + NODE_ID
 
@@ -276,11 +276,11 @@ def test_verify_configuration(storing: StoringRig) -> None:
 def test_file_outlives_the_process(tmp_path: Path) -> None:
     """Another device with the same file begins with what the first one has stored."""
     path = tmp_path / 'deep' / 'node_5.json'
-    first = StoringRig(ParameterFile(path))
+    first = StoringRig(ParameterMemory(path))
     first.put(0x6083, 4711)
     assert not path.exists()
     first.order(0x1010)
-    assert StoringRig(ParameterFile(path)).get(0x6083) == 4711
+    assert StoringRig(ParameterMemory(path)).get(0x6083) == 4711
     assert [file.name for file in path.parent.iterdir()] == ['node_5.json']
 
 
@@ -293,7 +293,7 @@ def test_damaged_file(tmp_path: Path, text: str, caplog: pytest.LogCaptureFixtur
     path = tmp_path / 'node_5.json'
     path.write_text(text, encoding='utf-8')
     with caplog.at_level(logging.ERROR):
-        storing = StoringRig(ParameterFile(path))
+        storing = StoringRig(ParameterMemory(path))
     assert values(storing) == values(StoringRig())
     assert str(path) in caplog.text
 

@@ -107,11 +107,7 @@ class Builder:
                     path.unlink(missing_ok=True)
 
     def leftovers(self, wanted: Iterable[str]) -> list[str]:
-        """Name what is installed and of no use any more.
-
-        Args:
-            wanted: The packages of the workspace that are not the underlay's.
-        """
+        """Name what is installed and not among the packages that are wanted."""
         keep = set(wanted)
         marks = self.layout.install.glob(
             f'{self._prefixes}share/ament_index/resource_index/packages/*'
@@ -127,12 +123,7 @@ class Builder:
         return '' if self._on_wheels else '*/'
 
     def build(self, runner: Runner, packages: Mapping[str, Package], stale: list[str]) -> None:
-        """Build packages from nothing.
-
-        Args:
-            runner: Starts the programs that build.
-            packages: All that are to be there afterwards, each after those that it needs.
-            stale: Names of those to build.
+        """Build the stale ones of packages from nothing; each stands after those that it needs.
 
         Raises:
             WorkspaceError: One of them does not build; the others keep their result.

@@ -72,12 +72,8 @@ class Environment:
         """List what has to be done, nothing when all is there.
 
         Whatever changes the environment first takes its state away, so an interrupted change of
-        any kind leads to a new environment.
-
-        Args:
-            state: What the environment holds by its record.
-            names: What is needed besides: `DEV`, `DOCS`, and packages, of which some have a
-                requirements file of their own.
+        any kind leads to a new environment. Names are what is needed besides: `DEV`, `DOCS`, and
+        packages, of which some have a requirements file of their own.
         """
         fresh = state is not None and state.base == self.base
         there = state.additions if fresh and state is not None else {}
@@ -233,11 +229,8 @@ def choose_python(
 ) -> str:
     """Choose the interpreter for the environment; return its path.
 
-    Args:
-        named: What a person named, or empty.
-        underlay: A system's ROS is built for one Python only.
-        state: A finished environment keeps its interpreter while that is there.
-        running: The interpreter that runs the set-up.
+    What a person named counts. A system's ROS is built for one Python only; a finished environment
+    keeps its interpreter while that is there; else the running one is taken.
 
     Raises:
         WorkspaceError: It cannot be started.

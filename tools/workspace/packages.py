@@ -77,13 +77,10 @@ def needed_packages(
     *,
     tests: bool = False,
 ) -> dict[str, Package]:
-    """Return the targets and what they need, each after what it needs itself.
+    """Return the targets, or all, and what they need, each after what it needs itself.
 
-    Args:
-        packages: All packages of the workspace.
-        targets: Names to begin with; none means all.
-        underlay: The ROS below; of a public package it has, our copy is not built.
-        tests: With what their tests need, too.
+    Of a public package that the underlay has, our copy is not built. With tests, what these need
+    is there, too.
 
     Raises:
         WorkspaceError: A target is not in the workspace.

@@ -74,13 +74,7 @@ class Runner:
         show: tuple[str, ...] = (),
         extra: Mapping[str, str] | None = None,
     ) -> None:
-        """Run a program to its end.
-
-        Args:
-            what: What the program does, for messages.
-            arguments: The program and its arguments.
-            show: How the lines of its output begin that a person wants to see.
-            extra: Variables to add to the environment.
+        """Run a program to its end, and show the lines of its output that begin with `show`.
 
         Raises:
             NetworkError: It failed for want of a connection.

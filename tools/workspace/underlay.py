@@ -62,12 +62,9 @@ class Underlay:
 
 
 def find_underlay(environ: Mapping[str, str], venv: Path) -> Underlay:
-    """Choose the system's ROS when it is there, else the wheels.
+    """Choose the system's ROS when it is there, else the wheels, which are in `venv`.
 
-    Args:
-        environ: Environment; `WORKSPACE_ROS_PREFIX` replaces /opt/ros/jazzy, and empty it stands
-            for the wheels.
-        venv: Where the wheels are, or will be.
+    `WORKSPACE_ROS_PREFIX` replaces /opt/ros/jazzy, and empty it stands for the wheels.
     """
     prefix = environ.get(PREFIX_VARIABLE, SYSTEM_PREFIX)
     if prefix and (Path(prefix) / 'local_setup.bash').is_file():

@@ -117,12 +117,8 @@ class ArmDemo(Demo[ServiceClient]):
     ) -> None:
         """Prepare; nothing happens yet.
 
-        Args:
-            arm: The processes of the arm.
-            limits: Its joints that have a drive.
-            duration: How long the demo runs in [s]; None until Ctrl-C.
-            commands: To try in a second terminal.
-            enabled: Drives that are enabled; without any all of the joints.
+        It runs for a duration in [s], or until Ctrl-C, on the joints that have a drive, with their
+        limits; all of these drives are enabled, or those that are named.
         """
         title = f'{arm.robot.name}: {len(arm.drives)} simulated drives on {arm.bus}{self.beside}'
         super().__init__(title, commands)
@@ -457,6 +453,7 @@ def run(
             groups = moved_groups(robot)
             make_files = partial(files, groups=groups)
         with session(
+            robot,
             arguments,
             ros,
             simulate=True,

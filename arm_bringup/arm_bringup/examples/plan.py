@@ -727,8 +727,7 @@ def with_gripper(arguments: argparse.Namespace) -> Robot:
     if os.sep not in arguments.robot:
         both = argparse.Namespace(**{**vars(arguments), 'robot': robot.name + WITH_GRIPPER})
         with contextlib.suppress(RobotError):
-            robot = locate(both)
-            arguments.robot = both.robot
+            return locate(both)
     return robot
 
 

@@ -21,7 +21,7 @@ import time
 from std_msgs.msg import Float64
 from urdf_reader import JointRange
 
-from ..groups import joints_of_groups, moved_groups, MovedGroups
+from ..groups import moved_groups, MovedGroups
 from ..robots import joint_limits, Robot, WaveError
 from ..service_client import ServiceClient
 from ..session import Session
@@ -243,8 +243,8 @@ def waving_joints(robot: Robot, drives: Sequence[str], joints: Collection[str]) 
     """
     waving: Collection[str] = drives
     if robot.groups:
-        groups = joints_of_groups(robot, MovedGroups(moved_groups(robot).arms))
-        waving = list(itertools.chain(*groups.values()))
+        groups = moved_groups(robot)
+        waving = list(itertools.chain(*(groups.joints[arm] for arm in groups.arms)))
     if found := [name for name in drives if name in joints and name in waving]:
         return found
     raise WaveError(

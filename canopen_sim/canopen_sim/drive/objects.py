@@ -4,9 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeAlias
-
 from canopen_core.standard import AXIS_OFFSET, Index, OperationMode, TARGET_OBJECTS
 
 from ..object_store import Integer, ObjectStore
@@ -51,23 +48,19 @@ class Rate:
         self.variable.put(rate / self._units[self._kind])
 
 
-Bind: TypeAlias = Callable[..., Integer]
-BindRate: TypeAlias = Callable[..., Rate]
-
-
 class DriveObjects:
     """All objects of a drive, bound once; units are increments, and [inc/s] of velocities.
 
     Those that a dictionary lacks get a harmless value and stay invisible.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0915  # a table of objects
         self, store: ObjectStore, axis: int = 0, rate_units: tuple[float, float] = (1.0, 1.0)
     ) -> None:
         """Bind those of an axis, numbered from 0; those of axis n stand 0x800 n further on."""
 
         def bind(index: int, subindex: int = 0, *, default: int = 0) -> Integer:
-            return store.integer(index + axis * AXIS_OFFSET, subindex, default=default)
+            return store.integer(index + self._offset, subindex, default=default)
 
         def rate(index: int, subindex: int = 0, *, default: int = 0) -> Rate:
             variable = bind(index, subindex, default=default)
@@ -75,29 +68,8 @@ class DriveObjects:
 
         # what 1 of its velocities is in [inc/s], of its accelerations in [inc/s^2]
         self.rate_units = list(rate_units)
-        self._bind_states(bind)
-        self._bind_actual_values(bind, rate)
-        self._bind_windows(bind, rate)
-        self._bind_targets(bind, rate)
-        self._bind_profile(bind, rate)
-        self._bind_velocity_mode(bind, rate)
-        self._bind_torque(bind)
         self._dictionary = store.dictionary
         self._offset = axis * AXIS_OFFSET
-
-    @property
-    def possible_modes(self) -> int:
-        """Bits of 0x6502 for the modes that the objects of the dictionary allow."""
-        modes = [
-            mode
-            for mode, (index, subindex) in TARGET_OBJECTS.items()
-            if (index + self._offset, subindex) in self._dictionary
-        ]
-        if (Index.HOMING_METHOD + self._offset, 0) in self._dictionary:
-            modes.append(OperationMode.HOMING)
-        return sum(mode.support_bit for mode in modes)
-
-    def _bind_states(self, bind: Bind) -> None:
         self.abort_connection = bind(Index.ABORT_CONNECTION_OPTION, default=1)
         self.error_code = bind(Index.ERROR_CODE)
         self.controlword = bind(Index.CONTROLWORD)
@@ -111,7 +83,6 @@ class DriveObjects:
         self.mode_display = bind(Index.MODE_OF_OPERATION_DISPLAY)
         self.supported_modes = bind(Index.SUPPORTED_MODES, default=0xFFFF_FFFF)
 
-    def _bind_actual_values(self, bind: Bind, rate: BindRate) -> None:
         self.position_demand = bind(Index.POSITION_DEMAND)
         self.position_internal = bind(Index.POSITION_ACTUAL_INTERNAL)
         self.position_actual = bind(Index.POSITION_ACTUAL)
@@ -119,7 +90,6 @@ class DriveObjects:
         self.velocity_actual = rate(Index.VELOCITY_ACTUAL)
         self.following_error = bind(Index.FOLLOWING_ERROR)
 
-    def _bind_windows(self, bind: Bind, rate: BindRate) -> None:
         self.following_window = bind(Index.FOLLOWING_ERROR_WINDOW, default=NO_WINDOW)
         self.following_timeout = bind(Index.FOLLOWING_ERROR_TIMEOUT)  # [ms]
         self.position_window = bind(Index.POSITION_WINDOW, default=NO_WINDOW)
@@ -129,7 +99,6 @@ class DriveObjects:
         self.velocity_threshold = rate(Index.VELOCITY_THRESHOLD, default=10)
         self.velocity_threshold_time = bind(Index.VELOCITY_THRESHOLD_TIME)  # [ms]
 
-    def _bind_targets(self, bind: Bind, rate: BindRate) -> None:
         self.target_position = bind(Index.TARGET_POSITION)
         self.target_velocity = rate(Index.TARGET_VELOCITY)
         self.interpolation_target = bind(Index.INTERPOLATION_DATA, 1)
@@ -147,7 +116,6 @@ class DriveObjects:
         self.homing_acceleration = rate(Index.HOMING_ACCELERATION)
         self.digital_inputs = bind(Index.DIGITAL_INPUTS)
 
-    def _bind_profile(self, bind: Bind, rate: BindRate) -> None:
         self.limit_low = bind(Index.SOFTWARE_POSITION_LIMIT, 1)
         self.limit_high = bind(Index.SOFTWARE_POSITION_LIMIT, 2)
         self.max_velocity = rate(Index.MAX_PROFILE_VELOCITY)
@@ -160,7 +128,6 @@ class DriveObjects:
         self.max_deceleration = rate(Index.MAX_DECELERATION)
         self.max_slippage = rate(Index.MAX_SLIPPAGE)
 
-    def _bind_velocity_mode(self, bind: Bind, rate: BindRate) -> None:
         self.vl_target = rate(Index.VL_TARGET_VELOCITY)
         self.vl_demand = rate(Index.VL_VELOCITY_DEMAND)
         self.vl_actual = rate(Index.VL_VELOCITY_ACTUAL)
@@ -169,7 +136,6 @@ class DriveObjects:
         ramps = (Index.VL_ACCELERATION, Index.VL_DECELERATION, Index.VL_QUICK_STOP)
         self._vl_ramps = [(rate(ramp, 1), bind(ramp, 2, default=1)) for ramp in ramps]
 
-    def _bind_torque(self, bind: Bind) -> None:
         self.target_torque = bind(Index.TARGET_TORQUE)
         self.torque_offset = bind(Index.TORQUE_OFFSET)
         self.torque_demand = bind(Index.TORQUE_DEMAND)
@@ -180,6 +146,18 @@ class DriveObjects:
         self.max_torque = bind(Index.MAX_TORQUE, default=NOMINAL_TORQUE)
         self.positive_torque = bind(Index.POSITIVE_TORQUE_LIMIT, default=NO_TORQUE_LIMIT)
         self.negative_torque = bind(Index.NEGATIVE_TORQUE_LIMIT, default=NO_TORQUE_LIMIT)
+
+    @property
+    def possible_modes(self) -> int:
+        """Bits of 0x6502 for the modes that the objects of the dictionary allow."""
+        modes = [
+            mode
+            for mode, (index, subindex) in TARGET_OBJECTS.items()
+            if (index + self._offset, subindex) in self._dictionary
+        ]
+        if (Index.HOMING_METHOD + self._offset, 0) in self._dictionary:
+            modes.append(OperationMode.HOMING)
+        return sum(mode.support_bit for mode in modes)
 
     @property
     def speed(self) -> float:

@@ -39,7 +39,7 @@ from node_runner import (
 from ..deviations import Fault, FaultInjection, parse_fault, unknown
 from ..device import Device
 from ..host import add_devices, DeviceHost, DeviceRunner, NodeIdCheck
-from ..object_store import ParameterFile, ParameterMemory
+from ..object_store import ParameterMemory
 
 CAN_INTERFACES = (
     'can0, vcan0, udp_multicast:239.x.y.z[:port], auto, or INTERFACE:CHANNEL[@BITRATE]'
@@ -127,8 +127,7 @@ def memories(node: Node) -> Callable[[int], ParameterMemory]:
     folder = ParameterReader(node).text('store_directory', '', STORE_DIRECTORY)
 
     def memory(node_id: int) -> ParameterMemory:
-        file = Path(folder) / f'node_{node_id}.json'
-        return ParameterFile(file) if folder else ParameterMemory()
+        return ParameterMemory(Path(folder) / f'node_{node_id}.json' if folder else None)
 
     return memory
 

@@ -75,10 +75,7 @@ class Contents(Protocol):
         """What was recorded, in one or more lines."""
 
     def save(self, folder: Path, pause: Pause) -> Path:
-        """Write the recording; called in the thread of the black box.
-
-        Returns:
-            The main file of the recording.
+        """Write the recording, in the thread of the black box; return its main file.
 
         Raises:
             OSError: The recording cannot be written.
@@ -112,13 +109,7 @@ class BlackBox:
     """
 
     def __init__(self, name: str, contents: Contents, settings: BlackBoxSettings) -> None:
-        """Create a black box; it writes nothing before :meth:`start`.
-
-        Args:
-            name: Name of what is recorded, used in the names of the folders.
-            contents: The data to keep.
-            settings: Its settings.
-        """
+        """Write nothing before :meth:`start`; the name stands in those of the folders."""
         self.last: Path | None = None
         self._name = re.sub(r'[^A-Za-z0-9.-]+', '_', name).strip('_.') or 'fault'
         self._contents = contents
@@ -305,7 +296,6 @@ class LogPlayer(Generic[Entry]):
         """Prepare.
 
         Args:
-            replay: Gets the entries.
             read: Yields the entries of the log with their times in [s], from the first one.
             name: Name of the log in errors: its file.
             rate: Seconds of the log played per second.
@@ -327,11 +317,7 @@ class LogPlayer(Generic[Entry]):
         return self._zero + (log_time - self._log_zero) / self._rate
 
     def play(self, stop: threading.Event, *, loop: bool) -> None:
-        """Play until the end, or until stopped.
-
-        Args:
-            stop: Ends it.
-            loop: Begin again at the end.
+        """Play until the end, with ``loop`` again and again, or until stopped.
 
         Raises:
             PlaybackError: It has no entries, or ends before the start.

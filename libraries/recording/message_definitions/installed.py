@@ -41,10 +41,9 @@ _NESTED = '=' * 80  # before each nested definition
 
 
 def nested_type(line: str, package: str) -> str | None:
-    """Return the message type of the field that a line declares.
+    """Return the message type of the field that a line declares, `package/msg/Name`.
 
-    Returns:
-        `package/msg/Name`, or None for constants, primitive types and comments.
+    None for constants, primitive types and comments.
     """
     match = _FIELD.match(line.strip())
     if match is None:
@@ -55,12 +54,8 @@ def nested_type(line: str, package: str) -> str | None:
 def concatenated(name: str, read: Callable[[str], str]) -> str:
     """Return a definition with those of all nested messages, as in recordings (`ros2msg`).
 
-    Args:
-        name: `package/msg/Name`.
-        read: Returns the text of a definition by its name.
-
-    Returns:
-        The texts; each nested one appears once, below a line with its name.
+    Each nested one appears once, below a line with its name, `package/msg/Name`; `read` returns
+    the text of a definition by its name.
     """
     found: dict[str, str] = {}
     wanted = [name]
@@ -81,10 +76,7 @@ class DefinitionError(LookupError):
 
 
 def message_definition(name: str) -> str:
-    """Return the definition of an installed message with those of all messages in it.
-
-    Args:
-        name: `package/msg/Name`.
+    """Return the definition of `package/msg/Name` with those of all messages in it.
 
     Raises:
         DefinitionError: It, or one in it, is not installed, or has no .msg file.

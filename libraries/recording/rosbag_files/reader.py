@@ -92,11 +92,9 @@ class BagReader:
     def messages(
         self, topics: Collection[str] | None = None, start: int | None = None
     ) -> Iterator[BagMessage]:
-        """Yield the messages in the order in which they were received.
+        """Yield the messages of some or all topics in the order in which they were received.
 
-        Args:
-            topics: Which topics; None for all.
-            start: Earliest time in [ns since 1970].
+        They begin with a time in [ns since 1970].
 
         Raises:
             BagError: A file is missing.

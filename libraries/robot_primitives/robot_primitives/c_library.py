@@ -40,13 +40,8 @@ def load_c_library(
 ) -> ctypes.CDLL | None:
     """Return the library of a C file; None, with one warning, where it cannot be built or loaded.
 
-    Not thread-safe, and not cached in the process.
-
-    Args:
-        package: Name of its package, of the cache and of the variable that switches it off.
-        source: The C file.
-        consequence: What the warning says about going without.
-        flags: Options of the compiler beside :data:`FLAGS`.
+    Not thread-safe, and not cached in the process. The warning says what follows, and the package
+    has the cache and the variable that switches it off.
     """
     if os.environ.get(f'{package.upper()}_COMPILED') == '0':
         return None

@@ -57,11 +57,7 @@ class StreamGate(Generic[Channel]):
     def __init__(
         self, channels: Collection[Channel], rules: Mapping[Channel, StreamRules]
     ) -> None:
-        """Begin open.
-
-        Args:
-            rules: Rules of the channels on which clients send streams.
-        """
+        """Begin open; rules are those of the channels on which clients send streams."""
         self._lock = threading.Lock()  # held for a few instructions only
         self._numbers = count(1)
         self._floors: dict[Channel, tuple[int, str]] = dict.fromkeys(channels, (0, ''))
@@ -74,11 +70,7 @@ class StreamGate(Generic[Channel]):
             return next(self._numbers)
 
     def stop(self, channels: Collection[Channel], reason: str, number: int | None = None) -> None:
-        """Refuse what was requested on some channels before a number.
-
-        Args:
-            number: Number of a newer command; by default all that was requested so far is refused.
-        """
+        """Refuse what was requested on some channels so far, or before a newer number."""
         with self._lock:
             number = next(self._numbers) if number is None else number
             for channel in channels:
@@ -93,10 +85,7 @@ class StreamGate(Generic[Channel]):
     def command(
         self, channel: Channel, client: Hashable, now: float, expires: float = -math.inf
     ) -> str:
-        """Record a command of motion of a client.
-
-        Args:
-            expires: Time until which it moves the robot in [s]; by default not beyond now.
+        """Record a command of motion of a client, which moves the robot until it expires.
 
         Returns:
             Why it is refused, as its stream was ended; empty when it is not.
@@ -146,8 +135,7 @@ class StreamGate(Generic[Channel]):
     def renew(self, channel: Channel, now: float, silence: float = -math.inf) -> None:
         """Treat what comes next on a channel as new, on behalf of a person.
 
-        Args:
-            silence: Streams whose last command is no older than this stay as they are, in [s].
+        Streams whose last command is no older than ``silence`` in [s] stay as they are.
         """
         with self._lock:
             self._streams = {

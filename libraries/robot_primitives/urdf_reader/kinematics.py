@@ -11,12 +11,7 @@ from .urdf import Joint, JointKind, KinematicTree, MOVABLE, PointMass
 
 
 def joint_transform(joint: Joint, position: float) -> Transform:
-    """Return the pose of a joint's child link in its parent link.
-
-    Args:
-        joint: A fixed or movable joint.
-        position: Its position in [rad] or [m]; without meaning for a fixed one.
-    """
+    """Return the pose of a joint's child link in its parent at a position in [rad] or [m]."""
     if joint.kind is JointKind.PRISMATIC:
         x, y, z = joint.axis
         return compose(joint.origin, Transform((x * position, y * position, z * position)))
@@ -32,12 +27,7 @@ def joint_position(
     """Return the position of a joint in [rad] or [m]; None where nothing says it.
 
     One that follows another is where it was measured, else where its source puts it, as
-    robot_state_publisher has it.
-
-    Args:
-        joint: The joint.
-        positions: In [rad] or [m] by name.
-        missing: Position of joints without one, which others may follow.
+    robot_state_publisher has it. Joints without a position stand where ``missing`` says.
     """
     if joint.name in positions or joint.mimic is None:
         return positions.get(joint.name, missing)
@@ -48,12 +38,9 @@ def joint_position(
 def link_poses(
     tree: KinematicTree, positions: Mapping[str, float], base: str = ''
 ) -> dict[str, Transform]:
-    """Return the poses of all links below a base link, in the base.
+    """Return the poses of all links below a base link, by default the root, in it.
 
-    Args:
-        tree: The robot.
-        positions: Of joints in [rad] or [m]; those that are missing stand at zero.
-        base: Name of the base link; empty for the root.
+    Joints that are missing in the positions, in [rad] or [m], stand at zero.
     """
     poses = {base or tree.root: Transform()}
     for joint in parents_first(tree):
@@ -66,9 +53,7 @@ def link_poses(
 def centre_of_mass(masses: Iterable[PointMass], poses: Mapping[str, Transform]) -> Vector | None:
     """Return the centre of masses at poses of their links in [m]; None without masses.
 
-    Args:
-        masses: Those of links that have no pose are left out.
-        poses: Of the links, in the frame of the result.
+    Those of links that have no pose are left out.
     """
     total, x, y, z = 0.0, 0.0, 0.0, 0.0
     for part in masses:

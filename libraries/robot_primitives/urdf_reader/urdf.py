@@ -185,10 +185,7 @@ class KinematicTree:
         return {joint.name: joint.range for joint in self.joints if joint.independent}
 
     def chain(self, base: str, tip: str) -> list[Joint]:
-        """Return the joints from one link out to another.
-
-        Args:
-            tip: Link where it ends.
+        """Return the joints from a link out to the tip.
 
         Raises:
             DescriptionError: A link is unknown, or the tip does not hang on the base.
@@ -262,9 +259,7 @@ class KinematicTree:
     def bare_urdf(self, bound: float) -> str:
         """Return a URDF of links and joints only, for readers of kinematics.
 
-        Args:
-            bound: Where continuous joints, as revolute ones whose position is one number, end to
-                either side in [rad].
+        Continuous joints become revolute ones that end at the bound to either side in [rad].
         """
         bare = ET.Element('robot', name=self.name or 'robot')
         for link in self.links:
@@ -282,9 +277,6 @@ class KinematicTree:
 
 def read_urdf(text: str) -> KinematicTree:
     """Read a URDF.
-
-    Returns:
-        Its contents.
 
     Raises:
         DescriptionError: The text is empty or no URDF, or its joints make no tree; the message

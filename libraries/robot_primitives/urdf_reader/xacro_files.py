@@ -31,15 +31,8 @@ def expand_xacro(
     path: Path,
     arguments: Mapping[str, str] | None = None,
     packages: Mapping[str, Path] | None = None,
-    files: set[Path] | None = None,
 ) -> str:
-    """Expand a xacro file.
-
-    Args:
-        files: Gets all files that were read: this one, and what it includes or loads.
-
-    Returns:
-        What it makes, as XML text.
+    """Expand a xacro file to XML text.
 
     Raises:
         XacroError: The file cannot be expanded; the message is xacro's own, or names the package
@@ -48,7 +41,6 @@ def expand_xacro(
     import xacro
 
     packages = packages or {}
-    known = len(xacro.all_includes)  # it never forgets any
     complaints = io.StringIO()  # xacro writes to stderr where in the file it was
     try:
         with (
@@ -57,8 +49,6 @@ def expand_xacro(
             _without_other_hardware(xacro),
         ):
             document = xacro.process_file(str(path), mappings=dict(arguments or {}))
-            if files is not None:
-                files.update(Path(each).resolve() for each in (path, *xacro.all_includes[known:]))
     except Exception as error:  # an expression in the file may raise anything
         place = ' '.join(complaints.getvalue().split())
         if refusal := _missing(path, str(error)):

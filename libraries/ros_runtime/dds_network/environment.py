@@ -133,11 +133,7 @@ def selected_reach(environ: Mapping[str, str]) -> Reach:
 
 
 def dds_variables(environ: Mapping[str, str], reach: Reach) -> dict[str, str]:
-    """Return the variables that keep DDS to a reach.
-
-    Args:
-        environ: The environment; transports that the user configured stay as they are.
-        reach: What DDS may use.
+    """Return the variables that keep DDS to a reach; none where the user has own transports.
 
     Raises:
         NetworkChoiceError: The profile cannot be written.
@@ -158,10 +154,8 @@ def dds_variables(environ: Mapping[str, str], reach: Reach) -> dict[str, str]:
 def restrict_dds(environ: MutableMapping[str, str]) -> Reach:
     """Restrict DDS of this process and its children to the reach that the user has chosen.
 
-    Call it before rclpy.init: Fast DDS reads its profile once.
-
-    Args:
-        environ: ``os.environ``, or the environment of a process to start; it is changed.
+    Call it before rclpy.init, as Fast DDS reads its profile once. The environment, ``os.environ``
+    or that of a process to start, is changed.
 
     Raises:
         NetworkChoiceError: As of :func:`selected_reach`.

@@ -162,11 +162,9 @@ class FastReader:
     """
 
     def __init__(self, kind: type, *paths: str) -> None:
-        """Create a reader for the given numbers.
+        """Create a reader for the numbers at paths in messages of a kind.
 
-        Args:
-            kind: Class of the messages.
-            *paths: Attributes that are a float or a sequence of these, as ``twist.linear.x``.
+        They lead to attributes that are a float or a sequence of these, as ``twist.linear.x``.
         """
         self._kind = kind
         self._paths = [path.split('.') for path in paths]

@@ -36,12 +36,10 @@ def create_deferred_service(
 ) -> Service:
     """Create a service; its response is sent when a future is done.
 
+    What is still on its way when the node is to end is finished or cancelled before the node is
+    destroyed; a cancelled request is not answered.
+
     Args:
-        node: The node that offers it. What is still on its way when the node is to end is
-            finished or cancelled before the node is destroyed; a cancelled request is not
-            answered.
-        kind: Its type.
-        name: Its name.
         begin: Called in the executor with each request; returns the future of its outcome. What
             it raises is an outcome, too.
         respond: Called with an empty response and the outcome; returns what is sent. By default

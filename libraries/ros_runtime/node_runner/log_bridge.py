@@ -85,13 +85,7 @@ class RosLogBridge(logging.Handler):
         limit: LogRateLimit | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Prepare; :meth:`start` begins.
-
-        Args:
-            name: Name for the log until there is a node.
-            limit: How often one source may log; None for the default.
-            clock: The steady clock in [s].
-        """
+        """Prepare; :meth:`start` begins. The name is that of the log until there is a node."""
         super().__init__(logging.WARNING)
         self._logger = get_logger(name)
         self._attached = False

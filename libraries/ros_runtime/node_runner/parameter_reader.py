@@ -81,12 +81,9 @@ class ParameterReader:
     """
 
     def __init__(self, node: Node, prefix: str = '', *, fixed: bool = True) -> None:
-        """Declare for a node.
+        """Declare for a node, with a prefix and its dot before each name.
 
-        Args:
-            node: The node.
-            prefix: Before each name, with its dot.
-            fixed: They are read at the start only, and cannot be changed later.
+        ``fixed`` ones are read at the start only, and cannot be changed later.
         """
         self._node = node
         self._prefix = prefix
@@ -232,9 +229,7 @@ def given_values(node: Node) -> dict[str, object]:
 def give_defaults(node: Node, values: Mapping[str, object]) -> None:
     """Set parameters of a node that were not given, as if they came from outside.
 
-    Args:
-        node: The node; it has not declared them yet.
-        values: Values by name; those of kinds that no parameter has are passed over.
+    The node has not declared them yet. Values of kinds that no parameter has are passed over.
     """
     given = node._parameter_overrides  # noqa: SLF001
     for name, value in values.items():

@@ -164,7 +164,6 @@ def spin(
     to simulated time are named once, with what that does not cover.
 
     Args:
-        nodes: The nodes to serve.
         stop: Ends it within :data:`WAKE_PERIOD`.
         executor: What serves them; :func:`make_executor` chooses when it is None.
         linger: Time for which they are served after that in [s], see :data:`LINGER`.
@@ -228,11 +227,7 @@ def spin_beside(
 ) -> None:
     """Serve nodes while a thread works; what it raises is raised here when both have ended.
 
-    Args:
-        work: Done in the thread; it has to end soon after the event is set.
-        nodes: The nodes to serve.
-        stop: Ends both; set when the work is done.
-        name: Of the thread.
+    The event ends both; the work has to end soon after it, and sets it at its own end.
     """
     failures: list[Exception] = []
 
@@ -276,10 +271,7 @@ def init_ros(args: Sequence[str] | None = None, context: Context | None = None) 
     """Initialise rclpy without its signal handlers, with DDS on the networks that are open.
 
     A process that can be reached from outside this host logs so, or that it cannot, though asked.
-
-    Args:
-        args: Command line; None for the process's own.
-        context: What to initialise; None for the default one.
+    The command line is that of the process by default.
 
     Raises:
         NetworkChoiceError: ``DDS_NETWORK`` names what does not exist, or would be ignored.
@@ -301,17 +293,12 @@ def stop_on_signals(
 ) -> threading.Event:
     """Set an event at the first signal of :data:`ENDING`; nothing is torn in the middle.
 
-    A second SIGINT, later than :data:`ECHO_TIME`, ends the process at once. A SIGTERM or SIGHUP
-    does not: ``ros2 launch`` and its like send one when the first signal seems to
-    do nothing, while a robot comes to rest. A SIGHUP that is ignored already stays so, as
-    ``nohup`` wants it.
+    A second SIGINT, later than :data:`ECHO_TIME`, ends the process at once, but a ``patient`` one,
+    which has to leave a terminal as it was. A SIGTERM or SIGHUP does not: ``ros2 launch`` and its
+    like send one when the first signal seems to do nothing, while a robot comes to rest. A SIGHUP
+    that is ignored already stays so, as ``nohup`` wants it.
 
     Initialise rclpy by :func:`.init_ros`; :func:`.run_program` does both.
-
-    Args:
-        patient: Not even a second SIGINT ends the process at once; for programs that have to leave
-            a terminal as it was.
-        clock: Returns steady time in [s].
     """
     stop = threading.Event()
     first = math.inf
@@ -335,10 +322,8 @@ def notify_ready(status: str = '') -> None:
     """Report ``READY=1`` to the supervisor of this process, if it has one that wants to know.
 
     That is process_supervisor of this workspace, or systemd for a unit of ``Type=notify``. Only
-    the first call reports, so it may stand where readiness comes and goes.
-
-    Args:
-        status: What the supervisor shall show the user about this process, in one line.
+    the first call reports, so it may stand where readiness comes and goes. The supervisor shows
+    the user the status, one line about this process.
     """
     address = os.environ.pop(NOTIFY_VARIABLE, '')
     if not address:
@@ -365,7 +350,6 @@ def run_program(
     Python's ``logging`` appear in the log of ROS, see :class:`.RosLogBridge`.
 
     Args:
-        name: Name for the log.
         body: Makes the nodes and serves them; ends soon after the event is set, by Ctrl-C, SIGTERM
             or the closing of the terminal. May return an exit code.
         *errors: What else is logged as one line.
@@ -413,16 +397,9 @@ def run_node(
     *errors: type[Exception],
     args: Sequence[str] | None = None,
 ) -> int:
-    """Run one node that needs no more than its callbacks.
+    """Run one node that needs no more than its callbacks; return the exit code.
 
-    Args:
-        name: Name for the log.
-        make: Makes the node.
-        *errors: What is logged as one line when it cannot be made.
-        args: Command line; None for the process's own.
-
-    Returns:
-        Exit code: 0, or 1 when the node could not be made.
+    As :func:`run_program`: the errors are logged as one line when the node cannot be made.
     """
 
     def body(stop: threading.Event) -> None:

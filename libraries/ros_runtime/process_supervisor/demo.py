@@ -308,10 +308,7 @@ def signed(value: float) -> str:
 def run_demo(demo: Demo[ClientT], processes: Sequence[ProcessSpec], *, endless: bool) -> int:
     """Run a demo in a thread beside the supervisor of its processes.
 
-    Args:
-        demo: The demo.
-        processes: What runs.
-        endless: It ends at Ctrl-C; after a table there is no summary then.
+    An endless one ends at Ctrl-C, and has no summary after a table.
 
     Returns:
         0, or 1 when something went wrong.

@@ -48,11 +48,7 @@ class Executable:
 
 
 def find_executable(package: str, name: str) -> Path | None:
-    """Find an executable as ``ros2 run`` does.
-
-    Returns:
-        Where it should be; None when the package does not exist.
-    """
+    """Find an executable as ``ros2 run`` does; None when the package does not exist."""
     from ament_index_python import get_package_prefix, PackageNotFoundError
 
     try:
@@ -71,8 +67,6 @@ def node_argv(
     """Make the command line of a node.
 
     Args:
-        executable: What to run.
-        find: Finds executables.
         values: ROS parameters as the command line takes them.
         parameters: ROS parameter files, of this program's own or of
             :func:`namespaced_parameters`; a later one counts more.
@@ -236,14 +230,10 @@ seconds to end."""
 
 @contextlib.contextmanager
 def exclusive(thing: str, remedy: str) -> Iterator[None]:
-    """Hold a resource exclusively while the block runs.
-
-    Args:
-        thing: Name of the resource for the user: ``bus vcan0``.
-        remedy: Alternative to name in the message: ``another bus with --can``.
+    """Hold a resource such as ``bus vcan0`` exclusively while the block runs.
 
     Raises:
-        StartError: Another process holds it; the message names it.
+        StartError: Another process holds it; the message names it, and the remedy.
     """
     name = _abstract_name(thing)
     with socket.socket(socket.AF_UNIX) as holder:
@@ -334,10 +324,9 @@ def node_process(
 def state_publisher(
     parameters: Path, find: FindExecutable, ros: RosOptions, *, ready_timeout: float, order: int
 ) -> ProcessSpec | None:
-    """Return the process; the bring-up goes on without it when it ends.
+    """Return the process, without which the bring-up goes on when it ends.
 
-    Returns:
-        The process; None where neither program is installed.
+    None where neither program is installed.
     """
     installed = (each for each in STATE_PUBLISHERS if find(each.package, each.name) is not None)
     executable = next(installed, None)

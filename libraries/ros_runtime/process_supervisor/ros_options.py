@@ -18,11 +18,9 @@ from .spec import StartError
 
 
 def seconds_from(least: float, *, finite: bool = True) -> Callable[[str], float]:
-    """Return a type of argparse: a time that is long enough.
+    """Return a type of argparse: a time of at least so many [s], 0 for anything above.
 
-    Args:
-        least: The shortest in [s]; 0 means anything above.
-        finite: Refuse ``inf``, which waits without limit.
+    ``inf``, which waits without limit, is refused where it has to be finite.
     """
 
     def read(text: str) -> float:
@@ -161,11 +159,7 @@ def add_namespace(parser: argparse.ArgumentParser) -> None:
 def parse_with_ros(
     parser: argparse.ArgumentParser, argv: Sequence[str]
 ) -> tuple[argparse.Namespace, RosOptions]:
-    """Parse a command line that may have ROS arguments.
-
-    Returns:
-        What the parser found, and the options of the nodes.
-    """
+    """Parse a command line that may have ROS arguments, which are options of the nodes."""
     own, ros = split_ros_arguments(argv)
     arguments = parser.parse_args(own)
     try:

@@ -308,11 +308,7 @@ def _severity(returncode: int) -> Severity:
 
 
 def describe_exit(returncode: int) -> str:
-    """Return in words how a process ended.
-
-    Args:
-        returncode: Exit code; negative for the signal that killed it.
-    """
+    """Return in words how a process ended; a negative code is the signal that killed it."""
     if returncode >= 0:
         return f'ended with exit code {returncode}' if returncode else 'ended'
     try:

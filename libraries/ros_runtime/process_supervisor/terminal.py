@@ -34,10 +34,7 @@ wanted: Ctrl-C again, or a process has ended.
 
 
 def join_in_time(thread: threading.Thread) -> str:
-    """Wait for a thread that was asked to end; when it does not, the program ends without it.
-
-    Args:
-        thread: One that does not keep the interpreter alive (``daemon``).
+    """Wait for a daemon thread that was asked to end; the program ends without it else.
 
     Returns:
         Why it is given up, with what all threads are doing; empty when it has ended.
@@ -69,12 +66,8 @@ def supervise(
     """Run processes with their output on standard output, until Ctrl-C or one ends.
 
     That all are ready, and that all are stopped, is reported to systemd, or what else
-    ``NOTIFY_SOCKET`` names, as in sd_notify(3).
-
-    Args:
-        processes: What to run.
-        name: Name before the supervisor's own lines.
-        shutdown: Done in a thread before they are stopped, if all had got ready.
+    ``NOTIFY_SOCKET`` names, as in sd_notify(3). ``shutdown`` is done in a thread before they are
+    stopped, if all had got ready.
     """
     names = [spec.name for spec in processes]
     painter = Painter(name, names, wants_colour(sys.stdout, os.environ))
@@ -151,12 +144,7 @@ LOUD_SEVERITIES = {'WARN': Severity.WARNING, 'ERROR': Severity.ERROR, 'FATAL': S
 
 
 def wants_colour(stream: TextIO, environment: Mapping[str, str]) -> bool:
-    """Return whether output shall be coloured.
-
-    Args:
-        stream: Where it goes.
-        environment: Variables: NO_COLOR (https://no-color.org) and TERM count.
-    """
+    """Return whether a stream is coloured; NO_COLOR (https://no-color.org) and TERM count."""
     smart = environment.get('TERM', 'dumb') not in {'dumb', 'unknown', ''}
     return stream.isatty() and not environment.get('NO_COLOR') and smart
 
@@ -164,9 +152,8 @@ def wants_colour(stream: TextIO, environment: Mapping[str, str]) -> bool:
 def severity_of(line: str) -> Severity:
     """Return the severity of an output line of a ROS node.
 
-    Args:
-        line: A line of its output; one that is no log line, such as that of a traceback, is a
-            warning: nothing of the kind is expected.
+    One that is no log line, such as that of a traceback, is a warning: nothing of the kind is
+    expected.
     """
     match = ROS_SEVERITY.match(line)
     return LOUD_SEVERITIES.get(match[1], Severity.INFO) if match else Severity.WARNING

@@ -67,11 +67,7 @@ def load_overrides(path: str | None) -> dict[str, OfferedQos]:
 def topic_filter(args: Namespace, everything: bool, hidden: bool) -> Accepts:
     """Make the filter of a command line as rosbag2 does: what is chosen, less what is excluded.
 
-    Args:
-        args: With the arguments `topics`, `regex`, `exclude_regex`, `exclude_topics`, and perhaps
-            `topic_types` and `exclude_topic_types`.
-        everything: Whether all topics are chosen.
-        hidden: Whether hidden topics count; one that is chosen by name counts anyway.
+    Everything chooses all topics; hidden ones count only where that says so, or by their names.
 
     Raises:
         FrontendError: A regular expression is none.

@@ -163,12 +163,8 @@ def expand(
 ) -> Iterator[str]:
     """Yield the lines of `package/kind/Name`, each field of a message type followed by its lines.
 
-    Args:
-        name: The type.
-        read: Returns the text of a definition by its name.
-        comments: Whether to show comments and blank lines of the type itself.
-        nested_comments: Whether to show those of the types of its fields.
-        depth: How deep the definition stands; one tab each.
+    Comments and blank lines are shown of the type itself, and of those of its fields, as the
+    switches say. What stands deeper has one tab more for each level.
     """
     shown = nested_comments if depth else comments
     for line in read(name).splitlines():

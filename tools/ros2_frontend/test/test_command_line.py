@@ -19,12 +19,6 @@ from ros2_frontend.cli.commands import COMMANDS
 
 pytestmark = pytest.mark.slow
 
-EVERY_COMMAND = [
-    (name, *verb)
-    for name, command in COMMANDS.items()
-    for verb in ([()] if isinstance(command[1], str) else [(each,) for each in command[1]])
-]
-
 
 def test_help_lists_every_command(ros2: Ros2) -> None:
     """With the words of ros2cli; without a command, too."""
@@ -46,13 +40,12 @@ def test_a_group_without_a_verb_shows_its_help(ros2: Ros2) -> None:
 
 def test_every_command_has_help(ros2: Ros2) -> None:
     """Its module can be imported, its arguments can be added, its summary is shown."""
-    for words in EVERY_COMMAND:
-        outcome = ros2(*words, '--help')
+    for words, (summary, target) in COMMANDS.items():
+        if not target:
+            continue
+        outcome = ros2(*words.split(), '--help')
         assert outcome.code == 0
-        assert outcome.out.startswith(f'usage: ros2 {" ".join(words)} ')
-        summary, target = COMMANDS[words[0]]
-        if not isinstance(target, str):
-            summary, _ = target[words[1]]
+        assert outcome.out.startswith(f'usage: ros2 {words} ')
         assert ' '.join(summary.split()) in ' '.join(outcome.out.split())
 
 

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 import importlib
 import math
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeVar
 
 _ALIKE = 0.75  # types of two packages are 0.6 alike in their middle parts
 
@@ -132,121 +132,79 @@ def content(name: str, help_: str, stdin_help: str) -> Argument:
 
 PROGRAM = 'ros2'
 
-Command: TypeAlias = tuple[str, str]
-"""One line for the help page, and `module:verb` below `ros2_frontend.verbs`."""
-Group: TypeAlias = tuple[str, Mapping[str, Command]]
-"""One line for the help page, and the verbs by name."""
-
-COMMANDS: Mapping[str, Command | Group] = {
-    'action': (
-        'Various action related sub-commands',
-        {
-            'info': ('Print information about an action', 'action:info'),
-            'list': ('Output a list of action names', 'action:list_names'),
-            'send_goal': ('Send an action goal', 'send_goal:send_goal'),
-            'type': ("Print a action's type", 'action:type_of'),
-        },
-    ),
-    'bag': (
-        'Various rosbag related sub-commands',
-        {
-            'info': ('Print information about a bag to the screen', 'bag_info:info'),
-            'play': ('Play back ROS data from a bag', 'bag_play:play'),
-            'record': ('Record ROS data to a bag', 'bag_record:record'),
-            'reindex': ('Reconstruct metadata file for a bag', 'bag_info:reindex'),
-        },
-    ),
+COMMANDS: Mapping[str, tuple[str, str]] = {
+    'action': ('Various action related sub-commands', ''),
+    'action info': ('Print information about an action', 'action:info'),
+    'action list': ('Output a list of action names', 'action:list_names'),
+    'action send_goal': ('Send an action goal', 'send_goal:send_goal'),
+    'action type': ("Print a action's type", 'action:type_of'),
+    'bag': ('Various rosbag related sub-commands', ''),
+    'bag info': ('Print information about a bag to the screen', 'bag_info:info'),
+    'bag play': ('Play back ROS data from a bag', 'bag_play:play'),
+    'bag record': ('Record ROS data to a bag', 'bag_record:record'),
+    'bag reindex': ('Reconstruct metadata file for a bag', 'bag_info:reindex'),
     'doctor': ('Check ROS setup and other potential issues', 'doctor:doctor'),
-    'interface': (
-        'Show information about ROS interfaces',
-        {
-            'list': ('List all interface types available', 'interface:list_all'),
-            'package': (
-                'Output a list of available interface types within one package',
-                'interface:package',
-            ),
-            'packages': (
-                'Output a list of packages that provide interfaces',
-                'interface:packages',
-            ),
-            'proto': ('Output an interface prototype', 'interface:proto'),
-            'show': ('Output the interface definition', 'interface:show'),
-        },
+    'interface': ('Show information about ROS interfaces', ''),
+    'interface list': ('List all interface types available', 'interface:list_all'),
+    'interface package': (
+        'Output a list of available interface types within one package',
+        'interface:package',
     ),
+    'interface packages': (
+        'Output a list of packages that provide interfaces',
+        'interface:packages',
+    ),
+    'interface proto': ('Output an interface prototype', 'interface:proto'),
+    'interface show': ('Output the interface definition', 'interface:show'),
     'launch': ('Not among the wheels of ROS: names what to run instead', 'run:launch'),
-    'lifecycle': (
-        'Various lifecycle related sub-commands',
-        {
-            'get': ('Get lifecycle state for one or more nodes', 'lifecycle:get'),
-            'list': ('Output a list of available transitions', 'lifecycle:list_transitions'),
-            'nodes': ('Output a list of nodes with lifecycle', 'lifecycle:nodes'),
-            'set': ('Trigger lifecycle state transition', 'lifecycle:set_state'),
-        },
+    'lifecycle': ('Various lifecycle related sub-commands', ''),
+    'lifecycle get': ('Get lifecycle state for one or more nodes', 'lifecycle:get'),
+    'lifecycle list': ('Output a list of available transitions', 'lifecycle:list_transitions'),
+    'lifecycle nodes': ('Output a list of nodes with lifecycle', 'lifecycle:nodes'),
+    'lifecycle set': ('Trigger lifecycle state transition', 'lifecycle:set_state'),
+    'node': ('Various node related sub-commands', ''),
+    'node info': ('Output information about a node', 'node:info'),
+    'node list': ('Output a list of available nodes', 'node:list_names'),
+    'param': ('Various param related sub-commands', ''),
+    'param delete': ('Delete parameter', 'param:delete'),
+    'param describe': (
+        'Show descriptive information about declared parameters',
+        'param:describe_names',
     ),
-    'node': (
-        'Various node related sub-commands',
-        {
-            'info': ('Output information about a node', 'node:info'),
-            'list': ('Output a list of available nodes', 'node:list_names'),
-        },
+    'param dump': (
+        'Show all of the parameters of a node in a YAML file format',
+        'param:dump_file',
     ),
-    'param': (
-        'Various param related sub-commands',
-        {
-            'delete': ('Delete parameter', 'param:delete'),
-            'describe': (
-                'Show descriptive information about declared parameters',
-                'param:describe_names',
-            ),
-            'dump': (
-                'Show all of the parameters of a node in a YAML file format',
-                'param:dump_file',
-            ),
-            'get': ('Get parameter', 'param:get'),
-            'list': ('Output a list of available parameters', 'param:list_all'),
-            'load': ('Load parameter file for a node', 'param:load'),
-            'set': ('Set parameter', 'param:set_value'),
-        },
-    ),
-    'pkg': (
-        'Various package related sub-commands',
-        {
-            'executables': (
-                'Output a list of package specific executables',
-                'pkg:list_executables',
-            ),
-            'list': ('Output a list of available packages', 'pkg:list_names'),
-            'prefix': ('Output the prefix path of a package', 'pkg:prefix'),
-            'xml': ('Output the XML of the package manifest or a specific tag', 'pkg:xml'),
-        },
-    ),
+    'param get': ('Get parameter', 'param:get'),
+    'param list': ('Output a list of available parameters', 'param:list_all'),
+    'param load': ('Load parameter file for a node', 'param:load'),
+    'param set': ('Set parameter', 'param:set_value'),
+    'pkg': ('Various package related sub-commands', ''),
+    'pkg executables': ('Output a list of package specific executables', 'pkg:list_executables'),
+    'pkg list': ('Output a list of available packages', 'pkg:list_names'),
+    'pkg prefix': ('Output the prefix path of a package', 'pkg:prefix'),
+    'pkg xml': ('Output the XML of the package manifest or a specific tag', 'pkg:xml'),
     'run': ('Run a package specific executable', 'run:run'),
-    'service': (
-        'Various service related sub-commands',
-        {
-            'call': ('Call a service', 'service_call:call'),
-            'find': ('Output a list of available services of a given type', 'service:find'),
-            'info': ('Print information about a service', 'service:info'),
-            'list': ('Output a list of available services', 'service:list_names'),
-            'type': ("Output a service's type", 'service:type_of'),
-        },
-    ),
-    'topic': (
-        'Various topic related sub-commands',
-        {
-            'bw': ('Display bandwidth used by topic', 'topic_rate:bw'),
-            'delay': ('Display delay of topic from timestamp in header', 'topic_rate:delay'),
-            'echo': ('Output messages from a topic', 'topic_echo:echo'),
-            'find': ('Output a list of available topics of a given type', 'topic:find'),
-            'hz': ('Print the average receiving rate to screen', 'topic_rate:hz'),
-            'info': ('Print information about a topic', 'topic:info'),
-            'list': ('Output a list of available topics', 'topic:list_names'),
-            'pub': ('Publish a message to a topic', 'topic_pub:pub'),
-            'type': ("Print a topic's type", 'topic:type_of'),
-        },
-    ),
+    'service': ('Various service related sub-commands', ''),
+    'service call': ('Call a service', 'service_call:call'),
+    'service find': ('Output a list of available services of a given type', 'service:find'),
+    'service info': ('Print information about a service', 'service:info'),
+    'service list': ('Output a list of available services', 'service:list_names'),
+    'service type': ("Output a service's type", 'service:type_of'),
+    'topic': ('Various topic related sub-commands', ''),
+    'topic bw': ('Display bandwidth used by topic', 'topic_rate:bw'),
+    'topic delay': ('Display delay of topic from timestamp in header', 'topic_rate:delay'),
+    'topic echo': ('Output messages from a topic', 'topic_echo:echo'),
+    'topic find': ('Output a list of available topics of a given type', 'topic:find'),
+    'topic hz': ('Print the average receiving rate to screen', 'topic_rate:hz'),
+    'topic info': ('Print information about a topic', 'topic:info'),
+    'topic list': ('Output a list of available topics', 'topic:list_names'),
+    'topic pub': ('Publish a message to a topic', 'topic_pub:pub'),
+    'topic type': ("Print a topic's type", 'topic:type_of'),
     'wtf': ('Use `wtf` as alias to `doctor`', 'doctor:doctor'),
 }
+"""One line for the help page of each command, and `module:verb` below `ros2_frontend.verbs`; of
+a group of verbs that is empty."""
 _WITH_HIDDEN_NAMES = ('service', 'topic')
 
 
@@ -270,14 +228,14 @@ def build(argv: Sequence[str]) -> tuple[ArgumentParser, ArgumentParser, Verb | N
         'buffering, which might be affected by PYTHONUNBUFFERED/-u and depends on whatever '
         'stdout is interactive or not',
     )
-    parser, level, name = root, COMMANDS, PROGRAM
+    parser, name = root, ''
     for word in words:
-        parsers = _add_commands(parser, name, level)
-        if word not in level:
+        parsers = _add_commands(parser, name)
+        name = f'{name} {word}'.lstrip()
+        if name not in COMMANDS:
             return root, parser, None
-        _, target = level[word]
-        parser = parsers[word]
-        if isinstance(target, str):
+        parser, target = parsers[word], COMMANDS[name][1]
+        if target:
             module, _, attribute = target.partition(':')
             loaded = importlib.import_module(f'ros2_frontend.verbs.{module}')
             verb: Verb = getattr(loaded, attribute)
@@ -287,27 +245,28 @@ def build(argv: Sequence[str]) -> tuple[ArgumentParser, ArgumentParser, Verb | N
         if word in _WITH_HIDDEN_NAMES:
             help_ = f'Consider hidden {word}s as well'
             parser.add_argument(f'--include-hidden-{word}s', action='store_true', help=help_)
-        level, name = target, f'{PROGRAM} {word}'
-    _add_commands(parser, name, level)
+    _add_commands(parser, name)
     return root, parser, None
 
 
-def _add_commands(
-    parser: ArgumentParser, cli_name: str, commands: Mapping[str, Command | Group]
-) -> dict[str, ArgumentParser]:
+def _add_commands(parser: ArgumentParser, group: str) -> dict[str, ArgumentParser]:
     """Add sub-parsers and the list of them that the help page shows."""
+    commands = {
+        name.removeprefix(group).lstrip(): text
+        for name, (text, _) in COMMANDS.items()
+        if name.rpartition(' ')[0] == group
+    }
     width = max(map(len, commands))
-    listing = '\n'.join(f'{name.ljust(width)}  {text}' for name, (text, _) in commands.items())
     # not required: without a verb the group's help is shown, with exit code 0
     subparsers = parser.add_subparsers(
         title='Commands',
-        description=listing,
-        metavar=f'Call `{cli_name} <command> -h` for more detailed usage.',
+        description='\n'.join(f'{name.ljust(width)}  {text}' for name, text in commands.items()),
+        metavar=f'Call `{f"{PROGRAM} {group}".rstrip()} <command> -h` for more detailed usage.',
         required=False,
     )
     return {
         name: subparsers.add_parser(
             name, description=text, formatter_class=RawDescriptionHelpFormatter
         )
-        for name, (text, _) in commands.items()
+        for name, text in commands.items()
     }

@@ -18,12 +18,9 @@ from types import FrameType
 def keys(enabled: bool = True) -> Iterator[Callable[[], str]]:
     """Read keys without waiting for Enter.
 
-    Args:
-        enabled: Whether to read at all.
-
     Yields:
-        A function that returns what was typed since it was called last; always nothing where
-        standard input is no terminal, or belongs to another process group.
+        A function that returns what was typed since it was called last; always nothing unless
+        enabled, or where standard input is no terminal, or belongs to another process group.
     """
     if not enabled or not has_keyboard():
         yield lambda: ''

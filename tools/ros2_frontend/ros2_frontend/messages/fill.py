@@ -184,12 +184,9 @@ class Filler:
     stamps: list[Callable[[Message], None]] = field(default_factory=list)
 
     def fill(self, message: Message, values: object, path: str = '') -> None:
-        """Set the fields of a message.
+        """Set the fields of a message that `values`, a mapping or None, names.
 
-        Args:
-            message: The message; fields that `values` does not name keep their value.
-            values: A mapping of field names to values; None is an empty one.
-            path: Where the message stands in a larger one, for error messages.
+        `path` is where the message stands in a larger one, for error messages.
 
         Raises:
             FieldValueError: When a field does not exist or cannot take its value.

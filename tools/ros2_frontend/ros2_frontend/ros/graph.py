@@ -79,11 +79,9 @@ class Session:
 
 @contextlib.contextmanager
 def open_session(args: Namespace, node_name: str | None = None) -> Iterator[Session]:
-    """Join the ROS graph for one command.
+    """Join the ROS graph for one command, by a node that is gone from it afterwards.
 
-    Args:
-        args: Parsed arguments; `use_sim_time` is looked at.
-        node_name: Name of the node; None makes a hidden one. It is gone from the graph afterwards.
+    Without a name it is a hidden one.
 
     Raises:
         FrontendError: The node's name, or another that the session uses, is malformed.
