@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 
 from arm_canopen.config import FactorGroup
 from canopen_core.can import Frame
@@ -91,7 +92,12 @@ class Device:
         self._send = self._line.send
         self._nmt = NmtSlave(self.node_id, self._reset, self._nmt_changed, boot_time)
         self._errors = EmcyProducer(self.store, self._send)
-        self._sync = SyncConsumer(self.store, self._on_sync, self._on_sync_length, self._subscribe)
+        self._sync = SyncConsumer(
+            self.store,
+            self._on_sync,
+            partial(self._errors.set_error, SYNC_LENGTH_ERROR),
+            self._subscribe,
+        )
         # its axes; none when the device is not a drive
         self.drives = tuple(
             Drive(
@@ -355,9 +361,6 @@ class Device:
         for drive in self.drives:
             drive.sync(now)
         self._tpdos.poll(now)
-
-    def _on_sync_length(self, wrong: bool, now: float) -> None:
-        self._errors.set_error(SYNC_LENGTH_ERROR, wrong, now)
 
 
 SIMULATED_SPEED = 0x2000  # of cia406_encoder.eds: how fast the shaft turns in [units/s]

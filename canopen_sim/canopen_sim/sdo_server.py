@@ -116,7 +116,7 @@ class BlockUpload:
         self._sent = 0
         if complete:
             self._ended = True
-            return [self._end()]
+            return [sdo.end_frame(sdo.UPLOAD_END, self._data, with_crc=self._with_crc)]
         self._set_block(segments)
         return self._block()
 
@@ -129,9 +129,6 @@ class BlockUpload:
         frames = sdo.block_frames(self._data, self._position, self._segments)
         self._sent = len(frames)
         return frames
-
-    def _end(self) -> bytes:
-        return sdo.end_frame(sdo.UPLOAD_END, self._data, with_crc=self._with_crc)
 
 
 FRAME_BYTES = 8  # [byte] shorter frames are no SDO

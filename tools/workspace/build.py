@@ -109,18 +109,13 @@ class Builder:
     def leftovers(self, wanted: Iterable[str]) -> list[str]:
         """Name what is installed and not among the packages that are wanted."""
         keep = set(wanted)
-        marks = self.layout.install.glob(
-            f'{self._prefixes}share/ament_index/resource_index/packages/*'
-        )
+        prefixes = '' if self._on_wheels else '*/'
+        marks = self.layout.install.glob(f'{prefixes}share/ament_index/resource_index/packages/*')
         # a second name of a package, for its programs, has no folder
         names = {mark.name for mark in marks if (mark.parents[3] / mark.name).is_dir()}
         return sorted(
             name for name in names if name not in keep or self._stamp(name)[0] != self.base
         )
-
-    @property
-    def _prefixes(self) -> str:
-        return '' if self._on_wheels else '*/'
 
     def build(self, runner: Runner, packages: Mapping[str, Package], stale: list[str]) -> None:
         """Build the stale ones of packages from nothing; each stands after those that it needs.

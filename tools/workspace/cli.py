@@ -39,11 +39,7 @@ class Target:
 
 
 def plan(environment: Environment, target: Target) -> list[Step]:
-    """List the steps from what is there to what is wanted.
-
-    Raises:
-        WorkspaceError: The workspace does not have a package or an extra that is wanted.
-    """
+    """List the steps from what is there to what is wanted."""
     layout = environment.layout
     found = find_packages(layout.root)
     packages = needed_packages(found, target.packages, environment.underlay, tests=target.dev)
@@ -72,11 +68,7 @@ def plan(environment: Environment, target: Target) -> list[Step]:
 
 
 def carry_out(steps: Sequence[Step], runner: Runner) -> None:
-    """Do the steps, each announced and timed.
-
-    Raises:
-        WorkspaceError: A step failed; those before it stay done.
-    """
+    """Do the steps, each announced and timed."""
     begin = time.monotonic()
     for number, step in enumerate(steps, 1):
         head = f'[{number}/{len(steps)}] {step.title}'
@@ -99,11 +91,7 @@ def pinned_names(requirements: Path) -> list[str]:
 
 
 def renew(layout: Layout, runner: Runner) -> None:
-    """Pin the newest versions that fit, with their hashes, for every supported Python.
-
-    Raises:
-        WorkspaceError: They cannot be fetched, or do not fit together.
-    """
+    """Pin the newest versions that fit, with their hashes, for every supported Python."""
     for name in pinned_names(layout.requirements):
         print(f'Pinning {name}.in', flush=True)
         command: list[Argument] = [

@@ -73,11 +73,7 @@ class Interpreter:
 
 
 def probe(program: str) -> Interpreter:
-    """Query an interpreter, by its path or a name on PATH.
-
-    Raises:
-        WorkspaceError: It cannot be started.
-    """
+    """Query an interpreter, by its path or a name on PATH."""
     try:
         answer = subprocess.run(
             [program, '-c', _QUESTIONS], check=True, capture_output=True, text=True
@@ -91,11 +87,7 @@ def probe(program: str) -> Interpreter:
 
 
 def check_supported(underlay: Underlay, python: Interpreter, root: Path) -> None:
-    """Refuse a machine, a Python or a place of the checkout that no remedy here can help.
-
-    Raises:
-        WorkspaceError: One of them is not supported.
-    """
+    """Refuse a machine, a Python or a place of the checkout that no remedy here can help."""
     if any(character.isspace() for character in str(root)):
         raise WorkspaceError(
             f'The path of the checkout has a space in it: {root}',

@@ -277,10 +277,11 @@ class StateMachine:
 
     def _go(self, transition: Transition, now: float) -> bool:
         """Pass a transition; return whether the state has changed."""
+        without_mode = self._objects.mode_display.value == OperationMode.NO_MODE
         match transition.number:
             case 3 | 4 if not self.voltage:
                 return False
-            case 4 if self._without_mode and Fault.MODE_REQUIRED in self._causes:
+            case 4 if without_mode and Fault.MODE_REQUIRED in self._causes:
                 return False
             case 4:
                 self._axis.power_on(self._objects.slow_down)
@@ -300,10 +301,6 @@ class StateMachine:
             case _:
                 self.state = transition.target
         return True
-
-    @property
-    def _without_mode(self) -> bool:
-        return self._objects.mode_display.value == OperationMode.NO_MODE
 
     def _enable(self, now: float) -> bool:
         self.state = State.OPERATION_ENABLED

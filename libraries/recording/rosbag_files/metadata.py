@@ -232,11 +232,7 @@ def _file_dict(file: BagFile) -> dict[str, Any]:
 
 
 def load_metadata(path: Path) -> BagMetadata:
-    """Read a metadata.yaml; of any version up to 9.
-
-    Raises:
-        BagError: It cannot be read or has not what it needs to have.
-    """
+    """Read a metadata.yaml; of any version up to 9."""
     try:
         document = yaml.safe_load(path.read_text(encoding='utf-8'))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
@@ -297,11 +293,7 @@ def _topic(each: Mapping[str, Any], path: Path) -> TopicCount:
 
 
 def parse_profiles(profiles: object, where: str) -> tuple[OfferedQos, ...]:
-    """Read a list of QoS profiles; before version 9 it was YAML in a text.
-
-    Raises:
-        BagError: It is no such list.
-    """
+    """Read a list of QoS profiles; before version 9 it was YAML in a text."""
     if isinstance(profiles, str):
         try:
             profiles = yaml.safe_load(profiles)

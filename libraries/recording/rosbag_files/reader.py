@@ -95,9 +95,6 @@ class BagReader:
         """Yield the messages of some or all topics in the order in which they were received.
 
         They begin with a time in [ns since 1970].
-
-        Raises:
-            BagError: A file is missing.
         """
         by_message = self.metadata.compression_mode == 'MESSAGE'
         unpack = zstandard.ZstdDecompressor().decompress if by_message else bytes
@@ -155,11 +152,7 @@ class BagReader:
 
 
 def recording_files(folder: Path) -> list[Path]:
-    """The files of a recording in their order.
-
-    Raises:
-        BagError: There is none.
-    """
+    """The files of a recording in their order."""
     named = (path for path in folder.iterdir() if _NUMBER.search(path.name))
     # one that is being compressed is there twice, whole where it is not compressed
     by_number = {_number(path): path for path in sorted(named, key=lambda p: p.suffix != '.zstd')}

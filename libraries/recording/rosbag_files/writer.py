@@ -54,7 +54,7 @@ class WriterOptions:
 
 
 class BagWriter:
-    """Writes one recording; `close` it at the end.
+    """Writes one recording; `close` it at the end. What cannot be written is a BagError.
 
     Attributes:
         folder: Where it is.
@@ -82,9 +82,6 @@ class BagWriter:
         """Announce a topic before its first message, or renew what is known of it.
 
         Of one that is known, QoS profiles are renewed: in metadata.yaml, and in the next file.
-
-        Raises:
-            BagError: It cannot be written.
         """
         if topic.name not in self._topics:
             with _errors(self._file.path):
@@ -98,9 +95,6 @@ class BagWriter:
 
         It was received at `log_time` and published at `publish_time` in [ns since 1970]; MCAP
         keeps 32 bits of the number that its publisher gave it.
-
-        Raises:
-            BagError: It cannot be written.
         """
         with _errors(self._file.path):
             if self._is_full(log_time):
@@ -110,20 +104,12 @@ class BagWriter:
         self._counts[name] += 1
 
     def flush(self) -> None:
-        """Hand everything to the operating system, so that it outlives this process.
-
-        Raises:
-            BagError: It cannot be written.
-        """
+        """Hand everything to the operating system, so that it outlives this process."""
         with _errors(self._file.path):
             self._file.flush()
 
     def close(self) -> BagMetadata:
-        """Finish the last file and write metadata.yaml.
-
-        Raises:
-            BagError: It cannot be written.
-        """
+        """Finish the last file and write metadata.yaml."""
         with _errors(self.folder):
             self._finish_file()
             metadata = self._metadata(self._done)

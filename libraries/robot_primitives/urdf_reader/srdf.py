@@ -74,11 +74,7 @@ class SemanticDescription:
         )
 
     def group(self, name: str) -> Group:
-        """Return a group.
-
-        Raises:
-            DescriptionError: There is none of this name; lists those that there are.
-        """
+        """Return a group."""
         if name not in self.groups:
             known = ', '.join(self.groups) or 'none'
             raise DescriptionError(f'there is no group {name!r} in the SRDF; groups: {known}')
@@ -86,11 +82,7 @@ class SemanticDescription:
 
 
 def parse_srdf(text: str) -> SemanticDescription:
-    """Read an SRDF.
-
-    Raises:
-        DescriptionError: The text is no SRDF.
-    """
+    """Read an SRDF."""
     try:
         root = ET.fromstring(text)  # noqa: S314  a robot's own description, not from the network
     except ET.ParseError as error:
@@ -109,15 +101,13 @@ def parse_srdf(text: str) -> SemanticDescription:
     }
     fixed = (each for each in root.findall('virtual_joint') if each.get('type') == 'fixed')
     world_frames = tuple(filter(None, (each.get('parent_frame') for each in fixed)))
-    effectors = tuple(map(_end_effector, root.findall('end_effector')))
+    keys = ('name', 'group', 'parent_link', 'parent_group')
+    effectors = tuple(
+        EndEffector(*(each.get(key, '') for key in keys)) for each in root.findall('end_effector')
+    )
     return SemanticDescription(
         groups, poses, disabled, unchecked, enabled, effectors, passive, virtual, world_frames
     )
-
-
-def _end_effector(element: ET.Element) -> EndEffector:
-    keys = ('name', 'group', 'parent_link', 'parent_group')
-    return EndEffector(*(element.get(key, '') for key in keys))
 
 
 def _pairs(root: ET.Element, tag: str) -> frozenset[Pair]:

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The kinematic tree of a URDF: links and their shapes, joints, and which joints follow others.
 
-Format: http://wiki.ros.org/urdf/XML. Links, joints and their origins are checked at once, limits
-and collision shapes when they are read: a viewer does without.
+Format: http://wiki.ros.org/urdf/XML. Links, joints and their origins are checked at once, limits,
+shapes and masses when they are read: a viewer does without. What is not usable is a
+DescriptionError.
 """
 
 from __future__ import annotations
@@ -140,11 +141,7 @@ class UrdfShape:
     note: str = ''  # why its color is not usable; empty where it is, or where there is none
 
     def lengths(self, *names: str) -> tuple[float, ...]:
-        """Return the numbers of some of its attributes in [m].
-
-        Raises:
-            DescriptionError: One is missing, or no number.
-        """
+        """Return the numbers of some of its attributes in [m]."""
         try:
             return tuple(float(word) for name in names for word in self.attributes[name].split())
         except (KeyError, ValueError) as error:
@@ -177,11 +174,7 @@ class KinematicTree:
         return (joint for joint in self.joints if joint.kind in MOVABLE)
 
     def ranges(self) -> dict[str, JointRange]:
-        """Return how far and how fast the joints with a freedom of their own move, by name.
-
-        Raises:
-            DescriptionError: One has no usable ``<limit>``.
-        """
+        """Return how far and how fast the joints with a freedom of their own move, by name."""
         return {joint.name: joint.range for joint in self.joints if joint.independent}
 
     def chain(self, base: str, tip: str) -> list[Joint]:
@@ -209,27 +202,15 @@ class KinematicTree:
         return joints[::-1]
 
     def collisions(self) -> Iterator[UrdfShape]:
-        """Go through the collision shapes of all links.
-
-        Raises:
-            DescriptionError: The origin of one is not usable.
-        """
+        """Go through the collision shapes of all links."""
         return self._shapes('collision')
 
     def visuals(self) -> Iterator[UrdfShape]:
-        """Go through what the links look like.
-
-        Raises:
-            DescriptionError: The origin of one is not usable.
-        """
+        """Go through what the links look like."""
         return self._shapes('visual')
 
     def masses(self) -> Iterator[PointMass]:
-        """Go through the masses of the links that have one.
-
-        Raises:
-            DescriptionError: A number of one is not usable.
-        """
+        """Go through the masses of the links that have one."""
         for link in self._robot.findall('link'):
             inertial = link.find('inertial')
             mass = None if inertial is None else inertial.find('mass')

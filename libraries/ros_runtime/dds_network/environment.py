@@ -156,9 +156,6 @@ def restrict_dds(environ: MutableMapping[str, str]) -> Reach:
 
     Call it before rclpy.init, as Fast DDS reads its profile once. The environment, ``os.environ``
     or that of a process to start, is changed.
-
-    Raises:
-        NetworkChoiceError: As of :func:`selected_reach`.
     """
     reach = selected_reach(environ)
     environ.update(dds_variables(environ, reach))
@@ -166,20 +163,12 @@ def restrict_dds(environ: MutableMapping[str, str]) -> Reach:
 
 
 def open_dds(environ: MutableMapping[str, str], names: str | None) -> str:
-    """Do the same for a program with the option ``--network``, which overrides the variable.
-
-    Raises:
-        NetworkChoiceError: As of :func:`selected_reach`.
-    """
+    """Do the same for a program with the option ``--network``, which overrides the variable."""
     if names is not None:
         environ[NETWORK_VARIABLE] = names
     return restrict_dds(environ).describe()
 
 
 def is_this_host(environ: Mapping[str, str]) -> bool:
-    """Return whether DDS of a process with this environment reaches this host only.
-
-    Raises:
-        NetworkChoiceError: As of :func:`selected_reach`.
-    """
+    """Return whether DDS of a process with this environment reaches this host only."""
     return selected_reach(environ).is_this_host

@@ -143,11 +143,7 @@ class FastPublisher:
         self._templates: dict[MessageTemplate, SerializedTemplate] = {}
 
     def publish(self, form: MessageTemplate, time: int, numbers: Sequence[float]) -> None:
-        """Publish a message of a form, with a time [ns] and numbers.
-
-        Raises:
-            ValueError: The form does not put its stamp or one of its numbers into the message.
-        """
+        """Publish a message of a form, with a time [ns] and numbers."""
         template = self._templates.get(form)
         if template is None:
             template = self._templates[form] = SerializedTemplate(form)

@@ -17,22 +17,14 @@ from rclpy.node import Node
 from rclpy.service import Service
 
 
-def _result(_: Any, outcome: Future[Any]) -> Any:  # noqa: ANN401
-    return outcome.result()
-
-
-def _at_once(work: Callable[[], None]) -> None:
-    work()
-
-
 def create_deferred_service(
     node: Node,
     kind: Any,  # noqa: ANN401  # service classes have no type
     name: str,
     begin: Callable[[Any], Future[Any]],
-    respond: Callable[[Any, Future[Any]], Any] = _result,
+    respond: Callable[[Any, Future[Any]], Any] = lambda _, outcome: outcome.result(),
     *,
-    post: Callable[[Callable[[], None]], None] = _at_once,
+    post: Callable[[Callable[[], None]], None] = lambda work: work(),
 ) -> Service:
     """Create a service; its response is sent when a future is done.
 

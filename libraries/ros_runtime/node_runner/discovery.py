@@ -71,7 +71,8 @@ class ServerMatch:
             for name, probe in self._probes.items():
                 if probe.service_is_ready():
                     self._answers[name].append(probe.call_async(GetParameterTypes.Request()))
-        if self._services or not all(map(_answered, self._answers.values())):
+        answered = (any(each.done() for each in tries) for tries in self._answers.values())
+        if self._services or not all(answered):
             return False
         for probe in self._probes.values():
             self._node.destroy_client(probe)
@@ -93,7 +94,3 @@ class ServerMatch:
                 self._probes[probe] = self._node.create_client(GetParameterTypes, probe)
                 self._answers[probe] = []
                 self._asked = -math.inf
-
-
-def _answered(futures: list[Future]) -> bool:
-    return any(future.done() for future in futures)

@@ -110,7 +110,7 @@ class RosLogBridge(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Queue a record; never waits."""
-        if not self._limit.admit(_source(record), self._clock()):
+        if not self._limit.admit(f'{record.name}:{record.lineno}', self._clock()):
             return
         if len(self._records) >= QUEUE_LENGTH:
             self._dropped += 1
@@ -160,10 +160,6 @@ def log_as(node: Node) -> None:
     for handler in logging.getLogger().handlers:
         if isinstance(handler, RosLogBridge):
             handler.attach(node)
-
-
-def _source(record: logging.LogRecord) -> str:
-    return f'{record.name}:{record.lineno}'
 
 
 def _log(logger: RcutilsLogger, level: int, message: str) -> None:

@@ -112,11 +112,6 @@ class Demo(ABC, Generic[ClientT]):
             self._phase = phase
             self._screen.enter(phase)
 
-    def warn(self, text: str) -> None:
-        """Show a warning while the demo goes on."""
-        if self._screen is not None:
-            self._screen.notice(Notice(Severity.WARNING, text))
-
     def show(self) -> None:
         """Draw a new picture, when the last one is old enough."""
         now = time.monotonic()

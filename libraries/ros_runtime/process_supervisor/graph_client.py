@@ -68,12 +68,7 @@ class GraphClient:
             self._executor.spin_once(timeout_sec=SPIN)
 
     def wait_until_known(self, services: Collection[str], timeout: float) -> None:
-        """Wait until the nodes of services know the clients of this one, or answers are lost.
-
-        Raises:
-            CallError: They did not in time.
-            GivenUpError: It is no longer wanted.
-        """
+        """Wait as :meth:`wait_until` for nodes of services to know the clients of this one."""
         if unknown := set(services) - self._known:
             match = ServerMatch(self.node, unknown)
             self.wait_until(match.advance, timeout, f'the nodes of {", ".join(sorted(unknown))}')

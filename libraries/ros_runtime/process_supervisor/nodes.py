@@ -100,11 +100,7 @@ def write_parameters(file: Path, urdf: str) -> None:
 
 
 def namespaced_parameters(file: Path, ros: RosOptions, folder: Path) -> Path:
-    """Make a parameter file reach its nodes in a namespace, and count less than a person's words.
-
-    Raises:
-        StartError: It is no parameter file.
-    """
+    """Make a parameter file reach its nodes in a namespace, and count less than a person."""
     import yaml
 
     moved: dict[str, object] = {}
@@ -127,8 +123,10 @@ def parameters_by_node(file: Path) -> dict[str, Any]:
     Raises:
         StartError: It is no parameter file.
     """
+    import yaml
+
     found: dict[str, Any] = {}
-    for name, values in _read_parameters(file, _interpreted):
+    for name, values in _read_parameters(file, yaml.safe_load):
         own = name.rpartition('/')[2]
         found = _merged(found, {ANY_NODE if own.strip('*') == '' else own: {VALUES: values}})
     return found
@@ -143,13 +141,7 @@ def _read_parameters(file: Path, read: Callable[[str], Any]) -> list[tuple[str, 
         raise StartError(f'{file}: no ROS parameter file: {error}') from error
 
 
-def _interpreted(text: str) -> Any:  # noqa: ANN401  # whatever stands in a file
-    import yaml
-
-    return yaml.safe_load(text)
-
-
-def _verbatim(text: str) -> Any:  # noqa: ANN401
+def _verbatim(text: str) -> Any:  # noqa: ANN401  # whatever stands in a file
     """Read mappings, and leave values as they stand: rcl reads 1e-3 and 1:30 otherwise."""
     import yaml
 
@@ -305,11 +297,7 @@ def node_process(
     ready_timeout: float,
     stop_order: int,
 ) -> ProcessSpec:
-    """Return the process of a node that reports when it is ready.
-
-    Raises:
-        StartError: The executable is missing.
-    """
+    """Return the process of a node that reports when it is ready."""
     program, *ros_arguments = node_argv(executable, find, values, parameters, ros)
     return ProcessSpec(
         name=name,

@@ -83,13 +83,10 @@ class _Child:
         self.name = spec.name
         self.pidfd = os.pidfd_open(self.process.pid)
         self.splitter = LineSplitter()
-        self.output = self._raw_output()
-
-    def _raw_output(self) -> int:
         if self.process.stdout is None:
             raise StartError(f'{self.name}: no pipe for its output')
-        os.set_blocking(self.process.stdout.fileno(), False)
-        return self.process.stdout.fileno()
+        self.output = self.process.stdout.fileno()
+        os.set_blocking(self.output, False)
 
     def send(self, number: signal.Signals) -> None:
         with contextlib.suppress(ProcessLookupError):
@@ -191,15 +188,13 @@ class Runner:
 
     def _loop(self) -> None:
         while self._supervision.phase is not Phase.STOPPED:
-            for key, _ in self._selector.select(self._time_left()):
+            deadline = self._supervision.next_deadline()
+            left = None if deadline is None else max(0.0, deadline - time.monotonic())
+            for key, _ in self._selector.select(left):
                 # an earlier handler of this round may have closed it
                 if self._selector.get_map().get(key.fd) is key:
                     key.data()
             self._supervision.advance(time.monotonic())
-
-    def _time_left(self) -> float | None:
-        deadline = self._supervision.next_deadline()
-        return None if deadline is None else max(0.0, deadline - time.monotonic())
 
     def _start(self, spec: ProcessSpec) -> None:
         child = _Child(spec)

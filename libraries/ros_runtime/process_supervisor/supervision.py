@@ -192,8 +192,9 @@ class Supervision:
         how = describe_exit(returncode)
         if self.phase is Phase.STOPPING:
             self._stopping.exited(name)
-            self._say(f'{name} {how}', _severity(returncode))
-            crashed = returncode < 0 and returncode not in GOOD_ENDS and child.spec.required
+            is_good = returncode in GOOD_ENDS
+            self._say(f'{name} {how}', Severity.INFO if is_good else Severity.WARNING)
+            crashed = returncode < 0 and not is_good and child.spec.required
             if crashed and self.outcome and not self.outcome.exit_code:
                 forced = name in self._stopping.forced
                 reason = f'{name} {"had to be killed" if forced else how}'
@@ -216,11 +217,6 @@ class Supervision:
         child.ends, child.restart = child.ends + 1, now + delay
         text = f'{child.spec.name} {how}; it is started again in {delay:g} s'
         self._notify(Notice(Severity.WARNING, text, child.spec.name))
-
-    def _restart_ended(self, now: float) -> None:
-        for child in self._children.values():
-            if now >= child.restart and (why := self._run(child, now)):
-                self._plan_restart(child, why, now)
 
     def interrupt(self, now: float) -> None:
         """Ctrl-C: stop; again, later than :data:`ECHO_TIME`: stop at once."""
@@ -250,7 +246,9 @@ class Supervision:
     def advance(self, now: float) -> None:
         """Do what is due."""
         if self.phase in {Phase.STARTING, Phase.RUNNING}:
-            self._restart_ended(now)
+            for child in self._children.values():
+                if now >= child.restart and (why := self._run(child, now)):
+                    self._plan_restart(child, why, now)
             self._check_deadlines(now)
         elif self.phase is Phase.STOPPING:
             self._advance_stop(now)
@@ -301,10 +299,6 @@ class Supervision:
 
     def _say(self, text: str, severity: Severity = Severity.INFO) -> None:
         self._notify(Notice(severity, text))
-
-
-def _severity(returncode: int) -> Severity:
-    return Severity.INFO if returncode in GOOD_ENDS else Severity.WARNING
 
 
 def describe_exit(returncode: int) -> str:

@@ -60,9 +60,7 @@ def leave() -> None:
     os._exit(1)
 
 
-def supervise(
-    processes: Sequence[ProcessSpec], name: str = 'bringup', shutdown: Shutdown | None = None
-) -> Outcome:
+def supervise(processes: Sequence[ProcessSpec], shutdown: Shutdown | None = None) -> Outcome:
     """Run processes with their output on standard output, until Ctrl-C or one ends.
 
     That all are ready, and that all are stopped, is reported to systemd, or what else
@@ -70,7 +68,7 @@ def supervise(
     stopped, if all had got ready.
     """
     names = [spec.name for spec in processes]
-    painter = Painter(name, names, wants_colour(sys.stdout, os.environ))
+    painter = Painter('bringup', names, wants_colour(sys.stdout, os.environ))
     write = LineWriter(sys.stdout)
 
     def notify(notice: Notice) -> None:

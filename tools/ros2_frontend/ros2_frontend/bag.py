@@ -13,11 +13,35 @@ import sys
 
 from rosbag_files import BagError, BagReader, OfferedQos, read_qos
 
-from .cli.commands import FrontendError
+from .cli.commands import argument, FrontendError
 from .names import absolute, is_hidden
 
 Accepts = Callable[[str, str], bool]
 """Whether a topic, by its name and type, is chosen."""
+
+STORAGE = argument(
+    '-s', '--storage', default='mcap', choices=['mcap'], help='Storage identifier: mcap'
+)
+CHOICE = (
+    argument('--topics', default=[], metavar='Topic', nargs='+', help='Topics to choose.'),
+    argument('-e', '--regex', default='', help='Choose topics with this regular expression.'),
+    argument(
+        '-x',
+        '--exclude-regex',
+        '--exclude',
+        default='',
+        help='Leave out topics with this regular expression.',
+    ),
+    argument(
+        '--exclude-topics', default=[], metavar='Topic', nargs='+', help='Topics to leave out.'
+    ),
+    argument(
+        '--qos-profile-overrides-path',
+        metavar='FILE',
+        help='YAML file with QoS profiles for specific topics.',
+    ),
+)
+"""Options by which topics are chosen, of those that are there or are recorded."""
 
 
 @contextlib.contextmanager

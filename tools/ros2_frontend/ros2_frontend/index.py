@@ -13,18 +13,14 @@ import sys
 
 from message_definitions import nested_type
 
-from .cli.commands import BadTypeError, FrontendError, hint, UnknownNameError
+from .cli.commands import FrontendError, hint, UnknownNameError
 from .names import InterfaceClass
 
 _RESOURCE = 'rosidl_interfaces'
 
 
 def package_prefixes() -> Mapping[str, str]:
-    """Return the prefix path of each installed package by its name, sorted.
-
-    Raises:
-        FrontendError: The environment is not set up.
-    """
+    """Return the prefix path of each installed package by its name, sorted."""
     from ament_index_python.packages import get_packages_with_prefixes
 
     try:
@@ -80,9 +76,6 @@ def interfaces_of(package: str, kinds: Iterable[Kind] = Kind) -> list[str]:
     """Return the interfaces of one package, e.g. `std_msgs/msg/String`, sorted.
 
     Those that the generators derive from a service or an action are left out.
-
-    Raises:
-        UnknownNameError: The package defines none; it names the nearest.
     """
     from ament_index_python import get_resource, get_resources
 
@@ -121,7 +114,7 @@ def class_of(name: str, kind: Kind, refusal: str) -> InterfaceClass:
     """Import the Python class of `package/kind/Name`, or `package/Name`.
 
     Raises:
-        BadTypeError: It cannot be imported; after the refusal of ros2cli, it names the nearest.
+        FrontendError: It cannot be imported; after the refusal of ros2cli, it names the nearest.
     """
     parts = name.split('/')
     if len(parts) == 2:
@@ -130,18 +123,14 @@ def class_of(name: str, kind: Kind, refusal: str) -> InterfaceClass:
         package, folder, base = parts
         found = getattr(importlib.import_module(f'{package}.{folder}'), base)
     except (AttributeError, ImportError, ValueError):
-        raise BadTypeError(refusal + _near(name, [kind])) from None
+        raise FrontendError(refusal + _near(name, [kind])) from None
     if folder != kind.value:
-        raise BadTypeError(f'{refusal}: {name} is no {kind.name.lower()}')
+        raise FrontendError(f'{refusal}: {name} is no {kind.name.lower()}')
     return found
 
 
 def definition_path(name: str) -> Path:
-    """Return the file that defines `package/kind/Name`: `.idl` only where it was written in that.
-
-    Raises:
-        UnknownNameError: The name is malformed or not installed; it names the nearest.
-    """
+    """Return the file that defines `package/kind/Name`: `.idl` only where written in that."""
     from ament_index_python import get_package_share_directory
 
     parts = name.split('/')

@@ -26,10 +26,6 @@ class UnknownNameError(FrontendError, LookupError):
     """Nothing has the name that was given, e.g. ``topic info /chater``."""
 
 
-class BadTypeError(FrontendError, TypeError):
-    """An interface type that is not installed or not of the wanted kind."""
-
-
 class FieldValueError(FrontendError, ValueError):
     """A value that a message cannot take, e.g. an unknown field or text for a number."""
 

@@ -187,9 +187,6 @@ class Filler:
         """Set the fields of a message that `values`, a mapping or None, names.
 
         `path` is where the message stands in a larger one, for error messages.
-
-        Raises:
-            FieldValueError: When a field does not exist or cannot take its value.
         """
         values = {} if values is None else values
         kind, fields = type(message).__name__, message.get_fields_and_field_types()

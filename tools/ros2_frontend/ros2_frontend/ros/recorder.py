@@ -34,7 +34,7 @@ _FLUSH_PERIOD = 1.0  # [s]; what a SIGKILL may cost
 
 
 class Recorder:
-    """Records into a writer until it is stopped.
+    """Records into a writer until it is stopped. What cannot be written is a FrontendError.
 
     Attributes:
         paused: Whether messages are dropped at the moment, because the user wants that.
@@ -64,11 +64,7 @@ class Recorder:
         self._clock = self._subscribe_clock() if args.sim_time else None
 
     def run(self, poll: Callable[[], None]) -> None:
-        """Record until an exception, which is how Ctrl-C arrives; poll between two rounds.
-
-        Raises:
-            FrontendError: The recording cannot be written.
-        """
+        """Record until an exception, which is how Ctrl-C arrives; poll between two rounds."""
         self._graph.settle(lambda: self._round(discovery=True))
         self._log.info('All requested topics are subscribed. Recording...')
         while True:
@@ -77,11 +73,7 @@ class Recorder:
             time.sleep(_TAKE_PERIOD)
 
     def stop(self) -> None:
-        """Write what has arrived, and report what was lost.
-
-        Raises:
-            FrontendError: The recording cannot be written.
-        """
+        """Write what has arrived, and report what was lost."""
         try:
             self._take()
             self._confirm()
@@ -284,20 +276,12 @@ class _WriterThread:
         self._jobs.append((self._writer.write, job, size))
 
     def check(self) -> None:
-        """Raise what the thread met.
-
-        Raises:
-            FrontendError: The recording cannot be written.
-        """
+        """Raise what the thread met."""
         if self._error is not None:
             raise FrontendError(str(self._error))
 
     def close(self) -> None:
-        """Write what waits and finish the recording.
-
-        Raises:
-            FrontendError: The recording cannot be written.
-        """
+        """Write what waits and finish the recording."""
         self._closing.set()
         self._thread.join()
         self.check()

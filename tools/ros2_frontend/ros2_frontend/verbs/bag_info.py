@@ -10,7 +10,7 @@ import time
 
 from rosbag_files import BagMetadata, repair
 
-from ..bag import bag_errors, open_bag
+from ..bag import bag_errors, open_bag, STORAGE
 from ..cli.commands import argument, flag, verb
 
 _INDENT = 19
@@ -18,7 +18,6 @@ _NANO = 1_000_000_000
 _UNITS = ('B', 'KiB', 'MiB', 'GiB', 'TiB')
 
 _BAG = argument('bag_path', help='Bag to open')
-_STORAGE = argument('-s', '--storage', choices=['mcap'], help='Storage identifier: mcap')
 
 
 def info_text(metadata: BagMetadata, size: int) -> str:
@@ -68,7 +67,7 @@ def _moment(nanoseconds: int) -> str:
     return f'{day}.{rest:09d} ({_seconds(nanoseconds)})'
 
 
-@verb(_BAG, _STORAGE, flag('-t', '--topic-name', help='Only display topic names.'))
+@verb(_BAG, STORAGE, flag('-t', '--topic-name', help='Only display topic names.'))
 def info(args: Namespace) -> None:
     """Print what a recording has."""
     reader = open_bag(args.bag_path)
@@ -78,7 +77,7 @@ def info(args: Namespace) -> None:
         print(info_text(reader.metadata, reader.size()))
 
 
-@verb(_BAG, _STORAGE)
+@verb(_BAG, STORAGE)
 def reindex(args: Namespace) -> None:
     """Finish a recording whose recorder was killed."""
     with bag_errors():

@@ -13,7 +13,7 @@ import time
 
 from rosbag_files import BagMessage, OfferedQos, Topic
 
-from ..bag import bag_errors, load_overrides, open_bag, topic_filter
+from ..bag import bag_errors, CHOICE, load_overrides, open_bag, STORAGE, topic_filter
 from ..cli.commands import argument, flag, FrontendError, positive_float, unsigned_float, verb
 from ..cli.interrupts import has_keyboard, keys
 from ..index import class_of, Kind
@@ -32,15 +32,7 @@ def _remap(text: str) -> tuple[str, str]:
     return absolute(old), absolute(new)
 
 
-_CHOICE = (
-    argument('--topics', default=[], nargs='+', metavar='Topic', help='Topics to replay.'),
-    argument('-e', '--regex', default='', help='Play topics with this regular expression.'),
-    argument(
-        '-x', '--exclude-regex', default='', help='Leave out topics with this regular expression.'
-    ),
-    argument(
-        '--exclude-topics', default=[], nargs='+', metavar='Topic', help='Topics to leave out.'
-    ),
+_COURSE = (
     argument(
         '-m',
         '--remap',
@@ -50,13 +42,6 @@ _CHOICE = (
         metavar='OLD:=NEW',
         help='Topics to publish under other names.',
     ),
-    argument(
-        '--qos-profile-overrides-path',
-        metavar='FILE',
-        help='YAML file with QoS profiles for specific topics.',
-    ),
-)
-_COURSE = (
     argument(
         '-r', '--rate', type=positive_float, default=1.0, help='Rate at which to play (default: 1)'
     ),
@@ -84,8 +69,8 @@ _COURSE = (
 
 @verb(
     argument('bag_path', help='Bag to open'),
-    argument('-s', '--storage', choices=['mcap'], help='Storage identifier: mcap'),
-    *_CHOICE,
+    STORAGE,
+    *CHOICE,
     *_COURSE,
 )
 def play(args: Namespace) -> None:

@@ -12,7 +12,7 @@ import time
 
 from rosbag_files import BagWriter, Preset, WriterOptions
 
-from ..bag import bag_errors, load_overrides, topic_filter
+from ..bag import bag_errors, CHOICE, load_overrides, STORAGE, topic_filter
 from ..cli.commands import argument, flag, FrontendError, unsigned_int, verb
 from ..cli.interrupts import deferred_interrupts, keys
 from ..ros.graph import Graph, open_session
@@ -21,39 +21,20 @@ from ..ros.recorder import Recorder
 _NANO = 1_000_000_000
 
 
-_OUTPUT = (
-    argument(
-        '-o',
-        '--output',
-        help='Destination of the bagfile to create, defaults to a timestamped folder in the '
-        'current directory.',
-    ),
-    argument('-s', '--storage', default='mcap', choices=['mcap'], help='Storage identifier: mcap'),
+_OUTPUT = argument(
+    '-o',
+    '--output',
+    help='Destination of the bagfile to create, defaults to a timestamped folder in the '
+    'current directory.',
 )
 _TOPICS = (
     argument('topic_names', nargs='*', metavar='Topic', help='Topics to record'),
-    argument('--topics', default=[], metavar='Topic', nargs='+', help='List of topics to record.'),
     argument(
         '--topic-types', default=[], metavar='TopicType', nargs='+', help='Topic types to record.'
     ),
     flag('-a', '--all', help='Record all topics (hidden ones excluded).'),
     flag('--all-topics', help='Record all topics (hidden ones excluded).'),
-    argument(
-        '-e',
-        '--regex',
-        default='',
-        help='Record only topics containing provided regular expression. --all overrides it.',
-    ),
-    argument(
-        '-x',
-        '--exclude-regex',
-        '--exclude',
-        default='',
-        help='Exclude topics containing provided regular expression.',
-    ),
-    argument(
-        '--exclude-topics', default=[], metavar='Topic', nargs='+', help='Topics to leave out.'
-    ),
+    *CHOICE,
     argument(
         '--exclude-topic-types',
         default=[],
@@ -71,11 +52,6 @@ _TOPICS = (
         default=100,
         metavar='MS',
         help='Time [ms] between two looks for new topics (default: 100)',
-    ),
-    argument(
-        '--qos-profile-overrides-path',
-        metavar='FILE',
-        help='YAML file with QoS profiles for specific topics.',
     ),
 )
 _FILES = (
@@ -123,7 +99,7 @@ _BEHAVIOUR = (
 )
 
 
-@verb(*_OUTPUT, *_TOPICS, *_FILES, *_BEHAVIOUR)
+@verb(_OUTPUT, STORAGE, *_TOPICS, *_FILES, *_BEHAVIOUR)
 def record(args: Namespace) -> None:
     """Record until Ctrl-C or SIGTERM."""
     if args.topic_names:

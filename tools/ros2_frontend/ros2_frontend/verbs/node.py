@@ -9,7 +9,7 @@ from collections.abc import Callable
 import sys
 
 from ..cli.commands import Argument, argument, flag, hint, UnknownNameError, Verb
-from ..names import is_hidden, NamesAndTypes, NodeName
+from ..names import is_hidden, NodeName
 from ..ros.graph import Graph, graph_verb
 
 HIDDEN_NODES = flag('--include-hidden-nodes', help='Consider hidden nodes as well')
@@ -102,11 +102,10 @@ def info(graph: Graph, args: Namespace) -> None:
         ('Action Clients', get_action_client_names_and_types_by_node),
     ):
         entries = query(graph.session.node, wanted.name, wanted.namespace)
+        lines = [
+            f'    {name}: {", ".join(types)}'
+            for name, types in entries
+            if args.include_hidden or not is_hidden(name)
+        ]
         print(f'  {title}:')
-        _print_entries(entries, args.include_hidden)
-
-
-def _print_entries(entries: NamesAndTypes, include_hidden: bool) -> None:
-    shown = [(name, types) for name, types in entries if include_hidden or not is_hidden(name)]
-    # an empty block is one empty line
-    print(*(f'    {name}: {", ".join(types)}' for name, types in shown), sep='\n')
+        print(*lines, sep='\n')  # an empty block is one empty line
