@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 import urdf_reader
 from urdf_reader import Group, JointKind, KinematicTree, parse_srdf, read_urdf, SemanticDescription
 
-from process_supervisor import RosOptions, USAGE_ERROR
+from process_supervisor import RosOptions, Severity, USAGE_ERROR
 
 from .groups import given_positions
-from .motion_check import check_motion, error, Finding, Severity, warning
+from .motion_check import check_motion, error, Finding, warning
 from .robots import (
     BringupError,
     DescriptionError,

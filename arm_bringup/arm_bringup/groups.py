@@ -162,23 +162,12 @@ def motion_files(
     }
     if others := groups.names[1:]:  # an empty list has no type in a parameter file
         values['other_groups'] = list(others)
-    moveit_servo = {'frame_prefix': ros.frame_prefix}
-    servos = {'servo_node': {'ros__parameters': {'moveit_servo': moveit_servo}}} | {
-        f'{arm}_servo_node': {
-            'ros__parameters': {'group': arm, 'tip_link': '', 'moveit_servo': moveit_servo}
-        }
-        for arm in groups.arms[1:]
+    servo = {'moveit_servo': {'frame_prefix': ros.frame_prefix}}
+    nodes: dict[str, Mapping[str, object]] = {'': values, '/servo_node': servo}
+    nodes |= {
+        f'/{arm}_servo_node': {'group': arm, 'tip_link': '', **servo} for arm in groups.arms[1:]
     }
-    path = folder / 'motion.yaml'  # JSON is YAML, whatever characters are in it
-    path.write_text(
-        json.dumps(
-            {
-                EVERY_NODE: {'ros__parameters': values},
-                **{f'{EVERY_NODE}/{name}': values for name, values in servos.items()},
-            }
-        ),
-        encoding='utf-8',
-    )
+    path = _write(folder / 'motion.yaml', nodes)
     if not robot.controllers.is_file():
         return [path]
     return [path, namespaced_parameters(robot.controllers, ros, folder)]
@@ -197,10 +186,15 @@ def planning_files(
         for tool in groups.tools
     }
     own = {'moveit_simple_controller_manager': manager, 'frame_prefix': ros.frame_prefix}
-    values = {'ros__parameters': own}
-    path = folder / 'planning.yaml'
-    path.write_text(json.dumps({f'{EVERY_NODE}/move_group': values}), encoding='utf-8')
+    path = _write(folder / 'planning.yaml', {'/move_group': own})
     return [*motion_files(robot, folder, ros, groups), path]
+
+
+def _write(path: Path, nodes: Mapping[str, Mapping[str, object]]) -> Path:
+    """Write parameters by how names of nodes end; JSON is YAML, whatever characters are in it."""
+    table = {EVERY_NODE + name: {'ros__parameters': values} for name, values in nodes.items()}
+    path.write_text(json.dumps(table), encoding='utf-8')
+    return path
 
 
 def gripper_action(joints: Sequence[str]) -> str:
@@ -209,11 +203,7 @@ def gripper_action(joints: Sequence[str]) -> str:
 
 
 def controller_names(robot: Robot, groups: MovedGroups) -> dict[str, str]:
-    """Return the name of each group's controller; controllers.yaml may name that of the first.
-
-    Raises:
-        RobotError: A file cannot be read as what it should be.
-    """
+    """Return the name of each group's controller; controllers.yaml may name that of the first."""
     try:
         table = parameters_by_node(robot.controllers) if robot.controllers.is_file() else {}
     except StartError as error:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Findings of the check, and the part of it that needs kinematics.
 
-What is wrong is a :class:`Finding` of a :class:`Severity`, in all of ``check.py``. Here are those
+What is wrong is a :class:`Finding`, in all of ``check.py``. Here are those
 about limits, and about the pose that an arm starts from.
 """
 
@@ -11,13 +11,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 import difflib
-from enum import Enum
 import textwrap
 from typing import Any, TYPE_CHECKING
 
 from urdf_reader import DescriptionError, find_group, KinematicTree, SemanticDescription
 
-from process_supervisor import parameters_by_node, StartError
+from process_supervisor import parameters_by_node, Severity, StartError
 
 from .groups import choose_groups, controller_names, MovedGroups
 from .robots import read_semantic, Robot, RobotError, SETTINGS
@@ -27,21 +26,12 @@ if TYPE_CHECKING:
     from arm_model import JointLimits, RobotModel
 
 
-class Severity(Enum):
-    """How bad it is."""
-
-    ERROR = 'error'
-    """The robot does not run, or not as it is described."""
-
-    WARNING = 'warning'
-    """It runs; something will surprise."""
-
-
 @dataclass(frozen=True, slots=True)
 class Finding:
     """One thing that is wrong."""
 
-    severity: Severity  # how bad it is
+    # ERROR: the robot does not run, or not as it is described; WARNING: something will surprise
+    severity: Severity
     place: str  # file, and what in it
     problem: str  # what is wrong
     remedy: str  # what to do
@@ -110,7 +100,11 @@ def check_motion(
             model = RobotModel(urdf, text, limits, group, tip or None, moved_by_others=others)
             check_arm(model)
         except LimitsError as problem:
-            findings.append(error(robot.limits.name, str(problem), _limits_remedy(robot)))
+            remedy = (
+                f'give each joint of the group numbers above 0, none wider than in '
+                f'{robot.description.name}: max_velocity, max_acceleration and max_jerk'
+            )
+            findings.append(error(robot.limits.name, str(problem), remedy))
             continue
         except ModelError as problem:
             remedy = 'choose another group or tip_link, or correct the file'
@@ -148,13 +142,6 @@ def _not_executed(
                 f'plan for {min(whole)}; or name the groups to move in {SETTINGS}, as group: '
                 f'[{name}, ...]',
             )
-
-
-def _limits_remedy(robot: Robot) -> str:
-    return (
-        f'give each joint of the group numbers above 0, none wider than in'
-        f' {robot.description.name}: max_velocity, max_acceleration and max_jerk'
-    )
 
 
 def _note(robot: Robot, note: str) -> tuple[str, str, str]:

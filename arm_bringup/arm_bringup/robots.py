@@ -300,11 +300,7 @@ RELATIVE_MESH = re.compile(r'(<mesh\b[^>]*\bfilename\s*=\s*["\'])(?![a-z]+://|/)
 
 
 def read_description(robot: Robot) -> str:
-    """Return the URDF of a robot as XML text.
-
-    Raises:
-        DescriptionError: The file cannot be read or expanded.
-    """
+    """Return the URDF of a robot as XML text."""
     urdf = _read(robot.description, robot)
     for name, folder in robot.packages.items():  # only this robot folder knows them
         urdf = urdf.replace(f'package://{name}/', f'{folder.as_uri()}/')
@@ -314,11 +310,7 @@ def read_description(robot: Robot) -> str:
 
 
 def read_semantic(robot: Robot) -> str:
-    """Return the SRDF of a robot as XML text.
-
-    Raises:
-        DescriptionError: The file cannot be read or expanded.
-    """
+    """Return the SRDF of a robot as XML text."""
     return _read(robot.semantic, robot)
 
 
@@ -358,11 +350,7 @@ def expand_xacro(
 
 
 def joint_limits(urdf: str) -> dict[str, JointRange]:
-    """Read the limits of all joints that move by themselves, in the order of the URDF.
-
-    Raises:
-        DescriptionError: The text is no URDF, or a joint lacks its limits.
-    """
+    """Read the limits of all joints that move by themselves, in the order of the URDF."""
     try:
         return read_urdf(urdf).ranges()
     except urdf_reader.DescriptionError as error:

@@ -258,11 +258,7 @@ class Stack:
 
 
 def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
-    """Return the processes that make an arm; they start side by side.
-
-    Raises:
-        StartError: An executable is missing.
-    """
+    """Return the processes that make an arm; they start side by side."""
     make = partial(node_process, find=find, ros=stack.ros, ready_timeout=stack.ready_timeout)
     bus = {'bus_config': str(stack.robot.bus_config), 'can_interface_name': stack.bus}
     own = {'backend': 'canopen'} if stack.master == MOTION_NODE else {'robot_joint_states': 'true'}
@@ -299,11 +295,7 @@ def controller_process(
     find: FindExecutable,
     ros: RosOptions,
 ) -> ProcessSpec:
-    """Return the process that moves drives of another process; that one makes /tf, too.
-
-    Raises:
-        StartError: An executable is missing.
-    """
+    """Return the process that moves drives of another process; that one makes /tf, too."""
     return node_process(
         'controller',
         MOTION_NODE,

@@ -14,10 +14,9 @@ import yaml
 
 from arm_bringup.check import check_robot, main
 from arm_bringup.groups import controller_names, moved_groups
-from arm_bringup.motion_check import Severity
 from arm_bringup.robots import find_robot, in_namespace_of_bus, read_bus, Robot, RobotError
 from arm_bringup.srdf import main as make_srdf
-from process_supervisor import RosOptions
+from process_supervisor import RosOptions, Severity
 
 SAMPLES = ('--samples', '3000')
 

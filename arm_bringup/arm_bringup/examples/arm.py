@@ -55,8 +55,7 @@ the arm is now."""
 ENABLE_TIMEOUT = 15.0
 """Longest time in [s] for all drives to be enabled, and for them to be in their mode."""
 ENABLED = 'Operation enabled'  # title of the state in which a drive can move (CiA 402-2, figure 4)
-GAUGE_FROM, WORDS_FROM = 102, 118
-"""Columns from which there is room for the gauges, and from which modes are written out."""
+WIDE = 122  # columns from which there is room for modes and gauges
 GAUGE_WIDTH = 21  # characters of a gauge
 STATE_STYLES = {
     ENABLED: 'green',
@@ -65,21 +64,6 @@ STATE_STYLES = {
     'Quick stop active': 'yellow',
 }
 """Colours of CiA 402 states; others are dim."""
-SHORT = {
-    'PRE_OPERATIONAL': 'PRE-OP',
-    'BOOT_UP': 'BOOT-UP',
-    'Profile position': 'PP',
-    'Velocity': 'VL',
-    'Profile velocity': 'PV',
-    'Profile torque': 'TQ',
-    'Homing': 'HM',
-    'Interpolated position': 'IP',
-    'Cyclic position': 'CSP',
-    'Cyclic velocity': 'CSV',
-    'Cyclic torque': 'CST',
-    'No mode': '-',
-}
-"""How CiA 301 and CiA 402-2 abbreviate NMT states and modes."""
 
 
 class EndRequested(Exception):  # noqa: N818  # it is no error: the user asked for the end
@@ -103,7 +87,7 @@ class ArmDemo(Demo[ServiceClient]):
     """A demo on simulated drives: enables them, and shows what /diagnostics has of them."""
 
     opening = 'booting'
-    widest = WORDS_FROM
+    widest = WIDE
     beside = ''  # what runs beside the drives, for the title
     label = ''  # what the demo's own line in the table begins with
 
@@ -178,10 +162,13 @@ class ArmDemo(Demo[ServiceClient]):
     def observe(self, drive: str) -> None:  # a demo may need the latest only
         """Handle new figures of a drive."""
 
+    def is_online(self, name: str) -> bool:
+        """Return whether the master hears a drive."""
+        return self.drives.get(name, {}).get('online') == 'True'
+
     def is_enabled(self, name: str) -> bool:
         """Return whether a drive can move."""
-        drive = self.drives.get(name, {})
-        return drive.get('online') == 'True' and drive.get('state') == ENABLED
+        return self.is_online(name) and self.drives[name].get('state') == ENABLED
 
     @property
     def missed(self) -> int:
@@ -195,12 +182,13 @@ class ArmDemo(Demo[ServiceClient]):
 
     def bus_line(self) -> str:
         """Return how the bus and its cycle are."""
+        return ', '.join(self._bus_figures())
+
+    def _bus_figures(self) -> tuple[str, str]:
         jitter = '/'.join(known(1e3 * number(self.bus, f'jitter_p{p}'), 2) for p in (50, 99))
         rate, load = (known(number(self.bus, key)) for key in ('frames_per_second', 'bus_load'))
-        return (
-            f'{rate} frames/s, load {load} %, lost {self.count("frames_lost")}, '
-            f'cycle jitter p50/p99 {jitter} ms, missed PDOs {self.missed}'
-        )
+        bus = f'{rate} frames/s, load {load} %, lost {self.count("frames_lost")}'
+        return bus, f'cycle jitter p50/p99 {jitter} ms, missed PDOs {self.missed}'
 
     def progress(self) -> str:
         """Return the demo's own line, and the bus."""
@@ -279,7 +267,8 @@ class ArmDemo(Demo[ServiceClient]):
 
     def table(self, width: int) -> Sequence[RenderableType]:
         """Draw the drives, the bus, and the demo's own line."""
-        body: list[RenderableType] = [self._drive_table(width), Text(''), self._bus_text()]
+        bus = Text.assemble(('bus    ', 'bold'), '\n       '.join(self._bus_figures()))
+        body: list[RenderableType] = [self._drive_table(width), Text(''), bus]
         if self.label:
             line = Text.assemble((f'{self.label:<7}', 'bold'), self.line())
             line.truncate(width)
@@ -287,51 +276,30 @@ class ArmDemo(Demo[ServiceClient]):
         return body
 
     def _drive_table(self, width: int) -> Table:
-        in_words, with_gauge = width >= WORDS_FROM, width >= GAUGE_FROM
-        gauge = [(' between its limits', GAUGE_WIDTH + 1, False)] if with_gauge else []
+        wide = width >= WIDE
+        more = ('mode', 21, False), (' between its limits', GAUGE_WIDTH + 1, False)
         table = make_table(
             ('joint', 12, False),
-            ('NMT', 11, False),
+            ('NMT', 15, False),
             ('CiA 402 state', 21, False),
-            ('mode', 21 if in_words else 4, False),
             *((name, 8, True) for name in ('position', 'velocity', 'error')),
-            *gauge,
+            *(more if wide else ()),
         )
-        # a long name is cut, and no number
-        table.columns[0].max_width = max(12, width - 68 - 22 * with_gauge - 17 * in_words)
+        table.columns[0].max_width = max(12, width - 66 - 45 * wide)  # names are cut, no numbers
         for name, limits in self.limits.items():
             drive, moves = self.drives.get(name, {}), name in self.moved
-            nmt, state, mode = (drive.get(key, '') for key in ('nmt_state', 'state', 'mode'))
+            state, figures = drive.get('state', ''), ('position', 'velocity', 'following_error')
             cells = [
                 Text(name, style='bold' if moves else ''),
-                Text(SHORT.get(nmt, nmt), 'green' if drive.get('online') == 'True' else 'red'),
+                Text(drive.get('nmt_state', ''), 'green' if self.is_online(name) else 'red'),
                 Text(state, style=STATE_STYLES.get(state, 'dim')),
-                Text(mode if in_words else SHORT.get(mode, mode), '' if moves else 'yellow'),
-                *(
-                    Text(signed(number(drive, key)))
-                    for key in ('position', 'velocity', 'following_error')
-                ),
+                *(Text(signed(number(drive, key))) for key in figures),
             ]
-            table.add_row(
-                *cells, *([_gauge(number(drive, 'position'), limits)] if with_gauge else [])
-            )
+            if wide:
+                cells.append(Text(drive.get('mode', ''), '' if moves else 'yellow'))
+                cells.append(_gauge(number(drive, 'position'), limits))
+            table.add_row(*cells)
         return table
-
-    def _bus_text(self) -> Text:
-        bus = self.bus
-        if not math.isfinite(number(bus, 'frames_per_second')):
-            return Text('bus    waiting for the master\n', style='dim')
-        lost = self.count('frames_lost')
-        p50, p99 = (1e3 * number(bus, f'jitter_p{each}') for each in (50, 99))
-        return Text.assemble(
-            ('bus    ', 'bold'),
-            f'{number(bus, "frames_per_second"):.0f} frames/s   '
-            f'load {number(bus, "bus_load"):.0f} %   ',
-            (f'{lost} lost', 'bold red' if lost else ''),
-            f'   {self.missed} PDOs missed\n',
-            ('cycle  ', 'bold'),
-            f'jitter p50 {p50:.2f} ms   p99 {p99:.2f} ms',
-        )
 
 
 def _gauge(position: float, limits: JointRange) -> Text:

@@ -170,11 +170,7 @@ class Motion(ArmDemo):
 
     @property
     def last(self) -> Sample:
-        """The latest state.
-
-        Raises:
-            CallError: There is none.
-        """
+        """The latest state."""
         if not self.samples:
             raise CallError('the trajectory controller publishes no state: is the arm enabled?')
         return self.samples[-1]
@@ -414,17 +410,12 @@ def _why(goal: ActionRun) -> str:
     return f'{goal.result.error_code}: {goal.result.error_string}'
 
 
-def cycles_between(before: Sample, after: Sample, period: float) -> int:
-    """Return how many cycles lie between two samples, by their stamps."""
-    return round((after.time - before.time) / period)
-
-
 def tool_speed(samples: Sequence[Sample], period: float) -> float:
     """Return the median speed of the commanded tool in [m/s]; 0 without two samples."""
     speeds = [
         float(np.linalg.norm(after.tool - before.tool)) / (cycles * period)
         for before, after in pairwise(samples)
-        if (cycles := cycles_between(before, after, period)) >= 1
+        if (cycles := round((after.time - before.time) / period)) >= 1
     ]
     return float(np.median(speeds)) if speeds else 0.0
 
@@ -523,11 +514,7 @@ def free_way(model: RobotModel, begin: Array, end: Array) -> list[Array]:
 
 
 def free_end(model: RobotModel, begin: Array) -> Array:
-    """Return where a trajectory leads, each joint in the direction in which it has more room.
-
-    Raises:
-        ModelError: Links are in the way of all of them.
-    """
+    """Return where a trajectory leads, each joint in the direction in which it has more room."""
     for end in _ends(model, begin):
         if (end != begin).any() and is_free(model, begin, end):
             return end

@@ -177,7 +177,10 @@ CELLS = {
 
 
 class Plan(ArmDemo):
-    """Pick, place, a box in the way, a blocked goal; without a cell the box alone."""
+    """Pick, place, a box in the way, a blocked goal; without a cell the box alone.
+
+    What move_group or the gripper refuses, or does not do in time, is a CallError.
+    """
 
     beside = ', and move_group'
     label = 'plan'
@@ -235,7 +238,9 @@ class Plan(ArmDemo):
         node.create_subscription(JointState, 'joint_states', self._take_joints, QUEUE)
         path, scene = 'display_planned_path', 'monitored_planning_scene'
         node.create_subscription(DisplayTrajectory, path, self.paths.append, LATCHED)
-        node.create_subscription(PlanningScene, scene, self._take_scene, LATCHED)
+        node.create_subscription(
+            PlanningScene, scene, lambda message: setattr(self, 'scene', message), LATCHED
+        )
         return client
 
     def line(self) -> str:
@@ -435,11 +440,7 @@ class Plan(ArmDemo):
         self.add(name, f'{code}: {message}')
 
     def _go(self, name: str, target: Mapping[str, float] | Pose, speed: float) -> float:
-        """Move to joint positions freely, to a pose along a line; return the planning time in [s].
-
-        Raises:
-            CallError: It failed.
-        """
+        """Move to joints freely, to a pose along a line; return the planning time in [s]."""
         return self._finish(name, self._send(target, speed), target)
 
     def _finish(self, name: str, goal: ActionRun, target: Mapping[str, float] | Pose) -> float:
@@ -479,14 +480,10 @@ class Plan(ArmDemo):
 
     def _arrives(self, name: str, off: Callable[[], float], worst: float, unit: str) -> None:
         """Judge where something comes to rest within some seconds."""
-        if not self._comes(lambda: off() <= worst):
-            self.problem(name, f'{1e3 * off():.1f} m{unit} from its goal')
-
-    def _comes(self, condition: Callable[[], bool]) -> bool:
-        """Return whether something comes true within some seconds."""
         with contextlib.suppress(CallError):
-            self.wait_moving(condition, SETTLE_TIMEOUT, 'it')
-        return condition()
+            self.wait_moving(lambda: off() <= worst, SETTLE_TIMEOUT, 'it')
+        if off() > worst:
+            self.problem(name, f'{1e3 * off():.1f} m{unit} from its goal')
 
     def _rest(self, goal: ActionRun | None = None) -> float:
         """Wait until no joint moves, or a motion has ended; return when one moved last in [s]."""
@@ -542,11 +539,7 @@ class Plan(ArmDemo):
         return self._run
 
     def _solve(self, pose: Pose, seed: Sequence[float], *, free: bool) -> dict[str, float]:
-        """Return joint positions for a pose of the tip, near others; whether nothing may touch.
-
-        Raises:
-            CallError: There are none, or move_group does not answer.
-        """
+        """Return joint positions for a pose of the tip, near others; whether nothing may touch."""
         request = GetPositionIK.Request()
         wanted = request.ik_request
         wanted.group_name, wanted.ik_link_name = self.group, self.model.tip
@@ -566,11 +559,7 @@ class Plan(ArmDemo):
         return {joint: places[joint] for joint in self.model.joints}
 
     def _grip(self, position: float) -> None:
-        """Move the gripper, and wait until it is there.
-
-        Raises:
-            CallError: It did not get there, or its controller does not answer.
-        """
+        """Move the gripper, and wait until it is there."""
         goal, name = GripperCommand.Goal(), self.gripper_action
         goal.command.position = position
         grip = ActionRun(self.client, self._gripper, goal, name)
@@ -592,11 +581,7 @@ class Plan(ArmDemo):
     def _change(
         self, *things: CollisionObject, attached: AttachedCollisionObject | None = None
     ) -> None:
-        """Change the scene, as PlanningSceneInterface does.
-
-        Raises:
-            CallError: It was refused, or move_group does not answer.
-        """
+        """Change the scene, as PlanningSceneInterface does."""
         diff = PlanningScene(is_diff=True)
         diff.robot_state.is_diff = True
         for each in things:
@@ -618,9 +603,6 @@ class Plan(ArmDemo):
     def _take_joints(self, message: JointState) -> None:
         self.positions.update(zip(message.name, message.position, strict=False))
         self.states += 1
-
-    def _take_scene(self, message: PlanningScene) -> None:
-        self.scene = message
 
 
 def _ms(duration: float) -> str:
@@ -683,23 +665,12 @@ def box(name: str, edges: Sequence[float], place: Sequence[float]) -> CollisionO
     return message
 
 
-def cube_at(model: RobotModel, name: str, edge: float, positions: Array) -> CollisionObject:
-    """Return a cube around the tip of an arm at joint positions."""
-    place = model.kinematics.link_pose(model.tip, positions).position
-    return box(name, (edge, edge, edge), (*place.tolist(), 0.0))
-
-
-def with_box(model: RobotModel, thing: CollisionObject) -> arm_model.PlanningScene:
-    """Return the scene of an arm with an upright box in it."""
+def distance_of(model: RobotModel, thing: CollisionObject, positions: Array) -> float:
+    """Return the distance of an upright box from an arm in [m]; negative where they touch."""
     at = thing.pose.position
     pose = arm_model.Pose(arm_model.ORIGIN.rotation, arm_model.frozen([at.x, at.y, at.z]))
     shape = arm_model.Box(*thing.primitives[0].dimensions)
-    return model.scene.with_object(arm_model.CollisionObject(thing.id, shape, pose=pose))
-
-
-def distance_of(model: RobotModel, thing: CollisionObject, positions: Array) -> float:
-    """Return the distance of a box from an arm in [m]; negative where they touch."""
-    scene = with_box(model, thing)
+    scene = model.scene.with_object(arm_model.CollisionObject(thing.id, shape, pose=pose))
     distances = Clearances(scene).least(positions, FAR).tolist()
     pairs = zip(scene.pairs, distances, strict=True)
     return min((distance for pair, distance in pairs if thing.id in pair), default=FAR)
@@ -710,7 +681,8 @@ def box_ahead(model: RobotModel, rows: Sequence[Array]) -> CollisionObject | Non
     reach = max(model.reach, LEAST_REACH)
     for edge, share in product(EDGES, SHARES):
         at = rows[int(share * (len(rows) - 1))]
-        thing = cube_at(model, VISITOR, edge * reach, at)
+        tip = model.kinematics.link_pose(model.tip, at).position
+        thing = box(VISITOR, 3 * (edge * reach,), (*tip.tolist(), 0.0))
         room = min(distance_of(model, thing, each) for each in (rows[0], rows[-1]))
         if distance_of(model, thing, at) < 0.0 and room > ROOM * reach:
             return thing
@@ -727,7 +699,8 @@ def with_gripper(arguments: argparse.Namespace) -> Robot:
     if os.sep not in arguments.robot:
         both = argparse.Namespace(**{**vars(arguments), 'robot': robot.name + WITH_GRIPPER})
         with contextlib.suppress(RobotError):
-            return locate(both)
+            robot = locate(both)
+            arguments.robot = both.robot
     return robot
 
 
