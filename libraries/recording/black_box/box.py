@@ -103,14 +103,11 @@ class BlackBox:
 
     Reporting a fault waits neither for the disk nor for a lock. A disk that is full or
     a folder that cannot be made is a warning, and harms nothing else.
-
-    Attributes:
-        last: Main file of the last recording; None before the first one.
     """
 
     def __init__(self, name: str, contents: Contents, settings: BlackBoxSettings) -> None:
         """Write nothing before :meth:`start`; the name stands in those of the folders."""
-        self.last: Path | None = None
+        self.last: Path | None = None  # main file of the last recording; None before the first one
         self._name = re.sub(r'[^A-Za-z0-9.-]+', '_', name).strip('_.') or 'fault'
         self._contents = contents
         self._settings = settings
@@ -277,12 +274,7 @@ class Replay(Protocol[Entry_contra]):
 
 
 class LogPlayer(Generic[Entry]):
-    """Plays a log, once or again and again.
-
-    Attributes:
-        seeking: Whether the entries lie before the requested start.
-        on_tick: Called in the thread of :meth:`play`, some ten times a second at least.
-    """
+    """Plays a log, once or again and again."""
 
     def __init__(
         self,
@@ -302,7 +294,8 @@ class LogPlayer(Generic[Entry]):
             start: How far from its beginning it is played in time, in [s]; what comes before is
                 taken at once, so that states are known.
         """
-        self.seeking = False
+        self.seeking = False  # whether the entries lie before the requested start
+        # called in the thread of :meth:`play`, some ten times a second at least
         self.on_tick: Callable[[], None] = lambda: None
         self._replay = replay
         self._read = read

@@ -60,13 +60,7 @@ class BagMessage:
 
 
 class BagReader:
-    """A recording: a folder, or a single MCAP file.
-
-    Attributes:
-        folder: Where it is.
-        metadata: What it has.
-        finished: Whether it has a metadata.yaml; without, its files were read through for it.
-    """
+    """A recording: a folder, or a single MCAP file."""
 
     def __init__(self, path: Path) -> None:
         """Open a recording.
@@ -75,6 +69,7 @@ class BagReader:
             BagError: There is none, or it is not written as MCAP.
         """
         self.folder = path if path.is_dir() else path.parent
+        # whether it has a metadata.yaml; without, its files were read through for it
         self.finished = (path / METADATA_FILE).is_file()
         if self.finished:
             self.metadata = self._with_definitions(load_metadata(path / METADATA_FILE))

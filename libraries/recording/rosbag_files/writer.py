@@ -54,11 +54,7 @@ class WriterOptions:
 
 
 class BagWriter:
-    """Writes one recording; `close` it at the end. What cannot be written is a BagError.
-
-    Attributes:
-        folder: Where it is.
-    """
+    """Writes one recording; `close` it at the end. What cannot be written is a BagError."""
 
     def __init__(self, folder: Path, options: WriterOptions | None = None) -> None:
         """Make the folder and its first file.
@@ -156,18 +152,12 @@ def _errors(path: Path) -> Iterator[None]:
 
 
 class McapFile:
-    """One MCAP file with rosbag2's profile.
-
-    Attributes:
-        path: Where it is.
-        start: Earliest time in it in [ns].
-        counts: How many messages of each topic there are.
-    """
+    """One MCAP file with rosbag2's profile."""
 
     def __init__(self, path: Path, preset: Preset) -> None:
         self.path = path
-        self.start = 0
-        self.counts: Counter[str] = Counter()
+        self.start = 0  # earliest time in it in [ns]
+        self.counts: Counter[str] = Counter()  # how many messages of each topic there are
         self._end = 0
         self._stream = path.open('xb')
         compressed = preset in {Preset.ZSTD_FAST, Preset.ZSTD_SMALL}

@@ -49,12 +49,7 @@ class _Gap:
 
 
 class _Pieces:
-    """The bytes of a message, cut into numbers and what stands between them.
-
-    Attributes:
-        layout: All pieces in the order of the bytes.
-        gaps: The numbers, in this order; all other pieces are constant.
-    """
+    """The bytes of a message, cut into numbers and what stands between them, which is constant."""
 
     def __init__(self, data: bytes, gaps: Sequence[_Gap]) -> None:
         order, at, layout = _order(data), 0, ''
@@ -68,7 +63,7 @@ class _Pieces:
             at = gap.place + struct.calcsize(order + gap.letter)
         if len(data) > at:
             layout += self._constant(data[at:])
-        self.layout = struct.Struct(order + layout)
+        self.layout = struct.Struct(order + layout)  # all pieces in the order of the bytes
 
     def _constant(self, data: bytes) -> str:
         self.constants.append(data)

@@ -22,11 +22,7 @@ SPIN = 0.05  # longest time in [s] after which a wait looks whether it shall be 
 
 
 class GraphClient:
-    """A node of its own, in a context of its own; use it in one thread.
-
-    Attributes:
-        node: The node, for publishers, subscriptions and clients.
-    """
+    """A node of its own, in a context of its own; use it in one thread."""
 
     def __init__(self, name: str, given_up: Callable[[], bool], namespace: str = '') -> None:
         """Join the ROS graph; ``given_up`` returns True when no wait shall go on."""
@@ -34,6 +30,7 @@ class GraphClient:
         self._known = set[str]()  # services of which the nodes know this one's clients
         self._context = Context()
         init_ros(context=self._context)
+        # the node, for publishers, subscriptions and clients
         self.node = Node(
             name, context=self._context, namespace=namespace or None, enable_rosout=False
         )

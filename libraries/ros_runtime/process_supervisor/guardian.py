@@ -50,18 +50,14 @@ class StopSequence:
     It gets what happened (:meth:`exited`) and what time it is (:meth:`advance`), and sends
     signals, each to the process of a name, through the callable it was given. ``now`` is steady
     time in [s].
-
-    Attributes:
-        forced: Names of processes that did not end by their first signal.
-        abandoned: Names of those that did not even end by their last one.
     """
 
     def __init__(self, send: Callable[[str, Signals], None]) -> None:
         """Begin with no process to stop."""
         self._send = send
         self._members: dict[str, _Member] = {}
-        self.forced: set[str] = set()
-        self.abandoned: list[str] = []
+        self.forced: set[str] = set()  # names of processes that did not end by their first signal
+        self.abandoned: list[str] = []  # names of those that did not even end by their last one
 
     def add(self, name: str, order: int, steps: Iterable[tuple[Signals, float]]) -> None:
         """Add a running process, and the signals with the time in [s] that each is given."""

@@ -62,15 +62,11 @@ _MAX_MESSAGE = 4096
 
 
 class ReadinessSocket:
-    """Receives what one process reports; others of systemd's messages are passed over.
-
-    Attributes:
-        status: What it said last of itself, for the user.
-    """
+    """Receives what one process reports; others of systemd's messages are passed over."""
 
     def __init__(self) -> None:
         """Open it."""
-        self.status = ''
+        self.status = ''  # what it said last of itself, for the user
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
         self._socket.bind('')  # the kernel chooses a free name in the abstract namespace
 

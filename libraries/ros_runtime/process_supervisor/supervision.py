@@ -84,10 +84,6 @@ class Supervision:
     """Starts processes at once, waits until all are ready, stops all when a required one ends.
 
     Another one that ends after it was ready is started again. ``now`` is steady time in [s].
-
-    Attributes:
-        phase: What it is doing.
-        outcome: How it ends; None while nothing ends it.
     """
 
     def __init__(
@@ -114,8 +110,8 @@ class Supervision:
         Raises:
             ValueError: Two processes have the same name.
         """
-        self.phase = Phase.IDLE
-        self.outcome: Outcome | None = None
+        self.phase = Phase.IDLE  # what it is doing
+        self.outcome: Outcome | None = None  # how it ends; None while nothing ends it
         self._start = start
         self._notify = notify
         self._on_interrupt = on_interrupt

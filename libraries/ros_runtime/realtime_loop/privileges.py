@@ -29,10 +29,6 @@ class CycleTimer:
 
     So each cycle has a place of its own on the grid, and what is commanded in a cycle lasts for a
     period: a motion is late after a stall, but not faster.
-
-    Attributes:
-        period: Time between two cycles.
-        deadline: When the next one is due.
     """
 
     def __init__(self, period: float, now: float) -> None:
@@ -43,8 +39,8 @@ class CycleTimer:
         """
         if not period > 0.0:
             raise ValueError(f'period is {period}; it must be positive')
-        self.period = period
-        self.deadline = now
+        self.period = period  # time between two cycles
+        self.deadline = now  # when the next one is due
 
     def begin(self, now: float) -> Cycle:
         """Begin the cycle that is due; the next deadline is the first on the grid after now."""

@@ -47,9 +47,6 @@ class Session:
     that still works (`action send_goal` cancels its goal then), and always takes its participant
     out of the graph. Executor: `SingleThreadedExecutor`; the multi-threaded one hands callbacks
     out repeatedly, and the unbounded spin of the events executor burns a core (rclpy 7.1.6).
-
-    Attributes:
-        node: The node.
     """
 
     def __init__(self, node: Handle, executor: Handle) -> None:
@@ -145,15 +142,11 @@ _TIMEOUT = 5.0  # [s] for a service of a node that exists to show up, and to ans
 
 
 class Graph:
-    """What is in the ROS graph.
-
-    Attributes:
-        session: The session that looks; its node is part of the graph.
-    """
+    """What is in the ROS graph."""
 
     def __init__(self, session: Session, spin_time: float | None = None) -> None:
         """Start to look; discovery takes `spin_time` in [s], None for the default."""
-        self.session = session
+        self.session = session  # the session that looks; its node is part of the graph
         self._node = session.node
         fast = spin_time is None and is_this_host(os.environ)
         longest = _OPEN_SPIN_TIME if spin_time is None else spin_time

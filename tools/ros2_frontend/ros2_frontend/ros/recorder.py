@@ -34,11 +34,7 @@ _FLUSH_PERIOD = 1.0  # [s]; what a SIGKILL may cost
 
 
 class Recorder:
-    """Records into a writer until it is stopped. What cannot be written is a FrontendError.
-
-    Attributes:
-        paused: Whether messages are dropped at the moment, because the user wants that.
-    """
+    """Records into a writer until it is stopped. What cannot be written is a FrontendError."""
 
     def __init__(
         self,
@@ -49,6 +45,7 @@ class Recorder:
         args: Namespace,
     ) -> None:
         """Subscribe to nothing yet."""
+        # whether messages are dropped at the moment, because the user wants that
         self.paused = False
         self._graph = graph
         self._node = graph.session.node
@@ -240,15 +237,11 @@ def _taken(
 
 
 class _WriterThread:
-    """Writes on a thread of its own: a disk that stalls must not make DDS drop messages.
-
-    Attributes:
-        written: How many messages of each topic were handed over.
-        dropped: How many messages of each topic were not, as too much was waiting.
-    """
+    """Writes on a thread of its own: a disk that stalls must not make DDS drop messages."""
 
     def __init__(self, writer: BagWriter, max_bytes: int) -> None:
-        self.written: Counter[str] = Counter()
+        self.written: Counter[str] = Counter()  # how many messages of each topic were handed over
+        # how many messages of each topic were not, as too much was waiting
         self.dropped: Counter[str] = Counter()
         self._writer = writer
         self._max_bytes = max_bytes

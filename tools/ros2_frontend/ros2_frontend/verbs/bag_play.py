@@ -187,11 +187,7 @@ class PlayClock:
 
 
 class Player:
-    """Publishes messages of a recording.
-
-    Attributes:
-        clock: Which moment is due.
-    """
+    """Publishes messages of a recording."""
 
     def __init__(
         self,
@@ -202,7 +198,7 @@ class Player:
         remaps: Mapping[str, str],
     ) -> None:
         """Make the publishers of topics, with QoS and names by recorded topic where given."""
-        self.clock = clock
+        self.clock = clock  # which moment is due
         self._node = session.node
         self._publishers: dict[str, Handle] = {}
         for topic in topics:
