@@ -205,8 +205,7 @@ class Fault(Enum):
         return self.name.lower()
 
 
-FAULTS: dict[str, Fault] = {fault.label: fault for fault in Fault}
-"""Faults by name."""
+FAULTS: dict[str, Fault] = {fault.label: fault for fault in Fault}  # faults by name
 
 
 def _whole(text: str) -> int:

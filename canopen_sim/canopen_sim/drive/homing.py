@@ -56,11 +56,9 @@ REFERENCES: dict[int, Reference] = _WITH_INDEX | {
 }
 """Methods 1 to 14, and 17 to 30 that are the same without index pulse (CiA 402-2, 0x6098)."""
 
-INDEX_METHODS = {33: -1, 34: 1}
-"""The next index pulse in a direction becomes home."""
+INDEX_METHODS = {33: -1, 34: 1}  # the next index pulse in a direction becomes home
 
-PRESENT_POSITION_METHODS = frozenset({35, 37})
-"""The present position becomes home."""
+PRESENT_POSITION_METHODS = frozenset({35, 37})  # the present position becomes home
 
 
 class Move(NamedTuple):

@@ -32,14 +32,10 @@ _LIBRARY = 'rosbag_files'
 class Preset(Enum):
     """How MCAP files are written, after rosbag2's `--storage-preset-profile`."""
 
-    NONE = 'none'
-    """Chunks with an index, not compressed."""
-    FAST_WRITE = 'fastwrite'
-    """No chunks, no index."""
-    ZSTD_FAST = 'zstd_fast'
-    """Compressed chunks."""
-    ZSTD_SMALL = 'zstd_small'
-    """Large compressed chunks."""
+    NONE = 'none'  # chunks with an index, not compressed
+    FAST_WRITE = 'fastwrite'  # no chunks, no index
+    ZSTD_FAST = 'zstd_fast'  # compressed chunks
+    ZSTD_SMALL = 'zstd_small'  # large compressed chunks
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,4 @@
 
 from .serialized import FastPublisher, FastReader, MessageTemplate, SerializedTemplate
 
-__version__ = '0.1.0'
-
 __all__ = ['FastPublisher', 'FastReader', 'MessageTemplate', 'SerializedTemplate']

@@ -51,8 +51,6 @@ from .terminal import (
     wants_colour,
 )
 
-__version__ = '0.1.0'
-
 __all__ = [
     'EVERY_NODE',
     'USAGE_ERROR',

@@ -16,8 +16,7 @@ from rosbag_files import BagError, BagReader, OfferedQos, read_qos
 from .cli.commands import argument, FrontendError
 from .names import absolute, is_hidden
 
-Accepts = Callable[[str, str], bool]
-"""Whether a topic, by its name and type, is chosen."""
+Accepts = Callable[[str, str], bool]  # whether a topic, by its name and type, is chosen
 
 STORAGE = argument(
     '-s', '--storage', default='mcap', choices=['mcap'], help='Storage identifier: mcap'

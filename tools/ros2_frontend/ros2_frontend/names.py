@@ -9,8 +9,7 @@ from typing import Any, TypeAlias
 
 Message: TypeAlias = Any
 """An instance of a generated class: a message, request, response, goal, result or feedback."""
-InterfaceClass: TypeAlias = Any
-"""A generated class: of a message, a service or an action."""
+InterfaceClass: TypeAlias = Any  # a generated class: of a message, a service or an action
 Handle: TypeAlias = Any
 """An object of rclpy: node, client, publisher, future, goal handle, QoS profile, endpoint."""
 NamesAndTypes: TypeAlias = list[tuple[str, list[str]]]
