@@ -482,7 +482,7 @@ class Plan(ArmDemo):
         """Judge where something comes to rest within some seconds."""
         with contextlib.suppress(CallError):
             self.wait_moving(lambda: off() <= worst, SETTLE_TIMEOUT, 'it')
-        if off() > worst:
+        if not off() <= worst:
             self.problem(name, f'{1e3 * off():.1f} m{unit} from its goal')
 
     def _rest(self, goal: ActionRun | None = None) -> float:
