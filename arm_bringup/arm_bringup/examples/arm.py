@@ -116,6 +116,7 @@ class ArmDemo(Demo[ServiceClient]):
         self.rows: list[tuple[str, str]] = []  # of the summary
         self.found: list[str] = []
         self.moved: set[str] = set()  # joints that the demo moves
+        self.goal: ActionRun | None = None  # the last one, which Ctrl-C cancels
         self._enabling = enabling_services(list(enabled or limits), arm.mode_service)
 
     @abstractmethod
@@ -163,7 +164,7 @@ class ArmDemo(Demo[ServiceClient]):
         """Handle new figures of a drive."""
 
     def is_online(self, name: str) -> bool:
-        """Return whether the master hears a drive."""
+        """Return whether a drive is online."""
         return self.drives.get(name, {}).get('online') == 'True'
 
     def is_enabled(self, name: str) -> bool:
@@ -205,7 +206,7 @@ class ArmDemo(Demo[ServiceClient]):
         self.found.append(f'{name}: {text}')
 
     def repeat(self, begin: Callable[[], None], run: Callable[[], None]) -> None:
-        """Run parts until the time is over, once at least; after a problem no more."""
+        """Run parts until the time is over, once at least; after a problem or Ctrl-C no more."""
         try:
             end = time.monotonic() + self.duration
             begin()
@@ -218,6 +219,10 @@ class ArmDemo(Demo[ServiceClient]):
                 self.rows.clear()
         except CallError as error:
             self.found.append(str(error))
+        except EndRequested:
+            self.enter('leaving')
+            if self.goal is not None and not self.goal.done:
+                self.goal.cancel()
 
     def conclude(self) -> None:
         """Set summary, problems and warnings."""

@@ -36,7 +36,7 @@ from ..groups import controller_names, motion_files, MovedGroups
 from ..robots import read_semantic, Robot
 from ..service_client import ServiceClient
 from ..session import MOTION_NODE, Session
-from .arm import ActionRun, ArmDemo, EndRequested, number, parse, QUEUE, run
+from .arm import ActionRun, ArmDemo, number, parse, QUEUE, run
 
 RATE = 100.0  # rate of the controller's states in [Hz]
 JOG_PERIOD = 0.02  # time between two jog commands in [s]
@@ -119,7 +119,6 @@ class Motion(ArmDemo):
         self.samples: list[Sample] = []
         self.status = ''  # what the servo said last
         self.limited: list[str] = []  # what it said while something limited the motion
-        self._run: ActionRun | None = None
 
     def join(self, given_up: Callable[[], bool]) -> ServiceClient:
         """Join the ROS graph: twists and an override out, states of controller and servo in."""
@@ -143,12 +142,7 @@ class Motion(ArmDemo):
 
     def move(self) -> None:
         """Run the parts until the time is over; at Ctrl-C cancel what is on its way."""
-        try:
-            self.repeat(lambda: None, self._parts)
-        except EndRequested:
-            self.enter('leaving')
-            if self._run is not None and not self._run.done:
-                self._run.cancel()
+        self.repeat(lambda: None, self._parts)
         self._sum_up()
         self.conclude()
 
@@ -355,8 +349,8 @@ class Motion(ArmDemo):
         goal = FollowJointTrajectory.Goal(
             trajectory=JointTrajectory(joint_names=list(self.model.joints), points=[point])
         )
-        self._run = ActionRun(self.client, self._action, goal, self._action_name)
-        return self._run
+        self.goal = ActionRun(self.client, self._action, goal, self._action_name)
+        return self.goal
 
     def _finish(self, goal: ActionRun) -> None:
         self.wait_moving(lambda: goal.done, MOTION_TIMEOUT, 'the end of a trajectory')

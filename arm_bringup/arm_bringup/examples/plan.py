@@ -54,7 +54,7 @@ from ..groups import controller_names, MovedGroups, planning_files
 from ..robots import read_semantic, Robot, RobotError
 from ..service_client import ServiceClient
 from ..session import locate, MOTION_NODE, Session
-from .arm import ActionRun, ANSWER_TIMEOUT, ArmDemo, EndRequested, parse, QUEUE, run
+from .arm import ActionRun, ANSWER_TIMEOUT, ArmDemo, parse, QUEUE, run
 
 SLOW, CAREFUL, FREE = 0.1, 0.2, 0.5
 """Shares of the limits at which the arm meets a box, follows lines, moves freely."""
@@ -223,7 +223,6 @@ class Plan(ArmDemo):
         self.planning_times: list[float] = []
         self.text = ''
         self._place = 0  # where the part is
-        self._run: ActionRun | None = None
 
     def join(self, given_up: Callable[[], bool]) -> ServiceClient:
         """Join the ROS graph as a client of move_group does, and as a viewer."""
@@ -250,12 +249,7 @@ class Plan(ArmDemo):
 
     def move(self) -> None:
         """Run the parts until the time is over; at Ctrl-C cancel what is on its way."""
-        try:
-            self.repeat(self._begin, self._parts)
-        except EndRequested:
-            self.enter('leaving')
-            if self._run is not None and not self._run.done:
-                self._run.cancel()
+        self.repeat(self._begin, self._parts)
         planned = 'nothing was planned'
         if times := self.planning_times:
             planned = (
@@ -535,8 +529,8 @@ class Plan(ArmDemo):
         else:
             request.goal_constraints = [joint_goal(target)]
         self.text = request.planner_id or 'free motion'
-        self._run = ActionRun(self.client, self._move, goal, 'move_action')
-        return self._run
+        self.goal = ActionRun(self.client, self._move, goal, 'move_action')
+        return self.goal
 
     def _solve(self, pose: Pose, seed: Sequence[float], *, free: bool) -> dict[str, float]:
         """Return joint positions for a pose of the tip, near others; whether nothing may touch."""
