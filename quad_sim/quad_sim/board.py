@@ -281,7 +281,7 @@ class Board:
     def _boot(self, now: float) -> None:
         self._booted_at = now
         self._yaw_origin = 0.0
-        self._mode = Mode.SERVOS
+        self.mode = Mode.SERVOS  # who gives the servos their targets
         self._gait_at = math.inf
         self._turn: Turn | None = None
         self.walker.reset()
@@ -370,14 +370,9 @@ class Board:
 
     # -- who moves the servos
 
-    @property
-    def mode(self) -> Mode:
-        """Who gives the servos their targets."""
-        return self._mode
-
     def take_servos(self) -> None:
         """Hand the servos over to the host; a gait of the board ends where it is."""
-        self._mode = Mode.SERVOS
+        self.mode = Mode.SERVOS
         self._gait_at = math.inf
         self._turn = None
         self.walker.command = (0.0, 0.0, 0.0)
@@ -385,9 +380,9 @@ class Board:
 
     def start_gait(self) -> None:
         """Hand the servos over to the board's gait, which begins when the robot stands."""
-        if self._mode is Mode.GAIT:
+        if self.mode is Mode.GAIT:
             return
-        self._mode = Mode.GAIT
+        self.mode = Mode.GAIT
         self._plant.set_targets(self.walker.step(0.0), POSE_TIME)
         self._gait_at = self._now + POSE_TIME
 

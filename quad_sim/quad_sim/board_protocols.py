@@ -76,7 +76,7 @@ class Functions:
         """Forget what a host has set, as after switching on."""
         self._on = False
         self._period = 1.0 / DEFAULT_RATE
-        self._next_push = math.inf
+        self.next_push = math.inf  # when a state is due [s]; infinity without feedback
         self._sequence = 0
 
     def handle(self, frame: Frame, now: float) -> list[Frame]:
@@ -85,20 +85,15 @@ class Functions:
             answer = self._carry_out(frame)
         except RefusedError as refused:
             return [Frame(Kind.NACK, frame.address, bytes((refused.reason,)))]
-        if self._on and self._next_push == math.inf:
-            self._next_push = now
+        if self._on and self.next_push == math.inf:
+            self.next_push = now
         return [answer] if answer else []
-
-    @property
-    def next_push(self) -> float:
-        """When a state is due [s]; infinity without feedback."""
-        return self._next_push
 
     def push(self, now: float) -> Frame:
         """Return the state that is due, and plan the next one."""
-        self._next_push += self._period
-        if self._next_push < now:  # held up: go on from here, do not send a burst
-            self._next_push = now + self._period
+        self.next_push += self._period
+        if self.next_push < now:  # held up: go on from here, do not send a burst
+            self.next_push = now + self._period
         state = STATE.pack(**self._state(self._board.measure()))
         self._sequence = (self._sequence + 1) % _COUNT
         return Frame(Kind.PUSH, STATE.address, state)
@@ -131,7 +126,7 @@ class Functions:
             raise RefusedError(Refusal.WRONG_VALUE)
         self._on = bool(on)
         if not on:
-            self._next_push = math.inf
+            self.next_push = math.inf
 
     def _set_rate(self, values: Values) -> None:
         rate = values['rate'][0]

@@ -196,35 +196,26 @@ class RobotLine:
         self._functions, self._registers = Functions(board), Registers(board)
         self._by_baud = dict(speeds or {V2.baud: V2, V1.baud: V1})
         self._command_gap = command_gap
-        self._baud = next(iter(self._by_baud))
+        self.baud = next(iter(self._by_baud))  # speed of the line [bit/s]
         self._forget_partial_frames()
         self._received_at = self._frame_end = -math.inf
         self._battery_fault: Fault | None = None
-        self._powered = self._plugged = True
+        self._powered = True
+        self.plugged = True  # whether the port is there, faults considered
         self._now = 0.0
-
-    @property
-    def baud(self) -> int:
-        """Speed of the line [bit/s]."""
-        return self._baud
-
-    @property
-    def plugged(self) -> bool:
-        """Whether the port is there, faults considered."""
-        return self._plugged
 
     def set_baud(self, baud: int) -> None:
         """Follow the speed that the host has set [bit/s]."""
-        if baud != self._baud:
-            self._baud = baud
+        if baud != self.baud:
+            self.baud = baud
             self._forget_partial_frames()
 
     def receive(self, data: bytes, now: float) -> None:
         """Receive bytes that the host has begun to send."""
-        if self._baud not in self._by_baud:
+        if self.baud not in self._by_baud:
             self.statistics.garbled += len(data)
             return
-        self.to_robot.put(data, now, self._baud)
+        self.to_robot.put(data, now, self.baud)
 
     def advance(self, now: float) -> bytes:
         """Advance the time; return what has arrived at the host by then."""
@@ -265,7 +256,7 @@ class RobotLine:
             self._send(frame, V2, now)
 
     def _receive(self, arrived: Arrival) -> None:
-        protocol, parser = self._by_baud.get(self._baud), self._parser
+        protocol, parser = self._by_baud.get(self.baud), self._parser
         if protocol is None or parser is None:
             return
         self._board.advance(arrived.end)
@@ -297,18 +288,18 @@ class RobotLine:
             self._send(answer, protocol, now)
 
     def _forget_partial_frames(self) -> None:
-        protocol = self._by_baud.get(self._baud)
+        protocol = self._by_baud.get(self.baud)
         self._parser = None if protocol is None else StreamParser(protocol, HOST_KINDS)
 
     def _give_up_waiting(self, now: float) -> None:
         if self._parser is not None and self._parser.pending:
-            protocol = self._by_baud[self._baud]
+            protocol = self._by_baud[self.baud]
             for frame in self._parser.expire():
                 self._handle(frame, protocol, now, now, now)
 
     def _send(self, frame: Frame, protocol: Protocol, now: float) -> None:
-        if self._by_baud.get(self._baud) is protocol:  # the host may have gone on to another speed
-            self.to_host.put(frame.encode(protocol), now, self._baud)
+        if self._by_baud.get(self.baud) is protocol:  # the host may have gone on to another speed
+            self.to_host.put(frame.encode(protocol), now, self.baud)
 
     def _change_faults(self, now: float) -> None:
         self._now = now
@@ -328,4 +319,4 @@ class RobotLine:
         if self._powered:
             self._board.servos.fail(None if limp is None else int(limp['motor']))
         self._board.imu_failed = active(FaultKind.IMU, now) is not None
-        self._plugged = active(FaultKind.UNPLUG, now) is None
+        self.plugged = active(FaultKind.UNPLUG, now) is None

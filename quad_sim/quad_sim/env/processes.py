@@ -119,9 +119,8 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         for worker in self._workers:
             worker.order('step')
         infos = self._infos(self._answers())
-        rows = self._rows.copy()
         names = 'observations', 'rewards', 'terminated', 'truncated'
-        observations, rewards, fallen, over = (rows[name] for name in names)
+        observations, rewards, fallen, over = (self._rows[name].copy() for name in names)
         return observations, rewards, fallen, over, infos
 
     def call(self, name: str, *arguments: Any, **keywords: Any) -> tuple[Any, ...]:  # noqa: ANN401
