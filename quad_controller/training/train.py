@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-import math
 import os
 from pathlib import Path
 import sys
@@ -20,7 +19,7 @@ from progress import Progress
 
 from quad_controller.exceptions import PolicyError
 from quad_controller.policy.load import find_policy
-from quad_controller.policy_check.main import MAX_DURATION, MIN_DURATION
+from quad_controller.policy_check.main import MAX_DURATION, MIN_DURATION, number
 from quad_controller.policy_check.main import run as check_policy
 from quad_description import run_command
 
@@ -78,7 +77,9 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         description='Train a policy, check it and compare it.', allow_abbrev=False
     )
-    parser.add_argument('--minutes', type=_positive, default=30.0, help='how long it learns')
+    parser.add_argument(
+        '--minutes', type=number('time [min]', 0.01), default=30.0, help='how long it learns'
+    )
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--environments', type=int, default=64, help='at once')
     parser.add_argument(
@@ -88,27 +89,11 @@ def _parser() -> argparse.ArgumentParser:
         metavar='POLICY',
         help='ONNX file of this training, or a name that is shipped; default: %(default)s',
     )
-    parser.add_argument('--way', type=_duration, default=4.0, help='of each command compared [s]')
+    # check_policy would refuse another one after the training
+    duration = number('time in [s]', MIN_DURATION, MAX_DURATION)
+    parser.add_argument('--way', type=duration, default=4.0, help='of each command compared [s]')
     parser.add_argument('--output', type=Path, metavar='FOLDER', help='for policy and curves')
     return parser
-
-
-def _positive(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f'{text} is not above 0')
-    return value
-
-
-def _duration(text: str) -> float:
-    value = float(text)
-    if (
-        not MIN_DURATION <= value <= MAX_DURATION
-    ):  # check_policy would refuse it after the training
-        raise argparse.ArgumentTypeError(
-            f'{text} is not a time in [s]: it must be {MIN_DURATION:g} to {MAX_DURATION:g}'
-        )
-    return value
 
 
 if __name__ == '__main__':

@@ -204,72 +204,43 @@ def _parser() -> argparse.ArgumentParser:
         epilog='exit code: 0 it stands up, 1 it does not, 2 wrong use, 3 it could not be tried',
         allow_abbrev=False,
     )
-    parser.add_argument('policy', help='ONNX file, or the name of one that is shipped')
-    parser.add_argument('--preset', choices=list(PRESETS), default='lite', help='the robot')
-    parser.add_argument('--arm', action='store_true', help='the robot has its arm')
-    parser.add_argument(
-        '--contract',
-        type=Path,
-        metavar='FILE',
-        help='contract of the policy: YAML, deploy.yaml, env.yaml, config.yaml, config.json',
-    )
-    parser.add_argument(
-        '--phase-period',
-        type=_number('time in [s]', 0.0),
-        default=0.0,
-        help='[s]; 0: that of the file',
-    )
-    parser.add_argument(
+    add, chosen = parser.add_argument, PolicyOptions()
+    add('policy', help='ONNX file, or the name of one that is shipped')
+    add('--preset', choices=list(PRESETS), default='lite', help='the robot')
+    add('--arm', action='store_true', help='the robot has its arm')
+    files = 'YAML, deploy.yaml, env.yaml, config.yaml, config.json'
+    add('--contract', type=Path, metavar='FILE', help=f'contract of the policy: {files}')
+    time = number('time in [s]', 0.0)
+    add('--phase-period', type=time, default=0.0, help='[s]; 0: that of the file')
+    add(
         '--imu-frame',
         choices=[each.value for each in ImuFrame],
-        default='auto',
+        default=chosen.imu_frame.value,
         help='of the angular velocity (policy_imu_frame); needed where the file does not have it',
     )
-    parser.add_argument(
-        '--gravity-source', choices=[each.value for each in GravitySource], default='blend'
-    )
-    parser.add_argument(
-        '--hold-missing',
-        action='store_true',
-        help='accept a robot without some joints of the policy',
-    )
-    parser.add_argument(
-        '--servo',
-        type=_servo,
-        default=NOMINAL,
-        help='of the simulation: nominal, firm, vendor_rl, or kp=4,...',
-    )
+    sources = [each.value for each in GravitySource]
+    add('--gravity-source', choices=sources, default=chosen.gravity_source.value)
+    held = 'accept a robot without some joints of the policy'
+    add('--hold-missing', action='store_true', help=held)
+    servo = 'of the simulation: nominal, firm, vendor_rl, or kp=4,...'
+    add('--servo', type=_servo, default=NOMINAL, help=servo)
     ways = parser.add_argument_group('ways to try it, beside the gait but for the first')
-    ways.add_argument(
-        '--walk',
-        nargs=3,
-        type=_number('velocity'),
-        metavar=('X', 'Y', 'YAW'),
-        help='[m/s], [m/s], [rad/s]',
-    )
-    ways.add_argument(
+    add, velocity = ways.add_argument, number('velocity')
+    units = '[m/s], [m/s], [rad/s]'
+    add('--walk', nargs=3, type=velocity, metavar=('X', 'Y', 'YAW'), help=units)
+    add(
         '--duration',
-        type=_number('duration [s]', MIN_DURATION, MAX_DURATION),
+        type=number('duration [s]', MIN_DURATION, MAX_DURATION),
         help=f'of --walk ({WALK_DURATION:g}), of each command of --compare '
         f'({COMPARE_DURATION:g}) [s]',
     )
-    ways.add_argument(
-        '--compare',
-        action='store_true',
-        help='three speeds of each axis and one backward, in virtual time',
-    )
-    ways.add_argument(
-        '--chain',
-        action='store_true',
-        help='the same through servos, board, serial line and estimator, in real time',
-    )
-    ways.add_argument(
-        '--minutes',
-        type=_number('time [min]', MIN_MINUTES, MAX_MINUTES),
-        default=MINUTES,
-        help='of --chain (default: %(default)g)',
-    )
-    ways.add_argument(
+    course = 'three speeds of each axis and one backward, in virtual time'
+    add('--compare', action='store_true', help=course)
+    chain = 'the same through servos, board, serial line and estimator, in real time'
+    add('--chain', action='store_true', help=chain)
+    minutes = number('time [min]', MIN_MINUTES, MAX_MINUTES)
+    add('--minutes', type=minutes, default=MINUTES, help='of --chain (default: %(default)g)')
+    add(
         '--v1',
         action='store_true',
         help='--walk and --compare through the bytes of protocol v1, with differentiated joint '
@@ -307,16 +278,17 @@ def _servo(text: str) -> str:
     return text
 
 
-def _number(what: str, low: float = -math.inf, high: float = math.inf) -> Callable[[str], float]:
+def number(what: str, low: float = -math.inf, high: float = math.inf) -> Callable[[str], float]:
     """Return a reader of a number in a range, for argparse."""
-    limits = f'{low:g} or more' if high == math.inf else f'{low:g} to {high:g}'
+    limits = f': it must be {low:g} {"or more" if high == math.inf else f"to {high:g}"}'
 
     def read(text: str) -> float:
         value = float(text)
-        if not math.isfinite(value):
-            raise argparse.ArgumentTypeError(f'{text} is not a finite number')
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f'{text} is not a {what}: it must be {limits}')
+        if not (math.isfinite(value) and low <= value <= high):
+            kind = what if math.isfinite(value) else 'finite number'
+            raise argparse.ArgumentTypeError(
+                f'{text} is not a {kind}{limits if math.isfinite(low) else ""}'
+            )
         return value
 
     return read

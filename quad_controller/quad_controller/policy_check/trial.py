@@ -18,10 +18,10 @@ from ..exceptions import CheckError
 from ..gait.generator import GaitGenerator
 from ..gait.parameters import AS_TUNED, GaitParameters
 from ..gait.velocity import Velocity
-from ..policy.load import load_policy, LoadedPolicy, shipped_policies
+from ..policy.load import load_policy, shipped_policies
 from ..policy.options import PolicyOptions
 from ..states.modes import StateParameters
-from .arenas import AS_MADE, Conditions, PhysicsArena, RobotChoice, serial_arena
+from .arenas import AS_MADE, Conditions, PhysicsArena, RobotChoice, serial_arena, SerialArena
 from .course import CourseFigures, CourseWalker, REST_TIME, SETTLE_TIME, STAND_TIME
 
 
@@ -34,22 +34,17 @@ class Candidate:
     robot: RobotChoice = field(default_factory=RobotChoice)  # which robot walks
     gait: GaitParameters = AS_TUNED  # tuning of the gait
 
-    @property
-    def tuned(self) -> GaitParameters:
-        """Its gait, which knows how stiff the servos of its robot are."""
-        return self.robot.tuned(self.gait)
-
-    def load(self) -> LoadedPolicy | None:
-        """Return its policy, checked; None for the gait.
+    def placed_in(self, arena: PhysicsArena | SerialArena) -> CourseWalker:
+        """Put it on its feet in an arena, by a gait that knows how stiff its servos are.
 
         Raises:
-            PolicyError: It does not fit the robot.
+            PolicyError: The policy does not fit the robot.
         """
-        if self.path is None:
-            return None
-        robot = quadruped(self.robot.urdf)
-        stand = GaitGenerator(robot, self.tuned).stand_targets
-        return load_policy(self.path, robot, stand, self.options, StateParameters().period)
+        robot, gait, policy = quadruped(self.robot.urdf), self.robot.tuned(self.gait), None
+        if self.path is not None:
+            stand, period = GaitGenerator(robot, gait).stand_targets, StateParameters().period
+            policy = load_policy(self.path, robot, stand, self.options, period).runner
+        return CourseWalker(arena, robot, policy, gait)
 
 
 def shipped_walkers() -> dict[str, Candidate]:
@@ -74,11 +69,8 @@ class Trial:
             CheckError: The physics failed.
             PolicyError: The policy does not fit the robot.
         """
-        loaded = self.who.load()
-        policy = None if loaded is None else loaded.runner
         try:
-            arena = PhysicsArena(self.who.robot, self.conditions)
-            walker = CourseWalker(arena, quadruped(self.who.robot.urdf), policy, self.who.tuned)
+            walker = self.who.placed_in(PhysicsArena(self.who.robot, self.conditions))
             push = self.conditions.push
             return walker.walk(self.commands, self.duration, push=push, seed=self.seed)
         except SimulationError as error:
@@ -110,11 +102,8 @@ def run_chain(
     """
     figures = []
     for who in walkers:
-        loaded = who.load()
-        policy = None if loaded is None else loaded.runner
         with serial_arena(who.robot) as arena:
-            walker = CourseWalker(arena, quadruped(who.robot.urdf), policy, who.tuned)
-            figures.append(walker.walk(commands, duration))
+            figures.append(who.placed_in(arena).walk(commands, duration))
     return figures
 
 
