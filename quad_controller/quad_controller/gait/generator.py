@@ -110,11 +110,6 @@ class GaitGenerator:
         targets = self._robot.place(self._robot.solve(self._neutral), self.others)
         return targets if self._compensation is None else self._compensation.at_rest(targets)
 
-    @property
-    def phase(self) -> float:
-        """Share of the gait's period that has passed."""
-        return self._stepper.phase
-
     def choose(self, gait: Gait) -> None:
         """Change the gait; the robot stops for it when it walks."""
         self.wanted_gait = gait
@@ -178,12 +173,8 @@ class GaitGenerator:
             math.hypot(velocity.x - velocity.yaw * place[1], velocity.y + velocity.yaw * place[0])
             for place in self._neutral
         )
-        most = self._schedule.speed
+        most = self._stepper.schedule.speed
         return velocity.scaled(most / fastest) if fastest > most else velocity
 
     def _scheduled(self, gait: Gait) -> Schedule:
         return self._parameters.schedule(gait, self._robot.leg_length)
-
-    @property
-    def _schedule(self) -> Schedule:
-        return self._stepper.schedule

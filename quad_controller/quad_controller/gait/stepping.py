@@ -155,19 +155,9 @@ class Stepper:
         self.lift = lift
         self._depth = depth
         self._feet = [_Foot() for _ in neutral]
-        self._phase = 0.0
-        self._walking = False
+        self._phase = 0.0  # share of the period that has passed
+        self.walking = False  # whether any foot is off its neutral place or about to step
         self._engaged = 0.0
-
-    @property
-    def walking(self) -> bool:
-        """Whether any foot is off its neutral place or about to step."""
-        return self._walking
-
-    @property
-    def phase(self) -> float:
-        """Share of the period that has passed."""
-        return self._phase
 
     @property
     def contacts(self) -> tuple[bool, ...]:
@@ -185,16 +175,16 @@ class Stepper:
         """Put all feet back to their neutral places, at once."""
         self._feet = [_Foot() for _ in self._neutral]
         self._phase = self._engaged = 0.0
-        self._walking = False
+        self.walking = False
 
     def step(self, velocity: Velocity, dt: float) -> list[Vector]:
         """Advance and return the feet in the frame of a level body in [m]."""
-        if not self._walking and not velocity.at_rest:
-            self._walking = True
+        if not self.walking and not velocity.at_rest:
+            self.walking = True
             self._phase = 0.0
-        if self._walking:
+        if self.walking:
             self._advance(velocity, dt)
-        if self._walking and velocity.at_rest and self._all_at_place() and self._engaged <= 0.0:
+        if self.walking and velocity.at_rest and self._all_at_place() and self._engaged <= 0.0:
             self.reset()
         return [
             (place[0] + foot.x, place[1] + foot.y, place[2] + foot.z)

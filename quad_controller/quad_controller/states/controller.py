@@ -90,7 +90,8 @@ class Controller:
                     'give <limit velocity="..."> of the URDF in rad/s'
                 )
         poses = Poses(robot, states.lie_height, arm_pose)
-        self._fallback_positions = poses.fallback_positions
+        # positions of all joints that are assumed of those that nobody has measured [rad]
+        self.fallback_positions = poses.fallback_positions
         self._generator = GaitGenerator(robot, gait, poses.fallback_positions)
         self._generator.choose(first_gait)
         self._robot = robot
@@ -218,11 +219,6 @@ class Controller:
         self._generator = generator
         self._machine.retune(generator)
         return Answer(True, 'tuned')
-
-    @property
-    def fallback_positions(self) -> Targets:
-        """Positions of all joints that are assumed of those that nobody has measured [rad]."""
-        return self._fallback_positions
 
     @property
     def status(self) -> Status:

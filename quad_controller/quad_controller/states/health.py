@@ -60,11 +60,16 @@ class Health:
         self._foot_contacts_age += waited
         if measurement.foot_contacts is not None:
             self._foot_contacts, self._foot_contacts_age = measurement.foot_contacts, 0.0
-        problems = [
-            *self._take_joints(measurement.joints),
-            *self._take_imu(measurement.imu),
-            *self._take_linear_velocity(measurement.linear_velocity),
-        ]
+        joints, imu, velocity = measurement.joints, measurement.imu, measurement.linear_velocity
+        problems: list[str] = []
+        if joints and self._usable(Fault.JOINTS, joints.problem(self._count), problems):
+            self.joints, self.joints_age = joints, 0.0
+        if imu and self._usable(Fault.IMU, imu.problem(), problems):
+            self.imu, self.imu_age = imu, 0.0
+        if velocity and all(map(math.isfinite, velocity)):
+            self._linear_velocity, self._linear_velocity_age = velocity, 0.0
+        elif velocity:
+            problems.append('refused a velocity of the body that is not finite')
         self.refused += len(problems)
         if measurement.servo_problem is not None:
             self.servo_problem = measurement.servo_problem
@@ -207,33 +212,14 @@ class Health:
         rates = f'{_turn_rate(imu):.1f} rad/s, faster than {fastest:g}'
         return f'the body turns at {rates}; when it does not, /imu is wrong: look at the cable'
 
-    def _take_joints(self, joints: JointSample | None) -> Iterator[str]:
-        if joints is None:
-            return
-        if problem := joints.problem(self._count):
-            self.refuse(Fault.JOINTS, problem)
-            yield f'refused {problem}'
+    def _usable(self, what: Fault, problem: str, problems: list[str]) -> bool:
+        """Whether a sample has no problem; one that has is refused."""
+        if problem:
+            self.refuse(what, problem)
+            problems.append(f'refused {problem}')
         else:
-            self.joints, self.joints_age = joints, 0.0
-            self._refusals.pop(Fault.JOINTS, None)
-
-    def _take_imu(self, imu: ImuSample | None) -> Iterator[str]:
-        if imu is None:
-            return
-        if problem := imu.problem():
-            self.refuse(Fault.IMU, problem)
-            yield f'refused {problem}'
-        else:
-            self.imu, self.imu_age = imu, 0.0
-            self._refusals.pop(Fault.IMU, None)
-
-    def _take_linear_velocity(self, velocity: Vector | None) -> Iterator[str]:
-        if velocity is None:
-            return
-        if all(map(math.isfinite, velocity)):
-            self._linear_velocity, self._linear_velocity_age = velocity, 0.0
-        else:
-            yield 'refused a velocity of the body that is not finite'
+            self._refusals.pop(what, None)
+        return not problem
 
 
 def _longer(time: float | None, dt: float) -> float:

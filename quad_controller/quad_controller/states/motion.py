@@ -28,38 +28,33 @@ class StepLimiter:
         self._limits = tuple(limits)
         self._longest = MAX_PERIODS * period
         self._speed = speed
-        self._last: Targets | None = None
+        self.last: Targets | None = None  # what was let through last; None at the beginning
         self.limited = 0  # how many targets of single joints were too fast so far, and were cut
-
-    @property
-    def last(self) -> Targets | None:
-        """What was let through last; None at the beginning."""
-        return self._last
 
     def start(self, positions: Sequence[float]) -> Targets:
         """Begin where the joints are [rad], even if that is outside of their limits."""
-        self._last = tuple(positions)
-        return self._last
+        self.last = tuple(positions)
+        return self.last
 
     def reset(self) -> None:
         """Forget what was let through: joints were moved by something else."""
-        self._last = None
+        self.last = None
 
     def step(self, targets: Sequence[float], dt: float) -> Targets:
         """Return what may be sent instead of some finite targets."""
-        if self._last is None:
+        if self.last is None:
             return self.start(targets)
         dt = min(dt, self._longest) * self._speed
         sent = []
-        for limits, before, wanted in zip(self._limits, self._last, targets, strict=True):
+        for limits, before, wanted in zip(self._limits, self.last, targets, strict=True):
             most = limits.velocity * dt
             target = min(max(wanted, min(limits.lower, before)), max(limits.upper, before))
             if abs(target - before) > most:
                 target = before + math.copysign(most, target - before)
                 self.limited += 1
             sent.append(target)
-        self._last = tuple(sent)
-        return self._last
+        self.last = tuple(sent)
+        return self.last
 
 
 class Motion(ABC):
