@@ -304,6 +304,7 @@ def hold(page: Page, button: str) -> None:
 def drag(page: Page, slider: int, share: float) -> None:
     """Drag a slider of the open tab to a share of its way."""
     thumb = page.locator('[role=slider]:visible').nth(slider)
+    _wait_until_it_stands(thumb)
     box, track = thumb.bounding_box(), thumb.locator('xpath=..').bounding_box()
     assert box is not None
     assert track is not None
@@ -326,8 +327,8 @@ def slider_value(page: Page, slider: int) -> float:
 
 def choose(page: Page, dropdown: str, option: str) -> None:
     """Choose an option of a dropdown of the open tab."""
-    page.get_by_label(dropdown, exact=True).click(force=True)
-    page.get_by_role('option', name=option, exact=True).click(force=True)
+    press(page.get_by_label(dropdown, exact=True))
+    press(page.get_by_role('option', name=option, exact=True))
 
 
 def drag_arrow(page: Page, color: str, way: int) -> None:
