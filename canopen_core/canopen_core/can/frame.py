@@ -129,27 +129,19 @@ def is_unacknowledged(frame: Frame) -> bool:
 def error_text(frame: Frame) -> str:
     """Describe an error frame, e.g. ``controller problem (transmit error passive)``."""
     data = frame.data.ljust(8, b'\0')
+    tables = {
+        _CONTROLLER: (CONTROLLER_PROBLEMS, data[1]),
+        _PROTOCOL: (PROTOCOL_VIOLATIONS, data[2]),
+    }
     parts = []
     for bit, text in ERROR_CLASSES:
-        if not frame.can_id & bit:
-            continue
-        details = _details(bit, data)
-        parts.append(f'{text} ({details})' if details else text)
+        if frame.can_id & bit:
+            table, bits = tables.get(bit, ((), 0))
+            details = ', '.join(detail for each, detail in table if bits & each)
+            parts.append(f'{text} ({details})' if details else text)
     if frame.can_id & _COUNTERS:
         parts.append(f'{data[6]} transmit and {data[7]} receive errors counted')
     return ', '.join(parts) or f'error class 0x{frame.can_id:X}'
-
-
-def _details(error_class: int, data: bytes) -> str:
-    if error_class == _CONTROLLER:
-        return _named(CONTROLLER_PROBLEMS, data[1])
-    if error_class == _PROTOCOL:
-        return _named(PROTOCOL_VIOLATIONS, data[2])
-    return ''
-
-
-def _named(table: tuple[tuple[int, str], ...], bits: int) -> str:
-    return ', '.join(text for bit, text in table if bits & bit)
 
 
 # A data frame with an 11-bit identifier and n bytes takes 44 + 8n bits and 3 bits of intermission;
@@ -194,13 +186,6 @@ class LoadFigures:
     load: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class _Sample:
-    time: float  # [s]
-    frames: int
-    bits: float
-
-
 class BusLoad:
     """Estimates the load from the frames that are sent and received.
 
@@ -232,27 +217,27 @@ class BusLoad:
         """Return the figures of the last window before a steady time in [s]."""
         newest = self._sample(now)
         samples = self._samples
-        while len(samples) > 1 and samples[1].time <= now - self._window:
+        while len(samples) > 1 and samples[1][0] <= now - self._window:
             samples.popleft()
-        oldest = samples[0]
-        if now - samples[-1].time >= self._window / _SAMPLES:
+        begin, frames_before, bits_before = samples[0]
+        if now - samples[-1][0] >= self._window / _SAMPLES:
             samples.append(newest)
-        span = now - oldest.time
+        span, (_, frames, bits) = now - begin, newest
         if span <= 0.0:
             return LoadFigures()
         return LoadFigures(
-            (newest.frames - oldest.frames) / span,
-            (newest.bits - oldest.bits) / (span * self._bitrate),
+            (frames - frames_before) / span, (bits - bits_before) / (span * self._bitrate)
         )
 
-    def _sample(self, now: float) -> _Sample:
+    def _sample(self, now: float) -> tuple[float, int, float]:
+        """Return the time, and the frames and bits until then."""
         frames, bits = 0, 0.0
         for is_extended, counts in ((False, self._standard), (True, self._extended)):
             for size, count in enumerate(counts):
                 plain = frame_bits(size, is_extended=is_extended)
                 frames += count
                 bits += count * (plain + stuff_bits_mean(size, is_extended=is_extended))
-        return _Sample(now, frames, bits)
+        return now, frames, bits
 
 
 _RECORD = struct.Struct('<dIB8s')  # time, identifier with flags, length with direction, data

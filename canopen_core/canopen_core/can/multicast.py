@@ -45,24 +45,16 @@ def _flags(is_extended: bool, is_remote: bool, is_error: bool) -> bytes:
 
 # the time is 0.0, because receivers stamp for themselves
 _HEAD = _MAP_HEADER + _entries(timestamp=0.0) + _pack('arbitration_id')
-_ID_AT = len(_HEAD)
 _LENGTHS = tuple(
     _pack(size) + _pack('data') + _pack(bytes(size))[:_BINARY_HEADER]
     for size in range(PAYLOAD_MAX + 1)
 )
 """Length code, key and header of the payload, by its length in [byte]."""
-_LENGTH_SIZE = len(_LENGTHS[0])
 _TAIL = _entries(is_fd=False, bitrate_switch=False, error_state_indicator=False)
-_TAIL_SIZE = len(_TAIL)
 _PLAIN_FLAGS = _flags(is_extended=False, is_remote=False, is_error=False)
 _LAYOUT = (_HEAD, _PLAIN_FLAGS, _LENGTHS[0][1:-1], _TAIL)  # for the compiled reader
 _PLAIN_HEADS = tuple(_HEAD + _pack(can_id) + _PLAIN_FLAGS for can_id in range(STANDARD_ID_MAX + 1))
 """Everything before the length of a data frame, by its 11-bit identifier."""
-_PLAIN_IDS = {head: can_id for can_id, head in enumerate(_PLAIN_HEADS)}
-_HEAD_SIZES = [0] * 0x100
-"""Length of such a head in [byte] by the first byte of its identifier, 0 for none of them."""
-for _head in _PLAIN_HEADS:
-    _HEAD_SIZES[_head[_ID_AT]] = len(_head)
 
 
 def encode(frame: Frame) -> bytes:
@@ -80,28 +72,6 @@ def encode(frame: Frame) -> bytes:
 
 def decode(datagram: bytes, timestamp: float) -> Frame:
     """Read a datagram that came at a steady time in [s]; the time inside is the sender's."""
-    frame = _decode_plain(datagram, timestamp)
-    return _decode_any(datagram, timestamp) if frame is None else frame
-
-
-def _decode_plain(datagram: bytes, timestamp: float) -> Frame | None:
-    """Read a data frame with an 11-bit identifier in the usual layout; None for all others."""
-    if len(datagram) <= _ID_AT:
-        return None
-    length_at = _HEAD_SIZES[datagram[_ID_AT]]
-    can_id = _PLAIN_IDS.get(datagram[:length_at])
-    data = datagram[length_at + _LENGTH_SIZE : -_TAIL_SIZE]
-    if (
-        can_id is None
-        or len(data) > PAYLOAD_MAX
-        or not datagram.startswith(_LENGTHS[len(data)], length_at)
-        or not datagram.endswith(_TAIL)
-    ):
-        return None
-    return Frame(can_id, data, timestamp)
-
-
-def _decode_any(datagram: bytes, timestamp: float) -> Frame:
     try:
         fields = msgpack.unpackb(datagram, raw=False)
     except (ValueError, TypeError) as error:

@@ -8,6 +8,7 @@ The sections of a file become the entries of an object dictionary (CiA 306-1, 4.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 import os
@@ -44,8 +45,6 @@ class Eds:
     # data types that may stand in an RPDO as a gap
     dummy_types: frozenset[int] = frozenset(DUMMY_TYPES)
     warnings: tuple[Problem, ...] = ()  # what was odd but could be understood
-    # VendorNumber, ProductNumber and RevisionNumber of [DeviceInfo]; 0 where it has none
-    numbers: tuple[int, int, int] = (0, 0, 0)
 
 
 def load_eds(path: str | os.PathLike[str]) -> Eds:
@@ -64,7 +63,7 @@ def load_eds(path: str | os.PathLike[str]) -> Eds:
         findings.raise_errors()
     for line, key, message in ini.oddities:
         findings.warning(Place(path, line, key), message, TOLERATED)
-    return Eds(path, dictionary, node_id, _dummy_types(ini), findings.warnings, _numbers(ini))
+    return Eds(path, dictionary, node_id, _dummy_types(ini), findings.warnings)
 
 
 def read_eds_text(path: Path, findings: Findings) -> str:
@@ -86,24 +85,13 @@ def read_eds_text(path: Path, findings: Findings) -> str:
     return ''
 
 
-def _number(ini: IniFile, section: str, key: str) -> int:
-    """Return a number beside the objects, 0 where the file has none."""
-    try:
-        return parse_integer(ini.sections[section].text(key))
-    except (KeyError, ValueError):
-        return 0
-
-
 def _node_id(ini: IniFile) -> int | None:
-    found = (_number(ini, section, 'nodeid') for section in COMMISSIONING)
-    return next((number for number in found if NODE_ID_MIN <= number <= NODE_ID_MAX), None)
-
-
-def _numbers(ini: IniFile) -> tuple[int, int, int]:
-    vendor, product, revision = (
-        _number(ini, 'deviceinfo', f'{what}number') for what in ('vendor', 'product', 'revision')
-    )
-    return vendor, product, revision
+    for section in COMMISSIONING:
+        with suppress(KeyError, ValueError):
+            number = parse_integer(ini.sections[section].text('nodeid'))
+            if NODE_ID_MIN <= number <= NODE_ID_MAX:
+                return number
+    return None
 
 
 def _dummy_types(ini: IniFile) -> frozenset[int]:
@@ -229,7 +217,9 @@ class ObjectReader:
         name: str = '',
     ) -> ObjectEntry:
         data_type = self._data_type(section, code)
-        initial, configured = self._initial(section, data_type)
+        default = self._value(section, 'defaultvalue', data_type)
+        own = self._value(section, 'parametervalue', data_type)
+        initial = default if own is None else own
         low, high = self._limits(section, data_type)
         whole = self._objects.get(index, section)
         return ObjectEntry(
@@ -245,7 +235,7 @@ class ObjectReader:
             pdo_mappable=bool(self._number(section, 'pdomapping', 0)),
             line=section.line,
             record=whole.text('parametername') if whole.title != section.title else '',
-            configured=configured,
+            configured=own is not None and own != default,
         )
 
     def _data_type(self, section: IniSection, code: ObjectCode) -> DataType:
@@ -269,12 +259,6 @@ class ObjectReader:
             what = f'unknown AccessType {text[:20]!r}' if text else 'no AccessType'
             self._odd(section, 'accesstype', f'{what}, taken as rw')
             return AccessType.READ_WRITE
-
-    def _initial(self, section: IniSection, data_type: DataType) -> tuple[EdsValue | None, bool]:
-        """Read the value of the device, and whether it differs from the one after a reset."""
-        default = self._value(section, 'defaultvalue', data_type)
-        own = self._value(section, 'parametervalue', data_type)
-        return (default, False) if own is None else (own, own != default)
 
     def _limits(
         self, section: IniSection, data_type: DataType

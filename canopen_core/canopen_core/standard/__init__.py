@@ -52,10 +52,13 @@ from .drive import (
     IoGroup,
     mode_title,
     OperationMode,
+    POSITION_MODES,
     STATE_WORDS,
     Statusword,
     statusword_text,
     TARGET_OBJECTS,
+    TORQUE_MODES,
+    VELOCITY_MODES,
 )
 from .messages import (
     ALL_NODES,
@@ -101,7 +104,6 @@ from .objects import (
     PDO_BITS_MAX,
     PDO_COUNT_MAX,
     pdo_object,
-    PdoObject,
     slow_timeout,
 )
 from .sdo import abort_text, AbortCode
@@ -130,6 +132,7 @@ __all__ = [
     'OFFSETS',
     'PDO_BITS_MAX',
     'PDO_COUNT_MAX',
+    'POSITION_MODES',
     'PREDEFINED_MAX',
     'PROFILE_MASK',
     'REAL_FORMATS',
@@ -142,7 +145,9 @@ __all__ = [
     'TARGET_OBJECTS',
     'TIME_CONSUMER',
     'TIME_PRODUCER',
+    'TORQUE_MODES',
     'UNSIGNED_BITS',
+    'VELOCITY_MODES',
     'AbortCode',
     'AccessType',
     'CobId',
@@ -164,7 +169,6 @@ __all__ = [
     'ObjectEntry',
     'OperationMode',
     'PdoCodec',
-    'PdoObject',
     'Statusword',
     'Value',
     'abort_text',

@@ -167,6 +167,17 @@ TARGET_OBJECTS: dict[OperationMode, tuple[Index, int]] = {
     OperationMode.CYCLIC_TORQUE: (Index.TARGET_TORQUE, 0),
 }
 
+POSITION_MODES = (
+    OperationMode.PROFILE_POSITION,
+    OperationMode.INTERPOLATED_POSITION,
+    OperationMode.CYCLIC_POSITION,
+)
+VELOCITY_MODES = (
+    OperationMode.VELOCITY,
+    OperationMode.PROFILE_VELOCITY,
+    OperationMode.CYCLIC_VELOCITY,
+)
+TORQUE_MODES = (OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE)
 CYCLIC_MODES = frozenset(
     {
         OperationMode.INTERPOLATED_POSITION,
