@@ -197,9 +197,7 @@ class CanopenMaster:
             path: The bus.yml.
             bus: Name of the bus: ``can0``, ``vcan0``, ``udp_multicast:239.x.y.z[:port]``,
                 ``INTERFACE:CHANNEL[@BITRATE]`` of python-can, or ``auto``.
-            on_event: Takes what happens on the bus, in the thread of the cycle: it must not wait.
-            thread_priority: SCHED_FIFO priority of the cycle, where it is allowed; 0 for none.
-            beside_master: Start although another master is found, and command no device of its.
+            on_event: As of the constructor; so are those that follow.
 
         Raises:
             ConfigError: The bus.yml or an EDS is wrong; every problem is listed.

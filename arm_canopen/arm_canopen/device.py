@@ -19,6 +19,7 @@ from canopen_core.standard import (
     object_address,
     ObjectEntry,
     OperationMode,
+    POSITION_MODES,
     Value,
 )
 
@@ -33,11 +34,6 @@ from .master.runner import NetworkThread
 logger = logging.getLogger('arm_canopen')
 
 MOVE_TIMEOUT = 60.0  # [s]
-POSITION_MODES = (
-    OperationMode.PROFILE_POSITION,
-    OperationMode.INTERPOLATED_POSITION,
-    OperationMode.CYCLIC_POSITION,
-)
 
 
 class DeviceSdo:

@@ -33,9 +33,6 @@ MORE_ROWS = (
     Row(0x100D, 0, 'Life time factor', 5, 'rw', '0'),
     Row(0x1014, 0, 'COB-ID EMCY', 7, 'rw', '$NODEID+0x80'),
     Row(0x1019, 0, 'Synchronous counter overflow', 5, 'rw', '0'),
-    Row(0x1200, 0, 'Highest sub-index', 5, 'const', '2'),
-    Row(0x1200, 1, 'Client to server', 7, 'ro', '$NODEID+0x600'),
-    Row(0x1200, 2, 'Server to client', 7, 'ro', '$NODEID+0x580'),
     Row(0x6502, 0, 'Supported drive modes', 7, 'ro', '0xA5'),
 )
 RICH_EDS = eds_text(

@@ -10,7 +10,14 @@ from enum import auto, Enum
 import math
 
 from canopen_core import CanopenError, SdoError
-from canopen_core.standard import DriveState, Index, mode_title, OperationMode, Statusword
+from canopen_core.standard import (
+    DriveState,
+    Index,
+    mode_title,
+    OperationMode,
+    Statusword,
+    TORQUE_MODES,
+)
 
 from ..config.model.drive import DriveConfig
 from ..master.events import EventKind, Severity
@@ -27,7 +34,7 @@ from .modes import (
     NO_BITS,
 )
 from .modes.cyclic_position import Following, FollowingWatch, MARGIN_TIME
-from .modes.mode import check_setpoint, check_target, TORQUE_MODES
+from .modes.mode import check_setpoint, check_target
 from .motion import AxisFeedback, Refusal, RefusalCause, Setpoint
 from .parameters import quirks_of
 from .state import AxisState, DriveStatus, FAULTY, LOOK_PERIOD, POWERED

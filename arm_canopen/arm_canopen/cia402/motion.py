@@ -37,15 +37,10 @@ class RefusalCause(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """Why a drive accepts no targets.
+    """Why a drive accepts no targets."""
 
-    Attributes:
-        cause: What keeps it from accepting them, for programs.
-        detail: More of it in words; may be empty.
-    """
-
-    cause: RefusalCause
-    detail: str = ''
+    cause: RefusalCause  # what keeps it from accepting them, for programs
+    detail: str = ''  # more of it in words; may be empty
 
     def __str__(self) -> str:
         """Return it as a sentence without its subject, which is the drive."""
@@ -56,53 +51,37 @@ class Refusal:
 class AxisFeedback:
     """What is known of one drive at the start of a cycle, made anew for each.
 
-    Attributes:
-        name: Name of the drive in bus.yml.
-        online: Booted, and its heartbeat is there.
-        state: State of the power drive system.
-        mode: Mode of operation as displayed in 0x6061.
-        position: Actual position in user units (rad for a revolute joint); the last one of a lost
-            drive, NaN before the first.
-        velocity: Actual velocity in user units per second.
-        setpoint: Position last commanded in user units; equals ``position`` while disabled.
-        followable: A position set-point of a source is sent in this cycle: the drive is online,
-            Operation Enabled and in a cyclic position mode, and nothing else moves it.
-        refusal: Why the drive accepts no stream of positions; None when it does. A drive that
-            moves and has stopped to send its TPDOs is followable for another second in spite of
-            it, so that the source can bring the whole arm to rest on its path; then it is halted.
-        age: Age of the oldest of these values in [s]; infinite while they are unknown.
-        speed_limit: Greatest velocity that the drive takes (0x607F) in user units per second;
-            infinite where it has none.
+    Positions are in user units (rad for a revolute joint), velocities in those per second.
     """
 
-    name: str
-    online: bool
-    state: DriveState
-    mode: int
-    position: float
-    velocity: float
-    setpoint: float
+    name: str  # name of the drive in bus.yml
+    online: bool  # booted, and its heartbeat is there
+    state: DriveState  # of the power drive system
+    mode: int  # mode of operation as displayed in 0x6061
+    position: float  # actual one; the last one of a lost drive, NaN before the first
+    velocity: float  # actual one
+    setpoint: float  # position last commanded; equals ``position`` while disabled
+    # a position set-point of a source is sent in this cycle: the drive is online, Operation
+    # Enabled and in a cyclic position mode, and nothing else moves it
     followable: bool
+    # why it accepts no stream of positions; None when it does. A drive that moves and has stopped
+    # to send its TPDOs is followable for another second in spite of it, so that the source can
+    # bring the whole arm to rest on its path; then it is halted
     refusal: Refusal | None = None
-    age: float = 0.0
-    speed_limit: float = math.inf
+    age: float = 0.0  # of the oldest of these values in [s]; infinite while they are unknown
+    speed_limit: float = math.inf  # greatest velocity that it takes (0x607F)
 
 
 @dataclass(slots=True)  # as above
 class Setpoint:
     """A position, and what the drive shall add to its own control on the way there.
 
-    Attributes:
-        position: In user units.
-        velocity: Feed-forward in user units per second (0x60B1, usually the rate of the
-            position); it has an effect in mode 8, where an RPDO carries the object.
-        effort: Feed-forward in units of effort (0x60B2, such as the weight of what hangs on the
-            axis); likewise.
+    Feed-forward has an effect in mode 8, where an RPDO carries its object.
     """
 
-    position: float
-    velocity: float = 0.0
-    effort: float = 0.0
+    position: float  # in user units
+    velocity: float = 0.0  # of 0x60B1 in user units per second, usually the rate of the position
+    effort: float = 0.0  # of 0x60B2, such as the weight of what hangs on the axis
 
 
 class MotionSource(Protocol):

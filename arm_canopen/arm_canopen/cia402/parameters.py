@@ -139,9 +139,12 @@ class ParameterCache:
         if self._reading is not None:
             self._reading.cancel(SdoError(reason))
 
-    async def factor_group(self) -> FactorGroup:
+    async def factor_group(
+        self, addresses: Sequence[tuple[int, int]] = FACTOR_ADDRESSES
+    ) -> FactorGroup:
         """Read what the drive says about its increments; SdoError when it does not answer."""
-        return await self._factor_group(FACTOR_ADDRESSES)
+        held = await self._read_each(addresses)
+        return FactorGroup.read(lambda index, subindex: held.get((index, subindex)))
 
     def _object_downloaded(
         self, index: int, subindex: int, data: bytes, end: Promise[None]
@@ -251,17 +254,13 @@ class ParameterCache:
             units=self._units_from,
         )
 
-    async def _factor_group(self, addresses: Sequence[tuple[int, int]]) -> FactorGroup:
-        held = await self._read_each(addresses)
-        return FactorGroup.read(lambda index, subindex: held.get((index, subindex)))
-
     async def _read_units(self) -> str:
         """Use the units of the factor group (CiA 402-2, clause 8); report where they are from."""
         config, source = self._config, 'bus.yml'
         if not config.scale_from_factor_group and config.scale_acc_from_dev is not None:
             return source
         addresses = FACTOR_ADDRESSES if config.scale_from_factor_group else ACCELERATION_ADDRESSES
-        factors = await self._factor_group(addresses)
+        factors = await self.factor_group(addresses)
         if config.scale_from_factor_group:
             scale, velocity_scale = factors.position_scale, factors.velocity_scale
             if not scale:

@@ -8,13 +8,19 @@ from collections.abc import Callable
 import contextlib
 
 from canopen_core import CodecError, DriveError, SdoError, SdoTimeoutError
-from canopen_core.standard import DriveState, Index, object_address, OperationMode, Statusword
+from canopen_core.standard import (
+    DriveState,
+    Index,
+    object_address,
+    OperationMode,
+    Statusword,
+    TORQUE_MODES,
+)
 
 from ..master.events import Severity
 from ..master.scheduler import Scheduler
 from .axis import Axis, NOT_TAKEN
 from .modes import Mode, ProfilePosition
-from .modes.mode import TORQUE_MODES
 from .motion import Refusal, RefusalCause
 from .parameters import quirks_of
 from .state import FAULTY

@@ -133,11 +133,10 @@ class BootProcess:
     async def _answers(self) -> bool:
         """Read 0x1000; any answer will do."""
         try:
-            await self._node.sdo.read(Index.DEVICE_TYPE, 0, self._node.config.boot_timeout)
+            with suppress(SdoAbortError):
+                await self._node.sdo.read(Index.DEVICE_TYPE, 0, self._node.config.boot_timeout)
         except SdoTimeoutError:
             return False
-        except SdoAbortError:
-            return True
         return True
 
     async def _boot(self) -> None:

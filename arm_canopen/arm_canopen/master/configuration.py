@@ -243,19 +243,15 @@ async def read_outputs(node: RemoteNode, timeout: float) -> None:
     read: dict[tuple[int, int], Number | None] = {}  # several targets start with one position
     for output, position, mapped in _mapped(node):
         value, source = None, _source(node, mapped)
-        if source is not None and _is_readable(node, source):
+        if source is not None:
             address = source.index, source.subindex
-            if address not in read:
+            entry = node.config.dictionary.get(*address)
+            if address not in read and (entry is None or entry.access.readable):
                 read[address] = None
                 with suppress(SdoAbortError, CodecError):
                     read[address] = await _present(node, source, timeout)
-            value = read[address]
+            value = read.get(address)
         output.values[position] = start_value(node.config, mapped) if value is None else value
-
-
-def _is_readable(node: RemoteNode, mapped: MappedObject) -> bool:
-    entry = node.config.dictionary.get(mapped.index, mapped.subindex)
-    return entry is None or entry.access.readable
 
 
 def _source(node: RemoteNode, mapped: MappedObject) -> MappedObject | None:

@@ -25,50 +25,6 @@ def guarding_request(node_id: int) -> Frame:
     return Frame(CobId.HEARTBEAT + node_id, is_remote=True)
 
 
-class Guarding:
-    """Requests the state of one device, again and again, and counts the missing answers."""
-
-    def __init__(self, node_id: int, guard_time: float, retry_factor: int, send: Send) -> None:
-        """Nothing is sent before :meth:`start`; ``guard_time`` is in [s]."""
-        self._request = guarding_request(node_id)
-        self._guard_time = guard_time
-        self._retry_factor = retry_factor
-        self._send = send
-        self._due: float | None = None
-        self._unanswered = 0
-        self._toggle: int | None = None
-
-    def start(self, now: float) -> None:
-        """Begin to send requests at a time in [s]; the first answer may have either toggle bit."""
-        self._due, self._unanswered, self._toggle = now, 0, None
-
-    def stop(self) -> None:
-        """Send no more requests."""
-        self._due = None
-
-    def receive(self, data: bytes) -> bool:
-        """Process an answer; return whether its toggle bit makes it a new one."""
-        toggle = data[0] & TOGGLE
-        if toggle == self._toggle:
-            return False
-        self._toggle = toggle
-        self._unanswered = 0
-        return True
-
-    def advance(self, now: float) -> bool:
-        """Send a request when it is due; return whether the device counts as lost."""
-        if self._due is None or now < self._due:
-            return False
-        if self._unanswered >= self._retry_factor:
-            self._due = None
-            return True
-        self._unanswered += 1
-        due = self._due + self._guard_time
-        self._due = due if due > now else now + self._guard_time
-        self._send(self._request)
-        return False
-
-
 class LifeSigns:
     """The error control of one device."""
 
@@ -80,12 +36,14 @@ class LifeSigns:
         self.silent = False
         self.missed = 0  # how often in a row one was missing when it was due
         self._config = config
+        self._send = send
         self._since = self._awaited_from = 0.0
         self._timeout = math.inf
-        self._guarding: Guarding | None = None
-        if config.uses_node_guarding:
-            timing = (config.guard_time, config.retry_factor)
-            self._guarding = Guarding(config.node_id, *timing, send)
+        # of node guarding: when the next request is due, how many were not answered, and the
+        # toggle bit of the last answer; the first one may have either
+        self._due: float | None = None
+        self._unanswered = 0
+        self._toggle: int | None = None
 
     @property
     def consumer_time(self) -> float:
@@ -105,17 +63,18 @@ class LifeSigns:
         """Supervise no more."""
         self.missed = 0
         self._timeout = math.inf
-        if self._guarding is not None:
-            self._guarding.stop()
+        self._due = None
 
     def take(self, state: NmtState, frame: Frame, *, supervised: bool) -> bool:
         """Process a life sign; return whether it is new, by the toggle bit of node guarding.
 
         The toggle bit counts for a supervised device only, which is online.
         """
-        guarding = self._guarding if supervised and state is not NmtState.BOOT_UP else None
-        if guarding is not None and not guarding.receive(frame.data):
-            return False
+        if supervised and self._config.uses_node_guarding and state is not NmtState.BOOT_UP:
+            toggle = frame.data[0] & TOGGLE
+            if toggle == self._toggle:
+                return False
+            self._toggle, self._unanswered = toggle, 0
         self.last = frame.timestamp
         self.missed = 0
         return True
@@ -123,18 +82,24 @@ class LifeSigns:
     def overdue(self, now: float) -> str:
         """Return in words what is missing at a time in [s], empty while nothing is.
 
-        What is missing is awaited again from then on.
+        What is missing is awaited again from then on. A guarding request that is due is sent.
         """
+        config = self._config
         if now - max(self.last, self._awaited_from) > self._timeout:
             self._miss(now)
             return f'heartbeat lost: none within its consumer time of {self._timeout * 1000:g} ms'
-        if self._guarding is not None and self._guarding.advance(now):
+        if self._due is None or now < self._due:
+            return ''
+        if self._unanswered >= config.retry_factor:
             self._miss(now)
-            config = self._config
             return (
                 f'lost: no answer to node guarding {config.retry_factor} times in a row, each '
                 f'{config.guard_time * 1000:g} ms apart'
             )
+        self._unanswered += 1
+        due = self._due + config.guard_time
+        self._due = due if due > now else now + config.guard_time
+        self._send(guarding_request(config.node_id))
         return ''
 
     def _miss(self, now: float) -> None:
@@ -144,8 +109,8 @@ class LifeSigns:
 
     def _await_next(self, now: float) -> None:
         self._awaited_from = now
-        if self._guarding is not None:
-            self._guarding.start(now)
+        if self._config.uses_node_guarding:
+            self._due, self._unanswered, self._toggle = now, 0, None
 
 
 HISTORY = 16  # EMCYs that are remembered

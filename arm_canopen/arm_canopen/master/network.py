@@ -188,7 +188,7 @@ class Network:
     def cycle(self, now: float, period: float) -> None:
         """Begin the cycle whose SYNC has just been sent."""
         if self._round_open and self._sync.pending:
-            self._contain_each(lambda node: node.count_missed())
+            self._contain_each(lambda node: node.pdos.count_missed())
         self._round_open = self._syncs
         overdue = self.next_update < NEVER
         self.next_update = now

@@ -247,25 +247,20 @@ class InputReader:
     """Reads an object from a TPDO."""
 
     def __init__(self, source: ReceivedTpdo, position: int) -> None:
-        self._source = source
+        self.source = source  # its TPDO
         self._position = position
 
     @property
     def value(self) -> Number | None:
         """The value, None while unknown."""
-        values = self._source.values
+        values = self.source.values
         return None if values is None else values[self._position]
-
-    @property
-    def source(self) -> ReceivedTpdo:
-        """Its TPDO."""
-        return self._source
 
     def correct(self, value: Number) -> None:
         """Replace the value by one that was read by SDO, as its TPDO got lost."""
-        values = [*(self._source.values or ())]
+        values = [*(self.source.values or ())]
         values[self._position : self._position + 1] = [value]
-        self._source.values = tuple(values)
+        self.source.values = tuple(values)
 
 
 class OutputWriter:

@@ -146,10 +146,6 @@ class RemoteNode:
         if self.online:
             self.pdos.expect()
 
-    def count_missed(self) -> None:
-        """Count the TPDOs that did not answer the last SYNC."""
-        self.pdos.count_missed()
-
     def receive_heartbeat(self, frame: Frame) -> None:
         """Process a heartbeat or boot-up message."""
         state = parse_heartbeat(frame.data)

@@ -30,7 +30,7 @@ from ..cia402.sequences import HomingProgress
 from ..config.model.drive import FactorGroup
 from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
-from .device_node import DeviceNode
+from .device_node import answer_message, answer_success, DeviceNode
 from .joint_state_publisher import DriveJointStates
 from .output_thread import OutputThread
 
@@ -58,6 +58,8 @@ class AxisServices:
         commands: AxisCommands,
         place: str,
         thread: NetworkThread,
+        *,
+        file: BusFile,
     ) -> None:
         """``place`` is what the names begin with."""
         self._node = node
@@ -73,10 +75,16 @@ class AxisServices:
             COTargetDouble,
             f'{place}/target',
             lambda request: self._deliver(lambda: commands.set_target(request.target)),
-            self._answer_target,
+            partial(answer_success, node),
         )
-        node.offer(MoveService, f'{place}/move', self._move, self._answer_move)
+        node.offer(MoveService, f'{place}/move', self._move, answer_message)
         node.create_subscription(Float64, f'{place}/target', self._stream, 10)
+        node.offer(
+            ReadUnits,
+            f'{place}/read_units',
+            lambda request: thread.run_coroutine(commands.axis.view.cache.factor_group),
+            partial(answer_units, commands.axis, file),
+        )
         self._home = HomeAction(node, commands, f'{place}/home', thread, node.output)
 
     def _offer(self, name: str, request: Callable[[], Promise[str]]) -> None:
@@ -96,15 +104,6 @@ class AxisServices:
 
         return run
 
-    def _answer_target(
-        self, response: COTargetDouble.Response, future: Future[str]
-    ) -> COTargetDouble.Response:
-        error = future.exception()
-        response.success = error is None
-        if error is not None:
-            self._node.get_logger().warning(f'target: {error}')
-        return response
-
     def _move(self, request: MoveService.Request) -> Future[str]:
         move = Move(
             request.target,
@@ -113,14 +112,6 @@ class AxisServices:
             blend=request.blend,
         )
         return self._deliver(lambda: self._commands.move(move))
-
-    def _answer_move(
-        self, response: MoveService.Response, future: Future[str]
-    ) -> MoveService.Response:
-        error = future.exception()
-        response.success = error is None
-        response.message = future.result() if error is None else str(error)
-        return response
 
     def _stream(self, message: Float64) -> None:
         stream = self._admitted(lambda: self._commands.stream_target(message.data))
@@ -275,40 +266,26 @@ class BusFile:
         return cls(path.absolute(), stat.st_ino, stat.st_mtime_ns)
 
 
-class UnitsService:
-    """``~/read_units`` of one axis."""
-
-    def __init__(
-        self, node: DeviceNode, drive: Axis, place: str, thread: NetworkThread, file: BusFile
-    ) -> None:
-        self._drive, self._file = drive, file
-        node.offer(
-            ReadUnits,
-            f'{place}/read_units',
-            lambda request: thread.run_coroutine(drive.view.cache.factor_group),
-            self._answer,
-        )
-
-    def _answer(
-        self, response: ReadUnits.Response, future: Future[FactorGroup]
-    ) -> ReadUnits.Response:
-        error = future.exception()
-        if error is not None:
-            response.message = str(error)
-            return response
-        factors, drive = future.result(), self._drive
-        response.gear = factors.gear or 0.0
-        response.factor_scale = factors.position_scale
-        for key in KEYS:
-            setattr(response, key, getattr(drive.view.units.config, key))
-        response.bus_config = str(self._file.path)
-        response.bus_config_inode = self._file.inode
-        response.bus_config_changed = self._file.changed
-        config = drive.node.config
-        response.device = config.name
-        response.channel = drive.config.channel if len(config.axes) > 1 else -1
-        response.success = True  # last: an answer of which one part fails is sent, too
+def answer_units(
+    drive: Axis, file: BusFile, response: ReadUnits.Response, future: Future[FactorGroup]
+) -> ReadUnits.Response:
+    """Fill in how an axis counts, by the drive and by bus.yml."""
+    error = future.exception()
+    if error is not None:
+        response.message = str(error)
         return response
+    factors, config = future.result(), drive.node.config
+    response.gear = factors.gear or 0.0
+    response.factor_scale = factors.position_scale
+    for key in KEYS:
+        setattr(response, key, getattr(drive.view.units.config, key))
+    response.bus_config = str(file.path)
+    response.bus_config_inode = file.inode
+    response.bus_config_changed = file.changed
+    response.device = config.name
+    response.channel = drive.config.channel if len(config.axes) > 1 else -1
+    response.success = True  # last: an answer of which one part fails is sent, too
+    return response
 
 
 def offer_drive(
@@ -317,6 +294,5 @@ def offer_drive(
     """Offer services and topics of a drive with one axis or several; return its joint states."""
     for commands in axes:
         place = '~' if len(axes) == 1 else commands.axis.name
-        AxisServices(node, commands, place, thread)
-        UnitsService(node, commands.axis, place, thread, file)
+        AxisServices(node, commands, place, thread, file=file)
     return DriveJointStates(node, [commands.axis.view for commands in axes])

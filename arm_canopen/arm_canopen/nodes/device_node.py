@@ -173,11 +173,9 @@ class DeviceNode(Node):
         """Offer a std_srvs/Trigger whose message is what the future returns, or why it failed."""
 
         def respond(response: Any, future: Future[str]) -> Any:  # noqa: ANN401
-            error = future.exception()
-            response.success = error is None
-            response.message = future.result() if error is None else str(error)
-            if error is not None:
-                self.get_logger().warning(f'{name}: {error}')
+            answer_message(response, future)
+            if not response.success:
+                self.get_logger().warning(f'{name}: {response.message}')
             return response
 
         self.offer(Trigger, name, lambda request: handler(), respond)
@@ -288,6 +286,14 @@ class DeviceNode(Node):
         response.success = True
         response.message = f'{address} {object_path(entry)} = {written}'
         return response
+
+
+def answer_message(response: Any, future: Future[str]) -> Any:  # noqa: ANN401
+    """Fill in success, and what the future returns, or why it failed, as the message."""
+    error = future.exception()
+    response.success = error is None
+    response.message = future.result() if error is None else str(error)
+    return response
 
 
 def answer_read(node: Node, response: Any, future: Future[int]) -> Any:  # noqa: ANN401

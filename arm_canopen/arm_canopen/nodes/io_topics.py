@@ -39,7 +39,7 @@ from ..master.process_image import InputReader, ReceivedTpdo
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
 from .device_node import answer_success, DeviceNode
-from .joint_state_publisher import DriveJointStates
+from .joint_state_publisher import DriveJointStates, EncoderState
 
 
 class Channels:
@@ -180,43 +180,6 @@ def outputs_on_loss(config: NodeConfig, outputs: Sequence[ObjectEntry]) -> str:
     return ', '.join(parts)
 
 
-class EncoderState:
-    """An encoder as the joint states have an axis: position and velocity in user units."""
-
-    effort = 0.0  # of a joint without a motor
-
-    def __init__(self, device: RemoteNode, thread: NetworkThread) -> None:
-        self.name = device.name
-        self._scales = device.config.drive
-        self._device, self._thread = device, thread
-        self._position = device.image.reader(EncoderObject.POSITION)
-        self._speed = device.image.reader(EncoderObject.SPEED, 1)
-
-    @property
-    def fresh(self) -> bool:
-        """Whether the position is young enough to be published."""
-        reader = self._position
-        return (
-            self._device.online
-            and reader is not None
-            and not reader.source.stale(self._thread.now())
-        )
-
-    @property
-    def position(self) -> float:
-        """Position; NaN while it is unknown."""
-        scales = self._scales
-        return _value(self._position) * scales.scale_pos_from_dev + scales.offset_pos_from_dev
-
-    @property
-    def velocity(self) -> float:
-        """Velocity; NaN while no TPDO brings the speed (0x6030:01)."""
-        speed = self._speed
-        if speed is None or speed.source.stale(self._thread.now()):
-            return math.nan
-        return _value(speed) * self._scales.scale_vel_from_dev
-
-
 class EncoderTopics:
     """``~/joint_states`` and ``~/preset`` of an encoder."""
 
@@ -245,11 +208,6 @@ class EncoderTopics:
         return self._thread.run(
             lambda: objects.write_object(EncoderObject.PRESET, 0, round(counts))
         )
-
-
-def _value(reader: InputReader | None) -> float:
-    value = None if reader is None else reader.value
-    return math.nan if value is None else value
 
 
 def offer_io(node: DeviceNode, thread: NetworkThread) -> IoTopics | EncoderTopics | None:

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
+import math
 import sys
 import time
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
@@ -21,6 +22,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from canopen_core import CanopenError
+from canopen_core.standard import EncoderObject
 from node_runner import (
     destroyed_when_refused,
     LATCHED,
@@ -33,45 +35,71 @@ from node_runner import (
 from ..joints import JointAggregator, Joints, JointSample, JointSet, movable_joints, SilenceWatch
 from .output_thread import OutputThread
 
+if TYPE_CHECKING:
+    from ..cia402.state import AxisState
+    from ..master.process_image import InputReader
+    from ..master.remote_node import RemoteNode
+    from ..master.runner import NetworkThread
 
-class Measured(Protocol):
-    """An axis of a drive or an encoder, as of the last cycle, in user units."""
 
-    @property
-    def name(self) -> str:
-        """Name of the joint."""
+class EncoderState:
+    """An encoder as an axis: position and velocity in user units."""
+
+    effort = 0.0  # of a joint without a motor
+
+    def __init__(self, device: RemoteNode, thread: NetworkThread) -> None:
+        self.name = device.name
+        self._scales = device.config.drive
+        self._device, self._thread = device, thread
+        self._position = device.image.reader(EncoderObject.POSITION)
+        self._speed = device.image.reader(EncoderObject.SPEED, 1)
 
     @property
     def fresh(self) -> bool:
-        """Whether the values are young enough to be published."""
+        """Whether the position is young enough to be published."""
+        reader = self._position
+        return (
+            self._device.online
+            and reader is not None
+            and not reader.source.stale(self._thread.now())
+        )
 
     @property
     def position(self) -> float:
-        """Actual position."""
+        """Position; NaN while it is unknown."""
+        scales = self._scales
+        return _value(self._position) * scales.scale_pos_from_dev + scales.offset_pos_from_dev
 
     @property
     def velocity(self) -> float:
-        """Actual velocity."""
+        """Velocity; NaN while no TPDO brings the speed (0x6030:01)."""
+        speed = self._speed
+        if speed is None or speed.source.stale(self._thread.now()):
+            return math.nan
+        return _value(speed) * self._scales.scale_vel_from_dev
 
-    @property
-    def effort(self) -> float:
-        """Actual effort."""
+
+def _value(reader: InputReader | None) -> float:
+    value = None if reader is None else reader.value
+    return math.nan if value is None else value
 
 
 class DriveJointStates:
     """``~/joint_states`` of a drive, and of each of its channels where it has several."""
 
-    def __init__(self, node: Node, axes: Sequence[Measured]) -> None:
+    def __init__(self, node: Node, axes: Sequence[AxisState | EncoderState]) -> None:
         self.axes = list(axes)  # the state of each axis
         self.listened = False  # somebody listens to one of the topics
         names = [axis.name for axis in axes]
         topics = {'~': slice(None)}
         if len(names) > 1:  # and each channel as a drive of its own
             topics |= {name: slice(number, number + 1) for number, name in enumerate(names)}
-        self._topics = [
-            (_publisher(node, f'{place}/joint_states'), _message(names[axes]), axes)
-            for place, axes in topics.items()
-        ]
+        self._topics: list[tuple[Publisher, JointState, slice]] = []
+        for place, part in topics.items():
+            zeros = [0.0] * len(names[part])
+            message = JointState(name=names[part], position=zeros, velocity=zeros, effort=zeros)
+            publisher = node.create_publisher(JointState, f'{place}/joint_states', 10)
+            self._topics.append((publisher, message, part))
 
     def update_listeners(self) -> None:
         """Check for subscribers."""
@@ -99,7 +127,7 @@ class RobotJointStates:
         self.aggregator = JointAggregator(joints)  # the joints
         self.listened = False  # somebody listens to the topic
         self._clock = node.get_clock()
-        self._publisher = _publisher(node, 'joint_states')
+        self._publisher = node.create_publisher(JointState, 'joint_states', 10)
 
     def set_joints(self, joints: Joints) -> None:
         """Begin anew with other joints, or the same in another order."""
@@ -236,15 +264,6 @@ def on_description(node: Node, text: str, begin: Callable[[Joints], None]) -> No
             begin(joints)
 
     node.create_subscription(String, 'robot_description', receive, LATCHED)
-
-
-def _publisher(node: Node, topic: str) -> Publisher:
-    return node.create_publisher(JointState, topic, 10)
-
-
-def _message(joints: list[str]) -> JointState:
-    zeros = [0.0] * len(joints)
-    return JointState(name=joints, position=zeros, velocity=zeros, effort=zeros)
 
 
 WATCH_PERIOD = 2.0  # [s] between two looks for joints without states

@@ -27,67 +27,63 @@ from ..master.lifecycle import (
     Transition,
     TRANSITIONS,
     Verb,
-    Work,
 )
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
+from ..master.scheduler import Scheduler
 from .device_node import answer_success, DeviceNode
 from .output_thread import OutputThread
 
 BOOT_ATTEMPTS = 3  # boot time-outs that an activation waits, as ros2_canopen does
 
 
-class ManagedBus:
-    """The lifecycle of a master and its devices.
+def manage_bus(
+    node: Node,
+    devices: Mapping[str, DeviceNode],
+    axes: Callable[[RemoteNode], Sequence[AxisCommands]],
+    thread: NetworkThread,
+    output: OutputThread,
+) -> tuple[Node, Callable[[], None]]:
+    """Give a master and its devices a lifecycle.
 
     A device that is not active takes no commands. Deactivating a drive stops and disables it.
+
+    Returns:
+        The node ``lifecycle_manager``, in the namespace of the master, and what lets a request to
+        the master pass.
     """
+    master = Managed(node.get_name(), _nothing)
+    LifecycleServices(node, master, thread, output)
+    managed = []
+    for name, device in devices.items():
+        work = partial(_work, device.device, axes(device.device), thread.network.scheduler)
+        entry = Managed(name, work)
+        device.admit = entry.require_active
+        LifecycleServices(device, entry, thread, output)
+        managed.append(entry)
+    supervisor = Supervisor(master, managed, thread.network.scheduler)
+    manager = Node(MANAGER, namespace=node.get_namespace())
+    text = ParameterDescriptor(description='accepted for ros2_canopen; not needed', read_only=True)
+    manager.declare_parameter('container_name', '', text)
+    LifecycleServices(manager, Managed(MANAGER, supervisor.work), thread, output)
+    return manager, master.require_active
 
-    def __init__(
-        self,
-        node: Node,
-        devices: Mapping[str, DeviceNode],
-        axes: Callable[[RemoteNode], Sequence[AxisCommands]],
-        thread: NetworkThread,
-        output: OutputThread,
-    ) -> None:
-        self._scheduler = thread.network.scheduler
-        master = Managed(node.get_name(), _nothing)
-        self.admit = master.require_active  # lets a request to the master pass
-        LifecycleServices(node, master, thread, output)
-        managed = []
-        for name, device in devices.items():
-            entry = Managed(name, self._work(device.device, axes(device.device)))
-            device.admit = entry.require_active
-            LifecycleServices(device, entry, thread, output)
-            managed.append(entry)
-        supervisor = Supervisor(master, managed, self._scheduler)
-        # the node ``lifecycle_manager``, in the namespace of the master
-        self.manager = Node(MANAGER, namespace=node.get_namespace())
-        text = ParameterDescriptor(
-            description='accepted for ros2_canopen; not needed', read_only=True
-        )
-        self.manager.declare_parameter('container_name', '', text)
-        LifecycleServices(self.manager, Managed(MANAGER, supervisor.work), thread, output)
 
-    def _work(self, device: RemoteNode, axes: Sequence[AxisCommands]) -> Work:
-        async def work(verb: Verb) -> None:
-            if verb is Verb.ACTIVATE:
-                await self._booted(device)
-            elif verb in (Verb.DEACTIVATE, Verb.SHUTDOWN):
-                await self._scheduler.gather([axis.request('shutdown') for axis in axes])
-
-        return work
-
-    async def _booted(self, device: RemoteNode) -> None:
-        timeout = BOOT_ATTEMPTS * device.config.boot_timeout
-        try:
-            await self._scheduler.until(lambda: device.online, timeout)
-        except TimeoutError:
-            raise BootError(
-                f'{device.name} is not activated: not booted within {timeout:g} s '
-                f'({device.phase.value} {device.phase_detail})'.rstrip()
-            ) from None
+async def _work(
+    device: RemoteNode, axes: Sequence[AxisCommands], scheduler: Scheduler, verb: Verb
+) -> None:
+    if verb in (Verb.DEACTIVATE, Verb.SHUTDOWN):
+        await scheduler.gather([axis.request('shutdown') for axis in axes])
+    if verb is not Verb.ACTIVATE:
+        return
+    timeout = BOOT_ATTEMPTS * device.config.boot_timeout
+    try:
+        await scheduler.until(lambda: device.online, timeout)
+    except TimeoutError:
+        raise BootError(
+            f'{device.name} is not activated: not booted within {timeout:g} s '
+            f'({device.phase_text})'
+        ) from None
 
 
 async def _nothing(verb: Verb) -> None:
@@ -114,14 +110,15 @@ class LifecycleServices:
             partial(answer_success, node),
             post=output.post,
         )
-        node.create_service(GetState, '~/get_state', self._get_state)
-        node.create_service(GetAvailableStates, '~/get_available_states', self._get_states)
-        node.create_service(
-            GetAvailableTransitions, '~/get_available_transitions', self._get_transitions
-        )
-        node.create_service(
-            GetAvailableTransitions, '~/get_transition_graph', self._get_transition_graph
-        )
+        states, transitions = 'available_states', 'available_transitions'
+        graph = _descriptions(TRANSITIONS)
+        for kind, name, field, value in (
+            (GetState, 'get_state', 'current_state', lambda: _state(managed.state)),
+            (GetAvailableStates, f'get_{states}', states, lambda: [*map(_state, LifecycleState)]),
+            (GetAvailableTransitions, f'get_{transitions}', transitions, self._possible),
+            (GetAvailableTransitions, 'get_transition_graph', transitions, lambda: graph),
+        ):
+            node.create_service(kind, f'~/{name}', partial(_answer, field, value))
 
     def _change(self, request: ChangeState.Request) -> Future[None]:
         async def change() -> None:
@@ -160,21 +157,13 @@ class LifecycleServices:
             )
         )
 
-    def _get_state(self, _: Any, response: GetState.Response) -> GetState.Response:  # noqa: ANN401
-        response.current_state = _state(self._managed.state)
-        return response
+    def _possible(self) -> list[TransitionDescription]:
+        return _descriptions(self._managed.possible)
 
-    def _get_states(self, _: Any, response: Any) -> Any:  # noqa: ANN401
-        response.available_states = [_state(state) for state in LifecycleState]
-        return response
 
-    def _get_transitions(self, _: Any, response: Any) -> Any:  # noqa: ANN401
-        response.available_transitions = _descriptions(self._managed.possible)
-        return response
-
-    def _get_transition_graph(self, _: Any, response: Any) -> Any:  # noqa: ANN401
-        response.available_transitions = _descriptions(TRANSITIONS)
-        return response
+def _answer(field: str, value: Callable[[], Any], _: Any, response: Any) -> Any:  # noqa: ANN401
+    setattr(response, field, value())
+    return response
 
 
 def _state(state: LifecycleState) -> State:

@@ -55,7 +55,7 @@ from .device_node import (
 from .diagnostics import bus_diagnostics, DiagnosticsPublisher
 from .io_topics import EncoderTopics, offer_io
 from .joint_state_publisher import BusJointStates
-from .lifecycle import ManagedBus
+from .lifecycle import manage_bus
 from .output_thread import OutputThread
 
 SERVICE_TYPES = (
@@ -68,23 +68,35 @@ SERVICE_TYPES = (
 )
 """Data types that COReadID and COWriteID name."""
 
+SERVICE = 'stop'
+EVENT_TOPIC, STOP_EVENT = 'trajectory_execution_event', 'stop'
+"""By which MoveIt's move_group, or ours, gives up what it executes, and what it was to execute."""
 SDO_TIMEOUT = 0.5  # [s] a stranger's bus.yml entry, which would say, does not exist
 
 
 class MasterServices:
-    """Services of the master node."""
+    """Services of the master node; ``stop`` is there at any time, also while devices boot."""
 
-    def __init__(self, node: Node, thread: NetworkThread, output: OutputThread) -> None:
-        # called for every request; raises CanopenError when none is taken at the moment
+    def __init__(
+        self,
+        node: Node,
+        commands: Sequence[AxisCommands],
+        thread: NetworkThread,
+        output: OutputThread,
+    ) -> None:
+        # called for every other request; raises CanopenError when none is taken at the moment
         self.admit: Callable[[], None] = lambda: None
-        self._thread = thread
+        self._node, self._commands, self._thread = node, commands, thread
+        self._events = node.create_publisher(String, EVENT_TOPIC, 10)
+        post = output.post
+        create_deferred_service(node, Trigger, SERVICE, self._stop, self._answer_stop, post=post)
         for kind, name, begin, respond in (
             (COReadID, '~/sdo_read', self._read, answer_read),
             (COWriteID, '~/sdo_write', self._write, answer_success),
             (CONmtID, '~/set_nmt', self._set_nmt, answer_success),
         ):
             fill = partial(respond, node)
-            create_deferred_service(node, kind, name, begin, fill, post=output.post)
+            create_deferred_service(node, kind, name, begin, fill, post=post)
 
     def _read(self, request: COReadID.Request) -> Future[int]:
         async def read() -> int:
@@ -121,6 +133,27 @@ class MasterServices:
 
         return self._thread.run_coroutine(send)
 
+    def _stop(self, _: Trigger.Request) -> Future[StopReport]:
+        """Halt all drives of the bus."""
+        self._events.publish(String(data=STOP_EVENT))  # or a plan would begin after the halt
+        scheduler = self._thread.network.scheduler
+        return self._thread.run_coroutine(lambda: stop_all(self._commands, scheduler))
+
+    def _answer_stop(self, response: Any, future: Future[StopReport]) -> Any:  # noqa: ANN401
+        error = future.exception()
+        if error is None:
+            report = future.result()
+            response.success, response.message = not report.failed, str(report)
+        else:
+            response.success, response.message = False, str(error)
+        words = f'{SERVICE}: {response.message}'
+        # a line of its own for each severity: rclpy refuses another one from the same line
+        if response.success:
+            self._node.get_logger().info(words)
+        else:
+            self._node.get_logger().error(words)
+        return response
+
 
 def _data_type(number: int) -> DataType:
     for data_type in SERVICE_TYPES:
@@ -142,46 +175,6 @@ def _node_id(number: int) -> int:
     if not NODE_ID_MIN <= number <= NODE_ID_MAX:
         raise CanopenError(f'node id {number} is not {NODE_ID_MIN} to {NODE_ID_MAX}')
     return number
-
-
-SERVICE = 'stop'
-EVENT_TOPIC, STOP_EVENT = 'trajectory_execution_event', 'stop'
-"""By which MoveIt's move_group, or ours, gives up what it executes, and what it was to execute."""
-
-
-class StopService:
-    """Halts all drives of a bus; it is there at any time, also while devices boot."""
-
-    def __init__(
-        self,
-        node: Node,
-        commands: Sequence[AxisCommands],
-        thread: NetworkThread,
-        output: OutputThread,
-    ) -> None:
-        self._node, self._commands, self._thread = node, commands, thread
-        self._events = node.create_publisher(String, EVENT_TOPIC, 10)
-        create_deferred_service(node, Trigger, SERVICE, self._stop, self._answer, post=output.post)
-
-    def _stop(self, _: Trigger.Request) -> Future[StopReport]:
-        self._events.publish(String(data=STOP_EVENT))  # or a plan would begin after the halt
-        scheduler = self._thread.network.scheduler
-        return self._thread.run_coroutine(lambda: stop_all(self._commands, scheduler))
-
-    def _answer(self, response: Any, future: Future[StopReport]) -> Any:  # noqa: ANN401
-        error = future.exception()
-        if error is None:
-            report = future.result()
-            response.success, response.message = not report.failed, str(report)
-        else:
-            response.success, response.message = False, str(error)
-        words = f'{SERVICE}: {response.message}'
-        # a line of its own for each severity: rclpy refuses another one from the same line
-        if response.success:
-            self._node.get_logger().info(words)
-        else:
-            self._node.get_logger().error(words)
-        return response
 
 
 LISTENER_PERIOD = 0.1  # [s] in which a new subscriber gets its first message
@@ -238,20 +231,18 @@ class MasterProcess:
         drives += [io.joint_states for io in self._io.values() if isinstance(io, EncoderTopics)]
         self._joint_states = BusJointStates(node, drives, self._output)
         self._network.on_feedback = self._joint_states.feedback
-        services = MasterServices(node, self._thread, self._output)
         commands = list(self._master.commands.values())
-        StopService(node, commands, self._thread, self._output)
+        services = MasterServices(node, commands, self._thread, self._output)
         self._diagnostics = DiagnosticsPublisher(node, self._output)
         node.create_timer(diagnostics_period, self._request_diagnostics)
         node.create_timer(LISTENER_PERIOD, self._update_listeners)
         # the ROS nodes, the master's first
         self.nodes: list[Node] = [node, *self._devices.values()]
         if config.master.is_lifecycle:
-            managed = ManagedBus(
+            manager, services.admit = manage_bus(
                 node, self._devices, self._master.axes, self._thread, self._output
             )
-            services.admit = managed.admit
-            self.nodes.append(managed.manager)
+            self.nodes.append(manager)
 
     def listen(self) -> None:
         """Listen for another master before the first frame; call it right before :meth:`start`.
@@ -299,20 +290,11 @@ class MasterProcess:
         self._joint_states.publish_robot(description)
 
     def attach(self, source: MotionSource) -> Future[None]:
-        """Attach a motion source from any thread, without waiting.
-
-        Returns:
-            Done before the next cycle; or KeyError: an axis is no drive of this bus, BusError: the
-            cycle has ended.
-        """
+        """Attach a motion source, as :meth:`.CanopenMaster.begin_attach`."""
         return self._master.begin_attach(source)
 
     def detach(self, source: MotionSource) -> Future[None]:
-        """End a motion source, from any thread; drives that it moved are braked.
-
-        Returns:
-            Done before the next cycle.
-        """
+        """End a motion source, as :meth:`.CanopenMaster.begin_detach`."""
         return self._master.begin_detach(source)
 
     def _report(self, event: Event) -> None:

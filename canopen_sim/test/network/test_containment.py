@@ -71,7 +71,7 @@ STEPS: dict[str, Callable[[VirtualNetwork, str], tuple[object, str]]] = {
     'RPDO 1': lambda net, name: (rpdo(net, name, 1), 'frame'),
     'RPDO 2': lambda net, name: (rpdo(net, name, 2), 'frame'),
     'RPDO 3': lambda net, name: (rpdo(net, name, 3), 'frame'),
-    'count of TPDOs': lambda net, name: (net.network.nodes[name], 'count_missed'),
+    'count of TPDOs': lambda net, name: (net.network.nodes[name].pdos, 'count_missed'),
     'expectation of TPDOs': lambda net, name: (net.network.nodes[name], 'expect_answers'),
     'life signs': lambda net, name: (net.network.nodes[name], 'watch'),
 }

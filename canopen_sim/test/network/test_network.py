@@ -29,7 +29,7 @@ from arm_canopen import (
     SdoTimeoutError,
     Severity,
 )
-from arm_canopen.master.life_signs import EmergencyLog, Guarding
+from arm_canopen.master.life_signs import EmergencyLog, LifeSigns
 from arm_canopen.master.network import Network, NEVER, UPDATE_SHARE
 from arm_canopen.master.other_master import (
     CATCH_UP_MAX,
@@ -605,17 +605,21 @@ def test_a_device_that_never_answers_guarding_is_reported_once_and_left_in_peace
 def test_an_answer_that_is_repeated_is_none() -> None:
     """The toggle bit distinguishes a new answer from an old one."""
     requested: list[Frame] = []
-    guarding = Guarding(5, 0.1, 2, requested.append)
-    guarding.start(0.0)
-    assert not guarding.advance(0.0)
-    assert guarding.receive(b'\x05')
-    assert not guarding.receive(b'\x05')
-    assert guarding.receive(b'\x85')
-    assert not guarding.advance(0.1)
-    assert not guarding.receive(b'\x85')
-    assert not guarding.advance(0.2)
-    assert guarding.advance(0.31)
-    assert requested == [Frame(0x705, is_remote=True)] * 3
+    signs = LifeSigns(guarded_config(guard_time=0.1, retry_factor=2), requested.append)
+
+    def answer(data: bytes) -> bool:
+        return signs.take(NmtState.OPERATIONAL, Frame(0x702, data), supervised=True)
+
+    signs.start(0.0)
+    assert not signs.overdue(0.0)
+    assert answer(b'\x05')
+    assert not answer(b'\x05')
+    assert answer(b'\x85')
+    assert not signs.overdue(0.1)
+    assert not answer(b'\x85')
+    assert not signs.overdue(0.2)
+    assert signs.overdue(0.31)
+    assert requested == [Frame(0x702, is_remote=True)] * 3
 
 
 def test_an_emergency_is_received_where_the_device_sends_it() -> None:

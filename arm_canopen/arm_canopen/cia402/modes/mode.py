@@ -17,7 +17,13 @@ from collections.abc import Callable
 import math
 
 from canopen_core import DriveError
-from canopen_core.standard import Controlword, OperationMode, Statusword
+from canopen_core.standard import (
+    Controlword,
+    OperationMode,
+    Statusword,
+    TORQUE_MODES,
+    VELOCITY_MODES,
+)
 
 from ...config.model.drive_units import POSITION_TOLERANCE
 from ...master.process_image import Writer
@@ -156,12 +162,6 @@ class Homing(Mode):
         return Controlword.HOMING_START if self.started else NO_BITS
 
 
-VELOCITY_MODES = (
-    OperationMode.VELOCITY,
-    OperationMode.PROFILE_VELOCITY,
-    OperationMode.CYCLIC_VELOCITY,
-)
-TORQUE_MODES = (OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE)
 NEGLIGIBLE = 2e-3  # share of the profile velocity that may become 0, as in a stream that fades
 NEGLIGIBLE_EFFORT = 1e-3  # [unit of effort] likewise
 RANGE_SHARE = 1e-3  # share of the range (0x607D) that rounding to whole increments may cost

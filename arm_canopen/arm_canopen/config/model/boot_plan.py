@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from canopen_core import Place
 from canopen_core.standard import (
     CAN_ID_MASK,
     COB_ID_EXTENDED,
@@ -331,7 +330,8 @@ def assumed_cob_ids(node: NodeConfig) -> Iterator[BootWrite]:
 
 def _written(write: SdoWrite, *, unless_default: bool = False) -> Iterator[BootWrite]:
     """Yield a write of a file; before a COB-ID one that ends its service, which fixes it."""
-    address, key = (write.index, write.subindex), _key(write.place)
+    address, place = (write.index, write.subindex), write.place
+    key = f'{place.key} (line {place.line})' if place.line else place.key or 'bus.yml'
     value = int.from_bytes(write.data, 'little')
     mask, off = SERVICES_OFF.get(address, (0, 0))
     if value & mask != off:
@@ -340,10 +340,6 @@ def _written(write: SdoWrite, *, unless_default: bool = False) -> Iterator[BootW
         yield BootWrite(*address, ended, key, mask=mask, temporary=True)
         unless_default = False  # or an exported DCF would leave it ended
     yield BootWrite(*address, write.data, key, unless_default=unless_default)
-
-
-def _key(place: Place) -> str:
-    return f'{place.key} (line {place.line})' if place.line else place.key or 'bus.yml'
 
 
 def _units(time: float | None, per_second: float = HUNDRED_MICROSECONDS) -> int | None:

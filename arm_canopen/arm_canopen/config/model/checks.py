@@ -259,7 +259,6 @@ def check_identifiers(subjects: Sequence[Subject]) -> None:
             owners.setdefault(pdo.cob_id, (title, subject.pdo_place(direction, pdo, 'cob_id')))
     for subject in subjects:
         _check_emergency(subject)
-        _check_sdo_server(subject)
         value = subject.value(Index.EMCY_COB_ID)
         is_written = subject.node.write_of(Index.EMCY_COB_ID, 0) is not None
         if not is_written or value is None or value & COB_ID_INVALID:
@@ -289,20 +288,6 @@ def _check_emergency(subject: Subject) -> None:
             f'{node.node_id}; the master listens at 0x{own:03X}',
             f'correct it to $NODEID+0x80, or write 0x{own:X} to 0x1014',
         )
-
-
-def _check_sdo_server(subject: Subject) -> None:
-    node_id = subject.node.node_id
-    bases = ((1, CobId.SDO_REQUEST), (2, CobId.SDO_RESPONSE))
-    for subindex, base in bases:
-        value = subject.value(Index.SDO_SERVER, subindex)
-        if value is not None and value & CAN_ID_MASK not in (0, base, base + node_id):
-            subject.findings.warning(
-                subject.object_place(Index.SDO_SERVER, subindex),
-                f'the SDO server has COB-ID 0x{value & CAN_ID_MASK:03X} by the EDS, the master '
-                f'takes 0x{base + node_id:03X}',
-                'correct 0x1200 in the EDS; devices have the pre-defined identifiers',
-            )
 
 
 POLLED = (Index.STATUSWORD, Index.MODE_OF_OPERATION_DISPLAY, Index.POSITION_ACTUAL)

@@ -9,12 +9,19 @@ clause 8) says what these are in radians.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 import math
 
-from canopen_core.standard import DriveState, Index, OperationMode
+from canopen_core.standard import (
+    DriveState,
+    Index,
+    OperationMode,
+    POSITION_MODES,
+    TORQUE_MODES,
+    VELOCITY_MODES,
+)
 
 from ..keys import key, Kind, MILLISECONDS
 
@@ -157,7 +164,8 @@ class FactorGroup:
         """Position units per rad, or per m by 0x60A8; 0 when the drive does not have it."""
         # position = internal [inc] * feed / (resolution * gear); without a feed constant
         # the drive counts increments of its encoder
-        counts = self.feed if self.feed is not None else (self.resolution or 0.0) * self._gear
+        per_turn = (self.resolution or 0.0) * (self.gear or 1.0)
+        counts = per_turn if self.feed is None else self.feed
         if not counts and self.position_unit is not None:
             return 1.0 / self.position_unit.size
         return counts / REVOLUTION
@@ -208,10 +216,6 @@ class FactorGroup:
         objects = tuple(FACTOR_OBJECTS[name] for name in names if getattr(self, name) is not None)
         return objects or ((Index.SI_UNIT_POSITION,) if self.position_unit is not None else ())
 
-    @property
-    def _gear(self) -> float:
-        return self.gear or 1.0
-
 
 def _ratio(numerator: int | None, denominator: int | None) -> float | None:
     return numerator / denominator if numerator and denominator else None
@@ -220,25 +224,10 @@ def _ratio(numerator: int | None, denominator: int | None) -> float | None:
 SWITCHING_STATES = {state.value: state.title for state in DriveState if 2 <= state <= 5}
 FAULT_STATE = {DriveState.FAULT.value: 'Fault, taken as 5'}
 """What the multichannel sample of ros2_canopen writes, and means Operation enabled."""
-POSITION_MODES = {
-    mode.value: mode.title
-    for mode in (
-        OperationMode.PROFILE_POSITION,
-        OperationMode.INTERPOLATED_POSITION,
-        OperationMode.CYCLIC_POSITION,
-    )
-}
-VELOCITY_MODES = {
-    mode.value: mode.title
-    for mode in (
-        OperationMode.VELOCITY,
-        OperationMode.PROFILE_VELOCITY,
-        OperationMode.CYCLIC_VELOCITY,
-    )
-}
-EFFORT_MODES = {
-    mode.value: mode.title for mode in (OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE)
-}
+
+
+def _titles(modes: Iterable[OperationMode]) -> dict[int, str]:
+    return {mode.value: mode.title for mode in modes}
 
 
 class RecoveryPolicy(Enum):
@@ -300,13 +289,13 @@ class DriveConfig:
     position_mode: int | None = key(
         None,
         'mode for positions: 1, 7 or 8; its objects are checked, services select it',
-        choices=POSITION_MODES,
+        choices=_titles(POSITION_MODES),
     )
     velocity_mode: int | None = key(
-        None, 'as position_mode, for velocities: 2, 3 or 9', choices=VELOCITY_MODES
+        None, 'as position_mode, for velocities: 2, 3 or 9', choices=_titles(VELOCITY_MODES)
     )
     effort_mode: int | None = key(
-        None, 'as position_mode, for efforts: 4 or 10', choices=EFFORT_MODES
+        None, 'as position_mode, for efforts: 4 or 10', choices=_titles(TORQUE_MODES)
     )
     target_timeout: float = key(
         0.2,

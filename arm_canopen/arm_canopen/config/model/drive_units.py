@@ -86,6 +86,12 @@ def axis_units(subject: Subject, axis: DriveConfig) -> AxisUnits:
         acceleration = velocity * (factors.acceleration_ratio or 1.0)
         by = ', '.join(f'0x{index:04X}' for index in factors.acceleration_objects)
     per_radian = factors.position_scale
+    motion = {}  # in user units
+    for index in MOTION_OBJECTS:
+        held = subject.value(index + AXIS_OFFSET * axis.channel)
+        scale = acceleration if index in ACCELERATION_OBJECTS else velocity
+        if held is not None and scale:
+            motion[index] = held / abs(scale)
     return AxisUnits(
         name=axis.name or subject.node.name,
         rule=rule,
@@ -95,21 +101,8 @@ def axis_units(subject: Subject, axis: DriveConfig) -> AxisUnits:
         acceleration_by=by,
         radians=increments / per_radian if per_radian else None,
         factors=factors.position_objects,
-        motion=_motion(subject, axis, velocity, acceleration),
+        motion=motion,
     )
-
-
-def _motion(
-    subject: Subject, axis: DriveConfig, velocity: float, acceleration: float
-) -> dict[Index, float]:
-    """Return what an axis moves with, in user units."""
-    held = {index: subject.value(index + AXIS_OFFSET * axis.channel) for index in MOTION_OBJECTS}
-    scales = {index: acceleration if index in ACCELERATION_OBJECTS else velocity for index in held}
-    return {
-        index: value / abs(scales[index])
-        for index, value in held.items()
-        if value is not None and scales[index]
-    }
 
 
 def reported_increments(
@@ -139,10 +132,8 @@ def rate_units(bus: BusConfig, node: NodeConfig, axis: DriveConfig) -> tuple[flo
     0x60A9, 0x60AA), and 1 where neither says it, as most drives count increments.
     """
     subject = Subject(bus, node, Findings())
-    units, (velocity, acceleration) = (
-        axis_units(subject, axis),
-        _factor_group(subject, axis).rate_units,
-    )
+    units = axis_units(subject, axis)
+    velocity, acceleration = _factor_group(subject, axis).rate_units
     ratio = velocity / acceleration
     if units.velocity and units.velocity != DriveConfig().scale_vel_to_dev:
         velocity = abs(units.increments / units.velocity)

@@ -166,11 +166,8 @@ class _Converter:
                 for number, child in enumerate(node.value)
             )
             return YamlList(place, tuple(items))
-        if isinstance(node, yaml.ScalarNode):
-            return self._scalar(node, place)
-        raise TypeError(f'unknown kind of YAML node {node!r}')
-
-    def _scalar(self, node: yaml.ScalarNode, place: Place) -> Scalar:
+        if not isinstance(node, yaml.ScalarNode):
+            raise TypeError(f'unknown kind of YAML node {node!r}')
         known = {TAG_PREFIX + kind.value: kind for kind in ScalarKind}
         if node.tag not in known and node.tag not in TEXT_TAGS:
             self._findings.error(place, f'the tag {node.tag!r} has no meaning here', 'remove it')

@@ -107,16 +107,13 @@ def resolve_bus(
     unique = _check_node_ids(layout.master, settings.node_id, nodes, readers, findings)
     _check_axis_names(unique, readers, findings)
     finished = assign_cob_ids(unique, findings)
-    return BusConfig(file, master, finished, findings.warnings, dict(_locations(layout)))
-
-
-def _locations(layout: Layout) -> Iterator[tuple[tuple[str, ...], Place]]:
-    """Yield where each key stands, by the names that lead to it."""
-    for name, section in {'master': layout.master, **layout.devices}.items():
-        yield from _walk((name,), section)
+    sections = {'master': layout.master, **layout.devices}
+    locations = dict(at for name, item in sections.items() for at in _walk((name,), item))
+    return BusConfig(file, master, finished, findings.warnings, locations)
 
 
 def _walk(names: tuple[str, ...], item: Item) -> Iterator[tuple[tuple[str, ...], Place]]:
+    """Yield where each key stands, by the names that lead to it."""
     yield names, item.place
     if not isinstance(item, YamlMap) or len(names) > DEPTH_MAX:
         return

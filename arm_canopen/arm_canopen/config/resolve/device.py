@@ -350,13 +350,26 @@ def _placed(axes: Iterable[DriveConfig], dictionary: ObjectDictionary) -> tuple[
 
 ROS_NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_]*')
 SCALE_TOLERANCE = 0.01  # by which the product of the scales of both directions may miss 1
+INVERSES = (
+    ('scale_eff_from_dev', 'scale_eff_to_dev'),
+    ('scale_acc_from_dev', 'scale_acc_to_dev'),
+    ('scale_acc_to_dev', 'scale_acc_from_dev'),
+)
 POLICIES = {policy.value: policy for policy in RecoveryPolicy}
 
 
 def read_drive(section: YamlMap, values: dict[str, Any], findings: Findings) -> DriveConfig:
     """Build the settings that count for all axes of a drive from its drive keys by field."""
     if 'switching_state' in values:
-        values['switching_state'] = _switching_state(section, values, findings)
+        state = DriveState(values['switching_state'])
+        if state is DriveState.FAULT:
+            state = DriveState.OPERATION_ENABLED
+            findings.warning(
+                section.entries['switching_state'].place,
+                '8 is Fault, in which no drive switches its mode; taken as 5 (Operation enabled)',
+                'write switching_state: 5',
+            )
+        values['switching_state'] = state
     if 'recovery' in values:
         text, place = values['recovery'], section.entries['recovery'].place
         if text not in POLICIES:
@@ -423,8 +436,16 @@ def _with_scales(
     drive: DriveConfig, section: YamlMap, values: dict[str, Any], findings: Findings
 ) -> DriveConfig:
     """Return an axis with the values of a section, be it of its device or of its channel."""
-    _check_one_rule(section, values, findings)
-    axis = replace(drive, **_with_inverses(values))
+    scales = [key for key in SCALE_KEYS if key in section.entries]
+    if scales and values.get('scale_from_factor_group'):
+        findings.error(
+            section.entries['scale_from_factor_group'].place,
+            f'the units are given twice: by the factor group of the drive, and by {scales[0]}',
+            'remove one of them',
+        )
+    # of our own keys, what bus.yml gives in the other direction only
+    added = {key: 1.0 / values[given] for key, given in INVERSES if given in values}
+    axis = replace(drive, **added | values)
     for what in ('pos', 'vel', 'acc', 'eff'):
         keys = (f'scale_{what}_to_dev', f'scale_{what}_from_dev')
         given = [section.entries[key].place for key in keys if key in section.entries]
@@ -439,40 +460,6 @@ def _with_scales(
                 'make one the inverse of the other',
             )
     return axis
-
-
-def _switching_state(section: YamlMap, values: dict[str, Any], findings: Findings) -> DriveState:
-    state = DriveState(values['switching_state'])
-    if state is not DriveState.FAULT:
-        return state
-    findings.warning(
-        section.entries['switching_state'].place,
-        '8 is Fault, in which no drive switches its mode; taken as 5 (Operation enabled)',
-        'write switching_state: 5',
-    )
-    return DriveState.OPERATION_ENABLED
-
-
-def _check_one_rule(section: YamlMap, values: dict[str, Any], findings: Findings) -> None:
-    """Refuse scales beside those of the factor group."""
-    given = [key for key in SCALE_KEYS if key in section.entries]
-    if given and values.get('scale_from_factor_group'):
-        findings.error(
-            section.entries['scale_from_factor_group'].place,
-            f'the units are given twice: by the factor group of the drive, and by {given[0]}',
-            'remove one of them',
-        )
-
-
-def _with_inverses(values: dict[str, Any]) -> dict[str, Any]:
-    """Add the scales that bus.yml gives in the other direction only, of our own keys."""
-    inverses = (
-        ('scale_eff_from_dev', 'scale_eff_to_dev'),
-        ('scale_acc_from_dev', 'scale_acc_to_dev'),
-        ('scale_acc_to_dev', 'scale_acc_from_dev'),
-    )
-    added = {key: 1.0 / values[given] for key, given in inverses if given in values}
-    return added | values
 
 
 def _axis_name(item: Item, findings: Findings) -> str:

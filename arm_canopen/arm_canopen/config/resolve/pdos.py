@@ -204,10 +204,18 @@ class PdoReader:
                 return replace(pdo, cob_id=direction.default_cob_id(pdo.number, self._node_id))
             return replace(pdo, cob_id=AUTO_ID) if pdo.enabled else pdo
         try:
-            return replace(pdo, cob_id=_explicit(item))
+            cob_id = integer(item)
         except RefusedError as reason:
             self._findings.refuse(item.place, reason)
             return pdo
+        if 0 < cob_id <= CAN_ID_MASK:
+            return replace(pdo, cob_id=cob_id)
+        self._findings.error(
+            item.place,
+            f'{describe(item)} is no 11-bit identifier',
+            "take 0x181 to 0x6DF or 'auto'; a PDO is switched off with 'enabled: false'",
+        )
+        return pdo
 
 
 def _no_such_pdo(
@@ -226,16 +234,6 @@ def _no_such_pdo(
         f'{direction.title} {number} ({object_address(index)}) is not in the EDS',
         f'take one that the device has: {known}',
     )
-
-
-def _explicit(item: Item) -> int:
-    cob_id = integer(item)
-    if not 0 < cob_id <= CAN_ID_MASK:
-        raise RefusedError(
-            f'{describe(item)} is no 11-bit identifier',
-            "take 0x181 to 0x6DF or 'auto'; a PDO is switched off with 'enabled: false'",
-        )
-    return cob_id
 
 
 SIGNED_BY_BITS = {bits: data_type for data_type, bits in SIGNED_BITS.items()}

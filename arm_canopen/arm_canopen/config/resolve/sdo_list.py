@@ -66,9 +66,14 @@ def read_writes(
     writes = []
     for address, value, place, timeout in _wanted(device, findings):
         try:
-            entry = _writable_entry(dictionary, *address)
+            _check_purpose(*address)
+            entry = find_entry(dictionary, *address)
         except RefusedError as reason:
             findings.refuse(place, reason)
+            continue
+        if not entry.access.writable:
+            what = f'{entry} is read-only ({entry.access.value}) in the EDS'
+            findings.error(place, what, 'remove the entry')
             continue
         try:
             data = encode_value(entry, value)
@@ -123,16 +128,6 @@ def read_object(item: Item, keys: tuple[Key, ...], findings: Findings) -> dict[s
     if 'index' not in item.entries:
         findings.error(item.place, "no 'index'", f'write {example}')
     return values if 'index' in values else None
-
-
-def _writable_entry(dictionary: ObjectDictionary, index: int, subindex: int) -> ObjectEntry:
-    _check_purpose(index, subindex)
-    entry = find_entry(dictionary, index, subindex)
-    if entry.access.writable:
-        return entry
-    raise RefusedError(
-        f'{entry} is read-only ({entry.access.value}) in the EDS', 'remove the entry'
-    )
 
 
 def _check_purpose(index: int, subindex: int) -> None:
