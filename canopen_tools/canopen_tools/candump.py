@@ -194,7 +194,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ValueError as error:
         parser.error(str(error))
     try:
-        _run(options)
+        config = load_bus(Path(options.bus_config)) if options.bus_config else None
+        (_show_log if options.read else _show_bus)(options, config)
     except BrokenPipeError:
         # the interpreter flushes stdout once more when it ends
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -202,14 +203,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         _print_note(str(error))
         return 1
     return 0
-
-
-def _run(options: argparse.Namespace) -> None:
-    config = load_bus(Path(options.bus_config)) if options.bus_config else None
-    if options.read:
-        _show_log(options, config)
-    else:
-        _show_bus(options, config)
 
 
 def _show_log(options: argparse.Namespace, config: BusConfig | None) -> None:

@@ -10,7 +10,9 @@ up in 0x2000 + n - 1, the n-th RPDO is TPDO n and comes from 0x2200 + n - 1. The
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TypeAlias
 
 from arm_canopen.config import (
     BusConfig,
@@ -35,7 +37,6 @@ from canopen_core.standard import (
     ConsumerHeartbeatTime,
     DataType,
     Index,
-    MappedObject,
     object_address,
     ObjectCode,
     PDO_COUNT_MAX,
@@ -45,108 +46,99 @@ from canopen_core.standard import (
 
 from .eds_lint import LISTS, proper_list
 
-
-@dataclass(frozen=True, slots=True)
-class DcfEntry:
-    """A VAR, or a sub-index."""
-
-    name: str
-    data_type: DataType
-    access: AccessType
-    default: str = ''  # DefaultValue as it is written, empty for none
-    mappable: bool = False  # may be mapped into a PDO
-    upload_file: str = ''  # file whose content the object has, empty for none
-
-    def lines(self) -> list[str]:
-        """Return its keys."""
-        return [
-            f'ParameterName={self.name}',
-            f'ObjectType=0x{ObjectCode.VAR:X}',
-            f'DataType=0x{self.data_type:04X}',
-            f'AccessType={self.access.value}',
-            *([f'DefaultValue={self.default}'] if self.default else []),
-            f'PDOMapping={int(self.mappable)}',
-            *([f'UploadFile={self.upload_file}'] if self.upload_file else []),
-        ]
+Keys: TypeAlias = dict[str, str]
+DcfObject: TypeAlias = dict[str, Keys]
+"""The sections of an object, by what follows its index in their titles."""
 
 
-@dataclass(frozen=True, slots=True)
-class DcfRecord:
-    """A record or array with each sub-index written out; sub-index 0 is added."""
-
-    name: str
-    parts: Sequence[DcfEntry]  # its sub-indices from 1
-    code: ObjectCode = ObjectCode.RECORD  # RECORD or ARRAY
-
-
-@dataclass(frozen=True, slots=True)
-class DcfArray:
-    """An array of equal sub-indices, abbreviated with CompactSubObj (CiA 306-1, 4.6.3.2)."""
-
-    name: str
-    data_type: DataType
-    access: AccessType
-    size: int
-    # values by sub-index where they are not the default
-    values: Mapping[int, str] = field(default_factory=dict)
-    default: str = ''  # DefaultValue of all others, empty for none
-
-
-DcfObject = DcfEntry | DcfRecord | DcfArray
+def _keys(
+    name: str,
+    data_type: DataType,
+    access: AccessType,
+    default: str = '',
+    *,
+    mappable: bool = False,
+    upload_file: str = '',
+) -> Keys:
+    """Return the keys of a VAR or sub-index; without a default or a file those are left out."""
+    keys = {
+        'ParameterName': name,
+        'ObjectType': f'0x{ObjectCode.VAR:X}',
+        'DataType': f'0x{data_type:04X}',
+        'AccessType': access.value,
+        'DefaultValue': default,
+        'PDOMapping': str(int(mappable)),
+        'UploadFile': upload_file,
+    }
+    return {key: value for key, value in keys.items() if value or key == 'ParameterName'}
 
 
-def dcf_text(head: Mapping[str, Mapping[str, str]], objects: Mapping[int, DcfObject]) -> str:
-    """Return the text of a DCF: the sections before the objects, each with its keys, and these."""
-    lines: list[str] = []
-    for title, keys in head.items():
-        lines += [f'[{title}]', *(f'{key}={value}' for key, value in keys.items()), '']
+def _var(
+    name: str,
+    data_type: DataType,
+    access: AccessType,
+    default: str = '',
+    *,
+    mappable: bool = False,
+) -> DcfObject:
+    return {'': _keys(name, data_type, access, default, mappable=mappable)}
+
+
+def _record(name: str, parts: Sequence[Keys], code: ObjectCode = ObjectCode.RECORD) -> DcfObject:
+    """Return a record or array of sub-indices from 1 on; sub-index 0 is added."""
+    count = _keys('Highest sub-index supported', U8, AccessType.CONSTANT, str(len(parts)))
+    head = {
+        'ParameterName': name,
+        'ObjectType': f'0x{code:X}',
+        'SubNumber': str(len(parts) + 1),
+    }
+    return {'': head} | {f'sub{sub:X}': part for sub, part in enumerate((count, *parts))}
+
+
+def _array(
+    name: str,
+    data_type: DataType,
+    access: AccessType,
+    size: int,
+    values: Mapping[int, str] = MappingProxyType({}),
+    *,
+    default: str = '',
+) -> DcfObject:
+    """Return equal sub-indices, abbreviated with CompactSubObj (CiA 306-1, 4.6.3.2).
+
+    Values by sub-index are those that are not the default.
+    """
+    keys = _keys(name, data_type, access, default) | {
+        'ObjectType': f'0x{ObjectCode.ARRAY:X}',
+        'CompactSubObj': str(size),
+    }
+    if not values:
+        return {'': keys}
+    listed = {str(subindex): value for subindex, value in sorted(values.items())}
+    return {'': keys, 'Value': {'NrOfEntries': str(len(values))} | listed}
+
+
+def _numbers(name: str, words: Sequence[int], size: int = 0) -> DcfObject:
+    """Return an array of numbers, in its first sub-indices where it has more."""
+    values = {sub: f'0x{word:08X}' for sub, word in enumerate(words, start=1)}
+    return _array(name, U32, RW, size or len(words), values)
+
+
+def _text(head: Mapping[str, Keys], objects: Mapping[int, DcfObject]) -> str:
+    """Return the text of a DCF: the sections before the objects, their lists, and the objects."""
+    sections = dict(head)
     for title in LISTS.values():
-        lines += _list(title, sorted(i for i in objects if proper_list(i) == title))
-    for index, content in sorted(objects.items()):
-        lines += _object(index, content)
-    return '\n'.join(lines)
-
-
-def _list(title: str, indices: Iterable[int]) -> list[str]:
-    entries = [f'{n}=0x{index:04X}' for n, index in enumerate(indices, start=1)]
-    return [f'[{title}]', f'SupportedObjects={len(entries)}', *entries, '']
-
-
-def _object(index: int, content: DcfObject) -> list[str]:
-    if isinstance(content, DcfEntry):
-        return [f'[{index:04X}]', *content.lines(), '']
-    if isinstance(content, DcfArray):
-        return _array(index, content)
-    count = DcfEntry(
-        'Highest sub-index supported',
-        DataType.UNSIGNED8,
-        AccessType.CONSTANT,
-        str(len(content.parts)),
+        indices = sorted(index for index in objects if proper_list(index) == title)
+        sections[title] = {'SupportedObjects': str(len(indices))} | {
+            str(number): f'0x{index:04X}' for number, index in enumerate(indices, start=1)
+        }
+    for index, parts in sorted(objects.items()):
+        sections |= {f'{index:04X}{suffix}': keys for suffix, keys in parts.items()}
+    return '\n'.join(
+        line
+        for title, keys in sections.items()
+        for line in (f'[{title}]', *(f'{key}={value}' for key, value in keys.items()), '')
     )
-    lines = [f'[{index:04X}]', f'ParameterName={content.name}', f'ObjectType=0x{content.code:X}']
-    lines += [f'SubNumber={len(content.parts) + 1}', '']
-    for subindex, part in enumerate((count, *content.parts)):
-        lines += [f'[{index:04X}sub{subindex:X}]', *part.lines(), '']
-    return lines
-
-
-def _array(index: int, array: DcfArray) -> list[str]:
-    lines = [
-        f'[{index:04X}]',
-        f'ParameterName={array.name}',
-        f'ObjectType=0x{ObjectCode.ARRAY:X}',
-        f'DataType=0x{array.data_type:04X}',
-        f'AccessType={array.access.value}',
-        *([f'DefaultValue={array.default}'] if array.default else []),
-        'PDOMapping=0',
-        f'CompactSubObj={array.size}',
-        '',
-    ]
-    if array.values:
-        lines += [f'[{index:04X}Value]', f'NrOfEntries={len(array.values)}']
-        lines += [f'{subindex}={value}' for subindex, value in sorted(array.values.items())]
-        lines += ['']
-    return lines
 
 
 U8, U16, U32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
@@ -192,7 +184,7 @@ def master_dcf(config: BusConfig, upload_files: Mapping[int, str]) -> str:
             )
         counts[direction.name] = len(pdos)
         objects |= dict(_mirrored(direction, pdos))
-    return dcf_text(_head(config.master, counts[TPDO.name], counts[RPDO.name]), objects)
+    return _text(_head(config.master, counts[TPDO.name], counts[RPDO.name]), objects)
 
 
 def _head(master: MasterConfig, rpdos: int, tpdos: int) -> dict[str, dict[str, str]]:
@@ -240,73 +232,51 @@ def _head(master: MasterConfig, rpdos: int, tpdos: int) -> dict[str, dict[str, s
 def _communication(config: BusConfig) -> Iterator[tuple[int, DcfObject]]:
     """Yield the communication profile of the master (CiA 301, 7.5.2), without its PDOs."""
     master = config.master
-    yield Index.DEVICE_TYPE, DcfEntry('Device type', U32, RO, '0x00000000')
-    yield Index.ERROR_REGISTER, DcfEntry('Error register', U8, RO)
-    yield Index.PREDEFINED_ERROR_FIELD, DcfArray('Pre-defined error field', U32, RO, 254)
+    yield Index.DEVICE_TYPE, _var('Device type', U32, RO, '0x00000000')
+    yield Index.ERROR_REGISTER, _var('Error register', U8, RO)
+    yield Index.PREDEFINED_ERROR_FIELD, _array('Pre-defined error field', U32, RO, 254)
     sync = f'0x{SYNC_PRODUCER | CobId.SYNC:08X}'
-    yield Index.SYNC_COB_ID, DcfEntry('COB-ID SYNC', U32, RW, sync)
+    yield Index.SYNC_COB_ID, _var('COB-ID SYNC', U32, RW, sync)
     period, window = (round(t * MICROSECONDS) for t in (master.sync_period, master.sync_window))
-    yield Index.CYCLE_PERIOD, DcfEntry('Communication cycle period', U32, RW, str(period))
-    yield Index.SYNC_WINDOW, DcfEntry('Synchronous window length', U32, RW, str(window))
+    yield Index.CYCLE_PERIOD, _var('Communication cycle period', U32, RW, str(period))
+    yield Index.SYNC_WINDOW, _var('Synchronous window length', U32, RW, str(window))
     cob_id = f'0x{master.time_cob_id | TIME_PRODUCER * (master.time_period > 0):08X}'
-    yield Index.TIME_COB_ID, DcfEntry('COB-ID TIME', U32, RW, cob_id)
-    yield 0x1013, DcfEntry('High resolution time stamp', U32, RW, mappable=True)
-    yield Index.EMCY_COB_ID, DcfEntry('COB-ID EMCY', U32, RW, '$NODEID+0x80')
+    yield Index.TIME_COB_ID, _var('COB-ID TIME', U32, RW, cob_id)
+    yield 0x1013, _var('High resolution time stamp', U32, RW, mappable=True)
+    yield Index.EMCY_COB_ID, _var('COB-ID EMCY', U32, RW, '$NODEID+0x80')
     inhibit = str(round(master.emcy_inhibit_time * HUNDRED_MICROSECONDS))
-    yield Index.EMCY_INHIBIT_TIME, DcfEntry('Inhibit time EMCY', U16, RW, inhibit)
-    watched = _watched(config.nodes)
-    if watched:
-        yield (
-            Index.CONSUMER_HEARTBEAT,
-            DcfArray('Consumer heartbeat time', U32, RW, 127, dict(enumerate(watched, start=1))),
-        )
-    heartbeat = str(round(master.heartbeat_producer * MILLISECONDS))
-    yield Index.PRODUCER_HEARTBEAT, DcfEntry('Producer heartbeat time', U16, RW, heartbeat)
-    yield Index.IDENTITY, _identity(master)
-    overflow = str(master.sync_overflow)
-    yield Index.SYNC_OVERFLOW, DcfEntry('Synchronous counter overflow value', U8, RW, overflow)
-    emergencies = dict(_emergencies(config.nodes))
-    none = f'0x{COB_ID_INVALID:08X}'
-    yield 0x1028, DcfArray('Emergency consumer object', U32, RW, 127, emergencies, none)
-    behaviour = {sub: f'0x{value:02X}' for sub, value in ({1: 0} | master.error_behavior).items()}
-    yield Index.ERROR_BEHAVIOUR, DcfArray('Error behavior object', U8, RW, 254, behaviour)
-    inhibit = str(round(master.nmt_inhibit_time * HUNDRED_MICROSECONDS))
-    yield 0x102A, DcfEntry('NMT inhibit time', U16, RW, inhibit)
-
-
-def _identity(master: MasterConfig) -> DcfRecord:
-    identity = master.identity
-    return DcfRecord(
-        'Identity object',
-        [
-            DcfEntry(name, U32, RO, f'0x{value:08X}')
-            for name, value in (
-                ('Vendor-ID', identity.vendor_id),
-                ('Product code', identity.product_code),
-                ('Revision number', identity.revision_number),
-                ('Serial number', identity.serial_number),
-            )
-        ],
-    )
-
-
-def _watched(nodes: Iterable[NodeConfig]) -> list[str]:
-    """Return the entries of 0x1016: node id and consumer time in [ms]."""
-    return [
-        f'0x{ConsumerHeartbeatTime(node.node_id, _milliseconds(node.heartbeat_timeout)).word:08X}'
-        for node in nodes
-        if node.heartbeat_timeout > 0
+    yield Index.EMCY_INHIBIT_TIME, _var('Inhibit time EMCY', U16, RW, inhibit)
+    watched = [
+        ConsumerHeartbeatTime(node.node_id, min(round(timeout * MILLISECONDS), U16_MAX))
+        for node in config.nodes
+        if (timeout := node.heartbeat_timeout) > 0
     ]
-
-
-def _milliseconds(time: float) -> int:
-    return min(round(time * MILLISECONDS), U16_MAX)
-
-
-def _emergencies(nodes: Iterable[NodeConfig]) -> Iterator[tuple[int, str]]:
-    for node in nodes:
-        if node.emergency_id is not None:
-            yield node.node_id, f'0x{node.emergency_id:08X}'
+    if watched:
+        words = [entry.word for entry in watched]
+        yield Index.CONSUMER_HEARTBEAT, _numbers('Consumer heartbeat time', words, 127)
+    heartbeat = str(round(master.heartbeat_producer * MILLISECONDS))
+    yield Index.PRODUCER_HEARTBEAT, _var('Producer heartbeat time', U16, RW, heartbeat)
+    identity = (
+        ('Vendor-ID', master.identity.vendor_id),
+        ('Product code', master.identity.product_code),
+        ('Revision number', master.identity.revision_number),
+        ('Serial number', master.identity.serial_number),
+    )
+    parts = [_keys(name, U32, RO, f'0x{value:08X}') for name, value in identity]
+    yield Index.IDENTITY, _record('Identity object', parts)
+    overflow = str(master.sync_overflow)
+    yield Index.SYNC_OVERFLOW, _var('Synchronous counter overflow value', U8, RW, overflow)
+    emergencies = {
+        node.node_id: f'0x{node.emergency_id:08X}'
+        for node in config.nodes
+        if node.emergency_id is not None
+    }
+    none = f'0x{COB_ID_INVALID:08X}'
+    yield 0x1028, _array('Emergency consumer object', U32, RW, 127, emergencies, default=none)
+    behaviour = {sub: f'0x{value:02X}' for sub, value in ({1: 0} | master.error_behavior).items()}
+    yield Index.ERROR_BEHAVIOUR, _array('Error behavior object', U8, RW, 254, behaviour)
+    inhibit = str(round(master.nmt_inhibit_time * HUNDRED_MICROSECONDS))
+    yield 0x102A, _var('NMT inhibit time', U16, RW, inhibit)
 
 
 def _pdos(config: BusConfig, direction: Direction) -> Iterator[tuple[NodeConfig, PdoConfig]]:
@@ -321,61 +291,46 @@ def _mirrored(
 ) -> Iterator[tuple[int, DcfObject]]:
     """Yield what the master has for the PDOs of one direction of all devices."""
     side = SIDES[direction.name]
-    places: dict[tuple[int, int, int], str] = {}  # node id, object -> mapping entry
+    places: dict[tuple[int, int, int], int] = {}  # node id, object -> mapping entry
+    remote = f'Remote {direction.title}'
     for position, (node, pdo) in enumerate(pdos):
-        values: list[DcfEntry] = []
+        values: list[Keys] = []
         words = []
         for mapped in pdo.mapping:
             address = node.node_id, mapped.index, mapped.subindex
             if address not in places:  # an object that two PDOs carry has one place
-                values.append(_value(node, mapped, side.access))
+                entry = node.dictionary.get(mapped.index, mapped.subindex)
+                name = entry.name if entry is not None else object_address(*address[1:])
+                name = f'{node.name}: {name}'
+                values.append(_keys(name, mapped.data_type, side.access, mappable=True))
                 place = (side.values + position) << 16 | len(values) << 8 | mapped.bits
-                places[address] = f'0x{place:08X}'
+                places[address] = place
             words.append(places[address])
         yield side.own.communication + position, _communication_parameter(side.own, pdo)
-        yield side.own.mapping + position, _mapping(f'{side.own.title} mapping parameter', words)
+        yield side.own.mapping + position, _numbers(f'{side.own.title} mapping parameter', words)
         if values:
             name = f'Mapped application objects for {side.own.title} {position + 1}'
-            yield side.values + position, DcfRecord(name, values)
-        yield from _remote(direction, position, node, pdo)
+            yield side.values + position, _record(name, values)
+        whose = f'0x{pdo.number << 8 | node.node_id:08X}'
+        yield side.remote_number + position, _var(f'{remote} number and node-ID', U32, RW, whose)
+        words = [mapped.word for mapped in pdo.mapping]
+        yield side.remote_mapping + position, _numbers(f'{remote} mapping parameter', words)
 
 
-def _value(node: NodeConfig, mapped: MappedObject, access: AccessType) -> DcfEntry:
-    entry = node.dictionary.get(mapped.index, mapped.subindex)
-    name = entry.name if entry is not None else object_address(mapped.index, mapped.subindex)
-    return DcfEntry(f'{node.name}: {name}', mapped.data_type, access, mappable=True)
-
-
-def _communication_parameter(own: Direction, pdo: PdoConfig) -> DcfRecord:
+def _communication_parameter(own: Direction, pdo: PdoConfig) -> DcfObject:
     """Return the record 0x1400 or 0x1800 of the master for a PDO of a device."""
     sends = own is TPDO
     inhibit = round((pdo.inhibit_time or 0.0) * HUNDRED_MICROSECONDS) if sends else 0
     parts = [
-        DcfEntry(f'COB-ID used by {own.title}', U32, RW, f'0x{pdo.cob_id:08X}'),
-        DcfEntry('Transmission type', U8, RW, f'0x{pdo.transmission:02X}'),
-        DcfEntry('Inhibit time', U16, RW, str(inhibit)),
-        DcfEntry('Reserved', U8, RW, '0'),
-        DcfEntry('Event timer', U16, RW, '0'),
+        _keys(f'COB-ID used by {own.title}', U32, RW, f'0x{pdo.cob_id:08X}'),
+        _keys('Transmission type', U8, RW, f'0x{pdo.transmission:02X}'),
+        _keys('Inhibit time', U16, RW, str(inhibit)),
+        _keys('Reserved', U8, RW, '0'),
+        _keys('Event timer', U16, RW, '0'),
     ]
     if sends:
-        parts.append(DcfEntry('SYNC start value', U8, RW, str(pdo.sync_start or 0)))
-    return DcfRecord(f'{own.title} communication parameter', parts)
-
-
-def _mapping(name: str, words: list[str]) -> DcfArray:
-    return DcfArray(name, U32, RW, len(words), dict(enumerate(words, start=1)))
-
-
-def _remote(
-    direction: Direction, position: int, node: NodeConfig, pdo: PdoConfig
-) -> Iterator[tuple[int, DcfObject]]:
-    """Return which PDO of which device it is, and its mapping there."""
-    side = SIDES[direction.name]
-    whose = f'0x{pdo.number << 8 | node.node_id:08X}'
-    title = f'Remote {direction.title}'
-    yield side.remote_number + position, DcfEntry(f'{title} number and node-ID', U32, RW, whose)
-    words = [f'0x{mapped.word:08X}' for mapped in pdo.mapping]
-    yield side.remote_mapping + position, _mapping(f'{title} mapping parameter', words)
+        parts.append(_keys('SYNC start value', U8, RW, str(pdo.sync_start or 0)))
+    return _record(f'{own.title} communication parameter', parts)
 
 
 NODES = 127
@@ -394,12 +349,12 @@ def network_objects(
     nodes = config.nodes
     if upload_files:
         yield 0x1F22, _files('Concise DCF', upload_files)
-    yield 0x1F25, DcfArray('Configuration request', U8, WO, NODES)
-    yield 0x1F55, DcfArray('Expected software identification', U32, RW, NODES)
-    yield 0x1F80, DcfEntry('NMT start-up', U32, RW, f'0x{_start_up(config.master):08X}')
+    yield 0x1F25, _array('Configuration request', U8, WO, NODES)
+    yield 0x1F55, _array('Expected software identification', U32, RW, NODES)
+    yield 0x1F80, _var('NMT start-up', U32, RW, f'0x{_start_up(config.master):08X}')
     assignment = {node.node_id: f'0x{_assignment(node):08X}' for node in nodes}
-    yield 0x1F81, DcfArray('NMT slave assignment', U32, RW, NODES, assignment)
-    yield 0x1F82, DcfArray('Request NMT', U8, RW, NODES)
+    yield 0x1F81, _array('NMT slave assignment', U32, RW, NODES, assignment)
+    yield 0x1F82, _array('Request NMT', U8, RW, NODES)
     for index, name, attribute in (
         (0x1F84, 'Device type identification', 'device_type'),
         (0x1F85, 'Vendor identification', 'vendor_id'),
@@ -407,26 +362,26 @@ def network_objects(
     ):
         values = {node.node_id: getattr(node.identity, attribute) for node in nodes}
         texts = {node_id: f'0x{value:08X}' for node_id, value in values.items() if value}
-        yield index, DcfArray(name, U32, RW, NODES, texts)
+        yield index, _array(name, U32, RW, NODES, texts)
     # master.bin has the values of these two
-    yield 0x1F87, DcfArray('Revision number', U32, RW, NODES)
-    yield 0x1F88, DcfArray('Serial number', U32, RW, NODES)
+    yield 0x1F87, _array('Revision number', U32, RW, NODES)
+    yield 0x1F88, _array('Serial number', U32, RW, NODES)
     boot_time = str(round(config.master.boot_time * MILLISECONDS))
-    yield 0x1F89, DcfEntry('Boot time', U32, RW, boot_time)
+    yield 0x1F89, _var('Boot time', U32, RW, boot_time)
     restored = {
         node.node_id: f'0x{node.restore_configuration:02X}'
         for node in nodes
         if node.restore_configuration
     }
-    yield 0x1F8A, DcfArray('Restore configuration', U8, RW, NODES, restored)
+    yield 0x1F8A, _array('Restore configuration', U8, RW, NODES, restored)
 
 
-def _files(name: str, paths: Mapping[int, str]) -> DcfRecord:
+def _files(name: str, paths: Mapping[int, str]) -> DcfObject:
     parts = [
-        DcfEntry(f'Node-ID {node_id}', DataType.DOMAIN, RO, upload_file=paths.get(node_id, ''))
+        _keys(f'Node-ID {node_id}', DataType.DOMAIN, RO, upload_file=paths.get(node_id, ''))
         for node_id in range(1, NODES + 1)
     ]
-    return DcfRecord(name, parts, ObjectCode.ARRAY)
+    return _record(name, parts, ObjectCode.ARRAY)
 
 
 def _start_up(master: MasterConfig) -> int:

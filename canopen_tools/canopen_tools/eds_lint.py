@@ -29,7 +29,6 @@ from canopen_core.eds import (
 from canopen_core.standard import (
     AccessType,
     bit_length,
-    BIT_RATES_KBIT,
     COB_ID_INVALID,
     DataType,
     DeviceProfile,
@@ -335,17 +334,10 @@ PDO_COUNTS: tuple[tuple[str, str, Direction], ...] = (
     ('nrofrxpdo', 'NrOfRXPDO', RPDO),
     ('nroftxpdo', 'NrOfTXPDO', TPDO),
 )
-IDENTITY_KEYS = (
-    ('vendornumber', 'VendorNumber', 1),
-    ('productnumber', 'ProductNumber', 2),
-)
 
 
 def check_info(path: Path, ini: IniFile, dictionary: ObjectDictionary, findings: Findings) -> None:
-    """Check the sections FileInfo and DeviceInfo."""
-    for name, title in (('fileinfo', 'FileInfo'), ('deviceinfo', 'DeviceInfo')):
-        if name not in ini.sections:
-            findings.warning(Place(path), f'no section [{title}]', 'add it')
+    """Check the numbers of PDOs in the section DeviceInfo."""
     info = ini.sections.get('deviceinfo')
     if info is None:
         return
@@ -357,22 +349,6 @@ def check_info(path: Path, ini: IniFile, dictionary: ObjectDictionary, findings:
                 f'{title} is {count}, but there are {number} {direction.title}s',
                 f'write {title}={number}',
             )
-    for key, title, subindex in IDENTITY_KEYS:
-        named, default = _number(info, key), dictionary.number(Index.IDENTITY, subindex)
-        if named and default and named != default:
-            findings.warning(
-                Place(path, info.line_of(key), key='[DeviceInfo]'),
-                f'{title} is 0x{named:X}, but 0x1018:{subindex:02X} has 0x{default:X} as default; '
-                'the latter is checked at boot',
-                'correct the wrong one of them',
-            )
-    rates = [_number(info, f'baudrate_{rate}') for rate in BIT_RATES_KBIT]
-    if any(rate is not None for rate in rates) and not any(rates):
-        findings.warning(
-            Place(path, info.line, '[DeviceInfo]'),
-            'the device supports no bit rate',
-            'write BaudRate_1000=1 and so on for those that it has',
-        )
 
 
 def check_lists(path: Path, ini: IniFile, findings: Findings) -> None:

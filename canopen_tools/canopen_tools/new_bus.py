@@ -40,6 +40,7 @@ from canopen_core.standard import (
     ObjectEntry,
     OperationMode,
     PDO_BITS_MAX,
+    POSITION_MODES,
     profile_number,
     TARGET_OBJECTS,
 )
@@ -248,11 +249,7 @@ def _is_same(factors: FactorGroup, units: Units) -> bool:
     )
 
 
-POSITION_MODES = (
-    OperationMode.CYCLIC_POSITION,
-    OperationMode.INTERPOLATED_POSITION,
-    OperationMode.PROFILE_POSITION,
-)
+BEST_FIRST = POSITION_MODES[::-1]
 """Modes for arms, the best one first: set-points of each cycle, else moves of the drive's own."""
 HEARTBEAT_MS = 1000  # time between two heartbeats of a device in [ms]
 
@@ -358,7 +355,7 @@ def _mode(device: NewDevice) -> tuple[OperationMode, str]:
     if device.mode is not None:
         _check_offered(device, device.mode, bits)
         return device.mode, 'as asked'
-    offered = [mode for mode in POSITION_MODES if bits & mode.support_bit]
+    offered = [mode for mode in BEST_FIRST if bits & mode.support_bit]
     best = f'the best of 0x6502 in the EDS (0x{bits:08X})'
     for mode in offered:
         target = device.eds.dictionary.get(*TARGET_OBJECTS[mode])
@@ -366,7 +363,7 @@ def _mode(device: NewDevice) -> tuple[OperationMode, str]:
             return mode, f'{best} whose target can be mapped'
     if offered:
         return offered[0], best
-    known = ', '.join(f'{int(mode)} ({mode.title.lower()})' for mode in POSITION_MODES)
+    known = ', '.join(f'{int(mode)} ({mode.title.lower()})' for mode in BEST_FIRST)
     what = f'names no position mode in 0x6502 (0x{bits:08X})' if bits else 'has no 0x6502'
     raise NewBusError(
         f'{device.name}: {device.eds.path.name} {what}, the modes that the drive has; look'

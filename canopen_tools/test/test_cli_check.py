@@ -240,7 +240,6 @@ ERRORS = [
     Case('1800sub1', '[1800sub1]', '[1800sub7]', r'TPDO 1 has no sub-index 1 \(COB-ID\)', line=''),
     Case('1A00sub0', 'DefaultValue=0', 'DefaultValue=9', 'maps 9 .* 8 entries', line='[1A00sub0]'),
 ]
-NONE_500 = ('BaudRate_500=0', 'supports no bit rate')
 WARNINGS = [
     WRONG_COUNT,
     Case('1018', 'SubNumber=5', 'SubNumber=4', 'SubNumber is 4, but 5 sub-indices'),
@@ -277,9 +276,6 @@ WARNINGS = [
         line='[1A00sub0]',
     ),
     Case('DeviceInfo', 'VendorName=Sample', 'NrOfTXPDO=4', 'NrOfTXPDO is 4, but there are 6'),
-    Case('DeviceInfo', 'VendorName=Sample', 'VendorNumber=0x99', '0x99, but 0x1018:01 has 0x555'),
-    Case('DeviceInfo', 'VendorName=Sample', *NONE_500, line='[DeviceInfo]'),
-    Case('FileInfo', '[FileInfo]', '[Info]', r'no section \[FileInfo\]', line=''),
     Case('MandatoryObjects', '[MandatoryObjects]', '[M]', r'no section \[Mandatory', line=''),
 ]
 

@@ -80,20 +80,12 @@ def bitrate(text: str) -> int:
 
 def node_id(text: str) -> int:
     """Read a node id, decimal or hexadecimal with ``0x``."""
-    number = whole_number(text)
-    if not NODE_ID_MIN <= number <= NODE_ID_MAX:
-        raise argparse.ArgumentTypeError(f'{text} is no node id; take 1 to 127')
-    return number
-
-
-def whole_number(text: str) -> int:
-    """Read a number that is not negative, decimal or hexadecimal with ``0x``."""
     try:
         number = int(text, 0)
     except ValueError:
         raise argparse.ArgumentTypeError(f'{text!r} is no whole number') from None
-    if number < 0:
-        raise argparse.ArgumentTypeError(f'{text} is negative')
+    if not NODE_ID_MIN <= number <= NODE_ID_MAX:
+        raise argparse.ArgumentTypeError(f'{text} is no node id; take 1 to 127')
     return number
 
 

@@ -16,7 +16,7 @@ import sys
 from canopen_core.eds import load_eds
 from canopen_core.standard import OperationMode
 
-from ..new_bus import bus_text, contradiction, NewDevice, POSITION_MODES, said_units, TURN, Units
+from ..new_bus import BEST_FIRST, bus_text, contradiction, NewDevice, said_units, TURN, Units
 from .arguments import node_id, print_line, SubParsers, UsageError
 from .check import show_check
 
@@ -187,10 +187,10 @@ def _units(option: str, number: float) -> Units:
 
 
 def _mode(name: str, text: str) -> OperationMode:
-    for mode in POSITION_MODES:
+    for mode in BEST_FIRST:
         if text == str(int(mode)):
             return mode
-    known = ', '.join(f'{int(mode)} ({mode.title.lower()})' for mode in POSITION_MODES)
+    known = ', '.join(f'{int(mode)} ({mode.title.lower()})' for mode in BEST_FIRST)
     raise UsageError(f'--mode {name}={text}: choose one of {known}')
 
 

@@ -167,8 +167,7 @@ class FrameDescriber:
         for prefix, pdos in (('TPDO', node.tpdos), ('RPDO', node.rpdos)):
             for pdo in pdos:
                 if pdo.enabled:
-                    describer = PdoDescriber(f'{prefix}{pdo.number}', node, pdo, names)
-                    self._handlers[pdo.cob_id] = describer.describe
+                    self._handlers[pdo.cob_id] = _pdo(f'{prefix}{pdo.number}', node, pdo, names)
 
     def describe(self, frame: Frame) -> Description:
         """Return what a frame means; unknown ones are shown as such, and none is an error."""
@@ -276,31 +275,24 @@ def _cob_id(node: NodeConfig, index: Index) -> int | None:
     return None if value is None or value & COB_ID_INVALID else value & CAN_ID_MASK or None
 
 
-class PdoDescriber:
-    """Describes the frames of one PDO."""
+def _pdo(label: str, node: NodeConfig, pdo: PdoConfig, names: ObjectNames) -> _Handler:
+    """Return what names the objects of a PDO with their values; the label is like ``TPDO1``."""
+    codec = PdoCodec(pdo.mapping)
+    titles = [
+        names.name(entry.index, entry.subindex) or object_address(entry.index, entry.subindex)
+        for entry in pdo.mapping
+    ]
 
-    def __init__(self, label: str, node: NodeConfig, pdo: PdoConfig, names: ObjectNames) -> None:
-        """Prepare the mapping; the label is like ``TPDO1``."""
-        self._label = label
-        self._node = node.name
-        self._node_id = node.node_id
-        self._codec = PdoCodec(pdo.mapping)
-        self._titles = [
-            names.name(entry.index, entry.subindex) or object_address(entry.index, entry.subindex)
-            for entry in pdo.mapping
-        ]
-
-    def describe(self, frame: Frame) -> Description:
-        """Name the objects of a frame with their values."""
+    def describe(frame: Frame) -> Description:
         try:
-            text, is_alert = self._values(frame.data), False
+            values = zip(titles, codec.objects, codec.unpack(frame.data), strict=True)
+            text = '  '.join(
+                f'{title}={value_text(entry.index, entry.subindex, value)}'
+                for title, entry, value in values
+            )
+            is_alert = False
         except CodecError as error:
             text, is_alert = str(error), not frame.is_remote
-        return Description(FrameKind.PDO, self._label, self._node, text, is_alert, self._node_id)
+        return Description(FrameKind.PDO, label, node.name, text, is_alert, node.node_id)
 
-    def _values(self, data: bytes) -> str:
-        words = []
-        values = self._codec.unpack(data)
-        for title, entry, value in zip(self._titles, self._codec.objects, values, strict=True):
-            words.append(f'{title}={value_text(entry.index, entry.subindex, value)}')
-        return '  '.join(words)
+    return describe

@@ -24,6 +24,7 @@ from canopen_core.standard import (
     error_code_text,
     error_register_text,
     Index,
+    is_signed,
     mapped_place,
     mode_title,
     object_address,
@@ -85,21 +86,14 @@ _SIGNED_OBJECTS = frozenset(
         Index.MODE_OF_OPERATION,
         Index.MODE_OF_OPERATION_DISPLAY,
         Index.POSITION_DEMAND,
-        Index.POSITION_ACTUAL,
         Index.VELOCITY_DEMAND,
-        Index.VELOCITY_ACTUAL,
-        Index.TARGET_TORQUE,
-        Index.TORQUE_ACTUAL,
-        Index.TARGET_POSITION,
         Index.HOME_OFFSET,
         Index.SOFTWARE_POSITION_LIMIT,
         Index.HOMING_METHOD,
-        Index.INTERPOLATION_DATA,
         Index.FOLLOWING_ERROR,
-        Index.TARGET_VELOCITY,
     }
 )
-"""Objects that are signed, for when there is no EDS (CiA 402-2)."""
+"""Signed objects beside targets and actual values, for when there is no EDS (CiA 402-2)."""
 
 _COB_ID_SUBINDEX = 1  # of a PDO communication parameter (CiA 301, 7.5.2.35)
 
@@ -187,8 +181,8 @@ def data_text(index: int, subindex: int, data_type: DataType | None, data: bytes
     The type by the EDS is None when it is unknown.
     """
     if data_type is None:
-        likely = _SIGNED_TYPES if index in _SIGNED_OBJECTS else _UNSIGNED_TYPES
-        data_type = likely.get(len(data))
+        signed = index in _SIGNED_OBJECTS or is_signed(index, subindex)
+        data_type = (_SIGNED_TYPES if signed else _UNSIGNED_TYPES).get(len(data))
     if data_type is None:
         return data.hex(' ') or 'nothing'
     try:
