@@ -166,7 +166,10 @@ class Kinematics:
         Seen from a joint, nothing of a body is farther away than the lengths that lead there.
         """
         model = self.native
-        inward, outward = _between(model, body, other)
+        # the joints from the body in to the common trunk, and from there out to the other
+        above, below = list(model.supports[body]), list(model.supports[other])
+        inward = [joint for joint in above if joint not in below][::-1]
+        outward = [joint for joint in below if joint not in above]
         sign, rate = np.zeros(model.nv), np.zeros(model.nv)
         turning = np.zeros(model.nv, dtype=bool)
         sign[[joint - 1 for joint in outward]] = 1.0
@@ -175,7 +178,7 @@ class Kinematics:
         # from the body joint by joint towards the other one
         for joint in (*inward, *outward):
             length = float(np.linalg.norm(model.jointPlacements[joint].translation))
-            slides = _slides(model, joint)
+            slides = str(model.joints[joint].shortname()).startswith('JointModelP')
             reach += length * (joint in outward) + (self._travel(joint) if slides else 0.0)
             rate[joint - 1] = 1.0 if slides else reach
             turning[joint - 1] = not slides
@@ -204,14 +207,3 @@ def _full(tree: KinematicTree) -> Native:
         if frame.type == pin.FrameType.BODY:
             frame.name = LINK + frame.name
     return model
-
-
-def _between(model: Native, first: int, second: int) -> tuple[list[int], list[int]]:
-    """Return the joints from a body in to the common trunk, and from there out to another."""
-    above, below = list(model.supports[first]), list(model.supports[second])
-    inward = [joint for joint in above if joint not in below]
-    return inward[::-1], [joint for joint in below if joint not in above]
-
-
-def _slides(model: Native, joint: int) -> bool:
-    return str(model.joints[joint].shortname()).startswith('JointModelP')

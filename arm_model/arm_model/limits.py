@@ -23,8 +23,7 @@ and often no acceleration, and some descriptions write velocity 0.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 import difflib
 import math
@@ -101,6 +100,13 @@ class JointLimits:
     def in_nearest_turn(self, positions: Array, seed: Array) -> Array:
         """Return positions, those of continuous joints in the turn that is nearest to a seed."""
         return np.where(self.continuous, seed + self.error(positions, seed), positions)
+
+    def span(self, near: Array, turn: float = math.pi) -> tuple[Array, Array]:
+        """Return ranges, those of joints without an end by a turn in [rad] about a place."""
+        return (
+            np.where(np.isfinite(self.lower), self.lower, near - turn),
+            np.where(np.isfinite(self.upper), self.upper, near + turn),
+        )
 
     def scaled(
         self, velocity: float, acceleration: float = 1.0, fastest: float = math.inf
@@ -184,8 +190,10 @@ def merge_limits(
     rows: list[_Row] = []
     problems: list[str] = []
     for name in names:
-        with _collected(problems):
+        try:
             rows.append(_row(joints[name], table, defaults))
+        except LimitsError as error:  # noqa: PERF203  # reported with what is wrong with others
+            problems += error.problems
     if problems:
         raise LimitsError(*problems)
     notes += [f'{default}: {", ".join(found)}' for default, found in defaults.items()]
@@ -194,15 +202,6 @@ def merge_limits(
     )
     assumed = frozenset(defaults.get(NO_JERK, ()))
     return JointLimits(tuple(names), lower, upper, velocity, acceleration, jerk, assumed)
-
-
-@contextmanager
-def _collected(problems: list[str]) -> Iterator[None]:
-    """Keep what is wrong with one joint, to report it with that of the others."""
-    try:
-        yield
-    except LimitsError as error:
-        problems += error.problems
 
 
 def _row(joint: Joint, table: Mapping[str, Any], defaults: dict[str, list[str]]) -> _Row:
@@ -222,7 +221,9 @@ def _row(joint: Joint, table: Mapping[str, Any], defaults: dict[str, list[str]])
 
     sliding = joint.kind is JointKind.PRISMATIC
     unit = 'm' if sliding else 'rad'
-    velocity = _velocity(name, entry) or span.velocity
+    # MoveIt's wizard writes a velocity of 0 where there is none
+    is_given = entry.get('max_velocity') != 0.0
+    velocity = (is_given and _positive(name, entry, 'velocity')) or span.velocity
     if not velocity:
         value = DEFAULT_SLIDING_VELOCITY if sliding else DEFAULT_VELOCITY
         velocity = default(f'no max_velocity in any file, so {value:g} {unit}/s', value)
@@ -238,11 +239,6 @@ def _row(joint: Joint, table: Mapping[str, Any], defaults: dict[str, list[str]])
     )
     jerk = _positive(name, entry, 'jerk') or default(NO_JERK, DEFAULT_JERK_RATIO * acceleration)
     return lower, upper, velocity, acceleration, jerk
-
-
-def _velocity(name: str, entry: Mapping[str, Any]) -> float:
-    """Return the velocity of a limits file; 0 where it has none, as MoveIt's wizard writes it."""
-    return 0.0 if entry.get('max_velocity') == 0.0 else _positive(name, entry, 'velocity')
 
 
 def _positive(name: str, entry: Mapping[str, Any], kind: str) -> float:

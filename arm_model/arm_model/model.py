@@ -21,7 +21,7 @@ from .arrays import Array, frozen, Native, Pose, turned_twists
 from .exceptions import CommandError, description_refused, limits_refused, ModelError, SceneError
 from .kinematics import Kinematics
 from .limits import JointLimits, load_limits, merge_limits
-from .scene.clearances import Clearances, LeastClearance, Proximity
+from .scene.clearances import Clearances, Proximity
 from .scene.links import link_shapes, with_default_collisions
 from .scene.objects import AllowedCollisionMatrix
 from .scene.planning_scene import PlanningScene
@@ -93,7 +93,9 @@ class RobotModel:
         self.end_effectors: Sequence[EndEffector] = tuple(
             each
             for each in semantic.end_effectors
-            if each.parent_group in {'', chosen.name} and self._moves(each.parent_link)
+            if each.parent_group in {'', chosen.name}
+            and each.parent_link in self.kinematics.frames
+            and self.kinematics.parent_joint(each.parent_link)
         )
         shapes = link_shapes(tree, folder)
         notes = list(shapes.notes)
@@ -208,9 +210,10 @@ class RobotModel:
         Raises:
             CommandError: There is no such link.
         """
+        self.check_link(link)
+        frame = self._tip_frame if link is None else self.kinematics.frames[link]
         self._update(positions)
-        base = self._placement(self._base_frame)
-        placement = base.actInv(self._placement(self._frame(link)))
+        placement = self._placement(self._base_frame).actInv(self._placement(frame))
         return Pose(placement.rotation.copy(), placement.translation.copy())
 
     def jacobian(self, positions: Array) -> Array:
@@ -232,35 +235,15 @@ class RobotModel:
 
     def nearest(self, positions: Array, within: float, count: int) -> list[Proximity]:
         """Return the nearest pairs of shapes with the gradients of their distances."""
-        return self._clearances.nearest(positions, within, count)
+        return self.clearances.nearest(positions, within, count)
 
     def clearance(self, positions: Array, within: float = math.inf) -> float:
         """Return the least distance between two shapes in [m]; infinity when none are checked.
 
         Beyond a distance of interest a lower bound is good enough.
         """
-        distances = self._clearances.least(positions, within)
+        distances = self.clearances.least(positions, within)
         return float(distances.min(initial=math.inf))
-
-    def least_clearance(self, places: Array, within: float) -> LeastClearance:
-        """Return the two links that come nearest to each other at any of some places.
-
-        Args:
-            places: Joint positions in [rad] (m, n).
-            within: Distance of interest in [m]; where it is more, a lower bound is good enough.
-        """
-        least = LeastClearance(within)
-        clearances = self._clearances
-        for positions in places[clearances.provably_clear(places, within) :]:
-            distances = clearances.least(positions, within)
-            pair = int(distances.argmin())
-            if distances[pair] < least.distance:
-                least = LeastClearance(float(distances[pair]), self.pairs[pair])
-        return least
-
-    def stays_apart(self, lower: Array, upper: Array, within: float) -> bool:
-        """Whether no shapes are as near at any positions between bounds, as far as is known."""
-        return self._clearances.apart(lower, upper, within)
 
     def use_scene(self, clearances: Clearances) -> None:
         """Measure all distances in another scene from now on; for the loop that owns the model.
@@ -308,17 +291,13 @@ class RobotModel:
         if kinematics is self.kinematics:
             return self
         moved = copy.copy(self)
-        moved._use(kinematics, self.scene.with_others(kinematics))  # noqa: SLF001  # its own copy
+        moved.kinematics, moved.scene = kinematics, self.scene.with_others(kinematics)
+        # of its own copy
+        moved._model, moved._thread = kinematics.native, _Thread(moved.scene)  # noqa: SLF001
         return moved
 
-    def _use(self, kinematics: Kinematics, scene: PlanningScene) -> None:
-        """Use kinematics and scene of the same group."""
-        self.kinematics, self.scene = kinematics, scene
-        self._model = kinematics.native
-        self._thread = _Thread(scene)
-
     @property
-    def _clearances(self) -> Clearances:
+    def clearances(self) -> Clearances:
         """What measures the present scene in this thread."""
         thread = self._thread
         if thread.clearances.scene is not self.scene:
@@ -335,15 +314,6 @@ class RobotModel:
 
     def _placement(self, frame: int) -> Native:
         return pin.updateFramePlacement(self._model, self._thread.data, frame)
-
-    def _frame(self, link: str | None) -> int:
-        self.check_link(link)
-        return self._tip_frame if link is None else self.kinematics.frames[link]
-
-    def _moves(self, link: str) -> bool:
-        """Whether the group moves a link."""
-        frames = self.kinematics.frames
-        return link in frames and bool(self._model.frames[frames[link]].parentJoint)
 
     def _trunk(self) -> list[int]:
         """Return the joints that move the tip, from the base out."""

@@ -83,7 +83,7 @@ def test_no_distance_changes_faster_than_its_bounds_say(model: RobotModel) -> No
     """Gradients anywhere are at most the bounds of their rates."""
     rng = np.random.default_rng(6)
     lower, upper = np.maximum(model.limits.lower, -4.0), np.minimum(model.limits.upper, 4.0)
-    bounds = Clearances(model.scene).distance_rate_bounds
+    bounds = model.scene.distance_rate_bounds
     for _ in range(100):
         for near in model.nearest(rng.uniform(lower, upper), math.inf, len(model.pairs)):
             assert (np.abs(near.gradient) <= bounds[near.pair] + 1e-9).all()

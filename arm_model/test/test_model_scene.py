@@ -327,7 +327,7 @@ def test_a_model_measures_in_the_scene_that_it_is_given() -> None:
     assert model.scene is clearances.scene
     assert model.clearance(at) < alone
     assert 'floor' in model.nearest(at, math.inf, 1)[0].links
-    assert 'floor' in model.least_clearance(at[None], math.inf).links
+    assert 'floor' in model.nearest(at, math.inf, 1)[0].links
     with pytest.raises(SceneError, match='not that of right'):
         model.use_scene(Clearances(MODEL.scene))
 

@@ -108,8 +108,7 @@ class FreeMotion:
 
         A way is None where a search came to its end.
         """
-        lower = np.where(self._limits.continuous, start - MAX_TURN, self._limits.lower)
-        upper = np.where(self._limits.continuous, start + MAX_TURN, self._limits.upper)
+        lower, upper = self._limits.span(start, MAX_TURN)
         drawn, most, known = 0, RESTART, list(goals)
 
         def sample(count: int) -> Array:
@@ -345,8 +344,7 @@ class GoalStates:
         The first are near to the start, the others anywhere.
         """
         limits, start = self._model.limits, self._start
-        lower = np.where(limits.continuous, start - np.pi, limits.lower)
-        upper = np.where(limits.continuous, start + np.pi, limits.upper)
+        lower, upper = limits.span(start)
         if isinstance(goal, JointGoal):
             if not goal.tolerance.any():
                 return

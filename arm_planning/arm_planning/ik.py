@@ -99,16 +99,25 @@ class IkSolver:
         with coded(PlanningCode.INVALID_GOAL_CONSTRAINTS):
             seed = checked(seed, len(self._limits), 'seed')
         check_pose(pose)
-        if self.closed_form is not None:
-            found = self._exact(self.closed_form, pose, seed)
-            return found if scene is None else self._free(found, self._clearances_of(scene))
         clearances = None if scene is None else self._clearances_of(scene)
-        return self._searched(pose, seed, clearances, timeout, count)
+        if self.closed_form is None:
+            return self._searched(pose, seed, clearances, timeout, count)
+        found = self._exact(self.closed_form, pose, seed)
+        if clearances is None:
+            return found
+        free = [each for each in found if not _touches(clearances, each)]
+        if not free:
+            raise self._refused(_in_contact(clearances, found[0]))
+        return free
 
     def _exact(self, form: ClosedForm, pose: Pose, seed: Array) -> list[Array]:
         answers = form.solutions(pose, seed)
         if isinstance(answers, WristMiss):
-            raise self._refused(_out_of_reach(self.link.link, answers))
+            raise self._refused(
+                f'the wrist would be {answers.distance:.3f} m too near to the shoulder'
+                if answers.too_near
+                else f'{self.link.link} is out of reach by {answers.distance:.3f} m'
+            )
         limits = self._limits
         turned = self._in_nearest_turn(np.array(answers), seed)
         beyond = np.maximum(limits.lower - turned, turned - limits.upper)
@@ -142,7 +151,7 @@ class IkSolver:
                 solution = self._in_nearest_turn(end.positions, seed)
                 touches = clearances is not None and _touches(clearances, solution)
                 among = touching if touches else free
-                if not _known(solution, among):
+                if all(np.abs(solution - each).max() >= SAME_TOLERANCE for each in among):
                     among.append(solution)
             if len(free) >= count or starts >= MAX_STARTS or self._clock() >= deadline:
                 break
@@ -162,7 +171,7 @@ class IkSolver:
         return frozen(self._in_nearest_turn(end.positions, seed)) if end.converged else None
 
     def _descent(self, pose: Pose, seed: Array) -> Descent:
-        start = random_start(self._limits, seed, self._draw)
+        start = self._draw.uniform(*self._limits.span(seed))
         return descend(self.link, pose, start, self._limits.lower, self._limits.upper)
 
     def _in_nearest_turn(self, positions: Array, seed: Array) -> Array:
@@ -172,12 +181,6 @@ class IkSolver:
         turned -= turn * (turned > limits.upper + RANGE_TOLERANCE)
         turned += turn * (turned < limits.lower - RANGE_TOLERANCE)
         return turned
-
-    def _free(self, found: list[Array], clearances: Clearances) -> list[Array]:
-        free = [each for each in found if not _touches(clearances, each)]
-        if not free:
-            raise self._refused(_in_contact(clearances, found[0]))
-        return free
 
     def _clearances_of(self, scene: PlanningScene) -> Clearances:
         if self._clearances is None or self._clearances.scene is not scene:
@@ -254,16 +257,6 @@ def _in_contact(clearances: Clearances, positions: Array) -> str:
     )
 
 
-def _out_of_reach(link: str, miss: WristMiss) -> str:
-    if miss.too_near:
-        return f'the wrist would be {miss.distance:.3f} m too near to the shoulder'
-    return f'{link} is out of reach by {miss.distance:.3f} m'
-
-
-def _known(solution: Array, among: Sequence[Array]) -> bool:
-    return any(np.abs(solution - other).max() < SAME_TOLERANCE for other in among)
-
-
 def _nearest_first(solutions: Sequence[Array], seed: Array) -> list[Array]:
     ordered = sorted(solutions, key=lambda each: float(np.linalg.norm(each - seed)))
     return [frozen(each) for each in ordered]
@@ -334,11 +327,3 @@ def _step(jacobian: Array, error: Array, positions: Array, lower: Array, upper: 
             break
         free &= ~held
     return step
-
-
-def random_start(limits: JointLimits, seed: Array, draw: np.random.Generator) -> Array:
-    """Return a start anywhere in the ranges; a joint without end is half a turn off at most."""
-    lower = np.where(np.isfinite(limits.lower), limits.lower, seed - np.pi)
-    upper = np.where(np.isfinite(limits.upper), limits.upper, seed + np.pi)
-    start: Array = draw.uniform(lower, upper)
-    return start

@@ -100,14 +100,11 @@ def _walk(
             inner = prefix if f'{key}.' == prefix else f'{name}.'
             yield from _walk(path, loader, value_node, inner)
         else:
-            yield name, _value(loader, value_node), line
-
-
-def _value(loader: yaml.SafeLoader, node: yaml.Node) -> object:
-    value = loader.construct_object(node, deep=True)
-    if isinstance(node, yaml.ScalarNode) and node.style is None and isinstance(value, str):
-        return float(value) if EXPONENT.fullmatch(value) else value
-    return value
+            value = loader.construct_object(value_node, deep=True)
+            is_plain = isinstance(value_node, yaml.ScalarNode) and value_node.style is None
+            if is_plain and isinstance(value, str) and EXPONENT.fullmatch(value):
+                value = float(value)
+            yield name, value, line
 
 
 FILES: Sequence[tuple[Sequence[str], str]] = (

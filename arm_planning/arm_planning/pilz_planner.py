@@ -65,24 +65,15 @@ class PilzPlanner:
         start = check.start(request.start)
         problems: list[PlanningError] = []
         for goal in request.goals:
-            found = self._tried(request, start, goal, check)
-            if isinstance(found, MotionPlan):
-                return found
-            problems.append(found)
+            try:
+                full, link = self._full(request, start, goal, check)
+                return self._finished(full, (request,), link, check)
+            except PlanningError as error:  # noqa: PERF203  # another goal may be reached
+                problems.append(error)
         if len(problems) == 1:
             raise problems[0]
         reasons = '; '.join(f'goal {n}: {error}' for n, error in enumerate(problems))
         raise PlanningError(problems[0].code, reasons) from problems[0]
-
-    def _tried(
-        self, request: MotionRequest, start: Array, goal: Goal, check: ValidityCheck
-    ) -> MotionPlan | PlanningError:
-        """Return the motion to a goal, or why there is none."""
-        try:
-            full, link = self._full(request, start, goal, check)
-            return self._finished(full, (request,), link, check)
-        except PlanningError as error:
-            return error
 
     def plan_sequence(
         self, items: Sequence[SequenceItem], check: ValidityCheck, first: int = 0

@@ -70,7 +70,11 @@ class Planner:
         """
         began = self._clock()
         scene = self._model.scene if scene is None else scene
-        self._refuse(request)
+        if request.planner_id not in ('', *FREE_MOTION, *PLANNER_IDS):
+            raise unknown_planner(request.planner_id, FREE_MOTION)
+        if not request.goals:
+            raise PlanningError(PlanningCode.INVALID_GOAL_CONSTRAINTS, 'the request has no goal')
+        check_scaling(request)
         if request.planner_id in PLANNER_IDS:
             plan = self._industrial.plan(request, self._checked_in(scene))
         else:
@@ -174,7 +178,12 @@ class Planner:
         constraints = None
         if request.constraints is not None:
             constraints = ConstraintCheck(self._model, request.constraints)
-            _require_start(constraints, start)
+            constraints.refuse_narrow(start)
+            if not constraints.heeds(start):
+                raise PlanningError(
+                    PlanningCode.START_STATE_VIOLATES_PATH_CONSTRAINTS,
+                    f'start: {constraints.reason(start)}; begin where the constraint holds',
+                )
         states = GoalStates(
             self._model,
             self._solver,
@@ -204,24 +213,6 @@ class Planner:
     def _numbers(self, positions: Sequence[float] | Array) -> Array:
         with coded(PlanningCode.INVALID_ROBOT_STATE):
             return checked(positions, len(self._model), 'state')
-
-    def _refuse(self, request: MotionRequest) -> None:
-        """Raise what is wrong with a request before anything is computed."""
-        if request.planner_id not in ('', *FREE_MOTION, *PLANNER_IDS):
-            raise unknown_planner(request.planner_id, FREE_MOTION)
-        if not request.goals:
-            raise PlanningError(PlanningCode.INVALID_GOAL_CONSTRAINTS, 'the request has no goal')
-        check_scaling(request)
-
-
-def _require_start(constraints: ConstraintCheck, start: Array) -> None:
-    """Raise why free motion cannot begin under path constraints."""
-    constraints.refuse_narrow(start)
-    if not constraints.heeds(start):
-        raise PlanningError(
-            PlanningCode.START_STATE_VIOLATES_PATH_CONSTRAINTS,
-            f'start: {constraints.reason(start)}; begin where the constraint holds',
-        )
 
 
 def unknown_planner(planner_id: str, planner_ids: Sequence[str]) -> PlanningError:

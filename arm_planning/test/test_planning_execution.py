@@ -294,7 +294,7 @@ def test_a_controller_that_is_gone_while_it_moves_ends_the_motion(
 def test_a_start_is_reported_with_the_way_to_its_first_point(bench: Bench) -> None:
     """What is refused is not reported."""
     begun: list[Any] = []
-    bench.execution.on_start(lambda: begun.append(bench.execution.running[-1].way))
+    bench.execution.on_start = lambda: begun.append(bench.execution.running[-1].way)
     trajectory = motion()
     del trajectory.points[0]
     trajectory.points[0].positions = [0.005, 0.0]
@@ -309,7 +309,7 @@ def test_a_start_is_reported_with_the_way_to_its_first_point(bench: Bench) -> No
 def test_why_a_controller_gave_up_is_found_out_first(bench: Bench, change: str) -> None:
     """It looks at the scene too, and may be quicker: that is another code than a defect."""
     asked: list[execution.Execution] = []
-    bench.execution.on_failure(asked.append)
+    bench.execution.on_failure = asked.append
     running = bench.start()
     bench.controller.end(GoalStatus.STATUS_ABORTED, 'left is in fault')
     assert (asked, bench.ends) == ([running], [])
@@ -342,7 +342,7 @@ def test_a_controller_that_says_little_is_put_into_words(
 
 def test_a_cancel_does_not_wait_for_why(bench: Bench) -> None:
     """It is what the client asked for; what is found out later counts nothing."""
-    bench.execution.on_failure(lambda _: None)
+    bench.execution.on_failure = lambda _: None
     running = bench.start()
     bench.controller.end(GoalStatus.STATUS_ABORTED)
     bench.execution.stop(running, reason='canceled')
@@ -352,7 +352,7 @@ def test_a_cancel_does_not_wait_for_why(bench: Bench) -> None:
 
 def test_why_is_not_waited_for_for_ever(bench: Bench) -> None:
     """The words of the controller count then, and its joints are free."""
-    bench.execution.on_failure(lambda _: None)
+    bench.execution.on_failure = lambda _: None
     running = bench.start()
     bench.controller.end(GoalStatus.STATUS_ABORTED)
     running.deadline = 0.0
@@ -374,7 +374,7 @@ def test_a_scene_that_changes_at_the_end_is_too_late(
     bench: Bench, status: int, outcome: PlanningCode
 ) -> None:
     """What counts is whether the arm has arrived."""
-    bench.execution.on_failure(lambda _: pytest.fail('it was stopped'))
+    bench.execution.on_failure = lambda _: pytest.fail('it was stopped')
     bench.execution.stop(bench.start(), execution.INVALIDATED, 'the scene has changed')
     bench.controller.end(status)
     assert [code for code, _ in bench.ends] == [outcome]

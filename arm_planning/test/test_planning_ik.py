@@ -25,7 +25,7 @@ from arm_model import (
     Sphere,
 )
 from arm_planning import PlanningCode, PlanningError
-from arm_planning.ik import IkSolver, random_start
+from arm_planning.ik import IkSolver
 from arm_planning.link_kinematics import pose_error
 
 pytestmark = pytest.mark.slow
@@ -49,7 +49,7 @@ def chain(kinds: str) -> RobotModel:
 
 def drawn(limits: JointLimits, seed: int) -> Array:
     """Return random positions within limits."""
-    return random_start(limits, np.zeros(len(limits)), np.random.default_rng(seed))
+    return np.random.default_rng(seed).uniform(*limits.span(np.zeros(len(limits))))
 
 
 def meets(inverse: IkSolver, pose: Pose, positions: Array, tolerance: float) -> bool:

@@ -99,20 +99,13 @@ class Executions:
     def __init__(self) -> None:
         self.running: list[Execution] = []
         self.stopped: list[tuple[Execution, PlanningCode, str]] = []
-        self.begun: Callable[[], None] = lambda: None
-
-    def on_start(self, begun: Callable[[], None]) -> None:
-        """Take who wants to know of a start."""
-        self.begun = begun
-
-    def on_failure(self, _find_out: Any) -> None:
-        """No controller fails."""
+        self.on_start: Callable[[], None] = lambda: None
 
     def start(self, trajectory: JointTrajectory) -> Execution:
         """Have a trajectory on its way."""
         execution = Execution(trajectory, lambda *_: None, way=trajectory)
         self.running = [*self.running, execution]
-        self.begun()
+        self.on_start()
         return execution
 
     def stop(self, execution: Execution, code: PlanningCode, reason: str) -> None:
@@ -145,7 +138,6 @@ def test_what_begins_in_a_scene_that_has_changed_meanwhile_is_stopped() -> None:
     monitor = SimpleNamespace(
         snapshot=SimpleNamespace(scene=crate_at(0.9)),
         positions=lambda: places(READY),
-        on_change=lambda _look: None,
     )
     executions, later = Executions(), Later()
     PathWatch(monitor, executions, later)  # type: ignore[arg-type]

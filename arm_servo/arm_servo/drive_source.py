@@ -46,6 +46,7 @@ REMEDIES: Mapping[RefusalCause, str] = {
     RefusalCause.SHUTDOWN: 'start the master again',
 }
 
+SILENT = RefusalCause.SILENT
 SILENT_AGE_FACTOR = 0.5
 """Share of the age of a silent drive from which on another one counts as silent, too."""
 
@@ -79,17 +80,16 @@ def too_fast(feedback: Sequence[AxisFeedback], velocities: Array) -> str:
 
     A path that is faster is refused by the drive half-way, and ends in a stop beside the path.
     """
-    remedy = 'lower max_velocity there, or raise 0x607F in the sdo list of bus.yml'
+    words = (
+        'is limited to {:.4g} per second by 0x607F, and limits.yaml allows {:.4g}; lower'
+        ' max_velocity there, or raise 0x607F in the sdo list of bus.yml'
+    )
     pairs = zip(feedback, velocities, strict=True)
     return _sentence(
-        (axis.name, f'is limited to {_rates(axis.speed_limit, velocity)}; {remedy}')
+        (axis.name, words.format(axis.speed_limit, velocity))
         for axis, velocity in pairs
         if velocity > axis.speed_limit
     )
-
-
-def _rates(limit: float, velocity: float) -> str:
-    return f'{limit:.4g} per second by 0x607F, and limits.yaml allows {velocity:.4g}'
 
 
 def what_happened(feedback: Sequence[AxisFeedback], released: Released) -> tuple[str, GoalCode]:
@@ -100,35 +100,19 @@ def what_happened(feedback: Sequence[AxisFeedback], released: Released) -> tuple
     causes: list[tuple[str, Refusal | str | None]] = [
         (axis.name, released.get(axis.name) or axis.refusal) for axis in feedback
     ]
-    oldest = max((axis.age for axis in feedback if _is_silent(axis)), default=math.inf)
+    silent = (each for each in feedback if each.refusal and each.refusal.cause is SILENT)
+    oldest = max((axis.age for axis in silent), default=math.inf)
     for number, axis in enumerate(feedback):
         # what cuts several drives off at once shows of some of them a few cycles later
         if causes[number][1] is None and axis.age > SILENT_AGE_FACTOR * oldest:
             detail = f'the last is {axis.age:.1f} s old'
-            causes[number] = axis.name, Refusal(RefusalCause.SILENT, detail)
+            causes[number] = axis.name, Refusal(SILENT, detail)
     is_behind = any(
         isinstance(cause, Refusal) and cause.cause is RefusalCause.NOT_FOLLOWING
         for _, cause in causes
     )
     code = GoalCode.PATH_TOLERANCE_VIOLATED if is_behind else GoalCode.INVALID_GOAL
     return _sentence(causes) or why_not(feedback, released), code
-
-
-def taken_away(axis: str, refusal: Refusal) -> str:
-    """Return why a drive was taken away."""
-    return _sentence([(axis, refusal)])
-
-
-def before_first_command(refusal: Refusal) -> Refusal | str:
-    """Return why an arm that has not moved yet has to be commanded first.
-
-    A drive that was initialized, or got its mode, before that had no client.
-    """
-    return UNUSED if refusal.cause in PREPARATIONS else refusal
-
-
-def _is_silent(axis: AxisFeedback) -> bool:
-    return axis.refusal is not None and axis.refusal.cause is RefusalCause.SILENT
 
 
 UNKNOWN = 'accepts no set-points; see the log of the master'
@@ -205,9 +189,10 @@ class DriveSource:
 
         What was requested before is refused, also where it would get the drive back.
         """
-        reason = refusal if self._has_moved else before_first_command(refusal)
-        self._released = {axis: reason, **self._released}
-        self._gateway.interrupt(taken_away(axis, refusal))
+        # a drive that was initialized, or got its mode, before the first motion had no client
+        is_prepared = refusal.cause in PREPARATIONS and not self._has_moved
+        self._released = {axis: UNUSED if is_prepared else refusal, **self._released}
+        self._gateway.interrupt(_sentence([(axis, refusal)]))
 
     def update(
         self, now: float, period: float, feedback: Sequence[AxisFeedback]

@@ -154,11 +154,20 @@ def upcoming_points(
         GoalError: It is refused.
     """
     points = _upcoming(_ordered(goal, limits, state, rules), goal.age)
-    points = _by_the_short_way(points, limits, state)
+    # by the short way: the first point of a continuous joint is at most half a turn off
+    first = points.positions[0]
+    turned = limits.in_nearest_turn(first, state.position) - first
+    points = replace(points, positions=points.positions + turned)
     for number, positions in enumerate(points.positions):
         if words := limits.beyond(positions, SPAN_TOLERANCE):
             raise refuse(f'point {number}: {words}')
-    _check_end(points, limits, rules)
+    end = np.abs(points.at(-1).velocity)
+    joint = int(np.argmax(end / limits.velocity))
+    if not rules.end_velocity and end[joint] > 1e-3 * limits.velocity[joint]:
+        raise refuse(
+            f'{limits.names[joint]} has {end[joint]:.4f} rad/s at the last point; end at rest, or'
+            ' set allow_nonzero_velocity_at_trajectory_end'
+        )
     return points
 
 
@@ -275,24 +284,6 @@ def _upcoming(points: Points, age: float) -> Points:
     soonest = MIN_JOIN_TIME if age > 0.0 else 0.0
     left = min(int(np.searchsorted(times, soonest)), len(times) - 1)
     return replace(points, times=times, requested_duration=float(times[-1])).since(left)
-
-
-def _by_the_short_way(points: Points, limits: JointLimits, state: RobotState) -> Points:
-    """Move continuous joints by whole turns: the first point is at most half a turn off."""
-    turn = 2 * math.pi
-    turns = np.round((state.position - points.positions[0]) / turn) * turn
-    shifted = points.positions + np.where(limits.continuous, turns, 0.0)
-    return replace(points, positions=shifted)
-
-
-def _check_end(points: Points, limits: JointLimits, rules: GoalRules) -> None:
-    end = np.abs(points.at(-1).velocity)
-    joint = int(np.argmax(end / limits.velocity))
-    if not rules.end_velocity and end[joint] > 1e-3 * limits.velocity[joint]:
-        raise refuse(
-            f'{limits.names[joint]} has {end[joint]:.4f} rad/s at the last point; end at rest, or'
-            ' set allow_nonzero_velocity_at_trajectory_end'
-        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,7 +9,7 @@ which takes longer where it must.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 import math
 
@@ -351,24 +351,18 @@ def approach_path(
     # an arm that is beyond a limit may come back
     lower = np.minimum(limits.lower, state.position)
     upper = np.maximum(limits.upper, state.position)
-    for path in _candidates(state, begin, duration, limits):
-        if farthest_beyond(path, lower, upper) is None:
-            return path
-    return None
-
-
-def _candidates(
-    state: RobotState, begin: RobotState, duration: float, limits: JointLimits
-) -> Iterator[Path]:
     if duration > 0.0:
-        smooth = Path.between(duration, state, begin)
-        if Timing(smooth, limits).demand.time_factor <= 1.0:
-            yield smooth
+        path = Path.between(duration, state, begin)
+        fits = Timing(path, limits).demand.time_factor <= 1.0
+        if fits and farthest_beyond(path, lower, upper) is None:
+            return path
     generator = OnlineTrajectoryGenerator(limits)
     plan = generator.to_state(state, begin, duration or None)
     plan = plan or generator.to_state(state, begin)  # ruckig may refuse a least duration
-    if plan is not None:
-        yield _phases(plan)
+    if plan is None:
+        return None
+    path = _phases(plan)
+    return path if farthest_beyond(path, lower, upper) is None else None
 
 
 def stop_path(state: RobotState, limits: JointLimits) -> Path | None:

@@ -112,7 +112,10 @@ class Path:
     @classmethod
     def between(cls, duration: float, begin: RobotState, end: RobotState) -> Path:
         """Return the quintic that meets positions, velocities and accelerations at both ends."""
-        ends = (np.array(pair) for pair in zip(_fields(begin), _fields(end), strict=True))
+        ends = (
+            np.array((getattr(begin, name), getattr(end, name)))
+            for name in ('position', 'velocity', 'acceleration')
+        )
         lasts = np.array([duration])
         return cls(lasts, quintics(lasts, *ends))
 
@@ -128,9 +131,13 @@ class Path:
         """Return what lies between two times in [s], exactly."""
         inner = self.starts[(self.starts > begin) & (self.starts < end)]
         times = np.concatenate(((begin,), inner, (end,)))
-        numbers = np.searchsorted(self.starts, times[:-1], side='right') - 1
-        late = times[:-1] - self.starts[numbers]
-        return Path(np.diff(times), shifted(self.coefficients[numbers], late))
+        return Path(np.diff(times), self.cut(times))
+
+    def cut(self, times: Array) -> Array:
+        """Return the coefficients (k, 6, n) of its parts between times in [s] (k + 1)."""
+        middles = 0.5 * (times[:-1] + times[1:])
+        numbers = np.searchsorted(self.starts, middles, side='right') - 1
+        return shifted(self.coefficients[numbers], times[:-1] - self.starts[numbers])
 
     @property
     def control_values(self) -> Array:
@@ -212,10 +219,6 @@ def _extremes(coefficients: Array) -> list[tuple[float, float]]:
     return [(share, float(np.polyval(coefficients[::-1], share))) for share in shares]
 
 
-def _fields(point: RobotState) -> tuple[Array, Array, Array]:
-    return point.position, point.velocity, point.acceleration
-
-
 MAX_STEP = 0.005  # greatest motion of a link against another from one look to the next in [m]
 COARSE_PERIOD = 0.01  # time between the places from which the steps are laid out in [s]
 MAX_SAMPLES = 50_000  # looks at one way at most: beyond 250 m of motion they are farther apart
@@ -237,7 +240,7 @@ class PathCheck:
     """Looks for contact of links on ways; for one thread."""
 
     def __init__(self, scene: PlanningScene) -> None:  # ``model.scene`` is the arm alone
-        self._clearances = Clearances(scene)
+        self._scene, self._clearances = scene, Clearances(scene)
 
     def contact(
         self, positions_at: Callable[[Array], Array], duration: float
@@ -249,11 +252,11 @@ class PathCheck:
         Args:
             positions_at: Joint positions in [rad] (k, n) at times in [s] (k).
         """
-        if not self._clearances.pairs:
+        if not self._scene.pairs:
             return None
         times = self._looks(positions_at, duration)
         rows = positions_at(times)
-        floor = np.full(len(self._clearances.pairs), -np.inf)
+        floor = np.full(len(self._scene.pairs), -np.inf)
         place, ahead = 0, 1
         while place < len(rows):
             passed = self._clearances.provably_clear(rows[place : place + ahead], 0.0)
@@ -264,7 +267,7 @@ class PathCheck:
             distances = self._clearances.least(rows[place], 0.0)
             deeper = distances < floor
             if deeper.any():
-                links = self._clearances.pairs[int(deeper.argmax())]
+                links = self._scene.pairs[int(deeper.argmax())]
                 return PathContact(links, float(times[place]))
             floor = np.maximum(floor, np.minimum(distances, 0.0) - CONTACT_TOLERANCE)
             place, ahead = place + 1, 1
@@ -274,7 +277,7 @@ class PathCheck:
         """Return the times to look at: dense where the arm moves fast."""
         coarse = np.linspace(0.0, duration, math.ceil(duration / COARSE_PERIOD) + 2)
         turns = np.abs(np.diff(positions_at(coarse), axis=0))
-        motion = (turns @ self._clearances.distance_rate_bounds.T).max(axis=1)
+        motion = (turns @ self._scene.distance_rate_bounds.T).max(axis=1)
         along = np.concatenate(((0.0,), np.cumsum(motion)))
         count = min(math.ceil(along[-1] / MAX_STEP), MAX_SAMPLES)
         times: Array = np.interp(np.linspace(0.0, along[-1], count + 1), along, coarse)

@@ -62,7 +62,7 @@ def rounded(path: Path, limits: JointLimits, *, from_rest: bool = True) -> Path:
     base = Path.joined([*rests[0], path, *rests[1]])
     corners = replace(corners, times=corners.times + lead)
     starts = _breaks(base, corners.times, halves)
-    pieces = _cut(base, starts)
+    pieces = base.cut(starts)
     for corner in np.flatnonzero(halves):
         _round(pieces, starts, corners, int(corner), float(halves[corner]))
     return Path(np.diff(starts), pieces)
@@ -136,13 +136,6 @@ def _breaks(base: Path, times: Array, halves: Array) -> Array:
     apart = np.diff(inner, prepend=0.0) > MERGE_TOLERANCE
     breaks: Array = np.concatenate(((0.0,), inner[apart], (end,)))
     return breaks
-
-
-def _cut(base: Path, starts: Array) -> Array:
-    """Return the coefficients of a path between other times (k, 6, n)."""
-    middles = 0.5 * (starts[:-1] + starts[1:])
-    places = np.searchsorted(base.starts, middles, side='right') - 1
-    return shifted(base.coefficients[places], starts[:-1] - base.starts[places])
 
 
 def _round(pieces: Array, starts: Array, corners: _Corners, corner: int, half: float) -> None:

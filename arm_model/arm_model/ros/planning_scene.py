@@ -214,8 +214,13 @@ class _Draft:
         """Add, move, extend or remove an object of the world."""
         name, operation = message.id, _operation(message)
         _refuse_reserved(name)
-        if operation == REMOVE:
-            self._remove(name)
+        if operation == REMOVE and not name:
+            for each in self.objects.keys() - {OCTOMAP_NAME}:
+                del self.objects[each]
+        elif operation == REMOVE:
+            if name not in self.attached:  # what a link has taken up is in the world no more
+                self._known(name)
+                del self.objects[name]
         elif operation == MOVE:
             self.objects[name] = self._moved(message)
         elif operation == APPEND and name in self.objects:
@@ -264,14 +269,6 @@ class _Draft:
         in_link = in_world.at(combined(place, in_world.pose))
         self.attached[name] = AttachedBody(in_link, link, touch)
 
-    def _remove(self, name: str) -> None:
-        if not name:
-            for each in self.objects.keys() - {OCTOMAP_NAME}:
-                del self.objects[each]
-        elif name not in self.attached:  # what a link has taken up is in the world no more
-            self._known(name)
-            del self.objects[name]
-
     def _detach(self, name: str, link: str) -> None:
         fitting = [
             each
@@ -289,7 +286,9 @@ class _Draft:
     def _new(self, message: ObjectMessage) -> CollisionObject:
         """Return a new object; its pose is that of its only shape, where it has none (MoveIt)."""
         pose, shapes = self._pose(message), list(_shapes(message))
-        if len(shapes) == 1 and _is_unset(message.pose):
+        x, y, z, w = xyzw(message.pose.orientation)
+        is_unset = not any((*xyz(message.pose.position), x, y, z)) and w in {0.0, 1.0}
+        if len(shapes) == 1 and is_unset:
             pose, shapes = combined(pose, shapes[0].pose), [PlacedShape(shapes[0].shape)]
         return CollisionObject(message.id, *shapes, pose=pose)
 
@@ -438,12 +437,6 @@ def _plane(message: PlaneMessage, _name: str) -> Shape:
     a, b, c, d = (float(each) for each in message.coef)
     length = float(np.linalg.norm((a, b, c)))
     return Plane((a, b, c), -d / length if length else 0.0)
-
-
-def _is_unset(pose: Any) -> bool:  # noqa: ANN401  # message classes have no type
-    """Whether a pose is the identity, or was left at zeros."""
-    x, y, z, w = xyzw(pose.orientation)
-    return not any((*xyz(pose.position), x, y, z)) and w in {0.0, 1.0}
 
 
 def _pose(message: Any, name: str) -> Pose:  # noqa: ANN401  # message classes have no type

@@ -59,7 +59,7 @@ class Clearances:
     """
 
     def __init__(self, scene: PlanningScene) -> None:
-        self._scene = scene
+        self.scene = scene  # what is measured
         self._kinematics = scene.kinematics
         self._data = scene.kinematics.native.createData()
         self._results = scene.geometry.createData()
@@ -74,24 +74,14 @@ class Clearances:
         self._places: Array = np.zeros_like(scene.distance_rate_bounds)
 
     @property
-    def scene(self) -> PlanningScene:
-        """The scene that is measured."""
-        return self._scene
-
-    @property
     def pairs(self) -> Sequence[tuple[str, str]]:
         """Links or objects of each pair of shapes."""
-        return self._scene.pairs
-
-    @property
-    def distance_rate_bounds(self) -> Array:
-        """How far each joint changes a pair's distance at most (k, n) in [m/rad]."""
-        return self._scene.distance_rate_bounds
+        return self.scene.pairs
 
     def least(self, positions: Array, within: float) -> Array:
         """Return the distance of each pair in [m]: exact below one of interest, else a bound."""
         turned = np.abs(positions - self._places)
-        rates = self._scene.distance_rate_bounds
+        rates = self.scene.distance_rate_bounds
         bounds: Array = self._distances - np.einsum('kn,kn->k', turned, rates)
         (doubtful,) = (bounds < within).nonzero()
         if not doubtful.size:
@@ -119,13 +109,13 @@ class Clearances:
         self._place(positions)
         placed = zip(self._results.oMg, self._centers, strict=True)
         centers = np.array([placement.act(center) for placement, center in placed])
-        first, second = self._scene.pair_shapes.T
+        first, second = self.scene.pair_shapes.T
         between = np.linalg.norm(centers[first] - centers[second], axis=1)
         apart: Array = between - self._radii[first] - self._radii[second]
         return apart
 
     def _place(self, positions: Array) -> None:
-        native, geometry = self._kinematics.native, self._scene.geometry
+        native, geometry = self._kinematics.native, self.scene.geometry
         expanded = self._kinematics.expanded(positions)
         pin.updateGeometryPlacements(native, self._data, geometry, self._results, expanded)
 
@@ -135,7 +125,7 @@ class Clearances:
         The results of coal are those for all pairs, by their numbers. Only those of the pairs
         asked for are current; the next measurement overwrites them.
         """
-        geometry, results, found = self._scene.geometry, self._results, self._found
+        geometry, results, found = self.scene.geometry, self._results, self._found
         self._place(positions)
         # all at once, which is quicker than one by one; other threads wait meanwhile
         if len(pairs) == len(found) <= AT_ONCE:
@@ -148,7 +138,7 @@ class Clearances:
     def provably_clear(self, positions: Array, within: float) -> int:
         """Count the leading rows at which nothing is as near, as far as is known unmeasured."""
         turned = np.abs(positions[:, None, :] - self._places)
-        rates = self._scene.distance_rate_bounds
+        rates = self.scene.distance_rate_bounds
         bounds = self._distances - np.einsum('mkn,kn->mk', turned, rates)
         doubtful = (bounds < within).any(axis=1)
         return int(doubtful.argmax()) if doubtful.any() else len(positions)
@@ -156,7 +146,7 @@ class Clearances:
     def apart(self, lower: Array, upper: Array, within: float) -> bool:
         """Whether nothing is as near at any positions between bounds, as far as is known."""
         turned = np.maximum(upper - self._places, self._places - lower)
-        bounds = self._distances - np.einsum('kn,kn->k', turned, self._scene.distance_rate_bounds)
+        bounds = self._distances - np.einsum('kn,kn->k', turned, self.scene.distance_rate_bounds)
         return not (bounds < within).any()
 
     def nearest(self, positions: Array, within: float, count: int) -> list[Proximity]:
@@ -168,7 +158,7 @@ class Clearances:
             return []
         gradients = self._gradients(positions, [pair for _, pair in near])
         return [
-            Proximity(pair, self._scene.pairs[pair], distance, gradient)
+            Proximity(pair, self.scene.pairs[pair], distance, gradient)
             for (distance, pair), gradient in zip(near, gradients, strict=True)
         ]
 
@@ -180,7 +170,7 @@ class Clearances:
         for pair in sorted(touching, key=distances.__getitem__):
             result = self._found[pair]
             middle = 0.5 * (result.getNearestPoint1() + result.getNearestPoint2())
-            names, depth = self._scene.pairs[pair], -float(distances[pair])
+            names, depth = self.scene.pairs[pair], -float(distances[pair])
             found.append(Contact(names, middle, result.normal.copy(), depth))
         return found
 
@@ -199,5 +189,5 @@ class Clearances:
             x, y, z = result.normal.tolist()
             # crossed by hand: numpy's own takes ten times as long
             wrenches.append((x, y, z, b * z - c * y, c * x - a * z, a * y - b * x))
-        signs = self._scene.relative_motion_sign[pairs]
+        signs = self.scene.relative_motion_sign[pairs]
         return kinematics.projected((np.array(wrenches) @ self._data.J) * signs)

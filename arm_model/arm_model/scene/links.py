@@ -82,7 +82,9 @@ def link_shapes(tree: KinematicTree, folder: Path | None = None) -> LinkShapes:
         for shape, fullness in solids:
             if fullness < MIN_FULLNESS:
                 loose[collision.link] = min(fullness, loose.get(collision.link, 1.0))
-            placed = PlacedShape(shape, _pose(collision))
+            origin = collision.origin
+            rotation = pin.Quaternion(np.array(origin.rotation)).toRotationMatrix()
+            placed = PlacedShape(shape, Pose(rotation, np.array(origin.translation)))
             found.setdefault(collision.link, []).append(placed)
     shapes = {link: _with_capsules(each) for link, each in found.items()}
     return LinkShapes(shapes, [*_left_out(unusable, bool(found)), *_loose(loose)])
@@ -131,11 +133,6 @@ def _solids(collision: UrdfShape, folder: Path | None) -> Sequence[tuple[Shape, 
             f'link {collision.link}: <{collision.shape}> is not usable: {error}'
         ) from error
     return [(shape, 1.0)]
-
-
-def _pose(collision: UrdfShape) -> Pose:
-    rotation = pin.Quaternion(np.array(collision.origin.rotation)).toRotationMatrix()
-    return Pose(rotation, np.array(collision.origin.translation))
 
 
 def _with_capsules(shapes: Sequence[PlacedShape]) -> Sequence[PlacedShape]:

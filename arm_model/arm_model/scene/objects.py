@@ -154,23 +154,18 @@ def native(shape: Shape) -> Native:
         return shape.hull
     if isinstance(shape, Cells):
         return shape.tree
-    solid = _half_space(shape) if isinstance(shape, Plane) else _primitive(shape)
+    if isinstance(shape, Plane):
+        length = float(np.linalg.norm(shape.normal))
+        if not (np.isfinite(length) and length > 0.0 and np.isfinite(shape.offset)):
+            raise SceneError(f'{shape}: the normal has no direction, or the offset is not finite')
+        solid = coal.Halfspace(np.array(shape.normal) / length, shape.offset)
+    else:
+        lengths = [float(getattr(shape, name)) for name in shape.__match_args__]
+        if not all(0.0 < length < math.inf for length in lengths):
+            raise SceneError(f'{shape}: every length must be positive and finite')
+        solid = getattr(coal, type(shape).__name__)(*lengths)
     solid.computeLocalAABB()
     return solid
-
-
-def _half_space(plane: Plane) -> Native:
-    length = float(np.linalg.norm(plane.normal))
-    if not (np.isfinite(length) and length > 0.0 and np.isfinite(plane.offset)):
-        raise SceneError(f'{plane}: the normal has no direction, or the offset is not finite')
-    return coal.Halfspace(np.array(plane.normal) / length, plane.offset)
-
-
-def _primitive(shape: Box | Sphere | Cylinder | Capsule | Cone) -> Native:
-    lengths = [float(getattr(shape, name)) for name in shape.__match_args__]
-    if not all(0.0 < length < math.inf for length in lengths):
-        raise SceneError(f'{shape}: every length must be positive and finite')
-    return getattr(coal, type(shape).__name__)(*lengths)
 
 
 @lru_cache(maxsize=1024)

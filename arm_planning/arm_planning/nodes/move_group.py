@@ -21,7 +21,6 @@ from rclpy.utilities import remove_ros_args
 from std_msgs.msg import String
 
 from arm_model import ArmError, Array, compiled_scene, LimitsError, PlanningScene
-from arm_model.ros import Description
 from arm_trajectory import Path, PathCheck
 from node_runner import (
     destroyed_when_refused,
@@ -92,7 +91,13 @@ class MoveGroup(Node):
         super().__init__(NAME)
         given = declare_parameters(self, package)
         description, settings = given.description, given.settings
-        robot = _robot(description)
+        try:
+            robot = RobotGroups(description.urdf, description.srdf, description.limits)
+        except PlanningError as error:
+            if not isinstance(error.__cause__, LimitsError):
+                raise
+            text = f'{error} (joint_limits: {description.limits_file})'
+            raise PlanningError(error.code, text) from error
         self.groups = robot.names
         prefix = ParameterReader(self).text(
             'frame_prefix', '', 'what robot_state_publisher puts before frames in TF'
@@ -144,16 +149,6 @@ class MoveGroup(Node):
         self._watch.close()
 
 
-def _robot(description: Description) -> RobotGroups:
-    try:
-        return RobotGroups(description.urdf, description.srdf, description.limits)
-    except PlanningError as error:
-        if not isinstance(error.__cause__, LimitsError):
-            raise
-        text = f'{error} (joint_limits: {description.limits_file})'
-        raise PlanningError(error.code, text) from error
-
-
 LOOKS = 400  # places on a trajectory at which the arm is looked for
 
 AMBIGUOUS = 0.02
@@ -175,9 +170,8 @@ class PathWatch:
         """
         self._monitor, self._execution, self._background = monitor, execution, background
         self._is_looking, self._looks_again = False, False
-        monitor.on_change(self._look)
-        execution.on_start(self._look)
-        execution.on_failure(self._find_out)
+        monitor.on_change = execution.on_start = self._look
+        execution.on_failure = self._find_out
 
     def _find_out(self, failed: Execution) -> None:
         """Find out whether a controller gave up because of the scene."""

@@ -120,22 +120,15 @@ class TrajectoryExecution:
         self._watched = time.monotonic()
         self.stops = 0
         self._running: list[Execution] = []
-        self._find_out: Callable[[Execution], None] | None = None
-        self._begun: Callable[[], None] | None = None
+        self.on_start: Callable[[], None] = lambda: None  # called when a trajectory begins
+        # finds out why a controller gave up, and answers with :meth:`explain`
+        self.on_failure: Callable[[Execution], None] | None = None
         node.create_timer(WATCH_PERIOD, self._watch)
 
     @property
     def running(self) -> Sequence[Execution]:
         """What is on its way and not about to stop."""
         return [each for each in self._running if each.ending is None]
-
-    def on_start(self, begun: Callable[[], None]) -> None:
-        """Register a callback for each trajectory that begins."""
-        self._begun = begun
-
-    def on_failure(self, find_out: Callable[[Execution], None]) -> None:
-        """Register what finds out why a controller gave up, and answers with :meth:`explain`."""
-        self._find_out = find_out
 
     def explain(self, execution: Execution, change: str) -> None:
         """Store why a controller gave up: a change of the scene, or its own words for none."""
@@ -221,8 +214,7 @@ class TrajectoryExecution:
             sent.add_done_callback(
                 lambda answer, name=name: self._accepted(execution, name, answer)
             )
-        if self._begun is not None:
-            self._begun()
+        self.on_start()
 
     def _look_again(self, execution: Execution) -> None:
         """Send what was held when its controllers are found by now, or refuse it at last."""
@@ -338,9 +330,9 @@ class TrajectoryExecution:
         execution.is_complete = False
         if execution.ending is None:
             self.stop(execution, PlanningCode.CONTROL_FAILED, reason)
-            if self._find_out is not None:
+            if self.on_failure is not None:
                 execution.in_doubt = True
-                self._find_out(execution)
+                self.on_failure(execution)
         self._conclude(execution)
 
     def _conclude(self, execution: Execution) -> None:

@@ -73,11 +73,7 @@ class Controller:
         return f'{name}/{self.namespace}'
 
 
-def _follow(part: JointTrajectory) -> Any:  # noqa: ANN401  # messages have no type
-    return FollowJointTrajectory.Goal(trajectory=part)
-
-
-def _grip(part: JointTrajectory) -> Any:  # noqa: ANN401
+def _grip(part: JointTrajectory) -> Any:  # noqa: ANN401  # messages have no type
     """Return where the trajectory ends: how a gripper gets there is its own affair."""
     goal = GripperCommand.Goal()
     (goal.command.position,) = part.points[-1].positions
@@ -92,7 +88,10 @@ def _grip_in_parallel(part: JointTrajectory) -> Any:  # noqa: ANN401
 
 
 FOLLOW = ControllerKind(
-    'FollowJointTrajectory', FollowJointTrajectory, 'follow_joint_trajectory', _follow
+    'FollowJointTrajectory',
+    FollowJointTrajectory,
+    'follow_joint_trajectory',
+    lambda part: FollowJointTrajectory.Goal(trajectory=part),
 )
 KINDS = {
     each.name: each
@@ -186,15 +185,11 @@ def _complete(
     joints = [joint.name for joint in tree.movable() if joint.independent]
     table = {name: limits.get(name, {}) for name in joints}
     notes: list[str] = []
-
-    def check(name: str) -> None:
+    for name in joints:
         try:
             merge_limits([name], tree, table, notes)
-        except LimitsError as error:
+        except LimitsError as error:  # noqa: PERF203
             raise ConfigError(f'{at(f"{LIMITS}.{name}", places)}: {error}') from error
-
-    for name in joints:
-        check(name)
     by_default: dict[str, list[str]] = {}
     for note in notes:
         words, _, name = note.rpartition(': ')

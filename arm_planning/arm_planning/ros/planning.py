@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -94,8 +95,10 @@ class PlanningThreads:
         cartesian_limits: CartesianLimits | None = None,
     ) -> None:
         self._monitor, self._background, self._settings = monitor, background, settings
-        self._cartesian_limits = cartesian_limits
-        self._planners: dict[str, GroupPlanners] = {}
+        # those of each lane, in its thread
+        self._planners = defaultdict[str, GroupPlanners](
+            lambda: GroupPlanners(monitor.robot, cartesian_limits)
+        )
         self._displayed = node.create_publisher(DisplayTrajectory, 'display_planned_path', LATCHED)
         background.serve(
             GetMotionPlan,
@@ -187,12 +190,6 @@ class PlanningThreads:
             )
         )
 
-    def _planners_in(self, lane: str) -> GroupPlanners:
-        """Return the planners of a lane, in its thread."""
-        if lane not in self._planners:
-            self._planners[lane] = GroupPlanners(self._monitor.robot, self._cartesian_limits)
-        return self._planners[lane]
-
     def _plan(
         self,
         message: Any,  # noqa: ANN401
@@ -201,7 +198,7 @@ class PlanningThreads:
         is_canceled: Callable[[], bool],
     ) -> PlannedMotion:
         begin, group = time.monotonic(), message.group_name
-        model, planner = self._planners_in(group).at(group, positions)
+        model, planner = self._planners[group].at(group, positions)
         request = RequestReader(model, snapshot, positions, self._settings).request(message)
         plan = planner.plan(
             request,
@@ -220,7 +217,7 @@ class PlanningThreads:
         is_canceled: Callable[[], bool],
     ) -> PlannedMotion:
         begin, positions = time.monotonic(), start
-        planners = self._planners_in(runs[0].group)
+        planners = self._planners[runs[0].group]
         trajectories = []
         notes: list[str] = []
         for run in runs:
@@ -267,24 +264,17 @@ class PlanningThreads:
 
     def _serve_sequence(self, request: Any) -> Callable[[], Any]:  # noqa: ANN401
         work = self.prepare_sequence(request.request.items)
-
-        def answer() -> Any:  # noqa: ANN401
-            planned = work()
-            self.display(planned)
-            code = error_code(reason='; '.join(planned.notes))
-            return GetMotionSequence.Response(response=sequence_response(code, planned))
-
-        return answer
+        return lambda: GetMotionSequence.Response(
+            response=sequence_response(*self._displayed_plan(work))
+        )
 
     def _serve(self, request: Any) -> Callable[[], Any]:  # noqa: ANN401
         work = self.prepare(request.motion_plan_request)
 
         def answer() -> Any:  # noqa: ANN401
-            planned = work()
-            self.display(planned)
             response = GetMotionPlan.Response()
             filled = response.motion_plan_response
-            filled.error_code = error_code(reason='; '.join(planned.notes))
+            filled.error_code, planned = self._displayed_plan(work)
             filled.group_name = request.motion_plan_request.group_name
             filled.trajectory_start = planned.start
             (filled.trajectory,) = planned.trajectories
@@ -292,6 +282,13 @@ class PlanningThreads:
             return response
 
         return answer
+
+    def _displayed_plan(
+        self, work: Callable[[], PlannedMotion]
+    ) -> tuple[MoveItErrorCodes, PlannedMotion]:
+        planned = work()
+        self.display(planned)
+        return error_code(reason='; '.join(planned.notes)), planned
 
 
 def sequence_group(items: Sequence[Any]) -> str:
@@ -348,7 +345,9 @@ def _group_runs(items: Sequence[Any]) -> list[_GroupRun]:
             raise PlanningError(
                 PlanningCode.INVALID_GROUP_NAME, f'sequence: item {number}: group_name is empty'
             )
-        if group in groups[:number] and _has_state(item.req.start_state):
+        state = item.req.start_state
+        has_state = state.joint_state.name or state.attached_collision_objects
+        if group in groups[:number] and has_state:
             raise PlanningError(
                 PlanningCode.INVALID_ROBOT_STATE,
                 f'sequence: item {number} has a start state, and {group} is moved before it; only'
@@ -366,8 +365,3 @@ def _group_runs(items: Sequence[Any]) -> list[_GroupRun]:
     numbered = groupby(enumerate(items), key=lambda pair: pair[1].req.group_name)
     runs = [(group, list(pairs)) for group, pairs in numbered]
     return [_GroupRun(group, pairs[0][0], [item for _, item in pairs]) for group, pairs in runs]
-
-
-def _has_state(message: Any) -> bool:  # noqa: ANN401  # messages have no type
-    """Return whether a moveit_msgs/RobotState says where a robot is, or what is attached to it."""
-    return bool(message.joint_state.name or message.attached_collision_objects)

@@ -251,7 +251,8 @@ def object_message(thing: CollisionObject, details: ObjectDetails, frame: str) -
                 message.meshes.append(next(meshes, None) or _mesh(shape))
                 message.mesh_poses.append(pose)
             case Plane():
-                message.planes.append(_plane(shape))
+                length = float(np.linalg.norm(shape.normal))
+                message.planes.append(PlaneMessage(coef=[*shape.normal, -shape.offset * length]))
                 message.plane_poses.append(pose)
             case Box() | Sphere() | Cylinder() | Cone():
                 message.primitives.append(_primitive(shape))
@@ -325,12 +326,6 @@ def _as_primitives(placed: PlacedShape) -> Sequence[PlacedShape]:
     ends = (Pose(pose.rotation, pose.position + side * half) for side in (-1, 1))
     caps = (PlacedShape(Sphere(shape.radius), end) for end in ends)
     return (PlacedShape(Cylinder(shape.radius, shape.length), pose), *caps)
-
-
-def _plane(plane: Plane) -> PlaneMessage:
-    """Return a plane as a shape_msgs/Plane."""
-    length = float(np.linalg.norm(plane.normal))
-    return PlaneMessage(coef=[*plane.normal, -plane.offset * length])
 
 
 def _mesh(mesh: Mesh) -> MeshMessage:

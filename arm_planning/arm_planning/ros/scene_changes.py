@@ -34,12 +34,11 @@ from arm_model.ros import apply_planning_scene, hull_of, pose_of
 from ..exceptions import coded, PlanningCode, PlanningError
 from .scene import AttachedDetails, ObjectDetails, pose_message, SceneSnapshot
 
-NO_CODE = PlanningCode.FAILURE
 CODES = (
     (LinkNameError, PlanningCode.INVALID_LINK_NAME),
     (ObjectNameError, PlanningCode.INVALID_OBJECT_NAME),
 )
-"""Codes of refusals of the scene, as MoveIt has them; others have :data:`NO_CODE`."""
+"""Codes of refusals of the scene, as MoveIt has them; others have FAILURE."""
 
 MIN_THICKNESS = 1e-6  # least extent of a mesh along its thinnest axis in [m] that is a volume
 
@@ -66,8 +65,8 @@ def apply_scene(snapshot: SceneSnapshot, message: Any, positions: Array) -> Scen
             before.scene, message, positions, lambda frame: before.frame(frame, positions)
         )
     except SceneError as error:
-        code = next((code for kind, code in CODES if isinstance(error, kind)), NO_CODE)
-        raise PlanningError(code, str(error)) from error
+        codes = (code for kind, code in CODES if isinstance(error, kind))
+        raise PlanningError(next(codes, PlanningCode.FAILURE), str(error)) from error
     colors = {
         each.id: (each.color.r, each.color.g, each.color.b, each.color.a)
         for each in message.object_colors

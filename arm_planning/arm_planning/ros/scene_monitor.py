@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 import math
 import time
 from typing import Any
@@ -56,6 +57,7 @@ class SceneMonitor:
 
     Attributes:
         snapshot: The scene; a value that any thread may keep.
+        on_change: Called after each change of the scene.
     """
 
     def __init__(self, node: Node, robot: RobotGroups, frame_prefix: str = '') -> None:
@@ -72,7 +74,7 @@ class SceneMonitor:
         self._states = JointStateStore(robot.all_joints)
         self._before = self._mark = self._states.samples()  # from which speeds are measured
         self._marked = -math.inf
-        self._listeners: list[Callable[[], None]] = []
+        self.on_change: Callable[[], None] = lambda: None
         # first: a controller that has found it does not read the meshes of the other one
         self._collisions = node.create_publisher(PlanningScene, 'collision_scene', LATCHED)
         self._published = node.create_publisher(PlanningScene, 'monitored_planning_scene', LATCHED)
@@ -83,17 +85,14 @@ class SceneMonitor:
             (CollisionObject, 'collision_object', scene_change),
             (AttachedCollisionObject, 'attached_collision_object', scene_change),
         ):
-            node.create_subscription(kind, topic, self._change_by(topic, as_scene), DEPTH)
+            change = partial(self._take_change, topic, as_scene)
+            node.create_subscription(kind, topic, change, DEPTH)
         node.create_service(GetPlanningScene, 'get_planning_scene', self._get)
         node.create_service(ApplyPlanningScene, 'apply_planning_scene', self._apply)
         node.create_service(Empty, 'clear_octomap', self._clear_octomap)
         self._shown = self._seen = self.positions()
         self._publish_change()
         node.create_timer(REST_PERIOD, self._publish_rest)
-
-    def on_change(self, listener: Callable[[], None]) -> None:
-        """Register a callback for each change of the scene."""
-        self._listeners.append(listener)
 
     def received(self, joints: Sequence[str]) -> Mapping[str, float]:
         """Return where joints are in [rad], by joint; refuse those that are unknown or too old."""
@@ -186,11 +185,8 @@ class SceneMonitor:
             self._before, self._mark = self._mark, self._states.samples()
             self._marked = now
 
-    def _change_by(self, topic: str, as_scene: Any) -> Callable[[Any], None]:  # noqa: ANN401
-        def receive(message: Any) -> None:  # noqa: ANN401
-            self._change(topic, as_scene(message))
-
-        return receive
+    def _take_change(self, topic: str, as_scene: Any, message: Any) -> None:  # noqa: ANN401
+        self._change(topic, as_scene(message))
 
     def _change(self, source: str, scene: PlanningScene) -> bool:
         """Apply a scene; a refusal is logged and leaves the scene as it is."""
@@ -205,8 +201,7 @@ class SceneMonitor:
             if note not in known:
                 self._node.get_logger().warning(note)
         self._publish_change()
-        for listener in self._listeners:
-            listener()
+        self.on_change()
         return True
 
     def _publish_rest(self) -> None:

@@ -180,7 +180,15 @@ class RobotServices:
         count = 1 if constraints is None else CANDIDATES
         found = solver.solve(pose, reader.start, scene, timeout, count)
         if constraints is not None:
-            found = _heeding(ConstraintCheck(model, constraints), found)
+            check = ConstraintCheck(model, constraints)
+            violations = [check.violated(each) for each in found]
+            if all(violations):
+                raise PlanningError(
+                    PlanningCode.NO_IK_SOLUTION,
+                    f'{len(found)} solutions violate the constraints; in the nearest'
+                    f' {violations[0]}',
+                )
+            found = [found[violations.index('')]]
         everywhere = {
             **dict(zip(self._robot.joints, positions.tolist(), strict=True)),
             **dict(zip(model.joints, found[0].tolist(), strict=True)),
@@ -307,18 +315,6 @@ def _one_pose(request: Any) -> tuple[str, PoseStamped]:  # noqa: ANN401
             ' is solved, others in a request of their own',
         )
     return names[0], poses[0]
-
-
-def _heeding(check: ConstraintCheck, found: list[Array]) -> list[Array]:
-    """Return the solutions that heed constraints."""
-    heeding = [each for each in found if not check.violated(each)]
-    if not heeding:
-        raise PlanningError(
-            PlanningCode.NO_IK_SOLUTION,
-            f'{len(found)} solutions violate the constraints; in the nearest'
-            f' {check.violated(found[0])}',
-        )
-    return heeding
 
 
 def _refuse(response: Any, error: PlanningError) -> None:  # noqa: ANN401

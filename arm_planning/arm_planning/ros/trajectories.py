@@ -71,16 +71,13 @@ def trajectory_message(joints: Sequence[str], path: Path, root: str) -> RobotTra
     ends = {round(time * 1e9): time for time in [*path.starts.tolist(), path.duration]}
     times = list(ends.values())
     period = max(POINT_PERIOD, path.duration / MAX_SPLITS)
-    parts = [_split(begin, end, period) for begin, end in pairwise(times)]
+    parts = [
+        np.linspace(begin, end, math.ceil((end - begin) / period), endpoint=False).tolist()
+        for begin, end in pairwise(times)
+    ]
     trajectory = JointTrajectory(header=Header(frame_id=root), joint_names=list(joints))
     trajectory.points = [_point(path, time) for time in (*chain(*parts), times[-1])]
     return RobotTrajectory(joint_trajectory=trajectory)
-
-
-def _split(begin: float, end: float, period: float) -> Sequence[float]:
-    """Return times from a begin up to an end, which is left out, that are near to each other."""
-    count = math.ceil((end - begin) / period)
-    return [begin + number * (end - begin) / count for number in range(count)]
 
 
 def _point(path: Path, time: float) -> JointTrajectoryPoint:

@@ -28,16 +28,14 @@ from .mailbox import (
     ImmediateRequest,
     JogRequest,
     Mailbox,
-    MotionRequest,
     PauseRequest,
     Snapshot,
     StopRequest,
     TOGETHER,
 )
 from .motion_core import MotionCore
-from .motion_queue import MotionCommand, MotionQueue
+from .motion_queue import MotionQueue
 from .preparation import PreparedScene
-from .safety_filter import Neighbours
 
 MAX_QUEUED_JOGS = 1000  # jog commands that may wait for the cycle
 
@@ -74,6 +72,10 @@ class CommandGateway:
         self._motions = MotionQueue(
             core, self._mailbox, worker, clock, rest=self._rest, recheck=self._recheck
         )
+        self.request, self.cancel = self._motions.request, self._motions.cancel
+        self.number = self._gate.number  # the place of a command that comes now among all
+        self.keep_apart = core.keep_apart  # before the first cycle
+        self.reset = core.reset  # where others have moved the arm while it was at rest
 
     @property
     def refused(self) -> float:
@@ -127,32 +129,6 @@ class CommandGateway:
 
         self._mailbox.post(commit)
         return future
-
-    def number(self) -> int:
-        """Return the place of a command that comes now among all commands and stops."""
-        return self._gate.number()
-
-    def request(
-        self,
-        request: MotionRequest,
-        get_ready: Callable[[], object] = lambda: None,
-        number: int | None = None,
-        stream: Hashable = None,
-    ) -> MotionCommand:
-        """Prepare a motion, and begin it when its path is clear.
-
-        Args:
-            number: Its :meth:`number`, where it came before; by default it comes now.
-            stream: Where the motion comes from, if it replaces all from there that have not begun;
-                a displacement goes beyond those.
-            get_ready: Gets back drives that others have, where the arm does not follow; called in
-                any thread, and only for a motion that is not refused from where the arm stands.
-        """
-        return self._motions.request(request, get_ready, number, stream)
-
-    def cancel(self, command: MotionCommand, reason: str) -> None:
-        """End a motion: before its begin it does not begin, later the arm comes to rest."""
-        self._motions.cancel(command, reason)
 
     def stream(
         self,
@@ -219,10 +195,6 @@ class CommandGateway:
         self._mailbox.post(take)
         return future
 
-    def keep_apart(self, neighbours: Neighbours) -> None:
-        """Heed from now on how other arms of the robot move; before the first cycle."""
-        self._core.keep_apart(neighbours)
-
     def interrupt(self, reason: str) -> None:
         """Refuse what was requested so far and has not begun, and end the streams of clients."""
         self._gate.interrupt(reason, self._clock())
@@ -268,10 +240,6 @@ class CommandGateway:
         if self._lost and point.source is Source.NONE and not point.state.moving:
             self.is_following, self._lost = False, ''
         return point
-
-    def reset(self, positions: Array) -> None:
-        """Go on from where others have moved the arm while it was at rest."""
-        self._core.reset(positions)
 
     def abandon(self, now: float, reason: str) -> None:
         """End all that was commanded, for a cycle that has failed: none may follow."""

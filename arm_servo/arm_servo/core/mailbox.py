@@ -135,13 +135,8 @@ def check_limits(limits: JointLimits, target: Array) -> None:
     Raises:
         CommandError: One is beyond its limits.
     """
-    beyond = (target < limits.lower) | (target > limits.upper)
-    if beyond.any():
-        joint = int(np.argmax(beyond))
-        raise CommandError(
-            f'{limits.names[joint]}: {target[joint]:.4f} is beyond its limits'
-            f' {limits.lower[joint]:.4f}..{limits.upper[joint]:.4f}'
-        )
+    if words := limits.beyond(target, 0.0):
+        raise CommandError(words)
 
 
 def by_joint(model: RobotModel, values: Mapping[str, float], what: str) -> tuple[Array, Mask]:

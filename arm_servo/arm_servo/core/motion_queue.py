@@ -123,14 +123,19 @@ class MotionQueue:
     def request(
         self,
         request: MotionRequest,
-        get_ready: Callable[[], object],
+        get_ready: Callable[[], object] = lambda: None,
         number: int | None = None,
         stream: Hashable = None,
     ) -> MotionCommand:
         """Prepare a motion, and begin it when its path is clear.
 
-        It replaces those of its stream that wait; displacements add up. One that would lead a sum
-        beyond limits is refused alone.
+        Args:
+            get_ready: Gets back drives that others have, where the arm does not follow; called in
+                any thread, and only for a motion that is not refused from where the arm stands.
+            number: Its place among all commands and stops, where it came before; by default it
+                comes now.
+            stream: Where it comes from, if it replaces those from there that wait. Displacements
+                add up; one that would lead a sum beyond limits is refused alone.
         """
         error: ArmError | None = None
         before: MotionCommand | None = None

@@ -23,7 +23,6 @@ from arm_trajectory import (
     GoalError,
     OnlineTrajectoryGenerator,
     PathCheck,
-    Plan,
     TimerState,
     TrajectoryGoal,
 )
@@ -149,14 +148,9 @@ class Preparation:
             raise CommandError(f'greatest speed of a joint {max_speed} rad/s: it must be above 0')
         check_limits(self._limits, target)
         motion = SingleTarget(target, max_speed, self._generator)
-        self._check_single_target(motion.plan(basis.state, basis.speed_scaling), basis)
-        return motion
-
-    def _check_single_target(self, plan: Plan | None, basis: CommandBasis) -> None:
-        """Make sure that no links meet on the way to a single target, as it is driven."""
-        check = basis.scene.check
+        plan, check = motion.plan(basis.state, basis.speed_scaling), basis.scene.check
         if check is None or plan is None:
-            return
+            return motion
 
         def positions(times: Array) -> Array:
             return np.array([plan.at(time).position for time in times.tolist()])
@@ -167,6 +161,7 @@ class Preparation:
                 f'{" and ".join(found.links)} would collide after {found.time:.2f} s on the way'
                 ' to the target; go around that (check_self_collision switches this off)'
             )
+        return motion
 
     def _trajectory(self, goal: TrajectoryGoal, basis: CommandBasis) -> Execution:
         """Plan a trajectory and check its path.

@@ -187,7 +187,12 @@ class SafetyFilter:
         self.is_near_neighbour = False
         if beyond.any():  # these joints brake, each for itself; the others go on
             limiter = self._limit(wanted, int(np.argmax(beyond)))
-            wanted = _mixed(beyond, self._brake(state, period, now), wanted)
+            slower = self._brake(state, period, now)
+            wanted = RobotState(
+                np.where(beyond, slower.position, wanted.position),
+                np.where(beyond, slower.velocity, wanted.velocity),
+                np.where(beyond, slower.acceleration, wanted.acceleration),
+            )
             beyond, stop = self._beyond(wanted)
         if stop is not None and not beyond.any():
             if clearance is None and self._may_meet(stop, end, apart):
@@ -250,13 +255,19 @@ class SafetyFilter:
 
     def _least(self, stop: Plan, _begin: float, clearance: float) -> LeastClearance:
         """Return the least distance between links on a stop, if it is small."""
-        if self._model.stays_apart(*stop.extremes, clearance):
-            return LeastClearance(clearance)
+        least, clearances = LeastClearance(clearance), self._model.clearances
+        if clearances.apart(*stop.extremes, clearance):
+            return least
         way = np.ptp(np.stack(stop.extremes), axis=0).sum()
         looks = min(max(MIN_SAMPLES, round(way / MAX_STRIDE)), MAX_SAMPLES)
         times = np.linspace(0.0, stop.duration, looks + 1)[1:].tolist()
         places = np.array([stop.at(time).position for time in times])
-        return self._model.least_clearance(places, clearance)
+        for positions in places[clearances.provably_clear(places, clearance) :]:
+            distances = clearances.least(positions, clearance)
+            pair = int(distances.argmin())
+            if distances[pair] < least.distance:
+                least = LeastClearance(float(distances[pair]), clearances.pairs[pair])
+        return least
 
     def _eased(self, state: RobotState, period: float, now: float) -> RobotState | None:
         """Brake with the joints in step, which keeps the direction, where that is clear too."""
@@ -282,15 +293,6 @@ class SafetyFilter:
         if period >= stop.duration:
             return RobotState.at_rest(stop.at(stop.duration).position)
         return stop.at(period)
-
-
-def _mixed(mask: Mask, one: RobotState, other: RobotState) -> RobotState:
-    """Return one state where a mask says so, and the other elsewhere."""
-    return RobotState(
-        np.where(mask, one.position, other.position),
-        np.where(mask, one.velocity, other.velocity),
-        np.where(mask, one.acceleration, other.acceleration),
-    )
 
 
 MIN_LOOKS, MAX_LOOKS = 4, 12
@@ -444,7 +446,7 @@ class MovingArms:
         if len(known) == 1:
             return least
         clearances = self._clearances
-        lower = np.zeros(clearances.distance_rate_bounds.shape[1])
+        lower = np.zeros(clearances.scene.distance_rate_bounds.shape[1])
         upper = lower.copy()
         for columns, stop in known:
             lower[columns], upper[columns] = stop.extremes
@@ -468,7 +470,7 @@ class MovingArms:
 
         counts, interest = self._counts(stops), within + HORIZON
         found = look(begin + np.linspace(0.0, duration, looks + 1))
-        nearest = _nearest(found, clearances.distance_rate_bounds, look)
+        nearest = _nearest(found, clearances.scene.distance_rate_bounds, look)
         pair = int(nearest.distances.argmin())
         if nearest.distances[pair] < within:
             least = LeastClearance(float(nearest.distances[pair]), clearances.pairs[pair])
@@ -476,7 +478,7 @@ class MovingArms:
 
     def _counts(self, stops: Sequence[_Stop | None]) -> Mask:
         """Return the pairs that no arm moves whose place is not known."""
-        moved = self._clearances.distance_rate_bounds > 0.0
+        moved = self._clearances.scene.distance_rate_bounds > 0.0
         counts: Mask = np.ones(len(moved), dtype=bool)
         for columns, stop in zip(self._columns, stops, strict=True):
             if stop is None:
@@ -485,7 +487,7 @@ class MovingArms:
 
     def _ends(self) -> Array:
         """Return where all joints would stand in [rad]."""
-        places = np.zeros(self._clearances.distance_rate_bounds.shape[1])
+        places = np.zeros(self._clearances.scene.distance_rate_bounds.shape[1])
         for columns, stop in zip(self._columns, self._stops, strict=True):
             if stop is not None:
                 places[columns] = stop.end

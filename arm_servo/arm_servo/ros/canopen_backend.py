@@ -9,7 +9,7 @@ import threading
 from typing import TYPE_CHECKING
 
 from rclpy.node import Node
-from urdf_reader import Mimic, read_urdf
+from urdf_reader import read_urdf
 
 from arm_canopen import CanopenError, serve_buses
 from arm_model import ModelError, RobotModel
@@ -59,7 +59,12 @@ class BusDrives:
         Raises:
             ModelError: A joint has no drive, or the core cannot move such a group.
         """
-        _check_drives(master, model)
+        drives = master.bus.joints
+        if missing := [name for name in model.joints if name not in drives]:
+            raise ModelError(
+                f'{master.bus.file} has no drive {missing[0]!r}; drives have the names of the'
+                f' joints, and there are: {", ".join(drives) or "none"}'
+            )
         self._master = master
         self.gateway = CommandGateway(MotionCore(model, settings), start_worker())
         self._source = DriveSource(self.gateway)
@@ -75,16 +80,6 @@ class BusDrives:
         if is_detached:
             self._source.attach(self._master.attach)
         return is_detached
-
-
-def _check_drives(master: MasterProcess, model: RobotModel) -> None:
-    """Make sure that each joint of a group has a drive."""
-    drives = master.bus.joints
-    if missing := [name for name in model.joints if name not in drives]:
-        raise ModelError(
-            f'{master.bus.file} has no drive {missing[0]!r}; drives have the names of the'
-            f' joints, and there are: {", ".join(drives) or "none"}'
-        )
 
 
 class CanopenMotion:
@@ -118,11 +113,12 @@ class CanopenMotion:
         groups = build_groups(models, name, make_node, offers, on_bus)
         SceneListener(manager, *by_check(groups))
         broadcaster = make_node('joint_state_broadcaster')
+        followers = read_urdf(manager.get_parameter('robot_description').value).movable()
         self._broadcaster = JointStateBroadcaster(
             broadcaster,
             self._drives[0].gateway,
             [name for name in self._master.bus.joints if name not in main.joints],
-            _mimics(manager),
+            {each.name: each.mimic for each in followers if each.mimic is not None},
             active=broadcasts,
         )
         self.nodes = [manager, *(node for each in groups for node in each.nodes), broadcaster]
@@ -139,9 +135,3 @@ class CanopenMotion:
             drives.prepare()
         if not waiting:  # the cycle asks for set-points
             self._manager.destroy_timer(self._attaching)
-
-
-def _mimics(node: Node) -> dict[str, Mimic]:
-    """Return the joints of the description that follow others."""
-    tree = read_urdf(node.get_parameter('robot_description').value)
-    return {joint.name: joint.mimic for joint in tree.movable() if joint.mimic is not None}

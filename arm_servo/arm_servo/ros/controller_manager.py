@@ -135,7 +135,9 @@ class JointSamples(JointStateStore):
         }
         for name, mimic in self._mimics.items():
             if mimic.source in fresh and name not in fresh:
-                fresh[name] = _mimicked(mimic, fresh[mimic.source])
+                source = fresh[mimic.source]
+                velocity = mimic.velocity(source.velocity)
+                fresh[name] = JointSample(mimic.position(source.position), velocity, source.time)
         return fresh
 
     def _of_the_arm(self, snapshot: Snapshot) -> dict[str, JointSample]:
@@ -151,12 +153,6 @@ class JointSamples(JointStateStore):
             strict=True,
         )
         return {name: JointSample(*row) for name, *row in rows}
-
-
-def _mimicked(mimic: Mimic, source: JointSample) -> JointSample:
-    """Return what a joint does that follows another."""
-    position, velocity = mimic.position(source.position), mimic.velocity(source.velocity)
-    return JointSample(position, velocity, source.time)
 
 
 def declare_broadcaster(node: Node) -> tuple[str, float, bool]:

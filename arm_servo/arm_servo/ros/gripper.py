@@ -50,18 +50,6 @@ class GripperInterface:
     request: Callable[[Any, Sequence[str]], TargetRequest]  # what a goal asks of the joints
     asks_effort: Callable[[Any], bool]  # whether a goal asks for a limit of effort
 
-    def feedback(self, state: GripperState) -> Any:  # noqa: ANN401
-        """Return a state as feedback."""
-        return _message(self.action.Feedback, state)
-
-    def result(self, state: GripperState) -> Any:  # noqa: ANN401
-        """Return a state as result."""
-        return _message(self.action.Result, state)
-
-
-def _single_request(goal: Any, joints: Sequence[str]) -> TargetRequest:  # noqa: ANN401
-    return TargetRequest(_finite({joints[0]: goal.command.position}))
-
 
 def _parallel_request(goal: Any, joints: Sequence[str]) -> TargetRequest:  # noqa: ANN401
     """Return what a goal asks; one joint need not be named."""
@@ -105,7 +93,10 @@ def _message(kind: Any, state: GripperState) -> Any:  # noqa: ANN401
 
 
 SINGLE = GripperInterface(
-    GripperCommand, '~/gripper_cmd', _single_request, lambda goal: bool(goal.command.max_effort)
+    GripperCommand,
+    '~/gripper_cmd',
+    lambda goal, joints: TargetRequest(_finite({joints[0]: goal.command.position})),
+    lambda goal: bool(goal.command.max_effort),
 )
 """The position of the one joint."""
 
@@ -224,8 +215,10 @@ class GripperController:
     def _watch_goal(
         self, interface: GripperInterface, goals: MotionGoals[_Goal], goal: _Goal
     ) -> None:
-        measured = self._gateway.snapshot.measured
-        self._note_begin(goal.command)
+        measured, command = self._gateway.snapshot.measured, goal.command
+        newest = -1 if self._newest is None else self._newest.number
+        if command is not None and command.motion is not None and command.number > newest:
+            self._newest = command
         if measured is not None:
             goal.state = self._look(goal, measured)
         goal.problem = self._problem(goal, goals.outcome(goal))
@@ -236,13 +229,7 @@ class GripperController:
                 self._abandoned = goal.command
             goals.end(goal)
         elif state is not None:
-            goal.handle.publish_feedback(interface.feedback(state))
-
-    def _note_begin(self, command: MotionCommand | None) -> None:
-        if command is None or command.motion is None:
-            return
-        if self._newest is None or command.number > self._newest.number:
-            self._newest = command
+            goal.handle.publish_feedback(_message(interface.action.Feedback, state))
 
     def _succeeds(self, goal: _Goal) -> bool:
         """Whether a goal that ends is reached, or ends with something held."""
@@ -323,18 +310,18 @@ class GripperController:
         return 'canceled' if goal.handle.is_cancel_requested else ''
 
     def _conclude(self, interface: GripperInterface, goal: _Goal) -> tuple[Ending, Any]:
-        state = self._state_of(goal)
+        result = _message(interface.action.Result, self._state_of(goal))
         if self._succeeds(goal):
-            return Ending.SUCCEEDED, interface.result(state)
-        if not (goal.problem and goal.handle.is_cancel_requested):
-            reason = goal.problem or 'stalled in front of the goal (allow_stalling is false)'
-            self._node.get_logger().warning(f'goal aborted: {reason}')
-            return Ending.ABORTED, interface.result(state)
-        return Ending.CANCELED, interface.result(state)
+            return Ending.SUCCEEDED, result
+        if goal.problem and goal.handle.is_cancel_requested:
+            return Ending.CANCELED, result
+        reason = goal.problem or 'stalled in front of the goal (allow_stalling is false)'
+        self._node.get_logger().warning(f'goal aborted: {reason}')
+        return Ending.ABORTED, result
 
     def _fail(self, interface: GripperInterface, goal: _Goal, error: Exception) -> Any:  # noqa: ANN401
         self._node.get_logger().warning(f'goal aborted: {refused(error).reason}')
-        return interface.result(replace(self._state_of(goal), reached=False))
+        return _message(interface.action.Result, replace(self._state_of(goal), reached=False))
 
     def _state_of(self, goal: _Goal) -> GripperState:
         measured = self._gateway.snapshot.measured

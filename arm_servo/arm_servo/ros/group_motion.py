@@ -26,9 +26,9 @@ from ..core.preparation import CoreSettings
 from .controller_manager import Controller
 from .gripper import declare_gripper, GripperController
 from .servo import Servo
-from .servo_commands import declare_servo, PREFIX, ServoParameters
+from .servo_commands import declare_servo, PREFIX
 from .trajectory import TrajectoryController
-from .trajectory_goals import declare_check, declare_trajectory, TrajectoryParameters
+from .trajectory_goals import declare_check, declare_trajectory
 
 TRAJECTORY_KIND = 'joint_trajectory_controller/JointTrajectoryController'
 
@@ -100,31 +100,24 @@ def build_arm(
         None if controller is None else declare_trajectory(controller, model.joints, model.limits)
     )
     jogging = None if servo is None else declare_servo(servo, model)
-    check = trajectory.check if trajectory is not None else _check_of_servo(servo)
-    drives = make_drives(nodes[0], model, _settings(trajectory, jogging, check=check))
+    if trajectory is not None:
+        check = trajectory.check
+    else:  # of a servo that is alone: whether displacements are checked for collisions
+        check = servo is None or declare_check(ParameterReader(servo, PREFIX))
+    default = CoreSettings()
+    settings = CoreSettings(
+        default.servo if jogging is None else jogging.settings,
+        default.execution if trajectory is None else trajectory.execution,
+        default.clearance if jogging is None else jogging.clearance,
+        check_self_collision=check,
+    )
+    drives = make_drives(nodes[0], model, settings)
     if servo is not None and jogging is not None:
         Servo(servo, drives.gateway, jogging, drives.prepare)
     if controller is None or trajectory is None:
         return MovedGroup(nodes, drives.gateway, None)
     following = TrajectoryController(controller, drives.gateway, trajectory, drives.prepare)
     return MovedGroup(nodes, drives.gateway, following.set_active)
-
-
-def _check_of_servo(servo: Node | None) -> bool:
-    """Declare on a servo that is alone whether displacements are checked for collisions."""
-    return servo is None or declare_check(ParameterReader(servo, PREFIX))
-
-
-def _settings(
-    trajectory: TrajectoryParameters | None, jogging: ServoParameters | None, *, check: bool
-) -> CoreSettings:
-    default = CoreSettings()
-    return CoreSettings(
-        default.servo if jogging is None else jogging.settings,
-        default.execution if trajectory is None else trajectory.execution,
-        default.clearance if jogging is None else jogging.clearance,
-        check_self_collision=check,
-    )
 
 
 def build_tool(model: RobotModel, node: Node, make_drives: MakeDrives) -> MovedGroup:

@@ -181,21 +181,6 @@ PLACE_TIMEOUT = 1.0  # time for which a scene waits for a group's position witho
 OTHERS_TIMEOUT = 5.0  # time for which joints beside a group are awaited without a warning in [s]
 
 
-def keep_apart(gateways: Sequence[CommandGateway]) -> MovingArms | None:
-    """Keep arms that move by themselves apart; before their first cycles.
-
-    Returns:
-        What they know of each other; None where there is one arm.
-    """
-    arms = [gateway for gateway in gateways if gateway.model.moved_by_others]
-    if not arms:
-        return None
-    moving = MovingArms([gateway.model for gateway in arms])
-    for gateway in arms:
-        gateway.keep_apart(moving.neighbours(gateway.model.joints))
-    return moving
-
-
 class SceneListener:
     """Applies scenes and diffs to all groups, with the joints beside them where they are.
 
@@ -220,7 +205,11 @@ class SceneListener:
         self._node, self._clock = node, clock
         self._worker = worker or ThreadPoolExecutor(1, thread_name_prefix='scenes')
         arms = {gateway.model.group: gateway.model.joints for gateway in gateways}
-        moving = keep_apart(gateways)
+        free = [gateway for gateway in gateways if gateway.model.moved_by_others]
+        moving = MovingArms([gateway.model for gateway in free]) if free else None
+        if moving is not None:  # arms that move by themselves know of each other
+            for gateway in free:
+                gateway.keep_apart(moving.neighbours(gateway.model.joints))
         self._updaters = [
             SceneUpdater(gateway, arms, None if number else moving)
             for number, gateway in enumerate(gateways)

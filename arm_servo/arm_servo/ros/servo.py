@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import replace
-from enum import IntEnum
 from functools import partial
 import time
 import traceback
@@ -33,39 +33,28 @@ from ..controllers.controller import Cause, JOGGING, MotionReport, NotReadyError
 from ..core.gateway import CommandGateway
 from ..core.mailbox import CommandType, DisplacementRequest, JogRequest, Snapshot, StopRequest
 from .motion_goals import Refusals
-from .servo_commands import CommandConverter, PREFIX, read_scales, Scales, ServoParameters
+from .servo_commands import CommandConverter, PREFIX, read_scales, ServoParameters, Units
 
 HALTED_SPEED_FACTOR = 0.02  # share of the asked speed below which a motion counts as halted
 
 
-class StatusCode(IntEnum):
-    """Codes of moveit_msgs/msg/ServoStatus in Jazzy."""
-
-    INVALID = -1
-    NO_WARNING = 0
-    DECELERATE_FOR_APPROACHING_SINGULARITY = 1
-    HALT_FOR_SINGULARITY = 2
-    DECELERATE_FOR_LEAVING_SINGULARITY = 3
-    DECELERATE_FOR_COLLISION = 4
-    HALT_FOR_COLLISION = 5
-    JOINT_BOUND = 6
+CODES = {
+    Cause.COLLISION: (ServoStatus.DECELERATE_FOR_COLLISION, ServoStatus.HALT_FOR_COLLISION),
+    Cause.SINGULARITY: (
+        ServoStatus.DECELERATE_FOR_APPROACHING_SINGULARITY,
+        ServoStatus.HALT_FOR_SINGULARITY,
+    ),
+    Cause.JOINT_POSITION: (ServoStatus.JOINT_BOUND, ServoStatus.JOINT_BOUND),
+}
+"""Codes of what slows a motion down, and of what halts it; speed and acceleration have none."""
 
 
-def code_of(report: MotionReport) -> StatusCode:
-    """Return the code for what limits most; speed and acceleration have none."""
+def code_of(report: MotionReport) -> int:
+    """Return the code for what limits most."""
     for limiter in report.limiters:
-        halted = limiter.factor < HALTED_SPEED_FACTOR
-        if limiter.cause is Cause.COLLISION:
-            return StatusCode.HALT_FOR_COLLISION if halted else StatusCode.DECELERATE_FOR_COLLISION
-        if limiter.cause is Cause.SINGULARITY:
-            return (
-                StatusCode.HALT_FOR_SINGULARITY
-                if halted
-                else StatusCode.DECELERATE_FOR_APPROACHING_SINGULARITY
-            )
-        if limiter.cause is Cause.JOINT_POSITION:
-            return StatusCode.JOINT_BOUND
-    return StatusCode.NO_WARNING
+        if limiter.cause in CODES:
+            return int(CODES[limiter.cause][limiter.factor < HALTED_SPEED_FACTOR])
+    return int(ServoStatus.NO_WARNING)
 
 
 def status_of(
@@ -76,22 +65,20 @@ def status_of(
     Args:
         refusal: Why the last command was refused, with the remedy; empty when it was not.
     """
-    if refusal:
-        return int(StatusCode.INVALID), refusal
-    if stale := snapshot.stale(age):
-        return int(StatusCode.INVALID), stale
+    if refusal := refusal or snapshot.stale(age):
+        return ServoStatus.INVALID, refusal
     if snapshot.set_point is None or snapshot.blocked:
-        return int(StatusCode.INVALID), snapshot.blocked
+        return ServoStatus.INVALID, snapshot.blocked
     if paused:
-        return int(StatusCode.NO_WARNING), paused
+        return ServoStatus.NO_WARNING, paused
     if snapshot.paused:
-        return int(StatusCode.NO_WARNING), 'the arm is held; ~/resume of the trajectory controller'
+        return ServoStatus.NO_WARNING, 'the arm is held; ~/resume of the trajectory controller'
     report = snapshot.set_point.report
     if snapshot.source is not Source.JOG:
         words = IDLE_WORDS[snapshot.source]
-        return int(code_of(report)), f'{words}; {report}' if report.limiters else words
+        return code_of(report), f'{words}; {report}' if report.limiters else words
     words = str(report) if not capped else f'{capped}; {report}'
-    return int(code_of(report)), words
+    return code_of(report), words
 
 
 IDLE_WORDS = {
@@ -230,7 +217,7 @@ class Servo:
         """Command a motion, which gets back drives that others have."""
         # the events executor hands out no publisher, so topic and frame stand for the client
         note = partial(self._note, time.monotonic())
-        get_ready = _do_nothing if request.is_zero else self._prepare
+        get_ready = (lambda: None) if request.is_zero else self._prepare
         if isinstance(request, JogRequest):
             request = replace(request, client=client)
             self._gateway.command(request, get_ready).add_done_callback(note)
@@ -279,21 +266,15 @@ class Servo:
 
     def _check_scales(self, parameters: list[Parameter]) -> SetParametersResult:
         for parameter in parameters:
-            if parameter.name == f'{PREFIX}command_in_type':
-                known = {'unitless', 'speed_units'}
-                if parameter.value not in known:
-                    reason = f'{parameter.name}: one of {sorted(known)}'
-                    return SetParametersResult(successful=False, reason=reason)
+            known = sorted(unit.value for unit in Units)
+            if parameter.name == f'{PREFIX}command_in_type' and parameter.value not in known:
+                reason = f'{parameter.name}: one of {known}'
+                return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)
 
     def _rescale(self, _parameters: list[Parameter]) -> None:
-        self.converter.scales = self._scales()
-
-    def _scales(self) -> Scales:
-        try:
-            return read_scales(self._node)
-        except ModelError:
-            return self.converter.scales
+        with suppress(ModelError):
+            self.converter.scales = read_scales(self._node)
 
     def _publish_status(self) -> None:
         now, snapshot = time.monotonic(), self._gateway.snapshot
@@ -307,7 +288,3 @@ class Servo:
         if reason := self._refusals.to_log(now):
             self._node.get_logger().warning(f'refused: {reason}')
         self._status.publish(ServoStatus(code=code, message=words))
-
-
-def _do_nothing() -> None:
-    """Do not take drives back."""

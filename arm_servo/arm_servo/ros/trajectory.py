@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
+from functools import partial
 import time
 import traceback
 from typing import Any
@@ -132,17 +133,15 @@ class TrajectoryPause:
     def __init__(self, node: Node, gateway: CommandGateway) -> None:
         self._gateway = gateway
         self._paused = False  # as it was ordered: the cycle may not have come to it yet
-        node.create_service(Trigger, '~/pause', self._pause)
-        node.create_service(Trigger, '~/resume', self._resume)
-
-    def _pause(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        return self._order(True, words_of_pause, response)
-
-    def _resume(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        return self._order(False, words_of_resume, response)
+        node.create_service(Trigger, '~/pause', partial(self._order, True, words_of_pause))
+        node.create_service(Trigger, '~/resume', partial(self._order, False, words_of_resume))
 
     def _order(
-        self, paused: bool, words: Callable[[Snapshot], str], response: Trigger.Response
+        self,
+        paused: bool,
+        words: Callable[[Snapshot], str],
+        _: Trigger.Request,
+        response: Trigger.Response,
     ) -> Trigger.Response:
         snapshot = self._gateway.snapshot
         response.message = snapshot.stale(time.monotonic() - snapshot.time)
@@ -244,9 +243,6 @@ class TrajectoryController:
         command.future.add_done_callback(self._remember)
         return command
 
-    def _get_ready(self) -> None:
-        self._gateway.get_ready_for(Source.TRAJECTORY, TOPIC, self._prepare)
-
     def _stop(self, reason: str) -> None:
         self._gateway.command(StopRequest(reason, (Source.TRAJECTORY,)))
 
@@ -272,7 +268,10 @@ class TrajectoryController:
         try:
             self._gateway.stream(Source.TRAJECTORY, TOPIC)
             goal = goal_of_trajectory(message, self._now, self._parameters)
-            command = self._request(goal, self._get_ready, stream=TOPIC)
+            get_ready = partial(
+                self._gateway.get_ready_for, Source.TRAJECTORY, TOPIC, self._prepare
+            )
+            command = self._request(goal, get_ready, stream=TOPIC)
         except ArmError as error:
             self._news.append(f'trajectory refused: {error}')
             return

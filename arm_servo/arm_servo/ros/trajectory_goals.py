@@ -162,7 +162,15 @@ def goal_of_trajectory(
         raise GoalError(GoalCode.INVALID_GOAL, 'points have efforts; only positions are followed')
     return TrajectoryGoal(
         list(message.joint_names),
-        [_point(point) for point in message.points],
+        [
+            GoalPoint(
+                seconds(point.time_from_start),
+                list(point.positions),
+                list(point.velocities),
+                list(point.accelerations),
+            )
+            for point in message.points
+        ],
         age=now - stamp if stamp else 0.0,
         path_tolerance=parameters.path,
         goal_tolerance=parameters.goal,
@@ -212,15 +220,6 @@ def difference(limits: JointLimits, wanted: RobotState, actual: RobotState) -> R
         limits.error(wanted.position, actual.position),
         wanted.velocity - actual.velocity,
         0.0 * wanted.acceleration,
-    )
-
-
-def _point(point: Any) -> GoalPoint:  # noqa: ANN401
-    return GoalPoint(
-        seconds(point.time_from_start),
-        list(point.positions),
-        list(point.velocities),
-        list(point.accelerations),
     )
 
 
