@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import Enum
 import math
 
-from quad_description import MAX_TILT, Pose, pose_positions, STREAM_TIMEOUT
+from quad_description import MAX_TILT, Pose, pose_positions
 
 from .exceptions import CommandError
 from .joints import Command, CommandLimiter, JointMap, LimiterSettings, MAX_PERIOD
@@ -28,29 +28,63 @@ class LossReaction(Enum):
     HOLD = 'hold'  # stays as it is
 
 
-class CommandLoss:
-    """Watches a stream of commands, and brings the robot down when they leave a leg in the air.
+@dataclass(slots=True)
+class CommandCounters:
+    """What became of joint commands."""
 
-    A controller that dies in the middle of a trot leaves two legs in the air, and the servos hold
-    them there; so does one that held there for a fault, and then ended. A robot on all its feet
-    stays as it is, whether it moved or was put into a posture.
+    received: int = 0  # all of them
+    refused: int = 0  # of wrong length, not finite, or far from legs that something else has moved
+    clamped: int = 0  # went beyond limits and were taken to them
+    slowed: int = 0  # asked for more speed than allowed, and were approached
+    reason: str = ''  # why the last one was refused, or which joints were clamped
+    troubled: bool = False  # something was refused or clamped since the last look
+    largest_step: float = 0.0  # of a target since the last look [rad]
+    loss: str = ''  # what became of the robot when commands broke off; empty while they come
+
+
+class JointCommander:
+    """Lets joint commands through to the servos, and brings the robot down when they break off.
+
+    Times are on the monotonic clock [s]. A controller that dies in the middle of a trot leaves two
+    legs in the air, and the servos hold them there; so does one that held there for a fault, and
+    then ended. A robot on all its feet stays as it is, whether it moved or was put into a posture.
     """
 
     def __init__(
         self,
         joints: JointMap,
+        limiter: LimiterSettings,
+        reaction: LossReaction,
+        *,
         raised: Callable[[Sequence[float]], Sequence[str]],
-        reaction: LossReaction = LossReaction.LIE,
-        timeout: float = STREAM_TIMEOUT,
+        send: Callable[[Mapping[int, float]], bool],
+        waits: Callable[[], bool],
+        obstacle: Callable[[], str],
+        warn: Callable[[str], None],
     ) -> None:
-        """Begin without a stream; ``raised`` names feet in the air at targets of legs [rad]."""
-        self.timeout = timeout  # a pause after which a stream has ended [s]
+        """Begin without a stream.
+
+        Args:
+            reaction: What the robot does when commands break off while its legs move.
+            raised: Names the feet that are in the air at targets of the legs [rad].
+            send: Has servo angles sent, by motor id [deg]; returns whether they are.
+            waits: Says whether the last angles have not left yet; newer ones replace them.
+            obstacle: Says why nothing is sent.
+            warn: Takes what is the matter with a command.
+        """
+        self.timeout = limiter.stream_timeout  # a pause after which a stream has ended [s]
+        self.counters = CommandCounters()  # what became of them
         self._joints, self._legs = joints, joints.names[: joints.leg_count]
-        servos = joints.servos[: joints.leg_count]
         pose = pose_positions(Pose.LIE)
-        self._lying = {s.joint: min(max(pose[s.joint], s.lower), s.upper) for s in servos
-                       if s.joint in pose}  # fmt: skip
+        self._lying = {s.joint: min(max(pose[s.joint], s.lower), s.upper)
+                       for s in joints.servos[: joints.leg_count] if s.joint in pose}  # fmt: skip
         self._raised, self._reaction = raised, reaction
+        self._limiter = CommandLimiter(joints, limiter)
+        self._limits_descent = False  # the last command was one of the way down
+        self._send_angles, self._waits = send, waits
+        self._obstacle, self._warn = obstacle, warn
+        self._last_targets: tuple[float, ...] = ()
+        self._moved_by = ''  # what took the legs from where the commands of before left them
         self._began_at = self._last_at = -math.inf
         self._unseen_at = math.inf  # when they were missed and no report said where the legs are
         self._last: Sequence[float] = ()
@@ -134,55 +168,6 @@ class CommandLoss:
         if tilt is not None and tilt > MAX_TILT:
             return f'the body is tilted by {math.degrees(tilt):.0f} degrees'
         return ''
-
-
-@dataclass(slots=True)
-class CommandCounters:
-    """What became of joint commands."""
-
-    received: int = 0  # all of them
-    refused: int = 0  # of wrong length, not finite, or far from legs that something else has moved
-    clamped: int = 0  # went beyond limits and were taken to them
-    slowed: int = 0  # asked for more speed than allowed, and were approached
-    reason: str = ''  # why the last one was refused, or which joints were clamped
-    troubled: bool = False  # something was refused or clamped since the last look
-    largest_step: float = 0.0  # of a target since the last look [rad]
-    loss: str = ''  # what became of the robot when commands broke off; empty while they come
-
-
-class JointCommander(CommandLoss):
-    """Lets joint commands through to the servos; times are on the monotonic clock [s]."""
-
-    def __init__(
-        self,
-        joints: JointMap,
-        limiter: LimiterSettings,
-        reaction: LossReaction,
-        *,
-        raised: Callable[[Sequence[float]], Sequence[str]],
-        send: Callable[[Mapping[int, float]], bool],
-        waits: Callable[[], bool],
-        obstacle: Callable[[], str],
-        warn: Callable[[str], None],
-    ) -> None:
-        """Begin without a stream.
-
-        Args:
-            reaction: What the robot does when commands break off while its legs move.
-            raised: Names the feet that are in the air at targets of the legs [rad].
-            send: Has servo angles sent, by motor id [deg]; returns whether they are.
-            waits: Says whether the last angles have not left yet; newer ones replace them.
-            obstacle: Says why nothing is sent.
-            warn: Takes what is the matter with a command.
-        """
-        super().__init__(joints, raised, reaction, limiter.stream_timeout)
-        self.counters = CommandCounters()  # what became of them
-        self._limiter = CommandLimiter(joints, limiter)
-        self._limits_descent = False  # the last command was one of the way down
-        self._send_angles, self._waits = send, waits
-        self._obstacle, self._warn = obstacle, warn
-        self._last_targets: tuple[float, ...] = ()
-        self._moved_by = ''  # what took the legs from where the commands of before left them
 
     def limit_to(self, joints: JointMap) -> None:
         """Limit targets to the limits of these joints from now on; any thread may call it."""
@@ -300,30 +285,15 @@ class JointCommander(CommandLoss):
         return command
 
     def _check_start(self, positions: Sequence[float], place: Mapping[str, float]) -> None:
-        """Refuse targets that do not begin where the legs are."""
-        distance, joint = self._farthest(positions, place)
-        if distance > START_BAND:
+        """Refuse targets that do not begin where the legs are, and where one is not measured."""
+        pairs = zip(self._legs, positions, strict=False)
+        far = {name: abs(target - place.get(name, math.inf)) for name, target in pairs}
+        joint = max(far, key=far.__getitem__)
+        if far[joint] > START_BAND:
             raise CommandError(
-                f'{self._moved_by}, and {joint} is {distance:.2f} rad from its target; set the '
+                f'{self._moved_by}, and {joint} is {far[joint]:.2f} rad from its target; set the '
                 f'mode relax, then stand (commands begin up to {START_BAND:g} rad off the legs)'
             )
-
-    def _farthest(
-        self, positions: Sequence[float], place: Mapping[str, float]
-    ) -> tuple[float, str]:
-        """Return how far the targets of the legs are from where these are [rad], and where most.
-
-        A target that is no number, and a leg that is not measured, are infinitely far.
-        """
-        legs = self._joints.names[: self._joints.leg_count]
-        distances = (
-            (abs(target - place.get(name, math.nan)), name)
-            for target, name in zip(positions, legs, strict=False)
-        )
-        return max(
-            ((math.inf if math.isnan(far) else far, name) for far, name in distances),
-            default=(math.inf, ''),
-        )
 
     def _drop(self, *, forget: bool = True) -> None:
         self.lose()

@@ -214,11 +214,6 @@ class CommandLimiter:
         self._last_at = -math.inf
         self._end = self._seen_end = object()  # replaced by reset(), whichever thread it is in
 
-    @property
-    def largest_step(self) -> float:
-        """Farthest that a target of a leg joint moves with one command [rad]."""
-        return self._settings.speed * MAX_PERIOD
-
     def reset(self) -> None:
         """End the stream: the next command begins anew, and joints may have been moved.
 

@@ -15,7 +15,14 @@ import pytest
 
 from quad_description import movable_joints, robot_urdf
 from quad_hardware import CommandError
-from quad_hardware.joints import CommandLimiter, JointMap, JointServo, LimiterSettings, servo_of
+from quad_hardware.joints import (
+    CommandLimiter,
+    JointMap,
+    JointServo,
+    LimiterSettings,
+    MAX_PERIOD,
+    servo_of,
+)
 from quad_hardware.link.dialects import V1Dialect, V2Dialect
 from quad_hardware.protocol import LEG_MOTORS, Model
 
@@ -41,7 +48,7 @@ def test_no_target_jumps_or_goes_farther_beyond_its_limits(
         command = limiter.step(wanted, last, now)
         targets = list(command.targets)
         steps = [abs(b - a) for a, b in zip(last, targets, strict=True)]
-        assert max(steps) <= limiter.largest_step + 1e-9
+        assert max(steps) <= LimiterSettings().speed * MAX_PERIOD + 1e-9
         for servo, before, target in zip(JOINTS.servos, last, targets, strict=True):
             assert min(servo.lower, before) <= target <= max(servo.upper, before)
             inside = servo.lower <= target <= servo.upper

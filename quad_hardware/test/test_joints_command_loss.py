@@ -22,7 +22,6 @@ from quad_description import (
     robot_urdf,
 )
 from quad_hardware.commander import (
-    CommandLoss,
     JointCommander,
     LossReaction,
     REPORT_TIMEOUT,
@@ -46,9 +45,9 @@ def raised(targets: Sequence[float]) -> Sequence[str]:
 
 def command_loss(
     reaction: LossReaction = LossReaction.LIE, joints: JointMap = JOINTS
-) -> CommandLoss:
+) -> JointCommander:
     """What is watched."""
-    return CommandLoss(joints, raised, reaction)
+    return Line(reaction, joints).commander
 
 
 def trot(tick: int, lift: float) -> list[float]:
@@ -59,7 +58,7 @@ def trot(tick: int, lift: float) -> list[float]:
     ]
 
 
-def stream(loss: CommandLoss, duration: float, lift: float, start: float = 0.0) -> float:
+def stream(loss: JointCommander, duration: float, lift: float, start: float = 0.0) -> float:
     """Command a trot on the spot for a time; return its end [s]."""
     count = round(duration / PERIOD)
     for tick in range(count):
@@ -67,7 +66,7 @@ def stream(loss: CommandLoss, duration: float, lift: float, start: float = 0.0) 
     return start + count * PERIOD
 
 
-def descend(loss: CommandLoss, now: float) -> list[list[float]]:
+def descend(loss: JointCommander, now: float) -> list[list[float]]:
     """Step until the robot is down, ten seconds at most."""
     found = []
     for tick in range(500):
@@ -197,12 +196,14 @@ def test_whoever_commands_ends_the_way_down(after: float) -> None:
 class Line:
     """What a commander sends its angles to; it may be cut."""
 
-    def __init__(self) -> None:
+    def __init__(
+        self, reaction: LossReaction = LossReaction.LIE, joints: JointMap = JOINTS
+    ) -> None:
         self.sent: list[Mapping[int, float]] = []
         self.warned: list[str] = []
         self.obstacle = ''
         self.commander = JointCommander(
-            JOINTS, LimiterSettings(), LossReaction.LIE,
+            joints, LimiterSettings(), reaction,
             raised=raised, send=self._send, waits=lambda: False,
             obstacle=lambda: self.obstacle, warn=self.warned.append,
         )  # fmt: skip
