@@ -52,11 +52,7 @@ class ReplayedRobot(ObservedRobot):
 
     def status(self) -> LinkStatus:
         """Return how the link was."""
-        age = self._now - self._reported_at
-        if self._dialect is None:
-            return replace(self._status, age=age)
-        counters = self._received.counters, self._dialect.counters
-        return replace(self._status, age=age, parser=counters[0], dialect=counters[1])
+        return replace(self._status, age=self._now - self._reported_at)
 
     def take(self, entry: Entry, now: float) -> None:
         """Process the next entry of the log.
@@ -102,6 +98,7 @@ class ReplayedRobot(ObservedRobot):
         status = self._status
         status.protocol, status.baud = opened.protocol, opened.baud
         status.firmware = opened.firmware
+        status.parser, status.dialect = self._received.counters, self._dialect.counters
         status.connections += 1
         self._reported_at = self._now
 

@@ -382,7 +382,10 @@ class Estimator:
         problem = self._plausibility.imu_problem
         imu = None if problem else self._imu_sample(report, time)
         # the heading is unknown without an attitude
-        odometry = None if imu is None else self._locate(joints, imu)
+        odometry = None
+        if imu is not None:
+            feet = self._robot.foot_poses(joints.positions)
+            odometry = self._odometry.update(joints.time, feet, imu.orientation)
         charge = self._charge.take(report.battery, FULL)
         return RobotState(
             joints,
@@ -407,10 +410,6 @@ class Estimator:
         None while the body accelerates or the IMU is of no use, and without an accelerometer.
         """
         return None if self._plausibility.imu_problem else self._gravity.error
-
-    def _locate(self, joints: JointSample, imu: ImuSample) -> OdometryState:
-        feet = self._robot.foot_poses(joints.positions)
-        return self._odometry.update(joints.time, feet, imu.orientation)
 
     def _joint_sample(self, report: Report, time: float) -> JointSample:
         positions = self._joints.positions(report.positions)

@@ -19,19 +19,19 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from heapq import merge
 from itertools import islice
 import json
 import logging
 import math
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 from pathlib import Path
 from queue import SimpleQueue
 import re
 import threading
 import time
-from typing import TypeAlias, TypeVar
+from typing import TypeAlias
 
 from black_box import Pause
 from quad_description import MAX_TILT, RobotState
@@ -85,7 +85,6 @@ class StateEntered:
 
 Event: TypeAlias = Opened | StateEntered
 Entry: TypeAlias = Transfer | Opened | StateEntered
-Kind = TypeVar('Kind', Opened, StateEntered)
 
 
 def format_transfer(time: float, data: bytes, *, sent: bool) -> str:
@@ -95,19 +94,11 @@ def format_transfer(time: float, data: bytes, *, sent: bool) -> str:
 
 def format_event(event: Event, time: float) -> str:
     """Return the line of what is no transfer, with its end; the time is of the wall clock [s]."""
-    if isinstance(event, StateEntered):
-        kind = 'state'
-        content: dict[str, object] = {'state': event.state.value, 'detail': event.detail}
-    else:
-        kind = 'open'
-        content = {
-            'port': event.port,
-            'baud': event.baud,
-            'protocol': event.protocol,
-            'firmware': event.firmware,
-            'model': None if event.model is None else event.model.value,
-        }
-    return f'({time:.6f}) {kind} {json.dumps(content, ensure_ascii=False)}\n'
+    kind = 'state' if isinstance(event, StateEntered) else 'open'
+    content = asdict(event)
+    del content['time']
+    text = json.dumps(content, ensure_ascii=False, default=attrgetter('value'))
+    return f'({time:.6f}) {kind} {text}\n'
 
 
 def read_serial_log(path: Path) -> Iterator[Entry]:
@@ -246,8 +237,11 @@ class SerialMemory:
     def about(self) -> str:
         """The port, and how much of it is kept."""
         robot = 'no robot was found'
-        if (opened := _last(tuple(self._events), Opened)) is not None:
-            robot = f'robot: {opened.firmware}, protocol {opened.protocol} at {opened.baud} baud'
+        for opened in tuple(self._events):
+            if isinstance(opened, Opened):
+                robot = (
+                    f'robot: {opened.firmware}, protocol {opened.protocol} at {opened.baud} baud'
+                )
         return (
             f'black box of the serial port {self._port}: the last {self._window:g} s, in {LOG}\n'
             f'{robot}'
@@ -291,15 +285,10 @@ class SerialMemory:
 
 def _since(events: tuple[Event, ...], begin: float) -> list[tuple[float, Event]]:
     """Return events with their times, those that still held at the beginning as if of then."""
-    before = tuple(event for event in events if event.time < begin)
-    last = _last(before, Opened), _last(before, StateEntered)
-    held: list[Event] = [event for event in last if event is not None]
+    last = {type(event): event for event in events if event.time < begin}
+    held = sorted(last.values(), key=attrgetter('time'))
     later = [(event.time, event) for event in events if event.time >= begin]
-    return [(begin, event) for event in sorted(held, key=lambda event: event.time)] + later
-
-
-def _last(events: tuple[Event, ...], kind: type[Kind]) -> Kind | None:
-    return next((event for event in reversed(events) if isinstance(event, kind)), None)
+    return [(begin, event) for event in held] + later
 
 
 UPRIGHT = 0.8 * MAX_TILT  # [rad] below which a body that fell stands again

@@ -14,12 +14,8 @@ from quad_hardware.protocol import (
     V2,
 )
 
-NEW, OLD = V2, V1
-
 __all__ = [
     'HOST_KINDS',
-    'NEW',
-    'OLD',
     'ROBOT_KINDS',
     'V1',
     'V2',

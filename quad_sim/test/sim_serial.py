@@ -13,6 +13,7 @@ import time
 
 import serial
 
+from quad_hardware.calibration.wizard import LimpRobot
 from quad_hardware.link.dialects import V1Dialect, V2Dialect
 from quad_hardware.protocol import Frame, LEG_MOTORS, Protocol, ROBOT_KINDS, StreamParser, V1, V2
 from quad_hardware.report import Report
@@ -129,13 +130,13 @@ class VirtualRobot:
         return self.run(0.02)
 
 
-class Line:
+class Line(LimpRobot):
     """A robot on its serial line, bytes and all, in virtual time."""
 
     def __init__(self, *arguments: str, protocol: Protocol) -> None:
         self.robot = VirtualRobot(*arguments, protocol=protocol)
         self.dialect = (V1Dialect if protocol is V1 else V2Dialect)(0.0)
-        self._reports: list[Report] = []
+        self._arrived: list[Report] = []
         self._first: dict[int, float] = {}
         self.swung: set[int] = set()  # motors that were sent anywhere
 
@@ -157,7 +158,7 @@ class Line:
                 sent = now + self.dialect.protocol.wire_time(len(data))
         for frame in self.robot.run(TICK):
             if report := self.dialect.handle_frame(frame, self.robot.now):
-                self._reports.append(report)
+                self._arrived.append(report)
         return sent
 
     def command(self, angles: Mapping[int, float]) -> float:
@@ -175,13 +176,13 @@ class Line:
 
     def reports(self) -> list[Report]:
         """Return the reports since."""
-        reports, self._reports = self._reports, []
+        reports, self._arrived = self._arrived, []
         return reports
 
     def angles(self) -> dict[int, float]:
         """Return the angles of now [deg]."""
         self.wait_until(self.robot.now + 0.1)
-        found = self._reports[-1].positions
+        found = self._arrived[-1].positions
         return {motor: found[motor] for motor in LEG_MOTORS}
 
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from contextlib import nullcontext
 from dataclasses import replace
 import os
@@ -14,7 +15,7 @@ from processes import executable, RunningProcess
 import pytest
 from sim_serial import Line
 
-from operator_input import KeyAction, KeyEvent
+from operator_input import KeyAction, Keyboard, KeyEvent
 from quad_description import movable_joints, robot_urdf
 from quad_hardware import CommandError
 from quad_hardware.calibration.first_motion import check_joint, PERIOD
@@ -113,7 +114,7 @@ def test_a_whole_calibration_over_a_port_ends_with_the_servos(tmp_path: Path) ->
 SERVO_OF = {each.name: servo_of(each) for each in movable_joints(robot_urdf())}
 
 
-class Fingers:
+class Fingers(Keyboard):
     """Someone who presses the space bar, and lets go of it after a while."""
 
     def __init__(self, line: Line, *, hold: float = 60.0) -> None:
@@ -121,7 +122,7 @@ class Fingers:
         self._events = [(10 * PERIOD, KeyAction.PRESSED), (hold, KeyAction.RELEASED)]
         self._begin = line.now()
 
-    def wait(self, timeout: float) -> list[KeyEvent]:
+    def wait(self, timeout: float, others: Iterable[int] = ()) -> list[KeyEvent]:
         """Let time pass, and return what the fingers do; long after the release, enter."""
         self._line.wait_until(self._line.now() + timeout)
         now = self._line.now()
@@ -179,7 +180,7 @@ def test_leaving_writes_nothing() -> None:
     """Escape ends the motion."""
 
     class Leaving(Fingers):
-        def wait(self, timeout: float) -> list[KeyEvent]:
+        def wait(self, timeout: float, others: Iterable[int] = ()) -> list[KeyEvent]:
             return [*super().wait(timeout), KeyEvent('escape', KeyAction.PRESSED, 0.0)]
 
     line = Line('--held', '--start', 'stand', protocol=V2)
@@ -191,7 +192,7 @@ def test_a_key_that_is_not_held_writes_nothing_and_blames_no_joint() -> None:
     """Enter comes before the joint has moved."""
 
     class Entering(Fingers):
-        def wait(self, timeout: float) -> list[KeyEvent]:
+        def wait(self, timeout: float, others: Iterable[int] = ()) -> list[KeyEvent]:
             super().wait(timeout)
             return [KeyEvent('enter', KeyAction.PRESSED, 0.0)]
 

@@ -4,10 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 import math
-from typing import Protocol
 
 from first_motion import (
     DriveFacts,
@@ -21,12 +20,11 @@ from first_motion import (
     Seen,
     Verdict,
 )
-from operator_input import HeldKeys, KeyEvent
+from operator_input import HeldKeys, Keyboard
 
 from ..exceptions import CommandError, NoAnswerError
 from ..joints import JointServo
-from ..report import Report
-from .wizard import CancelledError, confirm, Console, place_of, prompt_number
+from .wizard import CancelledError, confirm, Console, LimpRobot, place_of, prompt_number
 
 DISTANCE = math.radians(10.0)  # [rad]
 SPEED = math.radians(5.0)  # [rad/s]
@@ -47,25 +45,10 @@ REMEDIES = {
 """What to do, where ``calibrate joints`` does not find it."""
 
 
-class MovedRobot(Protocol):
-    """A robot that is commanded and reports; :class:`.wizard.LimpRobot` is one."""
-
-    def angles(self) -> dict[int, float]: ...  # noqa: D102
-    def command(self, angles: Mapping[int, float]) -> float: ...  # noqa: D102
-    def reports(self) -> Sequence[Report]: ...  # noqa: D102
-    def now(self) -> float: ...  # noqa: D102
-
-
-class Keys(Protocol):
-    """Keys of a person; :class:`operator_input.Keyboard` has them."""
-
-    def wait(self, timeout: float) -> list[KeyEvent]: ...  # noqa: D102
-
-
 def check_joint(
     console: Console,
-    robot: MovedRobot,
-    keyboard: Callable[[], AbstractContextManager[Keys]],
+    robot: LimpRobot,
+    keyboard: Callable[[], AbstractContextManager[Keyboard]],
     servo: JointServo,
 ) -> None:
     """Move a joint while the space bar of an opened keyboard is held, and ask what was seen.
@@ -129,8 +112,8 @@ def _remedy(servo: JointServo) -> str:
 
 
 def _move(
-    robot: MovedRobot,
-    keys: Keys,
+    robot: LimpRobot,
+    keys: Keyboard,
     servo: JointServo,
     guard: MotionGuard,
     angles: Mapping[int, float],

@@ -24,7 +24,7 @@ from ..link.open import is_pseudo_terminal
 from ..protocol import LEG_MOTORS
 from ..serial_robot import JOINTS_CHECKED, UNCHECKED_JOINTS
 from .imu import calibrate_imu
-from .wizard import calibrate_joints, CancelledError, Console, limp_robot, zero_all
+from .wizard import calibrate_joints, CancelledError, Console, limp_robot, with_zero
 
 NODE, PARAMETERS = 'hardware_node', 'ros__parameters'
 
@@ -125,7 +125,8 @@ def _joints(options: argparse.Namespace, console: Console) -> None:
         with robot.limp():
             if options.zero_only:
                 console.prompt('Put all joints to zero, and hold them there. Enter')
-                found = zero_all(chosen, robot.angles())
+                now = robot.angles()
+                found = [with_zero(s, now[s.motor]) if s.motor in now else s for s in chosen]
             else:
                 found = calibrate_joints(console, robot, chosen, limits=options.limits)
         console.write('the servos hold again, where they are')

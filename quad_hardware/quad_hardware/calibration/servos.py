@@ -21,7 +21,6 @@ import itertools
 import math
 import random
 from statistics import median
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +32,8 @@ from ..exceptions import CommandError
 from ..joints import JointServo
 from ..link import STALE_TIME
 from ..protocol import LEG_MOTORS
-from ..report import Report, SampleClock
-from .wizard import Console
+from ..report import SampleClock
+from .wizard import Console, LimpRobot
 
 GRAVITY = 9.81  # [m/s²]
 ENCODER_STEP = 0.0015  # [rad] of 12 bits: the dead band that the rest of the free play is beside
@@ -295,20 +294,9 @@ MAX_OFFSET = 0.15  # [rad] between a servo that follows and its target at rest
 SETTLING = 1.0  # [s]
 
 
-class SwungRobot(Protocol):
-    """A robot that is commanded and reports; :class:`.wizard.LimpRobot` is one."""
-
-    def angles(self) -> dict[int, float]: ...  # noqa: D102
-    def command(self, angles: Mapping[int, float]) -> float: ...  # noqa: D102
-    def rounded(self, motor: int, angle: float) -> float: ...  # noqa: D102
-    def reports(self) -> Sequence[Report]: ...  # noqa: D102
-    def now(self) -> float: ...  # noqa: D102
-    def wait_until(self, moment: float) -> None: ...  # noqa: D102
-
-
 def calibrate_servos(
     console: Console,
-    robot: SwungRobot,
+    robot: LimpRobot,
     servos: Sequence[JointServo],
     urdf: str,
     leg: str,
@@ -378,7 +366,7 @@ def calibrate_servos(
     return found
 
 
-def _angle(robot: SwungRobot, servo: JointServo) -> float:
+def _angle(robot: LimpRobot, servo: JointServo) -> float:
     angle = robot.angles().get(servo.motor)
     if angle is None:
         raise CommandError(f'motor {servo.motor} reports no angle any more')
@@ -390,22 +378,18 @@ def _motion(centre: float, repeat: int) -> Iterator[tuple[float, float]]:
     uneven = random.Random(1)  # noqa: S311  no secret
     yield 0.0, centre
     for _ in range(repeat):
-        yield from _steps_and_sweep(centre, uneven)
-
-
-def _steps_and_sweep(centre: float, uneven: random.Random) -> Iterator[tuple[float, float]]:
-    for index in range(STEPS):
-        size = AMPLITUDE * uneven.uniform(0.3, 1.0)
-        yield uneven.uniform(*STEP_TIMES), centre + (size if index % 2 else -size)
-    yield SETTLING, centre
-    for index in range(round(SWEEP_TIME / PERIOD)):
-        time = index * PERIOD
-        cycles = SWEEP[0] * time + (SWEEP[1] - SWEEP[0]) * time * time / (2 * SWEEP_TIME)
-        yield PERIOD, centre + 0.5 * AMPLITUDE * math.sin(2 * math.pi * cycles)
+        for index in range(STEPS):
+            size = AMPLITUDE * uneven.uniform(0.3, 1.0)
+            yield uneven.uniform(*STEP_TIMES), centre + (size if index % 2 else -size)
+        yield SETTLING, centre
+        for index in range(round(SWEEP_TIME / PERIOD)):
+            time = index * PERIOD
+            cycles = SWEEP[0] * time + (SWEEP[1] - SWEEP[0]) * time * time / (2 * SWEEP_TIME)
+            yield PERIOD, centre + 0.5 * AMPLITUDE * math.sin(2 * math.pi * cycles)
 
 
 def _record(
-    robot: SwungRobot,
+    robot: LimpRobot,
     servo: JointServo,
     held: Mapping[int, float],
     motion: Sequence[tuple[float, float]],
@@ -430,7 +414,7 @@ def _record(
 
 
 def _go(
-    robot: SwungRobot, servo: JointServo, held: Mapping[int, float], start: float, end: float
+    robot: LimpRobot, servo: JointServo, held: Mapping[int, float], start: float, end: float
 ) -> None:
     count = max(math.ceil(abs(end - start) / (APPROACH_SPEED * PERIOD)), 1)
     due = robot.now()

@@ -77,7 +77,7 @@ class LimpRobot:
         x, y, z = map(fmean, zip(*forces, strict=True))
         return ImuReading(attitude, (x, y, z), way)
 
-    def reports(self) -> tuple[Report, ...]:
+    def reports(self) -> Sequence[Report]:
         """Return the reports since the reading before, MAX_REPORTS at most."""
         with self._changed:
             reports = tuple(self._reports)
@@ -323,17 +323,12 @@ def _calibrate(
         except CommandError as error:
             console.write(f'  {error}')
             continue
-        console.write(f'  {describe(found)}')
+        console.write(
+            f'  motor {found.motor}, sign {found.sign:+d}, offset {found.offset:+.3f} rad, '
+            f'{found.lower:+.2f} to {found.upper:+.2f} rad'
+        )
         if confirm(console, '  keep it?', default=True):
             return found
-
-
-def describe(servo: JointServo) -> str:
-    """Return what is known of a servo in words."""
-    return (
-        f'motor {servo.motor}, sign {servo.sign:+d}, offset {servo.offset:+.3f} rad, '
-        f'{servo.lower:+.2f} to {servo.upper:+.2f} rad'
-    )
 
 
 def _found(
@@ -362,11 +357,3 @@ def place_of(joint: str) -> tuple[str, str]:
     if joint.startswith('arm') and 'yaw' not in joint:
         return _ARM_PLACE
     return next((place for word, place in _PLACES.items() if word in joint), _ARM_PLACE)
-
-
-def zero_all(servos: Iterable[JointServo], angles: dict[int, float]) -> list[JointServo]:
-    """Return all servos with their zero where they are now, signs as they were.
-
-    For a robot that was put into its zero pose as a whole, in a jig.
-    """
-    return [with_zero(s, angles[s.motor]) if s.motor in angles else s for s in servos]

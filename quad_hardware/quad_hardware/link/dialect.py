@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 import math
 from typing import Any
@@ -89,13 +89,8 @@ class Dialect(ABC):
         self.can_release = True  # the torque of its servos can be switched off
         # what each motor can be sent [deg], where that is less than servos turn
         self.spans: Mapping[int, Span] = {}
-        self._counters = DialectCounters()
+        self.counters = DialectCounters()
         self._torque = b''  # bytes of a change that is still to be sent
-
-    @property
-    def counters(self) -> DialectCounters:
-        """A copy of the counters."""
-        return replace(self._counters)
 
     @property
     @abstractmethod

@@ -188,7 +188,7 @@ class V1Dialect(Dialect):
             or frame.address != waiting.register
             or len(frame.payload) != waiting.size
         ):
-            self._counters.unusable += 1
+            self.counters.unusable += 1
             return None
         self._waiting = None
         took = now - self._requested_at - waiting.wire_time
@@ -217,7 +217,7 @@ class V1Dialect(Dialect):
         size = request.payload[:1]
         for known in (_READ_MOTORS, _READ_IMU, _READ_BATTERY):
             if known.register == request.address and size == bytes((known.size,)):
-                self._counters.unanswered += self._waiting is not None
+                self.counters.unanswered += self._waiting is not None
                 self._waiting, self._requested_at = known, now
                 if known is _READ_MOTORS:
                     self._angles = None
@@ -233,7 +233,7 @@ class V1Dialect(Dialect):
 
     def _give_up(self) -> None:
         """Go on without an answer: the rest of this period is of no use."""
-        self._counters.unanswered += 1
+        self.counters.unanswered += 1
         self._latency_limit = min(1.5 * self._latency_limit, MAX_LATENCY)
         self._waiting = None
         self._queue.clear()
@@ -297,7 +297,7 @@ class V1Dialect(Dialect):
     def _report(self, imu: bytes, now: float) -> Report:
         angles, self._angles = self._angles or b'', None
         values = _IMU.unpack(imu)
-        self._counters.states += 1
+        self.counters.states += 1
         pairs = zip(BULK_READ_ORDER, angles, strict=True)
         wire_time = _on_the_line(imu)
         return Report(
@@ -370,13 +370,13 @@ class V2Dialect(Dialect):
     def handle_frame(self, frame: Frame, now: float) -> Report | None:
         """Process a frame of the robot; every state frame is a report."""
         if frame.kind is Kind.NACK:
-            self._counters.refused += 1
+            self.counters.refused += 1
         if frame.kind is not Kind.PUSH or frame.address != STATE.address:
             return None
         try:
             values = STATE.unpack(frame.payload)
         except CodecError:
-            self._counters.unusable += 1
+            self.counters.unusable += 1
             return None
         self._count(int(values['sequence'][0]))
         self._request_at = now + REQUEST_PERIOD
@@ -393,11 +393,11 @@ class V2Dialect(Dialect):
         return {int(m): a for m, a in zip(values['motor'], values['angle'], strict=True)}
 
     def _count(self, sequence: int) -> None:
-        self._counters.states += 1
+        self.counters.states += 1
         if self._sequence is not None:
             missing = (sequence - self._sequence - 1) % _SEQUENCE
             # a robot that restarted counts anew, which is no loss
-            self._counters.lost += missing if missing < _SEQUENCE // 2 else 0
+            self.counters.lost += missing if missing < _SEQUENCE // 2 else 0
         self._sequence = sequence
 
 

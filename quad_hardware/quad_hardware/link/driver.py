@@ -132,11 +132,7 @@ class Driver:
 
     def status(self) -> LinkStatus:
         """Return how the link is now."""
-        session, age = self._session, time.monotonic() - self._reported_at
-        if session is None:
-            return replace(self._status, age=age)
-        counters = session.parser.counters, session.dialect.counters
-        return replace(self._status, age=age, parser=counters[0], dialect=counters[1])
+        return replace(self._status, age=time.monotonic() - self._reported_at)
 
     def _wake(self) -> None:
         with suppress(BlockingIOError):  # a full pipe wakes as well
@@ -204,6 +200,7 @@ class Driver:
         self._session = session
         status.protocol, status.baud = dialect.protocol.name, port.baud
         status.firmware, status.latency = session.firmware, latency_timer(port.path)
+        status.parser, status.dialect = session.parser.counters, dialect.counters
         status.connections += 1
         found = (
             f'{session.firmware} on {port.path} speaks protocol '

@@ -204,25 +204,14 @@ def read_value(
     request = Frame(Kind.READ, value.register, bytes((value.size,)))
     if protocol is V2:
         request = Frame(Kind.READ, value.code)
-    answers = (send_request(port, protocol, request, value.size, timeout) for _ in range(attempts))
+    answers = (_ask(port, protocol, request, value.size, timeout) for _ in range(attempts))
     return next((answer for answer in answers if answer is not None), None)
 
 
-def send_request(
+def _ask(
     port: SerialPort, protocol: Protocol, request: Frame, size: int, timeout: float
 ) -> bytes | None:
-    """Send a request and wait for its answer.
-
-    Args:
-        size: Length of the answer [B]; others are passed over.
-        timeout: How long to wait [s].
-
-    Returns:
-        Payload of the answer, None when there is none in time.
-
-    Raises:
-        LinkError: The port was lost.
-    """
+    """Return the payload that answers a request within a time [s]; of another size [B] is none."""
     parser = StreamParser(protocol, ROBOT_KINDS)
     port.write(request.encode(protocol))
     deadline = time.monotonic() + timeout

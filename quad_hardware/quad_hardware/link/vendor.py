@@ -12,7 +12,6 @@ not found, are the serial port inside XgoDog and the name of the acceleration.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 import importlib
 import inspect
 from typing import Any
@@ -138,22 +137,17 @@ class VendorParser:
     def __init__(self) -> None:
         feedback = importlib.import_module('xgo_lib2.feedback')
         self._parser = feedback.SendStateParser()
-        self._counters = ParserCounters()
+        self.counters = ParserCounters()  # of bytes and states; the others are the vendor's affair
         self.pending = 0
-
-    @property
-    def counters(self) -> ParserCounters:
-        """A copy of the counters: bytes and states; the others are the vendor's affair."""
-        return replace(self._counters)
 
     def feed(self, data: bytes) -> list[object]:
         """Parse bytes; return the states that they complete."""
-        self._counters.bytes += len(data)
+        self.counters.bytes += len(data)
         try:
             states = list(self._parser.feed_bytes(data))
         except Exception as error:  # whatever the vendor's library raises
             raise LinkError(f'xgo_lib2 cannot read what came: {error}') from error
-        self._counters.frames += len(states)
+        self.counters.frames += len(states)
         return states
 
     def expire(self) -> list[object]:
@@ -222,7 +216,7 @@ class VendorDialect(Dialect):
             LinkError: The state has not what is public of it.
         """
         self._request_at = now + REQUEST_PERIOD
-        self._counters.states += 1
+        self.counters.states += 1
         try:
             return Report(
                 arrival=now,

@@ -99,7 +99,7 @@ class Replay:
             raise RecordingError(f'{self._log}: there is no such file')
         self._player: LogPlayer[Entry] = LogPlayer(
             self._robot,
-            partial(_timed_entries, self._log),
+            lambda: ((entry.time, entry) for entry in read_serial_log(self._log)),
             name=str(self._log),
             rate=rate,
             start=start,
@@ -175,11 +175,6 @@ def _serve(stop: threading.Event) -> None:
             replay.play(stop)
     finally:
         node.destroy_node()
-
-
-def _timed_entries(path: Path) -> Iterator[tuple[float, Entry]]:
-    for entry in read_serial_log(path):
-        yield entry.time, entry
 
 
 def _own(node: Node) -> list[str]:

@@ -9,8 +9,8 @@ of the layout is a change of one row. A stream may hold anything.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
-from enum import auto, Enum, Flag, IntEnum
+from dataclasses import dataclass, field
+from enum import Enum, Flag, IntEnum
 from itertools import chain
 import math
 import struct
@@ -309,12 +309,6 @@ class ParserCounters:
         return self.bad_tail + self.bad_checksum
 
 
-class _Verdict(Enum):
-    VALID = auto()
-    INCOMPLETE = auto()
-    WRONG = auto()
-
-
 class StreamParser:
     """Yields the valid frames of a byte stream, in order.
 
@@ -328,12 +322,7 @@ class StreamParser:
         self._protocol = protocol
         self._kinds = {int(kind): kind for kind in kinds & protocol.kinds}
         self._buffer = bytearray()
-        self._counters = ParserCounters()
-
-    @property
-    def counters(self) -> ParserCounters:
-        """A copy of the counters."""
-        return replace(self._counters)
+        self.counters = ParserCounters()
 
     @property
     def pending(self) -> int:
@@ -342,7 +331,7 @@ class StreamParser:
 
     def feed(self, data: bytes) -> list[Frame]:
         """Parse bytes; return the frames that they complete."""
-        self._counters.bytes += len(data)
+        self.counters.bytes += len(data)
         self._buffer += data
         return self._scan(more_comes=True)
 
@@ -360,46 +349,47 @@ class StreamParser:
             start = buffer.find(HEADER, position)
             if start < 0:
                 end = len(buffer) - (more_comes and buffer.endswith(HEADER[:1]))
-                self._counters.skipped += max(end - position, 0)
+                self.counters.skipped += max(end - position, 0)
                 position = max(end, position)
                 break
-            self._counters.skipped += start - position
+            self.counters.skipped += start - position
             position = start
-            verdict, length = self._judge(position)
-            if verdict is _Verdict.VALID:
+            length = self._frame_length(position)
+            if length:
                 frames.append(self._cut(position, length))
                 position += length
-            elif verdict is _Verdict.INCOMPLETE and more_comes:
+            elif length is None and more_comes:
                 break
             else:
-                self._counters.skipped += 1
+                self.counters.skipped += 1
                 position += 1
         del buffer[:position]
-        self._counters.frames += len(frames)
+        self.counters.frames += len(frames)
         return frames
 
-    def _judge(self, start: int) -> tuple[_Verdict, int]:
-        buffer, counters = self._buffer, self._counters
+    def _frame_length(self, start: int) -> int | None:
+        """Return the length of the frame behind a header; 0 for none, None while incomplete."""
+        buffer, counters = self._buffer, self.counters
         available = len(buffer) - start
         if available <= LENGTH_AT:
-            return _Verdict.INCOMPLETE, 0
+            return None
         length = buffer[start + LENGTH_AT]
         if not self._protocol.overhead <= length <= self._protocol.max_length:
-            return _Verdict.WRONG, 0
+            return 0
         if available > KIND_AT and buffer[start + KIND_AT] not in self._kinds:
             counters.bad_kind += 1
-            return _Verdict.WRONG, 0
+            return 0
         if available < length:
-            return _Verdict.INCOMPLETE, 0
+            return None
         end = start + length
         if buffer[end - len(TAIL) : end] != TAIL:
             counters.bad_tail += 1
-            return _Verdict.WRONG, 0
+            return 0
         body = buffer[start + len(HEADER) : end - _AFTER_CHECKSUM]
         if checksum(body) != buffer[end - _AFTER_CHECKSUM]:
             counters.bad_checksum += 1
-            return _Verdict.WRONG, 0
-        return _Verdict.VALID, length
+            return 0
+        return length
 
     def _cut(self, start: int, length: int) -> Frame:
         buffer = self._buffer

@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from enum import IntEnum, IntFlag
 from types import MappingProxyType
+from typing import Any
 
 from .frame import Access, Field, Function, Kind, Model, Protocol, Scalar, Span, table
 
@@ -44,35 +45,22 @@ MOTOR_OF_JOINT: Mapping[str, int] = MappingProxyType(
     | {'arm_yaw_joint': 54, 'arm_thigh_joint': 53, 'arm_calf_joint': 52, 'hand_right_joint': 51}
 )
 
-_HIP, _CLAW = Span(-30, 30), Span(-65, 65)
+
+Ends = tuple[float, float]
 
 
-def _angles(calf: Span, thigh: Span, hip: Span, arm: Mapping[int, Span]) -> dict[int, Span]:
-    legs = {motor: (calf, thigh, hip)[motor % 10 - 1] for motor in LEG_MOTORS}
-    return legs | {51: _CLAW} | dict(arm)
+def _angles(calf: Ends, thigh: Ends, hip: Ends, elbow: Ends, shoulder: Ends) -> dict[int, Span]:
+    ends = {motor: (calf, thigh, hip)[motor % 10 - 1] for motor in LEG_MOTORS}
+    ends |= {51: (-65, 65), 52: elbow, 53: shoulder, 54: (-175, 175)}
+    return {motor: Span(*each) for motor, each in ends.items()}
 
 
 # What the byte of a servo angle spreads over [deg] (quad.md 1.3); 54 moves on mini2SW and mini3W.
 ANGLE_SPANS: Mapping[Model, Mapping[int, Span]] = MappingProxyType(
     {
-        Model.MINI: _angles(
-            Span(-73, 57),
-            Span(-66, 93),
-            Span(-31, 31),
-            {52: Span(-85, 50), 53: Span(-75, 90), 54: Span(-175, 175)},
-        ),
-        Model.LITE: _angles(
-            Span(-70, 50),
-            Span(-70, 90),
-            _HIP,
-            {52: Span(-115, 70), 53: Span(-85, 100), 54: Span(-175, 175)},
-        ),
-        Model.WHEELED: _angles(
-            Span(-70, 50),
-            Span(-70, 90),
-            _HIP,
-            {52: Span(-50, 83), 53: Span(-90, 90), 54: Span(-175, 175)},
-        ),
+        Model.MINI: _angles((-73, 57), (-66, 93), (-31, 31), (-85, 50), (-75, 90)),
+        Model.LITE: _angles((-70, 50), (-70, 90), (-30, 30), (-115, 70), (-85, 100)),
+        Model.WHEELED: _angles((-70, 50), (-70, 90), (-30, 30), (-50, 83), (-90, 90)),
     }
 )
 
@@ -127,30 +115,76 @@ class Fault(IntFlag):
     IMU = 16
 
 
-STATE = Function(
+R, W, RW = Access.READ, Access.WRITE, Access.READ | Access.WRITE
+
+Spans = Mapping[Model, Span]
+
+
+def _byte(
+    code: int,
+    name: str,
+    meaning: str,
+    spans: Spans | None = None,
+    unit: str = '',
+    *,
+    access: Access = W,
+) -> Function:
+    field = Field('value', Scalar.U8)
+    return Function(code, name, access, (field,), meaning, spans=spans or {}, unit=unit)
+
+
+def _row(
+    code: int,
+    name: str,
+    access: Access,
+    meaning: str,
+    *fields: Field,
+    **more: Any,  # noqa: ANN401
+) -> Function:
+    return Function(code, name, access, fields, meaning, **more)
+
+
+_TEXT, _MOTOR = Field('text', Scalar.U8, count=10), Field('motor', Scalar.U8)
+_MOTORS = Field('motor', Scalar.U8, meaning='FF all')
+STATE = _row(
     Code.STATE,
     'state',
     Access.PUSH,
-    (
-        Field('battery', Scalar.U8, 0, unit='%'),
-        Field('mode', Scalar.U8, 1),
-        Field(
-            'faults', Scalar.U16, 2, meaning='1 low battery, 2 overload, 4 hot, 8 servo, 16 IMU'
-        ),
-        Field('device_time', Scalar.U32, 4, unit='ms'),
-        Field('euler1', Scalar.F32, 8, 3, unit='deg', meaning='not fused: to be ignored'),
-        Field('euler2', Scalar.F32, 20, 3, unit='deg', meaning='roll, pitch, yaw; the valid one'),
-        Field('acceleration', Scalar.F32, 32, 3, unit='m/s²', meaning='specific force, +g up'),
-        Field('position', Scalar.F32, 44, SLOTS, unit='deg', meaning='in the order of motors'),
-        Field('velocity', Scalar.F32, 108, SLOTS, unit='deg/s', meaning='in the order of motors'),
-        Field('load', Scalar.I16, 172, SLOTS, 0.1, '%', 'in the order of motors'),
-        Field('temperature', Scalar.U8, 204, SLOTS, unit='°C', meaning='in the order of motors'),
-        Field('battery_voltage', Scalar.U16, 220, scale=0.001, unit='V'),
-        Field('sequence', Scalar.U16, 222, meaning='counts frames, to notice lost ones'),
-    ),
     'the state of the robot',
+    Field('battery', Scalar.U8, 0, unit='%'),
+    Field('mode', Scalar.U8, 1),
+    Field('faults', Scalar.U16, 2, meaning='1 low battery, 2 overload, 4 hot, 8 servo, 16 IMU'),
+    Field('device_time', Scalar.U32, 4, unit='ms'),
+    Field('euler1', Scalar.F32, 8, 3, unit='deg', meaning='not fused: to be ignored'),
+    Field('euler2', Scalar.F32, 20, 3, unit='deg', meaning='roll, pitch, yaw; the valid one'),
+    Field('acceleration', Scalar.F32, 32, 3, unit='m/s²', meaning='specific force, +g up'),
+    Field('position', Scalar.F32, 44, SLOTS, unit='deg', meaning='in the order of motors'),
+    Field('velocity', Scalar.F32, 108, SLOTS, unit='deg/s', meaning='in the order of motors'),
+    Field('load', Scalar.I16, 172, SLOTS, 0.1, '%', 'in the order of motors'),
+    Field('temperature', Scalar.U8, 204, SLOTS, unit='°C', meaning='in the order of motors'),
+    Field('battery_voltage', Scalar.U16, 220, scale=0.001, unit='V'),
+    Field('sequence', Scalar.U16, 222, meaning='counts frames, to notice lost ones'),
     size=245,
 )
+
+
+def _v2_rows() -> Iterator[Function]:
+    yield _row(Code.VERSION, 'version', R, 'firmware, ASCII padded with NUL', _TEXT)
+    charge = Field('value', Scalar.U8, unit='%')
+    yield _row(Code.BATTERY, 'battery', R, '0 to 100', charge)
+    on, rate = Field('on', Scalar.U8), Field('rate', Scalar.U8, unit='Hz')
+    yield _row(Code.FEEDBACK, 'feedback', W, '1 pushes states', on)
+    yield _row(Code.FEEDBACK_RATE, 'feedback_rate', W, 'rate of the states', rate)
+    yield STATE
+    angle = Field('angle', Scalar.F32, 1, unit='deg')
+    yield _row(Code.SERVO, 'servo', W, 'angle of one servo', _MOTOR, angle)
+    angle = Field('angle', Scalar.I16, 1, scale=0.01, unit='deg')
+    meaning = 'angles of several servos, three bytes each'
+    yield _row(Code.SERVOS, 'servos', W, meaning, _MOTOR, angle, repeated=True)
+    on, speed = Field('on', Scalar.U8, 1), Field('speed', Scalar.U8, 1)
+    yield _row(Code.TORQUE, 'torque', W, '1 holds, 0 lets go', _MOTORS, on)
+    yield _row(Code.SPEED, 'speed', W, '1 to 255', _MOTORS, speed)
+
 
 V2 = Protocol(
     name='v2',
@@ -159,66 +193,9 @@ V2 = Protocol(
     address_size=2,
     kinds=frozenset(Kind),
     max_length=254,
-    functions=table(
-        Function(
-            Code.VERSION,
-            'version',
-            Access.READ,
-            (Field('text', Scalar.U8, count=10),),
-            'firmware, ASCII padded with NUL',
-        ),
-        Function(
-            Code.BATTERY,
-            'battery',
-            Access.READ,
-            (Field('value', Scalar.U8, unit='%'),),
-            '0 to 100',
-        ),
-        Function(
-            Code.FEEDBACK, 'feedback', Access.WRITE, (Field('on', Scalar.U8),), '1 pushes states'
-        ),
-        Function(
-            Code.FEEDBACK_RATE,
-            'feedback_rate',
-            Access.WRITE,
-            (Field('rate', Scalar.U8, unit='Hz'),),
-            'rate of the states',
-        ),
-        STATE,
-        Function(
-            Code.SERVO,
-            'servo',
-            Access.WRITE,
-            (Field('motor', Scalar.U8), Field('angle', Scalar.F32, 1, unit='deg')),
-            'angle of one servo',
-        ),
-        Function(
-            Code.SERVOS,
-            'servos',
-            Access.WRITE,
-            (Field('motor', Scalar.U8), Field('angle', Scalar.I16, 1, scale=0.01, unit='deg')),
-            'angles of several servos, three bytes each',
-            repeated=True,
-        ),
-        Function(
-            Code.TORQUE,
-            'torque',
-            Access.WRITE,
-            (Field('motor', Scalar.U8, meaning='FF all'), Field('on', Scalar.U8, 1)),
-            '1 holds, 0 lets go',
-        ),
-        Function(
-            Code.SPEED,
-            'speed',
-            Access.WRITE,
-            (Field('motor', Scalar.U8, meaning='FF all'), Field('speed', Scalar.U8, 1)),
-            '1 to 255',
-        ),
-    ),
+    functions=table(*_v2_rows()),
 )
 
-
-R, W, RW = Access.READ, Access.WRITE, Access.READ | Access.WRITE
 
 GRAVITY = 9.8  # [m/s²] what the vendor's library multiplies the accelerometer's g with
 ACCELERATION_STEP = GRAVITY / 16384  # [m/s²]
@@ -259,32 +236,11 @@ MOTOR_OF_REGISTER: Mapping[int, int] = {
 }
 REGISTER_OF_MOTOR: Mapping[int, int] = {m: r for r, m in MOTOR_OF_REGISTER.items()}
 
-Spans = Mapping[Model, Span]
-
 
 def _spans(mini: tuple[float, float], lite: tuple[float, float] | None = None) -> Spans:
     """Return ranges by model; mini2SW and mini3W are taken to have those of the mini."""
     low, high = Span(*mini), Span(*(lite or mini))
     return {Model.MINI: low, Model.LITE: high, Model.WHEELED: low}
-
-
-def _byte(
-    code: int,
-    name: str,
-    meaning: str,
-    spans: Spans | None = None,
-    unit: str = '',
-    *,
-    access: Access = W,
-) -> Function:
-    field = Field('value', Scalar.U8)
-    return Function(code, name, access, (field,), meaning, spans=spans or {}, unit=unit)
-
-
-def _row(
-    code: int, name: str, access: Access, meaning: str, *fields: Field, variable: bool = False
-) -> Function:
-    return Function(code, name, access, fields, meaning, variable=variable)
 
 
 def _float(code: int, name: str) -> Function:
@@ -302,11 +258,10 @@ def _system_rows() -> Iterator[Function]:
         'firmware',
         R,
         'ASCII, padded with NUL; M mini, L lite, R rider, W or MW wheeled',
-        Field('text', Scalar.U8, count=10),
+        _TEXT,
     )
     yield _byte(0x09, 'gait', '0 trot, 1 walk, 2 high walk, 3 slow trot')
-    name = Field('text', Scalar.U8, count=10)
-    yield _row(0x13, 'bluetooth_name', W, 'ASCII, up to 10 characters', name, variable=True)
+    yield _row(0x13, 'bluetooth_name', W, 'ASCII, up to 10 characters', _TEXT, variable=True)
     yield _byte(0x20, 'torque', '01 unload all, 00 load all, 10+leg unload, 20+leg load')
     yield _byte(0x21, 'teach_record', 'pose id')
     yield _byte(0x22, 'teach_play', 'pose id')
