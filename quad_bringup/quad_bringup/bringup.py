@@ -43,7 +43,7 @@ from process_supervisor import (
     write_parameters,
 )
 from process_supervisor.ros_options import add_network, add_timeout, apply_network
-from quad_description import movable_joints, PRESETS, robot_urdf
+from quad_description import PRESETS, robot_urdf
 from quad_hardware.protocol import V1, V2
 
 
@@ -93,6 +93,12 @@ class Stack:
     ros: RosOptions = field(default_factory=RosOptions)  # options of all nodes
     record: Path | None = None  # folder in which the controller records its runs; None for none
     view: bool = False  # with the page on which the robot is seen
+
+    @property
+    def title(self) -> str:
+        """What runs, and where."""
+        arm, simulated = ' with arm' * self.arm, ', simulated,' * self.simulate
+        return f'XGO {self.preset}{arm}{simulated} on {self.port}'
 
 
 def quad_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
@@ -168,16 +174,6 @@ def _controller_parameters(stack: Stack) -> dict[str, str]:
     return values
 
 
-@dataclass(frozen=True, slots=True)
-class Session:
-    """A quadruped that is about to be brought up."""
-
-    title: str  # what runs, and where
-    port: str  # its serial port
-    joints: list[str]  # names of its joints, in the order of /joint_command
-    processes: list[ProcessSpec]  # what is to be run
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments that bring-up and demo share."""
     parser.add_argument(
@@ -227,7 +223,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 @contextlib.contextmanager
-def session(arguments: argparse.Namespace, ros: RosOptions, port: str | None) -> Iterator[Session]:
+def session(
+    arguments: argparse.Namespace, ros: RosOptions, port: str | None
+) -> Iterator[tuple[Stack, list[ProcessSpec]]]:
     """Prepare a bring-up; the port and the namespace are its own as long as the block runs.
 
     Args:
@@ -249,9 +247,8 @@ def session(arguments: argparse.Namespace, ros: RosOptions, port: str | None) ->
             name = f'port {os.path.realpath(port)}'  # two names of one port are one port
             stack.enter_context(exclusive(name, PORT_REMEDY))
         folder = stack.enter_context(bring_up_place('quad_bringup', ros))
-        urdf = robot_urdf(arguments.preset, arm=arguments.arm)
         parameters = folder / 'robot_description.yaml'
-        write_parameters(parameters, urdf)
+        write_parameters(parameters, robot_urdf(arguments.preset, arm=arguments.arm))
         wanted = Stack(
             port=port or str(folder / 'xgo'),
             preset=arguments.preset,
@@ -267,12 +264,7 @@ def session(arguments: argparse.Namespace, ros: RosOptions, port: str | None) ->
             ready_timeout=arguments.timeout,
             view=arguments.view,
         )
-        title = f'XGO {wanted.preset}{" with arm" if wanted.arm else ""}' + (
-            f', simulated, on {wanted.port}' if wanted.simulate else f' on {wanted.port}'
-        )
-        joints = [joint.name for joint in movable_joints(urdf)]
-        processes = quad_processes(wanted, parameters, find_executable)
-        yield Session(title, wanted.port, joints, processes)
+        yield wanted, quad_processes(wanted, parameters, find_executable)
 
 
 def _protocol(wanted: str, *, simulate: bool) -> str:
@@ -369,11 +361,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments, ros = parse(sys.argv[1:] if argv is None else argv)
     try:
-        with session(arguments, ros, arguments.port) as quad:
+        with session(arguments, ros, arguments.port) as (quad, processes):
             hint = HINT.format(hint=ros.hint, set_mode=ros.resolve('set_mode'))
             sys.stdout.write(f'{quad.title}\n{hint}\n')
             shutdown = partial(_leave, namespace=ros.namespace, hold=arguments.hold)
-            return supervise(quad.processes, shutdown=shutdown).exit_code
+            return supervise(processes, shutdown=shutdown).exit_code
     except (BringupError, SupervisorError) as error:
         sys.stderr.write(f'{error}\n')
         return USAGE_ERROR

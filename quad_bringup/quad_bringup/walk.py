@@ -29,11 +29,11 @@ from process_supervisor import CallError, parse_with_ros, RosOptions, Supervisor
 from process_supervisor.demo import Demo, make_table, run_demo, signed
 from process_supervisor.ros_options import seconds_from
 from quad_controller import Gait, GaitParameters, Velocity
-from quad_description import LEGS
+from quad_description import LEGS, movable_joints, robot_urdf
 from quad_description.rotations import tilt_of, yaw_of
 from quad_msgs.msg import JointCommand
 
-from .bringup import add_arguments, BringupError, Session, session
+from .bringup import add_arguments, BringupError, session, Stack
 from .mode_client import ModeClient
 
 GROUND_TRUTH = 'fake_xgo/ground_truth'
@@ -141,14 +141,16 @@ class Walk(Demo[ModeClient]):
     # title, speeds (5), blank, legs (6), blank, body and loop (2), and one that is left free
     lines = 17
 
-    def __init__(self, quad: Session, ros: RosOptions, arguments: argparse.Namespace) -> None:
+    def __init__(self, quad: Stack, ros: RosOptions, arguments: argparse.Namespace) -> None:
         commands = [
             f'ros2 topic hz {ros.resolve("joint_command")}',
             f'ros2 topic echo {ros.resolve("odom")}',
             f'ros2 run quad_hardware doctor --port {quad.port}{ros.hint}',
         ]
         super().__init__(quad.title, commands)
-        self.joints, self.namespace = quad.joints, ros.namespace
+        urdf = robot_urdf(quad.preset, arm=quad.arm)
+        self.joints = [joint.name for joint in movable_joints(urdf)]  # as in /joint_command
+        self.namespace = ros.namespace
         self.duration: float | None = arguments.duration
         self.mode, self.share = 'policy', 1.0  # share of the velocities of a trot
         if arguments.policy is None:
@@ -463,9 +465,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     arguments, ros = parse_with_ros(parser, sys.argv[1:] if argv is None else argv)
     try:
-        with session(arguments, ros, None) as quad:
+        with session(arguments, ros, None) as (quad, processes):
             endless = arguments.duration is None
-            return run_demo(Walk(quad, ros, arguments), quad.processes, endless=endless)
+            return run_demo(Walk(quad, ros, arguments), processes, endless=endless)
     except (BringupError, SupervisorError) as error:
         sys.stderr.write(f'{error}\n')
         return USAGE_ERROR

@@ -16,7 +16,7 @@ import pytest
 from rich.console import Console
 
 from process_supervisor import RosOptions
-from quad_bringup.bringup import Session
+from quad_bringup.bringup import Stack
 from quad_bringup.walk import PARTS, Segment, STANDSTILL, Track, Walk, wrong_speed
 from quad_controller import Velocity
 from quad_description import LEGS
@@ -121,7 +121,7 @@ def test_a_slow_robot_that_stands_has_not_walked_and_odometry_is_second() -> Non
 @pytest.mark.parametrize('is_known', [False, True])
 def test_the_table_fits_a_usual_terminal(is_known: bool) -> None:
     """80 columns, in as many lines as it says, also before the robot is seen."""
-    quad = Session('XGO lite, simulated', '/tmp/xgo', JOINTS, [])
+    quad = Stack('/tmp/xgo', simulate=True)
     walk = Walk(quad, RosOptions(), argparse.Namespace(policy=None, gait='crawl', duration=None))
     if is_known:
         walk.targets = dict.fromkeys(JOINTS, -1.234)
