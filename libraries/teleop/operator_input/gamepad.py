@@ -293,16 +293,6 @@ def choose_preset(name: str, info: DeviceInfo) -> Preset:
     return replace(preset, axes=STANDARD_AXES if has_standard_axes else HID_AXES)
 
 
-def check_preset(name: str) -> None:
-    """Refuse a name that is neither that of a preset nor :data:`AUTO`.
-
-    Raises:
-        PresetError: There is none of that name.
-    """
-    if name != AUTO:
-        _named(name)
-
-
 def _named(name: str) -> Preset:
     for preset in PRESETS:
         if preset.name == name:
@@ -347,7 +337,8 @@ class Gamepad(contextlib.AbstractContextManager['Gamepad']):
             PresetError: There is no preset of that name, or the expression is none.
             ValueError: The dead zone is no share.
         """
-        check_preset(preset)
+        if preset != AUTO:
+            _named(preset)
         if not 0 <= dead_zone < 1:
             raise ValueError(f'dead zone {dead_zone}: wanted 0 to below 1')
         try:

@@ -20,7 +20,7 @@ import re
 import select
 import termios
 import time
-from typing import Any, Protocol, TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 import unicodedata
 
 from .exceptions import TerminalError
@@ -322,23 +322,13 @@ def status_text(parts: Iterable[StatusPart], *, colour: bool) -> str:
     )
 
 
-class Output(Protocol):
-    """What a status line needs of a terminal."""
-
-    def write(self, text: str) -> None:
-        """Write characters and control sequences."""
-
-    def width(self) -> int:
-        """Return the width [characters]."""
-
-
 class StatusLine:
     """Shows a line in place; never wider than the window, so that it never wraps.
 
     Texts may contain colours.
     """
 
-    def __init__(self, output: Output) -> None:
+    def __init__(self, output: TerminalKeyboard) -> None:
         self._output = output
         self._shown = ''
 

@@ -66,7 +66,7 @@ def test_every_push_is_popped(reports: list[Report]) -> None:
     assert written.count(PUSH) <= 1
 
 
-class Paper:
+class Paper(TerminalKeyboard):
     """Remembers what was written."""
 
     def __init__(self, columns: int) -> None:
