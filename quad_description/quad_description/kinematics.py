@@ -252,25 +252,15 @@ def raised_feet(feet: Sequence[Vector]) -> tuple[str, ...]:
     raised = []
     for index, link in enumerate(FEET):
         a, b, c = (foot for other, foot in enumerate(feet) if other != index)
-        normal = _cross(_difference(b, a), _difference(c, a))
+        (bx, by, bz), (cx, cy, cz), (x, y, z) = (
+            (one[0] - a[0], one[1] - a[1], one[2] - a[2]) for one in (b, c, feet[index])
+        )
+        normal = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
         length = math.copysign(math.hypot(*normal), normal[2])  # up, in the body
-        way = _difference(feet[index], a)
-        height = sum(n * w for n, w in zip(normal, way, strict=True))
+        height = normal[0] * x + normal[1] * y + normal[2] * z
         if length and height / length > MAX_GAP:
             raised.append(link)
     return tuple(raised)
-
-
-def _difference(one: Vector, other: Vector) -> Vector:
-    return one[0] - other[0], one[1] - other[1], one[2] - other[2]
-
-
-def _cross(one: Vector, other: Vector) -> Vector:
-    return (
-        one[1] * other[2] - one[2] * other[1],
-        one[2] * other[0] - one[0] * other[2],
-        one[0] * other[1] - one[1] * other[0],
-    )
 
 
 Targets = tuple[float, ...]

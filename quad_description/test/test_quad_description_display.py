@@ -4,21 +4,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 import subprocess
 import sys
-import time
-from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
 from isolation import Isolation
 import pytest
-import rclpy
-from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
+from ros_client import RosClient
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
@@ -53,37 +47,6 @@ def test_a_sweep_reaches_both_ends_of_every_joint() -> None:
         assert down[joint.name] == pytest.approx(joint.limits.lower)
 
 
-class Listener:
-    """A node of the test in a domain of its own."""
-
-    def __init__(self, domain_id: int) -> None:
-        self.context = Context()
-        rclpy.init(context=self.context, domain_id=domain_id)
-        self.node = Node('listener', context=self.context)
-        self.executor = SingleThreadedExecutor(context=self.context)
-        self.executor.add_node(self.node)
-
-    def wait_for(self, message_type: Any, topic: str, qos: Any) -> Any:
-        """Return the first message of a topic."""
-        messages: list[Any] = []
-        self.node.create_subscription(message_type, topic, messages.append, qos)
-        deadline = time.monotonic() + 20
-        while not messages:
-            assert time.monotonic() < deadline, f'nothing on {topic}'
-            self.executor.spin_once(0.05)
-        return messages[0]
-
-
-@pytest.fixture
-def listener(isolation: Isolation) -> Iterator[Listener]:
-    """Give the test's node, and leave the domain afterwards."""
-    listener = Listener(isolation.domain_id)
-    yield listener
-    listener.executor.shutdown()
-    listener.node.destroy_node()
-    rclpy.shutdown(context=listener.context)
-
-
 def display(isolation: Isolation, *parameters: str) -> subprocess.Popen[str]:
     """Start the node as its own process."""
     arguments = [word for text in parameters for word in ('-p', text)]
@@ -97,20 +60,23 @@ def display(isolation: Isolation, *parameters: str) -> subprocess.Popen[str]:
     )
 
 
-def test_the_display_publishes_what_viewers_need(listener: Listener, isolation: Isolation) -> None:
+def test_the_display_publishes_what_viewers_need(isolation: Isolation) -> None:
     """A late subscriber gets the URDF, and joint states name every motor of it."""
     process = display(isolation, 'preset:=mini', 'arm:=true', 'motion:=lie')
     try:
-        states = listener.wait_for(JointState, '/joint_states', 10)
-        description = listener.wait_for(String, '/robot_description', LATCHED)
-        assert description.data == robot_urdf('mini', arm=True)
-        tree = listener.wait_for(TFMessage, '/tf', 10).transforms[0]
+        with RosClient(isolation.domain_id) as client:
+            states = client.listen(JointState, '/joint_states')
+            client.spin_until(lambda: bool(states), 20.0, 'joint states')
+            late = client.listen(String, '/robot_description', LATCHED)
+            trees = client.listen(TFMessage, '/tf')
+            client.spin_until(lambda: bool(late and trees), 20.0, 'description and /tf')
+        assert late[0].data == robot_urdf('mini', arm=True)
+        tree = trees[0].transforms[0]
         assert (tree.header.frame_id, tree.child_frame_id) == ('base_link', 'base_footprint')
         lying = ROBOT.standing_height(list(pose_positions(Pose.LIE).values()))
         assert tree.transform.translation.z == pytest.approx(-lying)
-        assert dict(zip(states.name, states.position, strict=True)) == pose_positions(
-            Pose.LIE, arm=True
-        )
+        named = dict(zip(states[0].name, states[0].position, strict=True))
+        assert named == pose_positions(Pose.LIE, arm=True)
     finally:
         process.terminate()
         process.communicate(timeout=20)
