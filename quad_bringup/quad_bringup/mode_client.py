@@ -31,14 +31,9 @@ class ModeClient(GraphClient):
     def __init__(self, name: str, given_up: Callable[[], bool], namespace: str = '') -> None:
         """Join the ROS graph."""
         super().__init__(name, given_up, namespace)
-        self._state = ''
+        self.state = ''  # of the controller, as it calls it; empty before it is received
         self._modes = self.node.create_client(SetMode, 'set_mode')
         self.node.create_subscription(String, STATE_TOPIC, self._take_state, LATCHED)
-
-    @property
-    def state(self) -> str:
-        """State of the controller, as it calls it; empty before it is received."""
-        return self._state
 
     def set_mode(self, mode: str, timeout: float) -> str:
         """Ask the controller for a mode; again for a while when it refuses.
@@ -76,7 +71,7 @@ class ModeClient(GraphClient):
         return answer
 
     def _take_state(self, message: String) -> None:
-        self._state = message.data
+        self.state = message.data
 
 
 STATE_TIMEOUT = 5.0

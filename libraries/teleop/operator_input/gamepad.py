@@ -371,7 +371,7 @@ class Gamepad(contextlib.AbstractContextManager['Gamepad']):
     def scan(self, now: float) -> None:
         """Search for a gamepad if there is none and a scan is due."""
         if self._device is None:
-            for device in self._search.found(now, self._is_other_path):
+            for device in self._search.found(now, lambda path: self._path not in {'', path}):
                 if self._use(device):
                     break
         if self._device is None and self._is_first_scan:
@@ -419,9 +419,6 @@ class Gamepad(contextlib.AbstractContextManager['Gamepad']):
     def __exit__(self, *_: object) -> None:
         """Close the device."""
         self.close()
-
-    def _is_other_path(self, path: str) -> bool:
-        return bool(self._path) and path != self._path
 
     def _fits(self, info: DeviceInfo) -> bool:
         return is_gamepad(info) and bool(self._path or self._wanted.search(info.name))

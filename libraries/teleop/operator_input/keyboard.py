@@ -20,7 +20,6 @@ import time
 from typing import TYPE_CHECKING
 
 from .devices import (
-    DeviceInfo,
     DeviceSearch,
     EV_KEY,
     EV_SYN,
@@ -126,7 +125,9 @@ class Keyboards:
     """All keyboards of this machine that may be read; feeds a matcher with their keys."""
 
     def __init__(self, devices: InputDevices, matcher: ReleaseMatcher) -> None:
-        self._search = DeviceSearch(devices, _is_keyboard, SCAN_PERIOD, OTHERS_PERIOD)
+        self._search = DeviceSearch(
+            devices, lambda info: {KEY_Q, KEY_SPACE} <= info.keys, SCAN_PERIOD, OTHERS_PERIOD
+        )
         self._matcher = matcher
         self._open: dict[str, InputDevice] = {}
 
@@ -172,10 +173,6 @@ class Keyboards:
             elif event.type == EV_KEY and event.value == 0:
                 events += self._matcher.key_up(event.code, now)
         return events
-
-
-def _is_keyboard(info: DeviceInfo) -> bool:
-    return {KEY_Q, KEY_SPACE} <= info.keys
 
 
 def is_local(environment: Mapping[str, str], read_tmux: Callable[[], str] | None = None) -> bool:
