@@ -130,6 +130,7 @@ def controller() -> Node:
         (controller, 'robot_description:=none', 'robot_description: .*no XML'),
         (HardwareNode, 'robot_description:=none', 'robot_description: .*no XML'),
         (RobotStatePublisher, 'publish_frequncy:=9.0', "did you mean 'publish_frequency'"),
+        (RobotStatePublisher, 'publish_frequency:=1000.1', 'must be 0.0 to 1000.0'),
         (RobotStatePublisher, 'frame_prefix:=robot', 'no robot_description'),
         (RobotStatePublisher, 'robot_description:=<robot/>', '^robot_description: .*no <link>'),
         (Display, 'motion:=dance', "motion is 'dance': it must be sweep, stand"),

@@ -22,35 +22,15 @@ from urdf_reader import (
     Transform,
 )
 
-HIGHEST_FREQUENCY = 1000.0
-"""Greatest ``publish_frequency`` in [Hz] (robot_state_publisher 3.3.3)."""
-
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How transforms are published; names and defaults are robot_state_publisher's.
-
-    Attributes:
-        publish_frequency: Greatest rate of a joint's transform in [Hz]; 0 for every message.
-        frame_prefix: Put in front of each frame name as it is.
-        ignore_timestamp: Publish at each message, whatever its stamp is.
-    """
+    """How transforms are published; names and defaults are robot_state_publisher's."""
 
     publish_frequency: float = 20.0
-    frame_prefix: str = ''
-    ignore_timestamp: bool = False
-
-    def __post_init__(self) -> None:
-        """Refuse what has no meaning.
-
-        Raises:
-            ValueError: The frequency is beyond its range.
-        """
-        if not 0.0 <= self.publish_frequency <= HIGHEST_FREQUENCY:
-            raise ValueError(
-                f'publish_frequency {self.publish_frequency:g} is not between 0 and '
-                f'{HIGHEST_FREQUENCY:g} Hz'
-            )
+    """Greatest rate of a joint's transform, 0 to 1000 [Hz]; 0 for every message."""
+    frame_prefix: str = ''  # put in front of each frame name as it is
+    ignore_timestamp: bool = False  # publish at each message, whatever its stamp is
 
     @property
     def interval(self) -> int:
@@ -62,17 +42,11 @@ class Settings:
 
 @dataclass(frozen=True, slots=True)
 class FrameTransform:
-    """A transform with the names of its frames.
-
-    Attributes:
-        parent: Name of the parent frame, with prefix.
-        child: Name of the child frame, with prefix.
-        transform: Pose of the child in the parent.
-    """
+    """A transform with the names of its frames, which have the prefix."""
 
     parent: str
     child: str
-    transform: Transform
+    transform: Transform  # pose of the child in the parent
 
 
 class MessageProblem(Enum):
@@ -87,17 +61,11 @@ class MessageProblem(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Update:
-    """What follows from a message.
+    """What follows from a message."""
 
-    Attributes:
-        stamp: Stamp of the transforms in [ns].
-        transforms: To be published, possibly none.
-        problems: What is wrong with the message.
-    """
-
-    stamp: int
-    transforms: tuple[FrameTransform, ...] = ()
-    problems: tuple[MessageProblem, ...] = ()
+    stamp: int  # of the transforms in [ns]
+    transforms: tuple[FrameTransform, ...] = ()  # to be published, possibly none
+    problems: tuple[MessageProblem, ...] = ()  # what is wrong with the message
 
 
 class StatePublisher:
@@ -110,11 +78,6 @@ class StatePublisher:
         self._followers = [joint for joint in self._movable.values() if joint.mimic]
         self._published: dict[str, int] = {}
         self._last_now = 0
-
-    @property
-    def model(self) -> KinematicTree:
-        """The robot."""
-        return self._model
 
     def fixed(self) -> list[FrameTransform]:
         """Return the transforms that never change.
@@ -129,26 +92,24 @@ class StatePublisher:
     def update(
         self, names: Sequence[str], positions: Sequence[float], stamp: int, now: int
     ) -> Update:
-        """Store a JointState.
+        """Store a JointState, which may have joints of other robots; return what follows.
 
-        Args:
-            names: Names of joints, those of other robots among them.
-            positions: Their positions in [rad] or [m].
-            stamp: Stamp of the message in [ns].
-            now: ROS time in [ns].
-
-        Returns:
-            What follows.
+        Positions are in [rad] or [m], its stamp and the ROS time ``now`` in [ns].
         """
         if len(names) != len(positions):
             return Update(
                 stamp, (), (MessageProblem.LENGTHS if positions else MessageProblem.NO_POSITION,)
             )
-        problems = [*self._clock_problems(now)]
+        problems = []
+        if now < self._last_now:  # a bag that begins again, or a simulation that was reset
+            self._published.clear()
+            problems.append(MessageProblem.BACKWARDS)
+        self._last_now = now
         if not stamp and not self.settings.ignore_timestamp:
             problems.append(MessageProblem.NO_STAMP)
             stamp = now
-        if not self._is_due(names, stamp, now):
+        oldest = min([now, *(self._published.get(name, 0) for name in names)])
+        if not self.settings.ignore_timestamp and stamp < oldest + self.settings.interval:
             return Update(stamp, (), tuple(problems))
         finite = {
             name: position
@@ -159,16 +120,6 @@ class StatePublisher:
             problems.append(MessageProblem.NOT_FINITE)
         self._published.update(dict.fromkeys(names, stamp))
         return Update(stamp, tuple(self._transforms(finite)), tuple(problems))
-
-    def _clock_problems(self, now: int) -> Iterator[MessageProblem]:
-        if now < self._last_now:  # a bag that begins again, or a simulation that was reset
-            self._published.clear()
-            yield MessageProblem.BACKWARDS
-        self._last_now = now
-
-    def _is_due(self, names: Sequence[str], stamp: int, now: int) -> bool:
-        oldest = min([now, *(self._published.get(name, 0) for name in names)])
-        return self.settings.ignore_timestamp or stamp >= oldest + self.settings.interval
 
     def _transforms(self, positions: Mapping[str, float]) -> Iterator[FrameTransform]:
         for name, position in positions.items():

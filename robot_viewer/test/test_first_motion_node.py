@@ -5,8 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from html import unescape
 import math
 from pathlib import Path
+import re
 import sys
 from types import SimpleNamespace
 from typing import Any
@@ -53,7 +55,7 @@ from robot_viewer.page.first_motion import (
     RELEASED_AFTER,
     Saw,
 )
-from robot_viewer.page.live import HEARTBEAT
+from robot_viewer.page.live import HEARTBEAT, Live
 from robot_viewer.robot_state import Status
 
 PLAN = MotionPlan(start=0.5, distance=0.1, speed=0.05, increment=1e-4)
@@ -268,20 +270,64 @@ class Future:
         self._done(self)
 
 
+class Widget:
+    """A part of the page; what it says is kept."""
+
+    def __init__(self, shown: list[str], value: object = None) -> None:
+        self._shown, self.value, self.disabled = shown, value, False
+
+    def __enter__(self) -> None:
+        """Begin to fill it."""
+
+    def __exit__(self, *_: object) -> None:
+        """End that."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Keep what it says, without its mark."""
+        if name == 'content' and value:
+            self._shown.append(unescape(re.sub('<span.*?</span> |<.*?>', '', value)))
+        super().__setattr__(name, value)
+
+    def on_click(self, _press: object) -> None:
+        """Nobody presses it."""
+
+    on_update = on_click
+
+
+class Page:
+    """A page without a browser."""
+
+    before_log = 0.0
+
+    def __init__(self, shown: list[str]) -> None:
+        self._shown = shown
+        self.server = SimpleNamespace(gui=self)
+        self.live = Live(lambda *_: None)
+
+    def place(self, _group: str, _panel: object) -> Widget:
+        """Return the group."""
+        return Widget(self._shown)
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what adds a part of some kind."""
+        assert name.startswith('add_')
+        first = 'dropdown' in name
+        return lambda _, value='', **__: Widget(self._shown, value[0] if first else value)
+
+
 class Robot:
-    """A node that has no DDS, a page that has no browser, and their clock."""
+    """A node that has no DDS, and its clock."""
 
     def __init__(self) -> None:
         self.now = 100.0
         self.calls: list[tuple[str, Future]] = []
         self.targets: list[float] = []
         self.shown: list[str] = []
-        self.preparable = True
         self.positions = dict.fromkeys(JOINTS, 0.2)
         self.statuses: dict[str, Status] = {}
         self.motion = FirstMotion(
             self,  # type: ignore[arg-type]  # a node without DDS
-            None,  # type: ignore[arg-type]  # there is no page; this is its panel, too
+            Page(self.shown),  # type: ignore[arg-type]
             self.positions,
             self.statuses,
             lambda order: order(),
@@ -317,29 +363,10 @@ class Robot:
         """Return one that is silent."""
         return SimpleNamespace(info=lambda _: None, warning=lambda _: None, error=lambda _: None)
 
-    # -- the panel
-
-    def begin(self, text: str, *, failed: bool) -> None:
-        """Show it."""
-        self.preparable = True
-        self.shown.append(text)
-
-    def show_waiting(self, text: str, *, failed: bool) -> None:
-        """Show it."""
-        self.preparable = False
-        self.shown.append(text)
-
-    def show_ready(self, announced: list[str]) -> None:
-        """Show it."""
-        self.shown.append(announced[0])
-
-    def ask(self, ended: str, _reported: float) -> None:
-        """Show it."""
-        self.shown.append(ended)
-
-    def show_judgement(self, judgement: Any, *, right: bool) -> None:
-        """Show it."""
-        self.shown.append(judgement.verdict.value)
+    @property
+    def preparable(self) -> bool:
+        """Whether the page lets a motion be prepared."""
+        return not self.motion._prepare.disabled
 
     # -- what happens
 
@@ -397,10 +424,7 @@ class Robot:
 
 @pytest.fixture
 def robot(monkeypatch: pytest.MonkeyPatch) -> Robot:
-    """Make one, whose clock the test has; it is its own panel."""
-    monkeypatch.setattr(
-        first_motion, 'FirstMotionPanel', lambda _page, _joints, motion: motion._node
-    )
+    """Make one, whose clock the test has."""
     made = Robot()
     monkeypatch.setattr(first_motion, 'time', SimpleNamespace(monotonic=lambda: made.now))
     return made

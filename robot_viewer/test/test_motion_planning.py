@@ -44,18 +44,17 @@ from robot_viewer.nodes.motion_plan import (
     box_message,
     changed,
     LINE_POINTS,
-    moved_message,
     PAUSE,
     plan_groups,
     PlannedMotion,
     pose_message,
     refusal,
-    removed_message,
+    scene_change,
     SceneObject,
     SHOWINGS,
     tip_line,
 )
-from robot_viewer.nodes.motion_planning import ANSWER_TIME, DRAGGED, NO_GOAL, PlanPanel
+from robot_viewer.nodes.motion_planning import ANSWER_TIME, DRAGGED, MotionPlanning, NO_GOAL
 from robot_viewer.nodes.planning_scene import draw_object
 from robot_viewer.page.robot_page import RobotPage
 from robot_viewer.page.robot_scene import links_beyond, moved
@@ -174,10 +173,11 @@ def test_a_box_comes_moves_and_goes() -> None:
     (box,) = objects['box1'].message.primitives
     assert (box.type, list(box.dimensions)) == (SolidPrimitive.BOX, [0.1, 0.2, 0.3])
     assert objects['box1'].pose == TURNED
-    moved = changed(objects, moved_message(objects['box1'].message, Transform((1.0, 0.0, 0.0))))
+    header, place = objects['box1'].message.header, pose_message(Transform((1.0, 0.0, 0.0)))
+    moved = changed(objects, scene_change('MOVE', 'box1', header, pose=place))
     assert moved['box1'].pose.translation == (1.0, 0.0, 0.0)
     assert moved['box1'].message.primitives == [box]
-    assert set(changed(moved, removed_message(moved['box1'].message))) == {'box2'}
+    assert set(changed(moved, scene_change('REMOVE', 'box1', header))) == {'box2'}
     assert changed(moved, PlanningScene(is_diff=False)) == {}
     everything = CollisionObject(operation=CollisionObject.REMOVE)
     change = PlanningScene(is_diff=True)
@@ -310,17 +310,14 @@ class Planner(ViewerRig):
         node.create_timer(0.05, lambda: states.publish(state))
 
     @property
-    def panel(self) -> PlanPanel:
+    def panel(self) -> MotionPlanning:
         """That of the page."""
-        panel = self.viewer._planning.panel
-        assert panel is not None
-        return panel
+        return self.viewer._planning
 
     @property
     def said(self) -> str:
         """What the panel says."""
-        panel = self.viewer._planning.panel
-        return panel._outcome.content if panel else ''
+        return self.panel.outcome.content if self.panel.offered else ''
 
     def do(self, action: str, *arguments: Any, **options: Any) -> None:
         """Do it as a button of the page does."""
@@ -374,7 +371,7 @@ def planner(isolation: Isolation, monkeypatch: pytest.MonkeyPatch) -> Iterator[P
     """Start the page beside a move_group, as if it were open, and wait for the panel."""
     monkeypatch.setattr(RobotPage, 'watched', True)
     with in_domain(isolation, 'port:=8600'), closing(Planner()) as made:
-        made.spin_until(lambda: made.viewer._planning.panel is not None, 'the panel')
+        made.spin_until(lambda: made.panel.offered, 'the panel')
         made.spin_until(lambda: made.node.count_subscribers('joint_states') > 0, 'the page')
         made.spin_until(lambda: len(made.viewer._positions) > 2, 'joint states')
         yield made
@@ -416,15 +413,15 @@ def test_a_goal_that_is_chosen_meanwhile_stays(planner: Planner) -> None:
     planner.do('execute')
     planner.spin_until(lambda: bool(planner.execute.goals), 'an execution')
     planner.do('choose_goal', DRAGGED)
-    planner.spin_until(lambda: planner.panel._goal.value == DRAGGED, 'another goal')
+    planner.spin_until(lambda: planner.panel.goal.value == DRAGGED, 'another goal')
     planner.execute.answer(MoveItErrorCodes.SUCCESS)
     planner.spin_until(lambda: 'executed' in planner.said, 'the end')
-    assert planner.panel._goal.value == DRAGGED
+    assert planner.panel.goal.value == DRAGGED
     planner.plan()
     planner.do('execute')
     planner.spin_until(lambda: len(planner.execute.goals) == 2, 'an execution')
     planner.execute.answer(MoveItErrorCodes.SUCCESS)
-    planner.spin_until(lambda: planner.panel._goal.value == NO_GOAL, 'no goal')
+    planner.spin_until(lambda: planner.panel.goal.value == NO_GOAL, 'no goal')
 
 
 @pytest.mark.scenario
@@ -449,23 +446,23 @@ def test_stop_cancels_and_forgets(planner: Planner) -> None:
     planner.plan()
     planner.do('execute')
     planner.spin_until(lambda: bool(planner.execute.goals), 'an execution')
-    planner.viewer.stop()
+    planner.viewer.actions.stop()
     planner.spin_until(lambda: bool(planner.execute.canceled), 'a cancel')
     planner.spin_until(lambda: [each.data for each in planner.events] == ['stop'], 'the event')
     planner.spin_until(lambda: 'PREEMPTED: canceled' in planner.said, 'the end')
     planner.plan()
     planner.do('execute')
-    planner.viewer.stop()  # in the same turn
+    planner.viewer.actions.stop()  # in the same turn
     planner.spin_until(lambda: len(planner.execute.canceled) == 2, 'a cancel')
     planner.spin_until(lambda: not planner.viewer._planning.busy, 'its end')
     planner.plan()
-    planner.viewer.stop()
+    planner.viewer.actions.stop()
     planner.do('execute')  # it came late
     planner.spin_until(lambda: 'nothing is planned' in planner.said, 'a refusal')
     planner.do('choose_goal', 'up')
     planner.do('plan')
     planner.spin_until(lambda: len(planner.move.goals) == 4, 'a goal')
-    planner.viewer.stop()
+    planner.viewer.actions.stop()
     planner.spin_until(lambda: bool(planner.move.canceled), 'a cancel')
     planner.spin_until(lambda: not planner.viewer._orders, 'the end')
     assert planner.panel.hold in planner.viewer.page.live.off

@@ -22,7 +22,7 @@ from websockets.sync.client import connect
 from websockets.typing import Origin, Subprotocol
 
 from robot_viewer.page import gate
-from robot_viewer.page.gate import binding_problem, COOKIE, Gate, Overlay, STOP_HEADER
+from robot_viewer.page.gate import binding_problem, COOKIE, Gate, STOP_HEADER
 from robot_viewer.page.jog_panel import Actions
 from robot_viewer.page.live import Deadman, HEARTBEAT, Live, LIVE_PATH, RELEASED_AFTER
 from robot_viewer.page.robot_page import RobotPage
@@ -354,6 +354,6 @@ def test_a_server_that_is_not_guarded_is_none() -> None:
     """A version of viser that serves otherwise must not open the page to everybody."""
     with (
         pytest.raises(RuntimeError, match='asks nobody'),
-        Gate('127.0.0.1', Overlay(Nothing().stop, Live(lambda *_: None))).before(),
+        Gate('127.0.0.1', Nothing().stop, Live(lambda *_: None)).before(),
     ):
         pass

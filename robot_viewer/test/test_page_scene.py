@@ -67,12 +67,11 @@ def test_the_past_is_kept_for_half_a_minute() -> None:
         now = 0.02 * number
         history.add({'a': now, 'b': 0.0}, {'a': now - 0.1, 'c': 0.0}, now)
     assert history.joints == ('a',)
-    samples = history.of('a')
-    times = [sample.time for sample in samples]
+    times, targets, positions = history.of('a')
     assert times[-1] - times[0] == pytest.approx(KEPT, abs=2 * STEP)
     assert min(np.diff(times)) >= STEP - 1e-9
-    assert samples[-1].target - samples[-1].position == pytest.approx(0.1)
-    assert history.of('b') == ()
+    assert targets[-1] - positions[-1] == pytest.approx(0.1)
+    assert not history.of('b').size
 
 
 def test_a_drive_is_shown_with_what_it_reports() -> None:
@@ -147,7 +146,7 @@ def server() -> Iterator[ViserServer]:
 def test_joints_move_what_hangs_on_them(server: ViserServer, tmp_path: Path) -> None:
     """A joint may stand before the one that it hangs on; one that follows moves along."""
     trimesh.creation.box().export(tmp_path / 'cube.stl')
-    scene = RobotScene(server.scene, read_urdf(URDF.format(mesh='cube.stl')), tmp_path)
+    scene = RobotScene(server.scene, read_urdf(URDF.format(mesh=tmp_path / 'cube.stl')))
     assert scene.notes == []
     frames = scene._frames
     assert frames['slide'].name == '/robot/base/arm/hand/finger'
@@ -218,7 +217,7 @@ def test_a_mesh_that_no_reader_takes_is_named(
 ) -> None:
     """Whatever its reader raises: the rest of the robot is there."""
     (tmp_path / mesh).write_bytes(content)
-    scene = RobotScene(server.scene, read_urdf(URDF.format(mesh=mesh)), tmp_path)
+    scene = RobotScene(server.scene, read_urdf(URDF.format(mesh=tmp_path / mesh)))
     (found,) = scene.notes
     assert found.startswith(note)
 
@@ -241,8 +240,8 @@ COLLADA = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" versi
 def test_a_mesh_is_shown_in_its_own_unit(tmp_path: Path) -> None:
     """A COLLADA file in millimetres, once; the reader leaves the unit to us."""
     (tmp_path / 'a.dae').write_text(COLLADA)
-    shapes = shapes_of(read_urdf(URDF.format(mesh='a.dae')))
-    mesh, scale = Meshes(tmp_path).read(next(each for each in shapes if each.shape == 'mesh'))
+    shapes = shapes_of(read_urdf(URDF.format(mesh=tmp_path / 'a.dae')))
+    mesh, scale = Meshes().read(next(each for each in shapes if each.shape == 'mesh'))
     assert scale == pytest.approx((0.002, 0.002, 0.002))
     assert mesh.extents == pytest.approx((9.0, 8.0, 7.0))
 

@@ -27,7 +27,6 @@ from quad_msgs.msg import FootContacts
 from robot_viewer.nodes.body import (
     battery_text,
     Body,
-    BodyPanel,
     Contacts,
     DOWN_COLOR,
     horizon_html,
@@ -206,11 +205,9 @@ class Dog(ViewerRig):
         self._text.publish(String(data=URDF))
 
     @property
-    def panel(self) -> BodyPanel:
+    def body(self) -> Body:
         """That of the page."""
-        panel = self.viewer._body.panel
-        assert panel is not None
-        return panel
+        return self.viewer._body
 
     def _publish(self) -> None:
         positions = [self.lift, 0.0, 0.0, 0.0]
@@ -227,22 +224,22 @@ class Dog(ViewerRig):
 
 def test_the_page_shows_how_it_stands(dog: Dog) -> None:
     """Attitude, battery and feet; its sliders move the body until STOP."""
-    dog.spin_until(lambda: dog.viewer._body.panel is not None, 'the panel')
-    dog.spin_until(lambda: 'roll +5.7' in dog.panel._html.content, 'the attitude')
-    dog.spin_until(lambda: 'battery 75 %, 7.4 V' in dog.panel._html.content, 'the battery')
-    dog.spin_until(lambda: 'fr, rl, rr' in dog.panel._html.content, 'contacts')
-    feet = dog.panel._feet
+    dog.spin_until(lambda: dog.body.offered, 'the panel')
+    dog.spin_until(lambda: 'roll +5.7' in dog.body._html.content, 'the attitude')
+    dog.spin_until(lambda: 'battery 75 %, 7.4 V' in dog.body._html.content, 'the battery')
+    dog.spin_until(lambda: 'fr, rl, rr' in dog.body._html.content, 'contacts')
+    feet = dog.body._foot_marks
     dog.spin_until(lambda: tuple(feet['rr_foot'].color) == DOWN_COLOR, 'marks of contacts')
     assert tuple(feet['fl_foot'].color) != DOWN_COLOR
-    dog.panel.show_marks(False)
-    assert not any(mark.visible for mark in dog.panel._marks)
+    dog.body.show_marks(False)
+    assert not any(mark.visible for mark in dog.body._marks)
     dog.sends_contacts = False
     dog.spin_until(lambda: tuple(feet['rr_foot'].color) != DOWN_COLOR, 'the end of old contacts')
-    dog.spin_until(lambda: len(dog.panel._sliders) == 3, 'sliders')
-    publisher = dog.viewer._body._poses
+    dog.spin_until(lambda: len(dog.body._sliders) == 3, 'sliders')
+    publisher = dog.body._poses
     assert publisher is not None
     dog.spin_until(lambda: publisher.get_subscription_count() > 0, 'a subscription')
-    dog.viewer._body.send((0.1, 0.2, -0.01))
+    dog.body.send((0.1, 0.2, -0.01))
     dog.spin_until(lambda: bool(dog.poses), 'a pose')
     turn, place = dog.poses[0].orientation, dog.poses[0].position
     assert roll_pitch((turn.x, turn.y, turn.z, turn.w)) == pytest.approx((0.1, 0.2))
@@ -257,8 +254,8 @@ def test_a_machine_without_the_messages_shows_the_rest(
     said: list[str] = []
     monkeypatch.setattr(dog.viewer.page, 'say', lambda text, **_: said.append(text))
     monkeypatch.setitem(sys.modules, 'quad_msgs.msg', None)
-    dog.spin_until(lambda: dog.viewer._body.panel is not None, 'the panel')
-    dog.spin_until(lambda: 'roll +5.7' in dog.panel._html.content, 'the attitude')
-    dog.spin_until(lambda: len(dog.panel._sliders) == 3, 'sliders')
+    dog.spin_until(lambda: dog.body.offered, 'the panel')
+    dog.spin_until(lambda: 'roll +5.7' in dog.body._html.content, 'the attitude')
+    dog.spin_until(lambda: len(dog.body._sliders) == 3, 'sliders')
     (text,) = (text for text in said if 'quad_msgs' in text)
     assert text.startswith('the body is not shown as a whole: quad_msgs is not installed here')

@@ -367,10 +367,3 @@ def test_a_position_that_is_not_finite_is_left_out(value: float) -> None:
     update = send(publisher(), START, shoulder=value, lift=0.1)
     assert children(update) == {'slider'}
     assert update.problems == (MessageProblem.NOT_FINITE,)
-
-
-@pytest.mark.parametrize('frequency', [-1.0, 1000.1, math.nan])
-def test_a_frequency_beyond_its_range_is_refused(frequency: float) -> None:
-    """With the range."""
-    with pytest.raises(ValueError, match='between 0 and 1000'):
-        Settings(publish_frequency=frequency)

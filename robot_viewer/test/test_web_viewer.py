@@ -112,7 +112,7 @@ class Robot(ViewerRig):
         """
         enables = {'joint1/enable', 'joint2/enable'}
         for service in enables:
-            self.viewer.call('Enable', [f'/{service}'])
+            self.viewer.actions.call('Enable', [f'/{service}'])
         self.spin_until(lambda: enables <= set(self.calls), 'enable')
         called = sorted(each for each in self.calls if each not in enables)
         self.calls.clear()
@@ -169,10 +169,10 @@ def robot(isolation: Isolation, opened: list[bool]) -> Iterator[Robot]:
 def test_stop_halts_every_drive(robot: Robot) -> None:
     """And nothing that merely has a service of that name."""
     robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
-    answer = robot.viewer.stop()
+    answer = robot.viewer.actions.stop()
     assert robot.called_until_enable() == ['joint1/halt', 'joint2/halt']
     assert robot.answer_to(answer) == Stop(stands=True, text='done. done')
-    robot.viewer.call(
+    robot.viewer.actions.call(
         'Enable', ['/nobody/enable']
     )  # after good answers one that fails, which is a warning
     assert not robot.called_until_enable()
@@ -180,11 +180,11 @@ def test_stop_halts_every_drive(robot: Robot) -> None:
 
 def test_stop_is_answered_by_the_robot_alone(robot: Robot, said: list[str]) -> None:
     """Not by a robot that refuses, by none, or by one whose process hangs or has ended."""
-    answer = robot.viewer.stop()
+    answer = robot.viewer.actions.stop()
     assert robot.answer_to(answer) == Stop(stands=False, text='nothing here offers to be stopped')
     robot.success = False
     robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
-    answer = robot.viewer.stop()
+    answer = robot.viewer.actions.stop()
     robot.called_until_enable()
     assert robot.answer_to(answer) == Stop(stands=False, text='/joint1/halt: done')
     robot.success = True
@@ -196,14 +196,14 @@ def test_stop_is_answered_by_the_robot_alone(robot: Robot, said: list[str]) -> N
     robot.spin_until(lambda: '/stop' in robot.viewer._stops, 'the service')
     client = robot.viewer._triggers.client('/stop')
     robot.spin_until(client.service_is_ready, 'a connection')
-    answer = robot.viewer.stop()
+    answer = robot.viewer.actions.stop()
     robot.spin_until(lambda: said[-1:] == ['STOP: no answer from the robot yet'], 'the request')
     assert not robot.called_until_enable()
     assert not answer.done(), 'the one that was asked has not answered'
     hung.destroy_node()
     rclpy.shutdown(context=context)
     robot.spin_until(lambda: not client.service_is_ready(), 'its end')
-    answer = robot.viewer.stop()
+    answer = robot.viewer.actions.stop()
     robot.called_until_enable()
     assert robot.answer_to(answer) == Stop(stands=False, text='/stop is not there')
 
@@ -218,18 +218,18 @@ def test_stop_calls_one_service_that_stops_all(
     service = robot.offer_stop()
     robot.spin_until(lambda: '/stop' in robot.viewer._stops, 'the service')
     robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
-    robot.viewer.stop()
+    robot.viewer.actions.stop()
     robot.spin_until(lambda: 'stop' in robot.calls, 'the stop')
     assert robot.called_until_enable() == ['stop']
     with monkeypatch.context() as lost:  # as after a stall that is longer than the lease of DDS
         lost.setattr(robot.viewer, 'get_node_names_and_namespaces', list)
-        answer = robot.viewer.stop()
+        answer = robot.viewer.actions.stop()
         assert robot.answer_to(answer) == Stop(stands=True, text='done')
         assert robot.called_until_enable() == ['stop']
     robot.node.destroy_service(service)
     client = robot.viewer._triggers.client('/stop')
     robot.spin_until(lambda: not client.service_is_ready(), 'its end')
-    robot.viewer.stop()
+    robot.viewer.actions.stop()
     assert robot.called_until_enable() == ['joint1/halt', 'joint2/halt']
 
 
@@ -272,11 +272,11 @@ def test_a_stop_of_somebody_else_leaves_no_drive_moving(
     is_asked = kind is Trigger
 
     def stopped() -> list[str]:
-        robot.viewer.stop()
+        robot.viewer.actions.stop()
         return robot.called_until_enable()
 
     def reached() -> bool:  # the connection with the first server hides that with the second
-        robot.viewer.stop()
+        robot.viewer.actions.stop()
         return 'stop' in robot.calls
 
     def named() -> int:
@@ -313,7 +313,7 @@ def test_a_stop_of_somebody_else_is_no_answer_of_the_robot(
         robot.spin_until(lambda: '/stop' in robot.viewer._stops, 'the service')
         client = robot.viewer._triggers.client('/stop')
         robot.spin_until(client.service_is_ready, 'a connection')
-        answer = robot.viewer.stop()
+        answer = robot.viewer.actions.stop()
         robot.spin_until(lambda: bool(asked), 'the request')
         assert not robot.answer_to(answer).stands
 
@@ -332,7 +332,7 @@ def test_who_does_not_look_takes_no_messages(
     opened.append(False)
     robot.spin_until(lambda: listeners() == [1, 0, 1], 'their end')
     robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
-    robot.viewer.stop()
+    robot.viewer.actions.stop()
     robot.spin_until(lambda: len(robot.calls) == 2, 'halts')
     robot.viewer._listening.add(JointState, 'more', lambda _: None)
     assert not robot.node.count_subscribers('more')
@@ -401,8 +401,8 @@ def test_each_heartbeat_is_one_command(robot: Robot) -> None:
 
     robot.spin_until(connected, 'the servo')
     for _ in range(3):
-        viewer.jog(TWIST, 'link7')
-    viewer.jog_joint('joint1', -0.3)
+        viewer.actions.jog(TWIST, 'link7')
+    viewer.actions.jog_joint('joint1', -0.3)
     robot.spin_until(lambda: len(robot.jogs) == 3 and bool(joint_jogs), 'jogs')
     assert robot.jogs[0].twist.linear.z == pytest.approx(0.3)
     assert robot.jogs[0].header.frame_id == 'link7'
@@ -495,14 +495,14 @@ def test_a_gripper_is_opened_closed_and_stopped(robot: Robot, said: list[str]) -
     client = robot.viewer._grippers._found['/hand'].client
     robot.spin_until(client.server_is_ready, 'its action')
     for end, word in ((2.0, 'open'), (-2.0, 'close'), (0.5, 'to 0.5000')):
-        robot.viewer.grip('/hand', end)
+        robot.viewer.actions.grip('/hand', end)
         done = partial(said.__contains__, f'/hand: {word}: done, at 2.0000')
         robot.spin_until(done, 'the end')
         assert goals[-1].request.command.position == end
-    robot.viewer.grip('/hand', 2.0)
+    robot.viewer.actions.grip('/hand', 2.0)
     robot.spin_until(lambda: len(goals) == 4, 'a goal')
     robot.spin_until(lambda: robot.viewer._grippers.busy, 'a motion of it')
-    robot.viewer.stop()
+    robot.viewer.actions.stop()
     robot.spin_until(lambda: bool(canceled), 'its end')
     assert not robot.viewer._grippers.busy
     panel = robot.viewer.page._jog
@@ -510,13 +510,13 @@ def test_a_gripper_is_opened_closed_and_stopped(robot: Robot, said: list[str]) -
     panel._grip('Open gripper', '/hand', 2.0)
     assert said[-1] == f'Open gripper: stopped; press {ALLOW} first'
     assert len(goals) == 4
-    robot.viewer.grip('/hand', 2.0)
+    robot.viewer.actions.grip('/hand', 2.0)
     robot.spin_until(lambda: len(goals) == 5, 'a goal')
     assert robot.viewer._grippers.busy
     robot.viewer._grippers.look({}, {})  # its server died before the result
     assert not robot.viewer._grippers.busy
     assert said[-1].startswith('/hand: its action is gone')
-    robot.viewer.stop()
+    robot.viewer.actions.stop()
     # it was missing in the graph only, and goes on
     robot.spin_until(lambda: len(canceled) == 2, 'the end of its motion')
 
@@ -585,10 +585,10 @@ def test_after_stop_the_page_moves_nothing_until_that_is_allowed(robot: Robot) -
     page._stop()
     assert page.live.stopped
     robot.spin_until(lambda: answers[-1].startswith('STOPPED: Done'), 'the answer')
-    robot.viewer.act('Recover joint1')
+    robot.viewer.actions.act('Recover joint1')
     robot.spin_times(5)
     assert page.live.stopped
-    robot.viewer.act(ALLOW)
+    robot.viewer.actions.act(ALLOW)
     robot.spin_until(lambda: answers[-1].startswith('READY: '), 'an end')
     assert not page.live.stopped
     robot.success = False
@@ -635,7 +635,7 @@ def test_the_action_calls_one_group_of_services_after_the_other(robot: Robot) ->
             ).service_is_ready(),
             'the mode',
         )
-        robot.viewer.act('Enable joint1')
+        robot.viewer.actions.act('Enable joint1')
         robot.spin_until(partial(robot.has_called, called), 'calls')
         robot.spin_until(lambda: not robot.viewer._judge._acting, 'the end')
         robot.calls.clear()
@@ -711,24 +711,24 @@ def test_a_target_moves_its_joint_alone(robot: Robot, monkeypatch: pytest.Monkey
     assert list(sent[2].points[0].positions) == [2.0, -1.0]
     slide('a', 0.0)
     target._move()
-    robot.viewer.stop()
+    robot.viewer.actions.stop()
     robot.spin_times(20)
     assert len(sent) == 3
     assert not controller.busy
-    assert controllers.history.of('a')[-1].target == 0.504
+    assert controllers.history.of('a')[1][-1] == 0.504
     monkeypatch.setattr(controllers_module, 'SETTLING_TIMEOUT', 0.1)
     monkeypatch.setattr(controllers_module, 'motion_time', lambda *_: 0.1)
     live = robot.viewer.page.live
     for count in (5, 7):  # after a stop, and after a target that was not reached
         assert live._deadman.beat(1, target.hold, time.monotonic())
-        robot.viewer.aim({'a': 1.0}, 1.0)
+        robot.viewer.actions.aim({'a': 1.0}, 1.0)
         robot.spin_until(lambda count=count: len(sent) == count, 'an empty trajectory and another')
         assert not sent[-2].points
         assert list(sent[-1].points[0].positions) == [1.0, -9.004]
         robot.spin_until(lambda: not controller.busy, 'the end')
         assert not live.held, 'it has to be let go before it moves again'
         live._deadman.release(1, target.hold, time.monotonic() - 1.0)
-        robot.viewer.let_go()
+        robot.viewer.actions.let_go()
 
 
 @pytest.mark.parametrize(('target', 'end'), [(0.5, 'reached'), (1.0, 'not reached')])
@@ -744,7 +744,7 @@ def test_a_press_lasts_until_all_controllers_are_done(
     robot.viewer._controllers.found['/further_controller'] = further
     deadman, hold = robot.viewer.page.live._deadman, panel.hold
     assert deadman.beat(1, hold, time.monotonic())
-    robot.viewer.aim({'a': target, 'c': 1.0}, 1.0)
+    robot.viewer.actions.aim({'a': target, 'c': 1.0}, 1.0)
     robot.spin_until(lambda: any(each.startswith(f'target: {end}') for each in said), 'an end')
     assert not controller.busy
     assert further.busy
@@ -767,12 +767,12 @@ def test_a_motion_to_a_target_ends_when_its_button_is_let_go(
     robot.spin_times(20)
     assert not sent
     monkeypatch.setattr(controllers_module, 'RELEASED_AFTER', math.inf)
-    robot.viewer.aim({'a': 1.0}, 1.0)
+    robot.viewer.actions.aim({'a': 1.0}, 1.0)
     robot.spin_until(lambda: bool(sent), 'a trajectory')
     robot.spin_times(20)
     assert len(sent) == 1
     if way == 'let go':
-        robot.viewer.let_go()
+        robot.viewer.actions.let_go()
     else:
         monkeypatch.setattr(controllers_module, 'RELEASED_AFTER', 0.1)
     robot.spin_until(lambda: len(sent) == 2, 'its end')
@@ -803,7 +803,7 @@ def test_nothing_that_the_robot_sends_ends_the_page(
     robot.description.publish(String(data=ARM))
     robot.spin_until(lambda: 'robot arm' in said, 'the robot')
     robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
-    robot.viewer.stop()
+    robot.viewer.actions.stop()
     assert robot.called_until_enable() == ['joint1/halt', 'joint2/halt']
 
 
@@ -825,7 +825,7 @@ def test_messages_that_are_not_installed_here_leave_the_rest(
     robot.spin_until(lambda: bool(said), 'a sentence')
     assert said == [f'{what}: {package} is not installed here: run `make build`, or install it']
     robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
-    robot.viewer.stop()
+    robot.viewer.actions.stop()
     assert robot.called_until_enable() == ['joint1/halt', 'joint2/halt']
     assert len([each for each in said if package in each]) == 1
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from importlib import import_module
@@ -33,14 +33,13 @@ from urdf_reader import (
 )
 from viser import (
     GuiEvent,
-    GuiHtmlHandle,
     GuiSliderHandle,
     IcosphereHandle,
     LineSegmentsHandle,
 )
 
 from ..page.robot_page import RobotPage
-from ..page.robot_scene import feet_of, FOOT, LEAST_FEET, RobotScene
+from ..page.robot_scene import feet_of, FOOT, LEAST_FEET
 from ..page.style import NEUTRAL, value_of
 from .listening import Listening
 
@@ -72,7 +71,7 @@ class Body:
         self._listening, self._positions = listening, positions
         self._tree: KinematicTree | None = None
         self._feet: tuple[str, ...] = ()
-        self.panel: BodyPanel | None = None
+        self.offered = False  # on the page
         self._attitude: Quaternion | None = None
         self.battery = ''
         self._masses: tuple[PointMass, ...] = ()
@@ -82,10 +81,16 @@ class Body:
         self._support: Support | None = None
         self._found: set[str] = set()
         self._poses: Publisher | None = None
+        self._path = ''  # of the root link in the scene
+        self._seen = True
+        self._sliders: list[GuiSliderHandle[float]] = []
+        self._foot_marks: dict[str, IcosphereHandle] = {}
+        self._mass: IcosphereHandle | None = None
+        self._line: LineSegmentsHandle | None = None
 
     def describe(self, tree: KinematicTree) -> None:
-        """Use another robot; the page has removed the panel."""
-        self._tree, self._feet, self.panel = tree, feet_of(tree), None
+        """Use another robot."""
+        self._tree, self._feet = tree, feet_of(tree)
         self._masses, self._radius = (), 0.0
         self._contacts = self._support = None
         if not self._feet:
@@ -120,11 +125,50 @@ class Body:
             self._poses = self._node.create_publisher(
                 PoseMessage, 'body_pose', QoSProfile(depth=1)
             )
-        if self.panel is None and (self._found or self._poses is not None):
-            robot = self._page.robot
-            self.panel = None if robot is None else BodyPanel(self._page, robot)
-        if self.panel is not None and self._poses is not None:
-            self.panel.offer_pose(self.send)
+        robot = self._page.robot
+        if not self.offered and robot is not None and (self._found or self._poses is not None):
+            self._path = robot.path_of(robot.tree.root)
+            with self._page.place('Body', self):
+                self._folder = self._page.server.gui.add_folder(None)
+            with self._folder:
+                self._html = self._page.server.gui.add_html('')
+            self._page.offer_to_see('feet', self.show_marks)
+            self.offered = True
+        if self.offered and self._poses is not None and not self._sliders:
+            self._offer_pose()
+
+    def remove(self) -> None:
+        """Remove its marks from the view; the page removes its groups."""
+        for mark in self._marks:
+            mark.remove()
+        self._mass = self._line = None
+        self._foot_marks, self._sliders = {}, []
+        self._seen, self.offered = True, False
+
+    def _offer_pose(self) -> None:
+        """Offer the controls of the body."""
+        gui, live = self._page.server.gui, self._page.live
+
+        def moved(event: GuiEvent[GuiSliderHandle[float]]) -> None:
+            if event.client_id is None:  # it was set here
+                return
+            if not live.refuses(event.target.label, always=False):
+                roll, pitch, height = map(value_of, self._sliders)
+                self.send((math.radians(roll), math.radians(pitch), height / 1000.0))
+
+        def level() -> None:
+            if live.refuses(LEVEL_LABEL, always=False):
+                return
+            for slider in self._sliders:
+                slider.value = 0.0  # type: ignore[misc]  # it has a setter
+            self.send((0.0, 0.0, 0.0))
+
+        with self._folder:
+            for label, most in RANGES.items():
+                slider = gui.add_slider(label, -most, most, most / 100.0, 0.0)
+                slider.on_update(moved)
+                self._sliders.append(slider)
+            gui.add_button(LEVEL_LABEL, color=NEUTRAL).on_click(lambda _: level())
 
     def send(self, pose: Pose) -> None:
         """Publish a pose of the body once, at once; the controller moves there slowly."""
@@ -136,7 +180,7 @@ class Body:
 
     def draw(self) -> None:
         """Show how the feet are now."""
-        if self.panel is None or self._tree is None:
+        if not self.offered or self._tree is None:
             return
         if time.monotonic() - self._contacts_at > CONTACTS_AGE:
             self._contacts = None
@@ -149,16 +193,67 @@ class Body:
             centre_of_mass(self._masses, poses),
             self._radius,
         )
-        self.panel.show_feet(places, self._contacts)
-        self.panel.show_support(found)
+        down = frozenset() if self._contacts is None else self._contacts.feet
+        for foot, place in places.items():
+            if foot not in self._foot_marks:
+                self._foot_marks[foot] = self._mark(f'contact_{foot}', FOOT_RADIUS)
+            self._foot_marks[foot].position = place
+            self._foot_marks[foot].color = DOWN_COLOR if foot in down else UP_COLOR
+        self._show_support(found)
 
     def list(self) -> None:
         """Show attitude and battery."""
-        if self.panel is not None:
-            feet = ''
+        if self.offered:
+            html = horizon_html(self._attitude, self.battery)
             if self._contacts is not None and self._support is not None:
-                feet = self._contacts.html(self._support)
-            self.panel.show(horizon_html(self._attitude, self.battery) + feet)
+                html += self._contacts.html(self._support)
+            self._html.content = html
+
+    @property
+    def _marks(self) -> Sequence[IcosphereHandle | LineSegmentsHandle]:
+        marks = (*self._foot_marks.values(), self._mass, self._line)
+        return [mark for mark in marks if mark is not None]
+
+    def show_marks(self, seen: bool) -> None:
+        """Show or hide feet, support and centre of mass."""
+        self._seen = seen
+        for mark in self._marks:
+            mark.visible = seen
+
+    def _show_support(self, support: Support) -> None:
+        """Draw on the ground what the feet span, and the place below the centre of mass."""
+        corners = np.array(support.corners, float).reshape(-1, 3)
+        ends = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+        below, centre = support.below, support.centre
+        if below is not None and centre is not None:
+            ends = np.concatenate([ends, np.array([[centre, below]])])
+            if self._mass is None:
+                self._mass = self._mark('centre_of_mass', MASS_RADIUS)
+            self._mass.position = below
+            outside = support.margin is not None and support.margin < 0.0
+            self._mass.color = OUTSIDE_COLOR if outside else MASS_COLOR
+        if self._mass is not None:
+            self._mass.visible = below is not None and self._seen
+        if self._line is not None and len(self._line.points) == len(ends):
+            self._line.points = ends.astype(np.float32)
+            return
+        if self._line is not None:
+            self._line.remove()
+            self._line = None
+        if len(ends):
+            self._line = self._page.server.scene.add_line_segments(
+                f'{self._path}/support',
+                ends,
+                LINE_COLOR,
+                thickness=LINE_WIDTH,
+                thickness_units='screen',
+                visible=self._seen,
+            )
+
+    def _mark(self, name: str, radius: float) -> IcosphereHandle:
+        return self._page.server.scene.add_icosphere(
+            f'{self._path}/{name}', radius, UP_COLOR, opacity=0.8, visible=self._seen
+        )
 
     def _take_imu(self, message: Imu) -> None:
         turn = message.orientation
@@ -172,120 +267,6 @@ class Body:
 
     def _take_battery(self, message: BatteryState) -> None:
         self.battery = battery_text(message.percentage, message.voltage)
-
-
-class BodyPanel:
-    """Sliders of the body's pose, a horizon, and marks at the feet."""
-
-    def __init__(self, page: RobotPage, robot: RobotScene) -> None:
-        self._gui, self._scene, self._live = page.server.gui, page.server.scene, page.live
-        self._path = robot.path_of(robot.tree.root)
-        with page.place('Body', self):
-            self._folder = self._gui.add_folder(None)
-        with self._folder:
-            self._html: GuiHtmlHandle = self._gui.add_html('')
-        page.offer_to_see('feet', self.show_marks)
-        self._seen = True
-        self._sliders: list[GuiSliderHandle[float]] = []
-        self._feet: dict[str, IcosphereHandle] = {}
-        self._mass: IcosphereHandle | None = None
-        self._line: LineSegmentsHandle | None = None
-
-    def offer_pose(self, send: Callable[[Pose], None]) -> None:
-        """Enable the controls of the body."""
-        if self._sliders:
-            return
-
-        def moved(event: GuiEvent[GuiSliderHandle[float]]) -> None:
-            if event.client_id is None:  # it was set here
-                return
-            if not self._live.refuses(event.target.label, always=False):
-                roll, pitch, height = map(value_of, self._sliders)
-                send((math.radians(roll), math.radians(pitch), height / 1000.0))
-
-        def level() -> None:
-            if self._live.refuses(LEVEL_LABEL, always=False):
-                return
-            for slider in self._sliders:
-                slider.value = 0.0  # type: ignore[misc]  # it has a setter
-            send((0.0, 0.0, 0.0))
-
-        with self._folder:
-            for label, most in RANGES.items():
-                slider = self._gui.add_slider(label, -most, most, most / 100.0, 0.0)
-                slider.on_update(moved)
-                self._sliders.append(slider)
-            self._gui.add_button(LEVEL_LABEL, color=NEUTRAL).on_click(lambda _: level())
-
-    def remove(self) -> None:
-        """Remove its marks from the view."""
-        for node in self._marks:
-            node.remove()
-
-    @property
-    def _marks(self) -> list[IcosphereHandle | LineSegmentsHandle]:
-        marks = (*self._feet.values(), self._mass, self._line)
-        return [mark for mark in marks if mark is not None]
-
-    def show_marks(self, seen: bool) -> None:
-        """Show or hide feet, support and centre of mass."""
-        self._seen = seen
-        for mark in self._marks:
-            mark.visible = seen
-
-    def show(self, html: str) -> None:
-        """Show attitude and battery."""
-        if self._html.content != html:
-            self._html.content = html
-
-    def show_feet(self, places: Mapping[str, Vector], contacts: Contacts | None) -> None:
-        """Mark the feet."""
-        down = frozenset() if contacts is None else contacts.feet
-        for foot, place in places.items():
-            mark = self._feet.get(foot)
-            if mark is None:
-                mark = self._feet[foot] = self._mark(f'contact_{foot}', FOOT_RADIUS)
-            mark.position = place
-            _paint(mark, DOWN_COLOR if foot in down else UP_COLOR)
-
-    def show_support(self, support: Support) -> None:
-        """Draw on the ground what the feet span, and the place below the centre of mass."""
-        corners = np.array(support.corners, float).reshape(-1, 3)
-        ends = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
-        below, centre = support.below, support.centre
-        if below is not None and centre is not None:
-            ends = np.concatenate([ends, np.array([[centre, below]])])
-            if self._mass is None:
-                self._mass = self._mark('centre_of_mass', MASS_RADIUS)
-            self._mass.position = below
-            outside = support.margin is not None and support.margin < 0.0
-            _paint(self._mass, OUTSIDE_COLOR if outside else MASS_COLOR)
-        if self._mass is not None:
-            self._mass.visible = below is not None and self._seen
-        if self._line is not None and len(self._line.points) == len(ends):
-            self._line.points = ends.astype(np.float32)
-            return
-        if self._line is not None:
-            self._line.remove()
-            self._line = None
-        if len(ends):
-            self._line = self._scene.add_line_segments(
-                f'{self._path}/support',
-                ends,
-                LINE_COLOR,
-                thickness=LINE_WIDTH,
-                thickness_units='screen',
-                visible=self._seen,
-            )
-
-    def _mark(self, name: str, radius: float) -> IcosphereHandle:
-        path = f'{self._path}/{name}'
-        return self._scene.add_icosphere(path, radius, UP_COLOR, opacity=0.8, visible=self._seen)
-
-
-def _paint(mark: IcosphereHandle, color: tuple[int, int, int]) -> None:
-    if tuple(mark.color) != color:
-        mark.color = color
 
 
 SOURCES: Mapping[str, str] = {

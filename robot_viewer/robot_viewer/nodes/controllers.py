@@ -57,6 +57,11 @@ class Controller:
     held_at: float = -math.inf  # steady time at which it was seen to be held in [s]
     lets_go: bool = False  # the robot was stopped, or did not follow, and nothing was sent since
 
+    def end(self) -> None:
+        """Send an empty trajectory, which ends what went before."""
+        kind: Any = self.commands.msg_type
+        self.commands.publish(kind())
+
     @property
     def busy(self) -> bool:
         """Whether its joints are on their way."""
@@ -152,7 +157,7 @@ class Controllers:
         """Stop what is on its way to a target: its button was let go."""
         for controller in self.found.values():
             if controller.busy and not controller.arrived:
-                controller.commands.publish(_empty())
+                controller.end()
                 self._conclude(controller, 'target: let go, it stops', failed=False)
             controller.wanted = controller.aimed = None
 
@@ -170,7 +175,7 @@ class Controllers:
         for controller in self.found.values():
             if controller.wanted is not None and controller.lets_go:
                 if now - controller.sent > SILENCE:
-                    controller.commands.publish(_empty())
+                    controller.end()
                     controller.lets_go = False
             elif controller.wanted is not None and controller.positions:
                 (targets, share), controller.wanted = controller.wanted, None
@@ -195,10 +200,6 @@ class Controllers:
     def _conclude(self, controller: Controller, text: str, *, failed: bool) -> None:
         controller.targets = {}
         self._report(text, failed)
-
-
-def _empty() -> Any:  # noqa: ANN401
-    return import_module('trajectory_msgs.msg').JointTrajectory()
 
 
 def _trajectory(controller: Controller, duration: float) -> Any:  # noqa: ANN401
@@ -294,7 +295,7 @@ class Grippers:
         self._calls.clear()
         self._lost.clear()
 
-    def _done(self, what: str, result: Any, why: str) -> None:  # noqa: ANN401
+    def _done(self, what: str, _call: ActionCall, result: Any, why: str) -> None:  # noqa: ANN401
         if why:
             self._report(f'{what}: {why}', True)
             return

@@ -20,7 +20,6 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 from urdf_reader import JointKind as UrdfKind
 from urdf_reader import KinematicTree
-from viser import GuiDropdownHandle, GuiHtmlHandle, GuiNumberHandle
 
 from first_motion import (
     AxisScales,
@@ -32,7 +31,6 @@ from first_motion import (
     JointKind,
     judge,
     Judgement,
-    MotionGuard,
     Order,
     Outcome,
     Sample,
@@ -100,11 +98,14 @@ class FirstMotion:
         statuses: Mapping[str, Status],
         order: Callable[[Callable[[], None]], None],
     ) -> None:
-        self._node, self._page, self.order = node, page, order
+        self._node, self._page, self._order = node, page, order
         self._positions, self._statuses = positions, statuses
         self._kinds: Mapping[str, JointKind] = {}
         self._drives: Mapping[str, str] = {}
-        self._panel: FirstMotionPanel | None = None
+        self._offered = False
+        self._hold: int | None = None  # number of the button, while a motion is prepared
+        self._kind = JointKind.TURNS  # of the joint that is chosen
+        self._causes: Mapping[str, Cause] = {}
         self._publishers: dict[str, Publisher] = {}
         self._attempt = 0  # what is answered for an earlier one counts no more
         self._request = MotionRequest('', 0.0, 0.0)
@@ -133,7 +134,7 @@ class FirstMotion:
             for joint in tree.movable()
             if joint.mimic is None
         }
-        self._drives, self._panel = {}, None  # the page has removed it
+        self._drives = {}
 
     def look(self, services: Mapping[str, Sequence[str]], drives: Collection[str]) -> None:
         """Find the drives that say how they count."""
@@ -145,10 +146,124 @@ class FirstMotion:
         found = {joint: found[joint] for joint in self._kinds if joint in found}
         if not found or found == self._drives:
             return
-        self._end()
         self._drives = found
-        kinds = {joint: self._kinds[joint] for joint in found}
-        self._panel = FirstMotionPanel(self._page, kinds, self)
+        self._offer()
+
+    def _offer(self) -> None:
+        page, gui, order = self._page, self._page.server.gui, self._order
+        with page.place('Diagnose', self):
+            self._folder = gui.add_folder(
+                'First motion', order=page.before_log, expand_by_default=False
+            )
+        with self._folder:
+            self._joint = gui.add_dropdown('Joint', tuple(self._drives))
+            self._distance = gui.add_number('Distance', DISTANCE, step=0.1)
+            self._speed = gui.add_number('Speed', DISTANCE, step=0.1)
+            self._prepare = gui.add_button('Enable and prepare', color=WANTED)
+            self._state = gui.add_html('')
+            self._place_of_hold = gui.add_html('')
+            self._enough = gui.add_button('That is enough', color=NEUTRAL)
+            self._saw = gui.add_dropdown('What you saw', tuple(each.value for each in Saw))
+            self._far = gui.add_number('How far', DISTANCE, step=0.01)
+            self._conclude = gui.add_button('Conclude', color=NEUTRAL)
+            self._verdict = gui.add_html('')
+            self._cause = gui.add_dropdown('Cause', (CHOOSE,))
+            self._lines = gui.add_markdown('')
+            self._write = gui.add_button('Write it into bus.yml', color=CAUTION)
+            self._note = gui.add_html('')
+        self._joint.on_update(lambda _: self._select())
+        self._prepare.on_click(lambda _: order(partial(self.prepare, self._asked())))
+        self._enough.on_click(lambda _: order(self.finish))
+        self._conclude.on_click(lambda _: self._have_seen())
+        self._cause.on_update(lambda _: self._choose())
+        self._write.on_click(lambda _: order(self.write))
+        self._offered = True
+        self._use_units()
+        self._begin('')
+
+    def remove(self) -> None:
+        """Remove it from the page, and command nothing any more."""
+        self._end()
+        self._drop_hold()
+        self._folder.remove()
+        self._offered = False
+
+    def _select(self) -> None:
+        self._order(self.forget)
+        self._use_units()
+
+    def _have_seen(self) -> None:
+        saw, far = Saw(self._saw.value), abs(self._far.value) * self._kind.size
+        self._order(partial(self.conclude, saw, far))
+
+    def _choose(self) -> None:
+        cause = self._causes.get(self._cause.value)
+        if cause is not None:
+            self._order(partial(self.propose, cause))
+
+    def _use_units(self) -> None:
+        kind = self._kind = self._kinds[self._joint.value]
+        furthest, fastest = FURTHEST[kind] / kind.size, FASTEST[kind] / kind.size
+        self._distance.label = f'Distance [{kind.value}]'
+        self._distance.min, self._distance.max = -furthest, furthest
+        self._distance.value = DISTANCE  # type: ignore[misc]  # it has a setter
+        self._speed.label = f'Speed [{kind.value}/s]'
+        self._speed.min, self._speed.max, self._speed.step = 0.1, fastest, 0.1
+        self._speed.value = SPEEDS[kind]  # type: ignore[misc]
+        self._far.label = f'How far [{kind.value}]'
+
+    def _asked(self) -> MotionRequest:
+        size = self._kind.size
+        return MotionRequest(
+            self._joint.value, self._distance.value * size, self._speed.value * size
+        )
+
+    # -- what is shown
+
+    def _begin(self, text: str, *, failed: bool = False, waits: bool = False) -> None:
+        """Show that nothing is prepared, and why, or what is waited for."""
+        # what becomes of a drive that has to be disabled is not hidden by anything else
+        if self._offered and self._disabling is None:
+            self._prepare.disabled = waits
+            self._state.content = line(text, BAD if failed else PLAIN) if text else ''
+            self._show()
+
+    def _show(self, *, moves: bool = False, asks: bool = False, concluded: bool = False) -> None:
+        self._drop_hold()  # what is pressed for a motion moves nothing in the next one
+        if moves:
+            order = self._order
+            self._hold, html = self._page.live.button(
+                Hold(
+                    HOLD,
+                    lambda: order(partial(self.beat, time.monotonic())),
+                    lambda: order(self.release),
+                    always=True,
+                )
+            )
+            self._place_of_hold.content = f'<div class="rv-one">{html}</div>'
+        self._enough.visible = moves
+        for question in (self._saw, self._far, self._conclude):
+            question.visible = asks
+        self._verdict.visible = concluded
+        self._cause.visible = self._lines.visible = self._write.visible = False
+        self._note.content = ''
+
+    def _drop_hold(self) -> None:
+        if self._hold is not None:
+            self._page.live.remove(self._hold)
+            self._hold, self._place_of_hold.content = None, ''
+
+    def list(self) -> None:
+        """Show how far it is; called some times a second."""
+        targets = self._targets
+        if targets is None or targets.guard.detail:
+            return
+        kind, guard = self._kind, targets.guard
+        state, mark = ('moving', GOOD) if guard.moving else ('at rest', PLAIN)
+        if targets.press_anew:
+            state, mark = PRESS_ANEW, BAD
+        way = f'{guard.travelled / kind.size:.3f} of {kind.shown(abs(guard.plan.distance))}'
+        self._note.content = line(f'{state}: {way}', mark)
 
     def take(self, positions: Mapping[str, float]) -> None:
         """Store new positions."""
@@ -174,19 +289,14 @@ class FirstMotion:
         self._end()
         self._begin('')
 
-    def _begin(self, text: str, *, failed: bool = False) -> None:
-        # what becomes of a drive that has to be disabled is not hidden by anything else
-        if self._panel is not None and self._disabling is None:
-            self._panel.begin(text, failed=failed)
-
-    def _fail(self, why: str) -> None:
+    def _fail(self, why: str, *, waits: bool = False) -> None:
         self._end()
-        self._begin(f'{self._request.joint}: {why}', failed=True)
+        self._begin(f'{self._request.joint}: {why}', failed=True, waits=waits)
         self._node.get_logger().warning(f'first motion of {self._request.joint}: {why}')
 
     def prepare(self, request: MotionRequest) -> None:
         """Enable the drive, and say what will happen."""
-        if self._panel is None or request.joint not in self._drives or self._disabling is not None:
+        if request.joint not in self._drives or self._disabling is not None:
             return
         self._end()
         self._request, self._seen_at = request, -math.inf
@@ -199,7 +309,7 @@ class FirstMotion:
         except ModuleNotFoundError as error:
             self._fail(f'{error.name} is not installed here; build the workspace with arm_msgs')
             return
-        self._panel.show_waiting('asking the drive ...', failed=False)
+        self._begin('asking the drive ...', waits=True)
         self._ask_drive(service, READ_UNITS, self._take_units)
 
     def _ask_drive(
@@ -284,7 +394,7 @@ class FirstMotion:
 
     def _ready(self) -> None:
         axis, request, positions = self._axis, self._request, self._positions
-        if self._panel is None or axis is None:
+        if axis is None:
             return
         others = {
             name: positions[name]
@@ -298,7 +408,9 @@ class FirstMotion:
             return
         self._targets = targets = GuardedTargets(plan, time.monotonic())
         self._step = partial(self._move, targets)
-        self._panel.show_ready(list(announcement(request, axis, plan.start)))
+        self._prepare.disabled = False
+        self._state.content = ''.join(map(line, announcement(request, axis, plan.start)))
+        self._show(moves=True)
 
     # -- the motion
 
@@ -347,10 +459,7 @@ class FirstMotion:
     def _disable(self, why: str) -> None:
         """Disable a joint that moves without a command, as at the terminal."""
         joint = self._request.joint
-        self._fail(f'{why}; the drive is being disabled')
-        if self._panel is not None:
-            text = f'{joint}: {why}; the drive is being disabled ...'
-            self._panel.show_waiting(text, failed=True)
+        self._fail(f'{why}; the drive is being disabled ...', waits=True)
         disabling = Disabling(joint, why, time.monotonic() + DISABLE_TIMEOUT)
         self._disabling = disabling
 
@@ -375,12 +484,6 @@ class FirstMotion:
         else:
             self._node.get_logger().warning(text)
 
-    def list(self) -> None:
-        """Show how far it is; called some times a second."""
-        targets = self._targets
-        if targets is not None and not targets.guard.detail and self._panel is not None:
-            self._panel.show_progress(targets.guard, press_anew=targets.press_anew)
-
     def _publisher(self) -> Publisher:
         topic = f'{self._drives[self._request.joint]}/target'
         if topic not in self._publishers:
@@ -390,225 +493,62 @@ class FirstMotion:
     # -- after the motion
 
     def _await_rest(self, targets: GuardedTargets, until: float, now: float) -> None:
-        if now < until or self._panel is None:
+        if now < until:
             return
-        guard = targets.guard
+        guard, kind = targets.guard, self._kinds[self._request.joint]
         self._commanded = targets.commanded
         self._reported = self._positions[self._request.joint] - guard.plan.start
         self._step = self._targets = None
-        self._panel.ask(guard.detail, self._reported)
+        ended = f'{guard.detail}; the drive reported {kind.shown(self._reported)}'
+        self._state.content = line(ended) + line('What did the real joint do?')
+        self._far.value = round(abs(self._reported) / kind.size, 3)  # type: ignore[misc]
+        self._show(asks=True)
 
     def conclude(self, saw: Saw, distance: float) -> None:
         """Conclude from what was seen, and how far about it was in [rad] or [m]."""
         axis, reported = self._axis, self._reported
-        if axis is None or reported is None or self._panel is None:
+        if axis is None or reported is None:
             return
         seen = saw.seen(reported, distance)
         judgement = judge(axis.kind, self._commanded, reported, seen, axis.says)
         self._judgement, self._correction = judgement, None
         text = f'first motion of {self._request.joint}: {judgement.verdict.value}'
         self._node.get_logger().info(text)
-        self._panel.show_judgement(judgement, right=judgement.verdict is Verdict.RIGHT)
-        causes = judgement.causes
-        self.propose(causes[0] if len(causes) == 1 else None)
-
-    def propose(self, cause: Cause | None) -> None:
-        """Propose what corrects a cause; None where it is not chosen yet."""
-        axis, judgement = self._axis, self._judgement
-        if axis is None or judgement is None or self._panel is None:
-            return
-        self._correction = correction_of(axis, judgement, cause)
-        if self._correction is None:
-            return
-        lines = correction_lines(axis.place, self._correction)
-        here = axis.place.is_here
-        self._panel.show_correction(lines, self._correction.notes, writable=here)
-
-    def write(self) -> None:
-        """Change bus.yml."""
-        if self._axis is None or self._correction is None or self._panel is None:
-            return
-        try:
-            path = self._axis.place.write(self._correction)
-        except (OSError, ValueError) as error:
-            self._panel.show_written(str(error), failed=True)
-            return
-        text = f'{path} is written; restart the robot, which has the old scales'
-        self._node.get_logger().info(text)
-        self._panel.show_written(text, failed=False)
-
-
-class FirstMotionPanel:
-    """Asks for what people do, and shows what it is given; it decides nothing."""
-
-    def __init__(
-        self, page: RobotPage, joints: Mapping[str, JointKind], motion: FirstMotion
-    ) -> None:
-        self._joints, self._motion, self._live = joints, motion, page.live
-        self._hold: int | None = None  # while a motion is prepared
-        self._kind = next(iter(joints.values()))
-        self._causes: Mapping[str, Cause] = {}
-        gui = page.server.gui
-        with page.place('Diagnose', self):
-            self._folder = gui.add_folder(
-                'First motion', order=page.before_log, expand_by_default=False
-            )
-        with self._folder:
-            self._joint: GuiDropdownHandle[str] = gui.add_dropdown('Joint', tuple(joints))
-            self._distance: GuiNumberHandle[float] = gui.add_number('Distance', DISTANCE, step=0.1)
-            self._speed: GuiNumberHandle[float] = gui.add_number('Speed', SPEEDS[self._kind])
-            self._prepare = gui.add_button('Enable and prepare', color=WANTED)
-            self._state: GuiHtmlHandle = gui.add_html('')
-            self._place_of_hold: GuiHtmlHandle = gui.add_html('')
-            self._enough = gui.add_button('That is enough', color=NEUTRAL)
-            self._saw: GuiDropdownHandle[str] = gui.add_dropdown(
-                'What you saw', tuple(each.value for each in Saw)
-            )
-            self._far: GuiNumberHandle[float] = gui.add_number('How far', DISTANCE, step=0.01)
-            self._conclude = gui.add_button('Conclude', color=NEUTRAL)
-            self._verdict: GuiHtmlHandle = gui.add_html('')
-            self._cause: GuiDropdownHandle[str] = gui.add_dropdown('Cause', (CHOOSE,))
-            self._lines = gui.add_markdown('')
-            self._write = gui.add_button('Write it into bus.yml', color=CAUTION)
-            self._note: GuiHtmlHandle = gui.add_html('')
-        order = motion.order
-        self._joint.on_update(lambda _: self._select())
-        self._prepare.on_click(lambda _: order(partial(motion.prepare, self._request())))
-        self._enough.on_click(lambda _: order(motion.finish))
-        self._conclude.on_click(
-            lambda _: order(
-                partial(
-                    motion.conclude,
-                    Saw(self._saw.value),
-                    abs(self._far.value) * self._kind.size,
-                )
-            )
-        )
-        self._cause.on_update(lambda _: self._choose())
-        self._write.on_click(lambda _: order(motion.write))
-        self._use_units()
-        self.begin('', failed=False)
-
-    def remove(self) -> None:
-        """Remove it from the page."""
-        self._drop_hold()
-        self._folder.remove()
-
-    # -- what is shown
-
-    def begin(self, text: str, *, failed: bool) -> None:
-        """Show that nothing is prepared, and why."""
-        self._prepare.disabled = False
-        self._state.content = line(text, BAD if failed else PLAIN) if text else ''
-        self._show(moves=False, asks=False, concluded=False)
-
-    def show_waiting(self, text: str, *, failed: bool) -> None:
-        """Show what is waited for; nothing can be prepared meanwhile."""
-        self._prepare.disabled = True
-        self._state.content = line(text, BAD if failed else PLAIN)
-        self._show(moves=False, asks=False, concluded=False)
-
-    def show_ready(self, announced: Sequence[str]) -> None:
-        """Show what will happen, and offer the button."""
-        self._prepare.disabled = False
-        self._state.content = ''.join(line(text) for text in announced)
-        self._note.content = ''
-        self._show(moves=True, asks=False, concluded=False)
-
-    def show_progress(self, guard: MotionGuard, *, press_anew: bool) -> None:
-        """Show how far it is, and that the button does not count until it was let go."""
-        kind, distance = self._kind, guard.plan.distance
-        way = f'{guard.travelled / kind.size:.3f} of {kind.shown(abs(distance))}'
-        state, color = ('moving', GOOD) if guard.moving else ('at rest', PLAIN)
-        if press_anew:
-            state, color = PRESS_ANEW, BAD
-        self._note.content = line(f'{state}: {way}', color)
-
-    def ask(self, ended: str, reported: float) -> None:
-        """Ask what was seen of a motion that has ended."""
-        kind = self._kind
-        self._state.content = line(
-            f'{ended}; the drive reported {kind.shown(reported)}', PLAIN
-        ) + line('What did the real joint do?')
-        self._far.value = round(abs(reported) / kind.size, 3)  # type: ignore[misc]
-        self._note.content = ''
-        self._show(moves=False, asks=True, concluded=False)
-
-    def show_judgement(self, judgement: Judgement, *, right: bool) -> None:
-        """Show what is concluded."""
         causes = [f'{each.text} (factor {each.factor:.4g})' for each in judgement.causes]
+        right = judgement.verdict is Verdict.RIGHT
         texts = [judgement.remedy] if judgement.remedy else causes
         self._verdict.content = line(judgement.verdict.value, GOOD if right else BAD) + ''.join(
-            line(text) for text in texts
+            map(line, texts)
         )
         self._causes = dict(zip(causes, judgement.causes, strict=True))
         self._cause.options = (CHOOSE, *causes)
         self._cause.value = CHOOSE  # type: ignore[misc]
-        self._show(moves=False, asks=True, concluded=True)
+        self._show(asks=True, concluded=True)
         self._cause.visible = len(causes) > 1
+        self.propose(judgement.causes[0] if len(causes) == 1 else None)
 
-    def show_correction(self, lines: str, notes: Sequence[str], *, writable: bool) -> None:
-        """Show what to write."""
-        self._lines.content = f'```yaml\n{lines}\n```'
-        self._lines.visible = True
-        self._write.visible = writable
-        self._note.content = ''.join(line(text) for text in notes)
+    def propose(self, cause: Cause | None) -> None:
+        """Propose what corrects a cause; None where it is not chosen yet."""
+        axis, judgement = self._axis, self._judgement
+        if axis is None or judgement is None:
+            return
+        self._correction = correction_of(axis, judgement, cause)
+        if self._correction is not None:
+            self._lines.content = f'```yaml\n{correction_lines(axis.place, self._correction)}\n```'
+            self._lines.visible = True
+            self._write.visible = axis.place.is_here
+            self._note.content = ''.join(map(line, self._correction.notes))
 
-    def show_written(self, text: str, *, failed: bool) -> None:
-        """Show what became of the file."""
+    def write(self) -> None:
+        """Change bus.yml."""
+        if self._axis is None or self._correction is None:
+            return
+        try:
+            path = self._axis.place.write(self._correction)
+        except (OSError, ValueError) as error:
+            text, mark = str(error), BAD
+        else:
+            text, mark = f'{path} is written; restart the robot, which has the old scales', GOOD
+            self._node.get_logger().info(text)
         self._write.visible = False
-        self._note.content = line(text, BAD if failed else GOOD)
-
-    def _show(self, *, moves: bool, asks: bool, concluded: bool) -> None:
-        self._drop_hold()  # what is pressed for a motion moves nothing in the next one
-        if moves:
-            motion = self._motion
-            self._hold, html = self._live.button(
-                Hold(
-                    HOLD,
-                    lambda: motion.order(partial(motion.beat, time.monotonic())),
-                    lambda: motion.order(motion.release),
-                    always=True,
-                )
-            )
-            self._place_of_hold.content = f'<div class="rv-one">{html}</div>'
-        self._enough.visible = moves
-        for question in (self._saw, self._far, self._conclude):
-            question.visible = asks
-        self._verdict.visible = concluded
-        self._cause.visible = self._lines.visible = self._write.visible = False
-        if not moves and not asks:
-            self._note.content = ''
-
-    def _drop_hold(self) -> None:
-        if self._hold is not None:
-            self._live.remove(self._hold)
-            self._hold, self._place_of_hold.content = None, ''
-
-    # -- what people do
-
-    def _select(self) -> None:
-        self._motion.order(self._motion.forget)
-        self._use_units()
-
-    def _use_units(self) -> None:
-        kind = self._kind = self._joints[self._joint.value]
-        furthest, fastest = FURTHEST[kind] / kind.size, FASTEST[kind] / kind.size
-        self._distance.label = f'Distance [{kind.value}]'
-        self._distance.min, self._distance.max = -furthest, furthest
-        self._distance.value = DISTANCE  # type: ignore[misc]  # it has a setter
-        self._speed.label = f'Speed [{kind.value}/s]'
-        self._speed.min, self._speed.max, self._speed.step = 0.1, fastest, 0.1
-        self._speed.value = SPEEDS[kind]  # type: ignore[misc]
-        self._far.label = f'How far [{kind.value}]'
-
-    def _request(self) -> MotionRequest:
-        size = self._kind.size
-        return MotionRequest(
-            self._joint.value, self._distance.value * size, self._speed.value * size
-        )
-
-    def _choose(self) -> None:
-        cause = self._causes.get(self._cause.value)
-        if cause is not None:
-            self._motion.order(partial(self._motion.propose, cause))
+        self._note.content = line(text, mark)

@@ -11,7 +11,7 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 import hmac
 from http import HTTPStatus
@@ -75,26 +75,6 @@ ID_END = 2**32  # numbers that clients give are below; messages carry them as ui
 CLOSE_TIMEOUT = 1.0  # time for a client to answer that the connection ends, in [s]
 
 
-class AssetError(ValueError):
-    """A file that is not sent."""
-
-
-def read_asset(uri: str) -> bytes:
-    """Read a mesh of a package, or what belongs to one.
-
-    Raises:
-        AssetError: It is something else, or leaves its package.
-        MeshFileError: There is no such package or file.
-        OSError: It cannot be read.
-    """
-    if not MESHES.fullmatch(uri):
-        raise AssetError(f'{uri} is no mesh or image of a package (package://)')
-    # also as %2e%2e, which is decoded before the file is looked for
-    if '..' in PurePosixPath(unquote(uri)).parts:
-        raise AssetError(f'{uri} leaves its package; write it without ..')
-    return find_mesh(uri).read_bytes()
-
-
 @dataclass(frozen=True, slots=True)
 class Admission:
     """Decides who may connect.
@@ -131,14 +111,6 @@ class _Channel:
     qos: QoSProfile | None = None  # of the subscription
 
 
-@dataclass(eq=False, slots=True)
-class _Client:
-    """A client, and the topics that it wants by the numbers that it gave them."""
-
-    connection: ServerConnection
-    topics: dict[int, str] = field(default_factory=dict)
-
-
 class Server:
     """The clients, in a thread of their own; ``wanted`` is called with a topic."""
 
@@ -151,7 +123,8 @@ class Server:
             OSError: The address cannot be bound.
         """
         self._admission, self._wanted = admission, wanted
-        self._clients: set[_Client] = set()
+        # of each client the topics that it wants, by the numbers that it gave them
+        self._clients: dict[ServerConnection, dict[int, str]] = {}
         self._offers: dict[str, dict[str, object]] = {}
         self._loop = asyncio.new_event_loop()
         try:
@@ -179,7 +152,8 @@ class Server:
     @property
     def wanted(self) -> frozenset[str]:
         """The topics that clients want."""
-        return frozenset(t for each in tuple(self._clients) for t in tuple(each.topics.values()))
+        clients = tuple(self._clients.values())
+        return frozenset(topic for topics in clients for topic in tuple(topics.values()))
 
     def offer(self, topic: str, offer: dict[str, object]) -> None:
         """Offer a topic to all clients, also to those that come later."""
@@ -219,82 +193,88 @@ class Server:
 
     def _publish(self, operation: str, values: dict[str, object]) -> None:
         text = json.dumps({'op': operation, **values})
-        broadcast([client.connection for client in self._clients], text)
+        broadcast(self._clients, text)
 
     def _offer(self, topic: str, offer: dict[str, object]) -> None:
         self._offers[topic] = offer
         self._publish('advertise', {'channels': [offer]})
 
     def _withdraw(self, topic: str) -> None:
-        for client in self._clients:
-            client.topics = {n: wanted for n, wanted in client.topics.items() if wanted != topic}
+        for client, topics in self._clients.items():
+            self._clients[client] = {n: each for n, each in topics.items() if each != topic}
         self._publish('unadvertise', {'channelIds': [self._offers.pop(topic)['id']]})
 
     def _send(self, topic: str, stamp: int, data: bytes) -> None:
-        for client in self._clients:
-            if client.connection.transport.get_write_buffer_size() > WAITING:
+        for client, topics in self._clients.items():
+            if client.transport.get_write_buffer_size() > WAITING:
                 continue
-            for number, wanted in client.topics.items():
+            for number, wanted in topics.items():
                 if wanted == topic:
-                    head = struct.pack('<BIQ', MESSAGE_DATA, number, stamp)
-                    broadcast([client.connection], head + data)
+                    broadcast([client], struct.pack('<BIQ', MESSAGE_DATA, number, stamp) + data)
 
     async def _serve(self, connection: ServerConnection) -> None:
-        client = _Client(connection)
         info = {
             'op': 'serverInfo',
             'name': NAME,
             'capabilities': ['assets'],
             'metadata': {'ROS_DISTRO': os.environ.get('ROS_DISTRO', 'jazzy')},
         }
-        self._clients.add(client)
+        self._clients[connection] = {}
         channels = list(self._offers.values())
         broadcast([connection], json.dumps(info))
         broadcast([connection], json.dumps({'op': 'advertise', 'channels': channels}))
         try:
             async for text in connection:
                 with suppress(KeyError, TypeError, ValueError):  # it is none of the protocol
-                    await self._take(client, json.loads(text))
+                    await self._take(connection, json.loads(text))
         except ConnectionClosed:
             pass
         finally:
-            self._clients.discard(client)
+            self._clients.pop(connection, None)
             self._wanted('')
 
-    async def _take(self, client: _Client, message: dict[str, Any]) -> None:
+    async def _take(self, client: ServerConnection, message: dict[str, Any]) -> None:
         match message['op']:
             case 'subscribe':
                 topics = {offer['id']: topic for topic, offer in self._offers.items()}
                 for each in message['subscriptions']:
                     topic = topics.get(each['channelId'], '')
                     if topic and _accepts(client, 'subscription', each['id']):
-                        client.topics[each['id']] = topic
+                        self._clients[client][each['id']] = topic
                         self._wanted(topic)
             case 'unsubscribe':
                 for number in message['subscriptionIds']:
-                    client.topics.pop(number, None)
+                    self._clients[client].pop(number, None)
                 self._wanted('')
             case 'fetchAsset':
                 request, uri = message['requestId'], message['uri']
                 if _accepts(client, 'request', request):
-                    await client.connection.send(await asyncio.to_thread(_asset, request, uri))
+                    await client.send(await asyncio.to_thread(_asset, request, uri))
 
 
-def _accepts(client: _Client, what: str, number: object) -> bool:
+def _accepts(client: ServerConnection, what: str, number: object) -> bool:
     """Return whether messages can carry a number; refuse one that they cannot."""
     fits = type(number) is int and 0 <= number < ID_END
     if not fits:
         text = f'{what} {number!r}: give it a whole number from 0 to {ID_END - 1}'
         status = {'op': 'status', 'level': ERROR, 'message': text}
-        broadcast([client.connection], json.dumps(status))
+        broadcast([client], json.dumps(status))
     return fits
 
 
 def _asset(request: int, uri: str) -> bytes:
-    try:
-        data, failure = read_asset(uri), b''
-    except (OSError, ValueError) as error:
-        data, failure = b'', str(error).encode()
+    """Answer with a mesh of a package, or what belongs to one, or with why it is not sent."""
+    data, failure = b'', b''
+    if not MESHES.fullmatch(uri):
+        failure = f'{uri} is no mesh or image of a package (package://)'.encode()
+    # also as %2e%2e, which is decoded before the file is looked for
+    elif '..' in PurePosixPath(unquote(uri)).parts:
+        failure = f'{uri} leaves its package; write it without ..'.encode()
+    else:
+        try:
+            data = find_mesh(uri).read_bytes()
+        except (OSError, ValueError) as error:
+            failure = str(error).encode()
     return struct.pack('<BIBI', ASSET, request, bool(failure), len(failure)) + failure + data
 
 
@@ -369,8 +349,9 @@ class FoxgloveBridge(Node):
             kind, definition = class_of(type_), message_definition(type_)
         except (DefinitionError, LookupError) as error:
             self._refused.add((name, type_))
-            self.get_logger().warning(f'{name} is not shown: {error}')
-            self._server.warn(f'{name} is not shown: {error}')
+            text = f'{name} is not shown: {error}'
+            self.get_logger().warning(text)
+            self._server.warn(text)
             return
         offer: dict[str, object] = {
             'id': next(self._numbers),

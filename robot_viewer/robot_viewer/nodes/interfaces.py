@@ -120,7 +120,7 @@ class TriggerCalls:
             if len(answers) < len(services):
                 return
             self._running.pop(what, None)
-            bad = [f'{_node_of(each)}: {said}' for each, (ok, said) in answers.items() if not ok]
+            bad = [f'{n.split("/")[-2]}: {said}' for n, (ok, said) in answers.items() if not ok]
             texts = bad or list(dict.fromkeys(said for _, said in answers.values() if said))
             count = f'{len(services) - len(bad)} of {len(services)} done'
             self._report(what, '; '.join((count, *texts)), failed=bool(bad))
@@ -148,11 +148,8 @@ def text_of(call: Future) -> str:
     return f'no answer: {error}' if error is not None else str(call.result().message)
 
 
-def _node_of(service: str) -> str:
-    return service.rpartition('/')[0].rpartition('/')[2]
-
-
-Done = Callable[[Any, str], None]  # takes the result of an action, or None and why there is none
+Done = Callable[['ActionCall', Any, str], None]
+"""Takes a goal and its result, or None and why there is none."""
 
 
 class ActionCall:
@@ -194,7 +191,7 @@ class ActionCall:
 
     def _end(self, result: Any, why: str) -> None:  # noqa: ANN401
         self.ended = True
-        self._done(result, why)
+        self._done(self, result, why)
 
 
 class Border:

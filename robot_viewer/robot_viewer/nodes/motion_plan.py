@@ -7,13 +7,13 @@ The package needs moveit_msgs only where something is planned.
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, TypeAlias
 
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+import numpy as np
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from urdf_reader import (
@@ -84,15 +84,8 @@ class PlannedMotion:
 
     def at(self, time: float) -> dict[str, float]:
         """Return where the joints are at a time in [s], which rest before and after the motion."""
-        after = bisect_right(self.times, time)
-        if not 0 < after < len(self.times):
-            ends = self.points[min(after, len(self.points) - 1)] if self.points else ()
-            return dict(zip(self.joints, ends, strict=True)) if ends else {}
-        begin, end = self.times[after - 1 : after + 1]
-        share = (time - begin) / (end - begin)
-        between = zip(self.points[after - 1], self.points[after], strict=True)
-        places = (start + share * (goal - start) for start, goal in between)
-        return dict(zip(self.joints, places, strict=True))
+        tracks = zip(self.joints, zip(*self.points, strict=True), strict=True)
+        return {joint: float(np.interp(time, self.times, track)) for joint, track in tracks}
 
     def shown(self, elapsed: float) -> dict[str, float] | None:
         """Return where the joints are as it is shown again and again; None when that has ended."""
@@ -136,44 +129,37 @@ def plan_goal(
     options.planning_scene_diff.robot_state.is_diff = options.plan_only = True
     wanted = moveit.Constraints()
     if isinstance(goal, Transform):
-        wanted.position_constraints.append(_place(group.tip, goal, frame))
-        wanted.orientation_constraints.append(_turn(group.tip, goal, frame))
+        ball = import_module('shape_msgs.msg').SolidPrimitive(dimensions=[PLACE_TOLERANCE])
+        ball.type = ball.SPHERE
+        place = moveit.PositionConstraint(
+            header=Header(frame_id=frame), link_name=group.tip, weight=1.0
+        )
+        place.constraint_region.primitives.append(ball)
+        place.constraint_region.primitive_poses.append(pose_message(Transform(goal.translation)))
+        wanted.position_constraints.append(place)
+        turn = moveit.OrientationConstraint(
+            header=Header(frame_id=frame),
+            orientation=pose_message(goal).orientation,
+            link_name=group.tip,
+            absolute_x_axis_tolerance=TURN_TOLERANCE,
+            absolute_y_axis_tolerance=TURN_TOLERANCE,
+            absolute_z_axis_tolerance=TURN_TOLERANCE,
+            weight=1.0,
+        )
+        wanted.orientation_constraints.append(turn)
     else:
-        for name, position in goal.items():
-            wanted.joint_constraints.append(
-                moveit.JointConstraint(
-                    joint_name=name,
-                    position=position,
-                    tolerance_above=JOINT_TOLERANCE,
-                    tolerance_below=JOINT_TOLERANCE,
-                    weight=1.0,
-                )
+        wanted.joint_constraints.extend(
+            moveit.JointConstraint(
+                joint_name=name,
+                position=position,
+                tolerance_above=JOINT_TOLERANCE,
+                tolerance_below=JOINT_TOLERANCE,
+                weight=1.0,
             )
+            for name, position in goal.items()
+        )
     request.goal_constraints.append(wanted)
     return message
-
-
-def _place(link: str, pose: Transform, frame: str) -> Message:
-    constraint = import_module('moveit_msgs.msg').PositionConstraint(
-        header=Header(frame_id=frame), link_name=link, weight=1.0
-    )
-    solid = import_module('shape_msgs.msg').SolidPrimitive
-    region = constraint.constraint_region
-    region.primitives.append(solid(type=solid.SPHERE, dimensions=[PLACE_TOLERANCE]))
-    region.primitive_poses.append(pose_message(Transform(pose.translation)))
-    return constraint
-
-
-def _turn(link: str, pose: Transform, frame: str) -> Message:
-    return import_module('moveit_msgs.msg').OrientationConstraint(
-        header=Header(frame_id=frame),
-        orientation=pose_message(pose).orientation,
-        link_name=link,
-        absolute_x_axis_tolerance=TURN_TOLERANCE,
-        absolute_y_axis_tolerance=TURN_TOLERANCE,
-        absolute_z_axis_tolerance=TURN_TOLERANCE,
-        weight=1.0,
-    )
 
 
 def ik_request(
@@ -218,31 +204,18 @@ def box_message(
     name: str, size: tuple[float, float, float], pose: Transform, frame: str
 ) -> Message:
     """Return a scene to which a box comes, of a size in [m] about a pose in a frame."""
-    moveit, solid = (
-        import_module('moveit_msgs.msg'),
-        import_module('shape_msgs.msg').SolidPrimitive,
-    )
-    box = moveit.CollisionObject(header=Header(frame_id=frame), id=name, pose=pose_message(pose))
-    box.primitives.append(solid(type=solid.BOX, dimensions=list(size)))
-    box.primitive_poses.append(Pose())
-    return _change(box, moveit.CollisionObject.ADD)
+    solid = import_module('shape_msgs.msg').SolidPrimitive
+    box = solid(type=solid.BOX, dimensions=list(size))
+    shapes = {'pose': pose_message(pose), 'primitives': [box], 'primitive_poses': [Pose()]}
+    return scene_change('ADD', name, Header(frame_id=frame), **shapes)
 
 
-def moved_message(thing: Message, pose: Transform) -> Message:
-    """Return a scene in which an object is elsewhere."""
-    kind = import_module('moveit_msgs.msg').CollisionObject
-    return _change(kind(header=thing.header, id=thing.id, pose=pose_message(pose)), kind.MOVE)
-
-
-def removed_message(thing: Message) -> Message:
-    """Return a scene without an object."""
-    kind = import_module('moveit_msgs.msg').CollisionObject
-    return _change(kind(header=thing.header, id=thing.id), kind.REMOVE)
-
-
-def _change(thing: Message, operation: bytes) -> Message:
-    thing.operation = operation
-    scene = import_module('moveit_msgs.msg').PlanningScene(is_diff=True)
+def scene_change(operation: str, name: str, header: Header, **values: object) -> Message:
+    """Return a scene in which an operation of moveit_msgs/CollisionObject changes an object."""
+    moveit = import_module('moveit_msgs.msg')
+    code = getattr(moveit.CollisionObject, operation)
+    thing = moveit.CollisionObject(id=name, header=header, operation=code, **values)
+    scene = moveit.PlanningScene(is_diff=True)
     scene.robot_state.is_diff = True
     scene.world.collision_objects.append(thing)
     return scene

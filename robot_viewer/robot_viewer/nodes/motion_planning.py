@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from itertools import pairwise
@@ -13,17 +12,14 @@ import time
 from typing import Any
 
 import numpy as np
-from rclpy.client import Client
 from rclpy.node import Node
-from rclpy.publisher import Publisher
 from rclpy.task import Future
 from std_msgs.msg import String
-from urdf_reader import DescriptionError, KinematicTree, link_poses, Transform, Vector
+from urdf_reader import DescriptionError, link_poses, Transform
 from viser import (
     GuiButtonHandle,
     GuiDropdownHandle,
     GuiEvent,
-    GuiHtmlHandle,
     LineSegmentsHandle,
     TransformControlsEvent,
     TransformControlsHandle,
@@ -67,18 +63,14 @@ LINE_WIDTH = 3.0  # in [px]
 GOAL_SIZE = 0.22  # of the arrows by which the goal is dragged in [m]
 
 
-@dataclass(frozen=True, slots=True)
-class _Links:
-    """Clients of a move_group, and where executions are ended."""
-
-    move: GoalClient
-    execute: GoalClient
-    ik: Client
-    events: Publisher
-
-
 class MotionPlanning:
-    """What people plan; everything in the thread of the node, and nothing waits."""
+    """What people plan; everything in the thread of the node, and nothing waits.
+
+    Attributes:
+        offered: It is on the page; what it shows there is made with that.
+        hold: Number of the button that executes.
+        scene: The planning scene of move_group.
+    """
 
     def __init__(
         self,
@@ -89,9 +81,9 @@ class MotionPlanning:
     ) -> None:
         """Find no move_group yet."""
         self._node, self._page, self._positions, self._order = node, page, positions, order
-        self._links: _Links | None = None
+        self._connected = self.offered = False
+        self.hold = 0
         self._semantic = ''
-        self.panel: PlanPanel | None = None
         self._groups: Mapping[str, PlanGroup] = {}
         self._group = PlanGroup('', (), '', {})
         self._goal = NO_GOAL
@@ -106,14 +98,13 @@ class MotionPlanning:
         self._canceled_as = ''  # why the page has canceled it
         self._held_at = 0.0  # when the button of the execution was seen to be held
         self._executed_goal: tuple[str, dict[str, float]] = (NO_GOAL, {})
-        self.scene = PlanningScene(node, self.say)
+        self._ghost: RobotScene | None = None
+        self._links: frozenset[str] = frozenset()  # that the group moves
+        self._line: LineSegmentsHandle | None = None
+        self._gizmo: TransformControlsHandle | None = None
+        self.scene = PlanningScene(node, page, self.order, self.say)
 
     # -- what there is
-
-    def describe(self) -> None:
-        """Use another robot; the page has removed the panel."""
-        self.panel = None
-        self._drop()
 
     def look(self, services: Mapping[str, Sequence[str]]) -> None:
         """Find a move_group in the namespace of the node."""
@@ -121,26 +112,24 @@ class MotionPlanning:
             kind in services.get(self._node.resolve_service_name(name), ())
             for name, kind in OFFERED.items()
         )
-        if self._links is None:
+        if not self._connected:
             if there:
                 self._connect()
         elif not there and self._execution is not None:
             self._execution = None
-            if self.panel is not None:
-                self._page.live.end(self.panel.hold)
+            self._page.live.end(self.hold)
             self.say('move_group is gone; what it executed may go on: STOP', failed=True)
-        if self.panel is None and self._semantic and self._page.robot is not None:
+        if not self.offered and self._semantic and self._page.robot is not None:
             self._offer(self._page.robot)
 
     def _connect(self) -> None:
         node, actions = self._node, import_module('moveit_msgs.action')
         solve = import_module('moveit_msgs.srv').GetPositionIK
-        self._links = _Links(
-            GoalClient(node, actions.MoveGroup, MOVE),
-            GoalClient(node, actions.ExecuteTrajectory, EXECUTE),
-            node.create_client(solve, 'compute_ik'),
-            node.create_publisher(String, 'trajectory_execution_event', 10),
-        )
+        self._move = GoalClient(node, actions.MoveGroup, MOVE)
+        self._execute = GoalClient(node, actions.ExecuteTrajectory, EXECUTE)
+        self._ik = node.create_client(solve, 'compute_ik')
+        self._events = node.create_publisher(String, 'trajectory_execution_event', 10)
+        self._connected = True
         node.create_subscription(String, 'robot_description_semantic', self._name_groups, LATCHED)
         self.scene.connect()
 
@@ -148,7 +137,8 @@ class MotionPlanning:
         self._semantic = str(message.data)
 
     def _offer(self, robot: RobotScene) -> None:
-        if not self._page.has('Plan'):
+        page, gui = self._page, self._page.server.gui
+        if not page.has('Plan'):
             return
         try:
             self._groups = plan_groups(robot.tree, self._semantic)
@@ -156,9 +146,57 @@ class MotionPlanning:
             self._node.get_logger().error(f'robot_description_semantic: {error}')
             self._semantic = ''
             return
-        self.panel = PlanPanel(self._page, robot, list(self._groups), self)
-        self._page.cancel = partial(self.order, self._drop)
+        self._robot = robot
+        with page.place('Plan', self):
+            self._group_box = self._dropdown('Group', tuple(self._groups), self.choose_group)
+            self.goal = self._dropdown('Goal', (NO_GOAL, DRAGGED), self.choose_goal)
+            self._button('Plan motion', self.plan, WANTED)
+            self.outcome = gui.add_html('')
+            self._again = self._button('Show motion again', self.show_again)
+            self.hold, html = page.live.button(
+                Hold(
+                    HOLD_EXECUTE,
+                    lambda: self.order(partial(self.go_on, time.monotonic())),
+                    lambda: self.order(self.let_go),
+                    lambda: self.order(partial(self.execute, time.monotonic())),
+                )
+            )
+            gui.add_html(f'<div class="rv-one">{html}</div>')
+            self.scene.offer(robot)
+        self.offered = True
+        page.cancel = partial(self.order, self._drop)
+        self._allow(execute=False)
         self.choose_group(next(iter(self._groups)))
+
+    def _dropdown(
+        self, label: str, options: Sequence[str], action: Callable[[str], None]
+    ) -> GuiDropdownHandle[str]:
+        dropdown = self._page.server.gui.add_dropdown(label, options)
+
+        def chosen(event: GuiEvent[GuiDropdownHandle[str]]) -> None:
+            if event.client_id is not None:  # or it was set here
+                self.order(partial(action, event.target.value))
+
+        dropdown.on_update(chosen)
+        return dropdown
+
+    def _button(
+        self, label: str, press: Callable[[], None], color: Color = NEUTRAL
+    ) -> GuiButtonHandle:
+        button = self._page.server.gui.add_button(label, color=color)
+        button.on_click(lambda _: self.order(press))
+        return button
+
+    def remove(self) -> None:
+        """Remove it from the page: another robot comes."""
+        self._drop()
+        self.offered, self._pose = False, None
+        self._page.live.remove(self.hold)
+        self.scene.remove()
+        for node in (self._ghost, self._line, self._gizmo):
+            if node is not None:
+                node.remove()
+        self._ghost = self._line = self._gizmo = None
 
     # -- what people do
 
@@ -166,7 +204,7 @@ class MotionPlanning:
         """Carry out an action of the page, unless it belongs to a robot that has gone."""
 
         def act() -> None:
-            if self.panel is not None:
+            if self.offered:
                 action()
 
         self._order(act)
@@ -177,12 +215,11 @@ class MotionPlanning:
 
     def stop(self) -> None:
         """End what is executed and planned, also of others; nothing planned stays executable."""
-        if self._links is None:
-            return
-        self._links.events.publish(String(data=STOP))
-        if self._execution is not None:
-            self._execution.cancel()
-        self._drop()
+        if self._connected:
+            self._events.publish(String(data=STOP))
+            if self._execution is not None:
+                self._execution.cancel()
+            self._drop()
 
     def go_on(self, at: float) -> None:
         """Go on with the execution: its button was seen to be held at a steady time in [s]."""
@@ -214,71 +251,74 @@ class MotionPlanning:
 
     def draw(self) -> None:
         """Show the next picture of a plan, if it is being shown."""
-        if self.panel is None or self._motion is None or self._shown_since is None:
+        if self._motion is None or self._shown_since is None:
             return
         places = self._motion.shown(time.monotonic() - self._shown_since)
         if places is None:
             self._shown_since, places = None, self._motion.at(self._motion.duration)
         self._show_ghost(places)
 
-    def _show_ghost(self, goals: Mapping[str, float]) -> None:
-        if self.panel is not None:
-            self.panel.show_ghost(moved(self.panel.tree, self._positions, goals))
-
     def choose_group(self, name: str) -> None:
         """Plan for another group."""
         self._group = self._groups[name]
-        if self.panel is not None:
-            self.panel.show_group(self._group)
+        self._group_box.value = name  # type: ignore[misc]  # it has a setter
+        self.goal.options = (NO_GOAL, DRAGGED, *self._group.states)
+        links = links_beyond(self._robot.tree, frozenset(self._group.joints))
+        if links != self._links and self._ghost is not None:
+            self._ghost.remove()
+            self._ghost = None
+        self._links = links
         self.choose_goal(NO_GOAL)
 
     def choose_goal(self, name: str) -> None:
         """Go to a state of the SRDF, or to where the goal is dragged."""
-        panel = self.panel
-        if panel is None:
-            return
         self._drop()
         self._goal, self._pose, self._joints = name, None, {}
         if name in self._group.states or name == DRAGGED:
             here = {each: self._positions.get(each, 0.0) for each in self._group.joints}
             self._joints = {**here, **self._group.states.get(name, {})}
-        panel.show_goal(name)
-        panel.say('')
-        if not self._joints:
-            panel.place_goal(None)
-            panel.show_ghost(None)
-            return
-        everywhere = moved(panel.tree, self._positions, self._joints)
-        panel.place_goal(link_poses(panel.tree, everywhere)[self._group.tip])
-        panel.show_ghost(everywhere)
+        self.goal.value = name  # type: ignore[misc]
+        self.say('')
+        if self._joints:
+            tree = self._robot.tree
+            if self._gizmo is None:
+                self._gizmo = self._page.server.scene.add_transform_controls(
+                    f'{self._robot.path_of(tree.root)}/goal', GOAL_SIZE, disable_sliders=True
+                )
+                self._gizmo.on_update(self._dragged)
+            poses = link_poses(tree, moved(tree, self._positions, self._joints))
+            put(self._gizmo, poses[self._group.tip])
+            self._show_ghost(self._joints)
+        elif self._ghost is not None:
+            self._ghost.show(seen=False)
+        if self._gizmo is not None:
+            self._gizmo.visible = bool(self._joints)
+
+    async def _dragged(self, event: TransformControlsEvent) -> None:
+        self.order(partial(self.drag_goal, pose_of(event.target)))  # coroutines keep their order
 
     def drag_goal(self, pose: Transform) -> None:
         """Set the goal of the tip to a pose in the root link."""
         self._drop()
-        if self._goal != DRAGGED and self.panel is not None:
-            self._goal = DRAGGED
-            self.panel.show_goal(DRAGGED)
-        self._pose = pose
+        self._goal, self._pose = DRAGGED, pose
+        self.goal.value = DRAGGED  # type: ignore[misc]
         self._solve()
 
     def _solve(self) -> None:
         """Solve for joints that bring the tip to the dragged pose; one request at a time."""
-        links, panel = self._links, self.panel
         pose, now = self._pose, time.monotonic()
-        if pose is None or links is None or panel is None:
+        if pose is None or (self._asked is not None and now - self._asked < ANSWER_TIME):
             return
-        if self._asked is not None and now - self._asked < ANSWER_TIME:
-            return
-        if not links.ik.service_is_ready():
+        if not self._ik.service_is_ready():
             self.say('compute_ik is not there', failed=True)
             return
         self._asked = now
-        request = ik_request(self._group, pose, panel.tree.root, self._joints)
-        links.ik.call_async(request).add_done_callback(lambda done: self._solved(pose, done))
+        request = ik_request(self._group, pose, self._robot.tree.root, self._joints)
+        self._ik.call_async(request).add_done_callback(lambda done: self._solved(pose, done))
 
     def _solved(self, asked: Transform, future: Future) -> None:
         self._asked = None
-        if self._pose is None or self.panel is None:
+        if self._pose is None:
             return
         if future.exception() is not None:
             self.say(f'compute_ik: no answer: {future.exception()}', failed=True)
@@ -296,45 +336,43 @@ class MotionPlanning:
 
     def plan(self) -> None:
         """Plan, at the speed of the page."""
-        links, panel = self._links, self.panel
-        goal = self._pose or self._joints
-        if links is None or panel is None:
-            return
+        goal, reason = self._pose or self._joints, ''
         if not goal:
-            self.say('choose a goal first: a state, or one that is dragged', failed=True)
-            return
-        if self._execution is not None:
-            self.say('it is still executing; STOP ends it', failed=True)
-            return
-        if not links.move.server_is_ready():
-            self.say(f'{MOVE} is not there', failed=True)
+            reason = 'choose a goal first: a state, or one that is dragged'
+        elif self.busy:
+            reason = 'it is still executing; STOP ends it'
+        elif not self._move.server_is_ready():
+            reason = f'{MOVE} is not there'
+        if reason:
+            self.say(reason, failed=True)
             return
         self._drop()
         self.say('planning ...')
-        message = plan_goal(self._group, goal, panel.tree.root, self._page.speed())
-        call = ActionCall(
-            links.move, message, lambda result, why: self._planned(call, result, why)
-        )
-        self._planning = call
+        message = plan_goal(self._group, goal, self._robot.tree.root, self._page.speed())
+        self._planning = ActionCall(self._move, message, self._planned)
 
     def _planned(self, call: ActionCall, result: Message, why: str) -> None:
-        if call is not self._planning or self.panel is None:
+        if call is not self._planning:
             return  # of a request that counts no more
         self._planning = None
         reason = why or refusal(result.error_code)
         if reason:
             self.say(reason, failed=True)
             return
-        self._trajectory = result.planned_trajectory
-        self._motion = motion = planned_motion(self._trajectory)
+        self._motion = motion = planned_motion(result.planned_trajectory)
         if motion.duration == 0.0:
-            self._trajectory = None
             self.say('it is there already', failed=False)
             return
-        self._shown_since = time.monotonic()
-        tree, tip = self.panel.tree, self._group.tip
-        self.panel.show_line(tip_line(tree, tip, self._positions, motion))
-        self.panel.allow(execute=True)
+        self._trajectory, self._shown_since = result.planned_trajectory, time.monotonic()
+        points = tip_line(self._robot.tree, self._group.tip, self._positions, motion)
+        self._line = self._page.server.scene.add_line_segments(
+            f'{self._robot.path_of(self._robot.tree.root)}/line',
+            np.array(list(pairwise(points))),
+            LINE_COLOR,
+            thickness=LINE_WIDTH,
+            thickness_units='screen',
+        )
+        self._allow(execute=True)
         notes = f'; {result.error_code.message}' if result.error_code.message else ''
         self.say(
             f'the motion takes {motion.duration:.1f} s, planned in'
@@ -346,13 +384,10 @@ class MotionPlanning:
         """Execute what was planned; the button was seen to be held at a steady time in [s]."""
         if time.monotonic() - at > RELEASED_AFTER:
             return  # this node was held up; the button may be let go
-        links = self._links
-        if links is None or self.panel is None:
-            return
-        if self._trajectory is None:
+        if self._trajectory is None or self._motion is None:
             self.say('nothing is planned that may be executed', failed=True)
             return
-        if not links.execute.server_is_ready():
+        if not self._execute.server_is_ready():
             self.say(f'{EXECUTE} is not there', failed=True)
             return
         goal = import_module('moveit_msgs.action').ExecuteTrajectory.Goal()
@@ -360,14 +395,10 @@ class MotionPlanning:
         self._trajectory, self._shown_since, self._held_at = None, None, at
         self._canceled_as = ''
         self._executed_goal = self._goal, self._joints
-        self.panel.allow(execute=False)
-        if self._motion is not None:
-            self._show_ghost(self._motion.at(self._motion.duration))
+        self._allow(execute=False)
+        self._show_ghost(self._motion.at(self._motion.duration))
         self.say('executing ...')
-        call = ActionCall(
-            links.execute, goal, lambda result, why: self._executed(call, result, why)
-        )
-        self._execution = call
+        self._execution = ActionCall(self._execute, goal, self._executed)
 
     def _executed(self, call: ActionCall, result: Message, why: str) -> None:
         if call is not self._execution:
@@ -376,9 +407,8 @@ class MotionPlanning:
         reason = why or refusal(result.error_code)
         if reason and self._canceled_as:
             reason = f'ended, as {self._canceled_as} ({reason})'
-        if self.panel is not None:
-            self._page.live.end(self.panel.hold)
-        if not reason and self._executed_goal == (self._goal, self._joints):
+        self._page.live.end(self.hold)
+        if self.offered and not reason and self._executed_goal == (self._goal, self._joints):
             self.choose_goal(NO_GOAL)  # unless another one was chosen meanwhile
         self.say(reason or 'executed', failed=bool(reason))
 
@@ -388,147 +418,31 @@ class MotionPlanning:
             self._planning.cancel()
             self._planning = None
             self.say('canceled')
-        if self._motion is not None and self.panel is not None:
-            self.panel.show_line(())
-            self.panel.allow(execute=False)
-        self._trajectory = self._motion = self._shown_since = None
-
-    def say(self, text: str, *, failed: bool | None = None) -> None:
-        """Show what became of the last request."""
-        if self.panel is not None:
-            self.panel.say(text, failed=failed)
-
-
-class PlanPanel:
-    """Goal, ghost and path of a planned motion on the page."""
-
-    def __init__(
-        self, page: RobotPage, robot: RobotScene, groups: Sequence[str], plan: MotionPlanning
-    ) -> None:
-        self._page, self._robot, self._plan = page, robot, plan
-        self.tree: KinematicTree = robot.tree
-        self._path = robot.path_of(self.tree.root)
-        self._ghost: RobotScene | None = None
-        self._links: frozenset[str] = frozenset()
-        self._line: LineSegmentsHandle | None = None
-        self._gizmo: TransformControlsHandle | None = None
-        gui = page.server.gui
-        with page.place('Plan', self):
-            self._group = self._dropdown('Group', groups, plan.choose_group)
-            self._goal = self._dropdown('Goal', (NO_GOAL, DRAGGED), plan.choose_goal)
-            self._button('Plan motion', plan.plan, WANTED)
-            self._outcome: GuiHtmlHandle = gui.add_html('')
-            self._again = self._button('Show motion again', plan.show_again)
-            self.hold, html = page.live.button(
-                Hold(
-                    HOLD_EXECUTE,
-                    lambda: plan.order(partial(plan.go_on, time.monotonic())),
-                    lambda: plan.order(plan.let_go),
-                    lambda: plan.order(partial(plan.execute, time.monotonic())),
-                )
-            )
-            gui.add_html(f'<div class="rv-one">{html}</div>')
-            plan.scene.offer(page, robot, plan.order)
-        self.allow(execute=False)
-
-    def remove(self) -> None:
-        """Remove it from the page; what is attached to the robot goes with the robot."""
-        self._page.live.remove(self.hold)
-        self._plan.scene.remove()
-        for node in (self._ghost, self._line, self._gizmo):
-            if node is not None:
-                node.remove()
-
-    def show_group(self, group: PlanGroup) -> None:
-        """Show which group is planned for, and its states."""
-        choose(self._group, group.name)
-        self._goal.options = (NO_GOAL, DRAGGED, *group.states)
-        links = links_beyond(self.tree, frozenset(group.joints))
-        if links != self._links and self._ghost is not None:
-            self._ghost.remove()
-            self._ghost = None
-        self._links = links
-
-    def show_goal(self, name: str) -> None:
-        """Show which goal is chosen."""
-        choose(self._goal, name)
-
-    def place_goal(self, pose: Transform | None) -> None:
-        """Show the goal's handle at a pose."""
-        if pose is None:
-            if self._gizmo is not None:
-                self._gizmo.visible = False
-            return
-        if self._gizmo is None:
-            self._gizmo = self._page.server.scene.add_transform_controls(
-                f'{self._path}/goal', GOAL_SIZE, disable_sliders=True
-            )
-            self._gizmo.on_update(self._dragged)
-        put(self._gizmo, pose)
-        self._gizmo.visible = True
-
-    async def _dragged(self, event: TransformControlsEvent) -> None:
-        # coroutines keep their order
-        self._plan.order(partial(self._plan.drag_goal, pose_of(event.target)))
-
-    def show_ghost(self, positions: Mapping[str, float] | None) -> None:
-        """Show the robot where it is not."""
-        if positions is None:
-            if self._ghost is not None:
-                self._ghost.show(seen=False)
-            return
-        if self._ghost is None:
-            self._ghost = self._robot.ghost('ghost', self._links, GHOST_TINT)
-        self._ghost.place(positions)
-        self._ghost.show(seen=True)
-
-    def show_line(self, points: Sequence[Vector]) -> None:
-        """Draw where the tip passes."""
         if self._line is not None:
             self._line.remove()
             self._line = None
-        if len(points) > 1:
-            self._line = self._page.server.scene.add_line_segments(
-                f'{self._path}/line',
-                np.array(list(pairwise(points))),
-                LINE_COLOR,
-                thickness=LINE_WIDTH,
-                thickness_units='screen',
-            )
+        if self.offered:
+            self._allow(execute=False)
+        self._trajectory = self._motion = self._shown_since = None
+
+    # -- what is shown
+
+    def _show_ghost(self, goals: Mapping[str, float]) -> None:
+        """Show the robot with joints at goals."""
+        if self._ghost is None:
+            self._ghost = self._robot.ghost('ghost', self._links, GHOST_TINT)
+        self._ghost.place(moved(self._robot.tree, self._positions, goals))
+        self._ghost.show(seen=True)
 
     def say(self, text: str, *, failed: bool | None = None) -> None:
         """Show what became of the last request."""
-        mark = PLAIN if failed is None else BAD if failed else GOOD
-        self._outcome.content = line(text, mark) if text else ''
+        if self.offered:
+            mark = PLAIN if failed is None else BAD if failed else GOOD
+            self.outcome.content = line(text, mark) if text else ''
 
-    def allow(self, *, execute: bool) -> None:
+    def _allow(self, *, execute: bool) -> None:
         """Enable the buttons that need a plan."""
         self._again.disabled = not execute
         self._page.live.off.pop(self.hold, None)
         if not execute:
             self._page.live.off[self.hold] = 'Plan a motion first.'
-
-    def _dropdown(
-        self, label: str, options: Sequence[str], action: Callable[[str], None]
-    ) -> GuiDropdownHandle[str]:
-        dropdown = self._page.server.gui.add_dropdown(label, tuple(options))
-
-        def chosen(event: GuiEvent[GuiDropdownHandle[str]]) -> None:
-            if event.client_id is not None:  # or it was set here
-                self._plan.order(partial(action, event.target.value))
-
-        dropdown.on_update(chosen)
-        return dropdown
-
-    def _button(
-        self, label: str, press: Callable[[], None], color: Color = NEUTRAL
-    ) -> GuiButtonHandle:
-        button = self._page.server.gui.add_button(label, color=color)
-        button.on_click(lambda _: self._plan.order(press))
-        return button
-
-
-def choose(dropdown: GuiDropdownHandle[str], option: str) -> None:
-    """Show that an option is chosen."""
-    if dropdown.value != option:
-        dropdown.value = option  # type: ignore[misc]  # it has a setter

@@ -34,8 +34,8 @@ from .motion_plan import (
     box_message,
     changed,
     Message,
-    moved_message,
-    removed_message,
+    pose_message,
+    scene_change,
     SceneObject,
     transform_of,
 )
@@ -49,6 +49,10 @@ GIZMO_SIZE = 0.2  # of the arrows by which an object is dragged in [m]
 BOX_SIZE = (0.2, 0.2, 0.2)  # of a new box in [m]
 
 
+Order = Callable[[Callable[[], object]], None]
+"""Has something done in the thread of the node, as long as this robot is shown."""
+
+
 class Say(Protocol):
     """Shows what became of a request."""
 
@@ -59,8 +63,8 @@ class Say(Protocol):
 class PlanningScene:
     """What move_group has in its scene; everything in the thread of the node."""
 
-    def __init__(self, node: Node, say: Say) -> None:
-        self._node, self._say = node, say
+    def __init__(self, node: Node, page: RobotPage, order: Order, say: Say) -> None:
+        self._node, self._page, self._order, self._say = node, page, order, say
         self._apply: Client | None = None
         self._whole: Client | None = None
         self._robot: RobotScene | None = None  # on which it is shown
@@ -82,12 +86,10 @@ class PlanningScene:
         self._whole = node.create_client(services.GetPlanningScene, 'get_planning_scene')
         node.create_subscription(scene, 'monitored_planning_scene', self._take, LATCHED)
 
-    def offer(
-        self, page: RobotPage, robot: RobotScene, order: Callable[[Callable[[], object]], None]
-    ) -> None:
+    def offer(self, robot: RobotScene) -> None:
         """Show the scene beside a robot, and offer to change it."""
-        self._page, self._robot, self._order, self._seen = page, robot, order, True
-        gui = page.server.gui
+        self._robot, self._seen = robot, True
+        gui, order = self._page.server.gui, self._order
         self.chosen: GuiDropdownHandle[str] = gui.add_dropdown('Object', (NO_OBJECT,))
         self._remove: GuiButtonHandle = gui.add_button('Remove object', color=NEUTRAL)
         size = gui.add_vector3(
@@ -103,7 +105,7 @@ class PlanningScene:
         gui.add_button('Add box', color=NEUTRAL).on_click(
             lambda _: order(partial(self.add_box, size.value))
         )
-        page.offer_to_see('objects', lambda seen: order(partial(self.show_objects, seen)))
+        self._page.offer_to_see('objects', lambda seen: order(partial(self.show_objects, seen)))
         self._show()
         self._ask()
 
@@ -160,7 +162,7 @@ class PlanningScene:
             self.chosen.options = free
         thing = self._objects.get(self._name)
         thing = None if thing is not None and thing.attached else thing
-        if self._name in free and self.chosen.value != self._name:
+        if self._name in free:
             self.chosen.value = self._name  # type: ignore[misc]  # it has a setter
         self._remove.disabled = thing is None
         self._remove.label = f'Remove {"object" if thing is None else self._name}'
@@ -213,7 +215,9 @@ class PlanningScene:
         if self._name in self._drawn:
             put(self._drawn[self._name][1], pose)
         if is_last:
-            self._change(moved_message(thing.message, pose), f'{self._name} is moved')
+            header, place = thing.message.header, pose_message(pose)
+            change = scene_change('MOVE', self._name, header, pose=place)
+            self._change(change, f'{self._name} is moved')
 
     def add_box(self, size: tuple[float, float, float]) -> None:
         """Add a box of a size in [m]."""
@@ -231,7 +235,8 @@ class PlanningScene:
         thing = self._objects.get(self._name)
         if thing is not None:
             what, self._name = f'{self._name} is removed', NO_OBJECT
-            self._change(removed_message(thing.message), what)
+            change = scene_change('REMOVE', thing.message.id, thing.message.header)
+            self._change(change, what)
 
     def _change(self, scene: Message, what: str) -> None:
         if self._apply is None or not self._apply.service_is_ready():

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import fields
 from pathlib import Path
 import sys
 
@@ -33,7 +34,6 @@ from node_runner import (
 
 from ..state_publisher import (
     FrameTransform,
-    HIGHEST_FREQUENCY,
     MessageProblem,
     Settings,
     StatePublisher,
@@ -42,6 +42,7 @@ from ..state_publisher import (
 NAME = 'robot_state_publisher'
 DESCRIPTION = 'robot_description'
 DEFAULTS = Settings()
+HIGHEST_FREQUENCY = 1000.0  # greatest publish_frequency in [Hz] (robot_state_publisher 3.3.3)
 TF_DEPTH = 100
 """Queue of /tf, as tf2_ros has it."""
 
@@ -58,7 +59,21 @@ class RobotStatePublisher(Node):
             DescriptionError: The description cannot be used.
         """
         super().__init__(NAME)
-        declare(self, description)
+        read = ParameterReader(self, fixed=False)
+        read.number(
+            'publish_frequency',
+            DEFAULTS.publish_frequency,
+            (0.0, HIGHEST_FREQUENCY),
+            'greatest rate of each transform in [Hz]; 0: one for every message',
+        )
+        read.text(
+            'frame_prefix', DEFAULTS.frame_prefix, 'put in front of each frame name, as it is'
+        )
+        read.flag(
+            'ignore_timestamp', 'publish at each message, whatever its stamp is', default=False
+        )
+        read.text(DESCRIPTION, description, 'URDF as XML text; may be changed while it runs')
+        refuse_misspelt(self)
         if not self.get_parameter(DESCRIPTION).value:
             raise ParameterError(
                 'no robot_description: give the URDF as a parameter, or the name of a URDF file '
@@ -75,7 +90,7 @@ class RobotStatePublisher(Node):
             qos_profile_sensor_data,
             qos_overriding_options=QoSOverridingOptions.with_default_policies(),
         )
-        self.add_on_set_parameters_callback(check)
+        self.add_on_set_parameters_callback(self._check)
         self.add_post_set_parameters_callback(self._changed)
 
     def _apply(self) -> None:
@@ -84,7 +99,8 @@ class RobotStatePublisher(Node):
             model = read_urdf(text)
         except DescriptionError as error:
             raise DescriptionError(f'{DESCRIPTION}: {error}') from error
-        self._core = StatePublisher(model, read_settings(self))
+        settings = (self.get_parameter(each.name).value for each in fields(Settings))
+        self._core = StatePublisher(model, Settings(*settings))
         self._description.publish(String(data=text))
         fixed = self._core.fixed()
         self._tf_static.publish(_message(fixed, self.get_clock().now()))
@@ -98,6 +114,16 @@ class RobotStatePublisher(Node):
             f'publishing {len(fixed)} fixed and {moving} moving frames of robot {model.name!r}, '
             + (f'at most {rate:g} times a second' if rate else 'at each message')
         )
+
+    def _check(self, parameters: Iterable[Parameter]) -> SetParametersResult:
+        """Refuse a description that cannot be used; ranges are rclpy's to check."""
+        for parameter in parameters:
+            if parameter.name == DESCRIPTION:
+                try:
+                    read_urdf(str(parameter.value or ''))
+                except DescriptionError as error:
+                    return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
 
     def _changed(self, parameters: list[Parameter]) -> None:
         if any(parameter.name != 'use_sim_time' for parameter in parameters):
@@ -157,49 +183,6 @@ def _start() -> RobotStatePublisher:
     node = RobotStatePublisher(_read_argument(sys.argv))
     notify_ready()
     return node
-
-
-def declare(node: Node, description: str = '') -> None:
-    """Declare all parameters.
-
-    Raises:
-        ParameterError: A value is not usable, or a name is misspelt.
-    """
-    read = ParameterReader(node, fixed=False)
-    read.number(
-        'publish_frequency',
-        DEFAULTS.publish_frequency,
-        (0.0, HIGHEST_FREQUENCY),
-        'greatest rate of each transform in [Hz]; 0: one for every message',
-    )
-    read.text('frame_prefix', DEFAULTS.frame_prefix, 'put in front of each frame name, as it is')
-    read.flag(
-        'ignore_timestamp',
-        'publish at each message, whatever its stamp is',
-        default=DEFAULTS.ignore_timestamp,
-    )
-    read.text(DESCRIPTION, description, 'URDF as XML text; may be changed while it runs')
-    refuse_misspelt(node)
-
-
-def read_settings(node: Node) -> Settings:
-    """Read all but the description."""
-    return Settings(
-        node.get_parameter('publish_frequency').value,
-        node.get_parameter('frame_prefix').value,
-        node.get_parameter('ignore_timestamp').value,
-    )
-
-
-def check(parameters: Iterable[Parameter]) -> SetParametersResult:
-    """Refuse a description that cannot be used; ranges are rclpy's to check."""
-    for parameter in parameters:
-        if parameter.name == DESCRIPTION:
-            try:
-                read_urdf(str(parameter.value or ''))
-            except DescriptionError as error:
-                return SetParametersResult(successful=False, reason=str(error))
-    return SetParametersResult(successful=True)
 
 
 def main() -> int:

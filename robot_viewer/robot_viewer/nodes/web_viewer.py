@@ -41,8 +41,8 @@ from node_runner import (
 )
 
 from ..page.gate import binding_problem
-from ..page.jog_panel import Offered, Twist, Velocity
-from ..page.robot_page import RobotPage
+from ..page.jog_panel import Actions, Offered, Twist, Velocity
+from ..page.robot_page import DISABLE, DRIVE_GROUPS, RobotPage
 from ..page.robot_scene import greatest_velocities
 from ..robot_state import Stop
 from .body import Body
@@ -80,19 +80,7 @@ SERVO_STATUS_TYPE = 'moveit_msgs/msg/ServoStatus'
 GRAPH_PERIOD = 1.0  # time between two looks at the nodes there are in [s]
 SETTLED, SELDOM = 10, 3
 """After that many looks at the same nodes, what they offer is looked at with each third one."""
-DRIVE_SERVICES = (
-    'init',
-    'enable',
-    'disable',
-    'halt',
-    'quick_stop',
-    'recover',
-    'home',
-    'position_mode',
-    'velocity_mode',
-    'interpolated_position_mode',
-    'cyclic_position_mode',
-)
+DRIVE_SERVICES = (DISABLE, *(verb for group in DRIVE_GROUPS.values() for verb in group.values()))
 """Services of a drive that the page offers; a node with halt and quick_stop is one."""
 WARN = 30  # level of warnings in rcl_interfaces/Log
 ROSOUT = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -150,7 +138,22 @@ class WebViewer(Node):
         self._jogs: Publisher | None = None
         self._joint_jogs: Publisher | None = None
         self._walks: Publisher | None = None
-        self.page = RobotPage(host, port, self)
+        order = self._order
+        self.actions = Actions(
+            stop=self._request_stop,
+            act=lambda action: order(partial(self._judge.act, action)),
+            call=lambda what, services: order(partial(self._triggers.call_all, what, services)),
+            walk=self._walk,
+            set_mode=lambda mode: order(partial(self._request_mode, mode)),
+            jog=self._jog,
+            jog_joint=self._jog_joint,
+            grip=lambda gripper, position: order(partial(self._grippers.grip, gripper, position)),
+            aim=lambda targets, share: order(
+                partial(self._controllers.aim, targets, share, time.monotonic())
+            ),
+            let_go=lambda: order(self._controllers.let_go),
+        )
+        self.page = RobotPage(host, port, self.actions)
         self._controllers = Controllers(self, self._listening, self._say, self.page.end_target)
         self._grippers = Grippers(self, self._say)
         self._judge = Judge(self, self.page, self._watch, self._triggers)
@@ -192,7 +195,6 @@ class WebViewer(Node):
         self._independent = [joint.name for joint in tree.joints if joint.independent]
         self._grippers.describe(tree)
         notes = self.page.show_robot(tree)
-        self._planning.describe()
         self._first_motion.describe(tree)
         self._body.describe(tree)
         for note in notes:
@@ -280,10 +282,21 @@ class WebViewer(Node):
             self.page.show_base(self._base)
 
     def _list(self) -> None:
-        self._judge_robot()
+        limit, at = self._limit
+        drives = 'Its gripper was pressed on a page.' if self._grippers.busy else ''
+        if self._planning.busy:
+            drives = 'The plan is executed while its button is held.'
+        now = time.monotonic()
+        self._judge.judge(
+            self._positions,
+            publishes=self._robot_publishes,
+            limit=limit if now - at < LIMIT_AGE else '',
+            battery=self._body.battery,
+            drives=drives,
+            controllers=self._controllers.found,
+        )
         if not self.page.watched:
             return
-        now = time.monotonic()
         self.page.list_log()
         for legs in self._watch.legs:
             self.page.show_mode(legs.values.get('state', ''))
@@ -295,22 +308,6 @@ class WebViewer(Node):
             self._plotted_at = now
             self.page.plot(self._controllers.history, now)
 
-    def _judge_robot(self) -> None:
-        limit, at = self._limit
-        self._judge.judge(
-            self._positions,
-            publishes=self._robot_publishes,
-            limit=limit if time.monotonic() - at < LIMIT_AGE else '',
-            battery=self._body.battery,
-            drives=self._drives_it(),
-            controllers=self._controllers.found,
-        )
-
-    def _drives_it(self) -> str:
-        if self._planning.busy:
-            return 'The plan is executed while its button is held.'
-        return 'Its gripper was pressed on a page.' if self._grippers.busy else ''
-
     # -- what the robot offers
 
     def _look_around(self) -> None:
@@ -320,30 +317,28 @@ class WebViewer(Node):
         if self._looks > SETTLED and self._looks % SELDOM:
             return  # to list all services is a quarter of the load of a page at rest
         services = dict(self.get_service_names_and_types())
-        around = self.border.around
-        with around('drives are not offered'):
-            triggers = {name for name, kinds in services.items() if TRIGGER in kinds}
-            self._find_drives(triggers)
-        self._judge.look(self._of_this_robot(services))
-        with around('the first motion is not offered'):
-            self._first_motion.look(services, self._drives)
-        with around('targets are not offered'):
-            self._controllers.look(self.resolve_topic_name('robot_description'))
-        with around('grippers are not offered'):
-            self._grippers.look(services, self._controllers.found)
-        with around('single joints are not jogged'):
-            self._find_joint_jogging()
-        with around('jogging is not offered'):
-            self._find_jogging()
-        with around('limits are not shown'):
-            self._find_servo()
-        self.page.offer_drive(self._offered())
-        with around('walking is not offered'):
-            self._find_walking(services)
-        with around('planning is not offered'):
-            self._planning.look(services)
-        with around('the body is not shown as a whole'):
-            self._body.look()
+        description = self.resolve_topic_name('robot_description')
+        looks: Mapping[str, Callable[[], None]] = {
+            'drives are not offered': lambda: self._find_drives(services),
+            'the state is not known': lambda: self._judge.look(self._of_this_robot(services)),
+            'the first motion is not offered': lambda: self._first_motion.look(
+                services, self._drives
+            ),
+            'targets are not offered': lambda: self._controllers.look(description),
+            'grippers are not offered': lambda: self._grippers.look(
+                services, self._controllers.found
+            ),
+            'single joints are not jogged': self._find_joint_jogging,
+            'jogging is not offered': self._find_jogging,
+            'limits are not shown': self._find_servo,
+            'an arm is not driven': lambda: self.page.offer_drive(self._offered()),
+            'walking is not offered': lambda: self._find_walking(services),
+            'planning is not offered': lambda: self._planning.look(services),
+            'the body is not shown as a whole': self._body.look,
+        }
+        for without, look in looks.items():
+            with self.border.around(without):
+                look()
         # also while a link is cut, or when it has ended
         self._robot_publishes |= bool(self.count_publishers('joint_states'))
 
@@ -354,7 +349,8 @@ class WebViewer(Node):
         own = set(of_robot(self.resolve_topic_name('robot_description'), topics, nodes))
         return {name: kinds for name, kinds in services.items() if name.rpartition('/')[0] in own}
 
-    def _find_drives(self, triggers: Collection[str]) -> None:
+    def _find_drives(self, services: Mapping[str, Sequence[str]]) -> None:
+        triggers = {name for name, kinds in services.items() if TRIGGER in kinds}
         topics = (name for name, _ in self.get_topic_names_and_types())
         own = self.resolve_topic_name('robot_description')
         stopped = (n.removesuffix('/quick_stop') for n in triggers if n.endswith('/quick_stop'))
@@ -428,21 +424,12 @@ class WebViewer(Node):
 
     # -- what people do on the page, in its threads
 
-    def stop(self) -> concurrent.futures.Future[Stop]:
-        """Stop whatever moves; the future has the robot's answer."""
+    def _request_stop(self) -> concurrent.futures.Future[Stop]:
         answer: concurrent.futures.Future[Stop] = concurrent.futures.Future()
         self._order(partial(self._stop, answer))
         return answer
 
-    def act(self, action: str) -> None:
-        """Do the action that is wanted now, if it is still this one."""
-        self._order(partial(self._judge.act, action))
-
-    def call(self, what: str, services: Sequence[str]) -> None:
-        """Call Trigger services at the same time; what they are for, in words."""
-        self._order(partial(self._triggers.call_all, what, services))
-
-    def jog(self, twist: Twist, frame: str = '') -> None:
+    def _jog(self, twist: Twist, frame: str) -> None:
         """Publish a jog once, at once; the robot's time-out ends it."""
         if self._jogs is None:
             return
@@ -453,8 +440,7 @@ class WebViewer(Node):
         linear.x, linear.y, linear.z, angular.x, angular.y, angular.z = twist
         self._jogs.publish(message)
 
-    def jog_joint(self, joint: str, share: float) -> None:
-        """Publish a jog of a joint once, at once; the robot's time-out ends it."""
+    def _jog_joint(self, joint: str, share: float) -> None:
         if self._joint_jogs is None:
             return
         kind: Any = self._joint_jogs.msg_type
@@ -462,29 +448,12 @@ class WebViewer(Node):
         message.header.stamp = self.get_clock().now().to_msg()
         self._joint_jogs.publish(message)
 
-    def grip(self, gripper: str, position: float) -> None:
-        """Move a gripper."""
-        self._order(partial(self._grippers.grip, gripper, position))
-
-    def walk(self, velocity: Velocity) -> None:
-        """Publish a velocity once, at once; the robot's time-out ends it."""
+    def _walk(self, velocity: Velocity) -> None:
         if self._walks is None:
             return
         message = TwistMessage()
         message.linear.x, message.linear.y, message.angular.z = velocity
         self._walks.publish(message)
-
-    def set_mode(self, mode: str) -> None:
-        """Request a mode of a walking robot."""
-        self._order(partial(self._request_mode, mode))
-
-    def aim(self, targets: Mapping[str, float], share: float) -> None:
-        """Move joints to targets as long as this comes."""
-        self._order(partial(self._controllers.aim, targets, share, time.monotonic()))
-
-    def let_go(self) -> None:
-        """Stop a motion to targets."""
-        self._order(self._controllers.let_go)
 
     def _order(self, order: Callable[[], object]) -> None:
         self._orders.append(order)
@@ -517,7 +486,7 @@ class WebViewer(Node):
             self.page.say(f'STOP: {text}', failed=True)
             answer.set_result(Stop(stands=False, text=text))
             return
-        _StopCalls(counted, answer)
+        _await_all(counted, answer)
 
     def _doubtful_stops(self, services: Collection[str]) -> dict[str, list[str]]:
         """Return those that are not a robot's own alone, with the other nodes that offer them.
@@ -564,36 +533,29 @@ class WebViewer(Node):
             self.get_logger().info(f'{what}: {text}')
 
 
-class _StopCalls:
-    """The calls of one STOP: the robot stands when each of them was answered with success."""
+def _await_all(
+    calls: Mapping[str, Future | None], answer: concurrent.futures.Future[Stop]
+) -> None:
+    """Answer a STOP when each of its calls has succeeded, or with the first that has failed."""
+    texts: list[str] = []
 
-    def __init__(
-        self,
-        calls: Mapping[str, Future | None],
-        answer: concurrent.futures.Future[Stop],
-    ) -> None:
-        """Wait for them; the first that fails is the answer."""
-        self._answer = answer
-        self._open = {service for service, call in calls.items() if call is not None}
-        self._texts: list[str] = []
-        for service, call in calls.items():
-            if call is None:
-                self._fail(f'{service} is not there')
-            else:
-                call.add_done_callback(partial(self._answered, service))
-
-    def _answered(self, service: str, call: Future) -> None:
-        self._open.discard(service)
-        if not succeeded(call):
-            self._fail(f'{service}: {text_of(call)}')
+    def take(service: str, call: Future | None) -> None:
+        text = 'is not there' if call is None else text_of(call)
+        stands = call is not None and succeeded(call)
+        texts.append(text)
+        if answer.done():  # also when the page waits no more
             return
-        self._texts.append(text_of(call))
-        if not self._open and not self._answer.done():
-            self._answer.set_result(Stop(stands=True, text='. '.join(self._texts)))
+        if not stands:
+            what = f'{service} {text}' if call is None else f'{service}: {text}'
+            answer.set_result(Stop(stands=False, text=what))
+        elif len(texts) == len(calls):
+            answer.set_result(Stop(stands=True, text='. '.join(texts)))
 
-    def _fail(self, text: str) -> None:
-        if not self._answer.done():  # also when the page waits no more
-            self._answer.set_result(Stop(stands=False, text=text))
+    for service, call in calls.items():
+        if call is None:
+            take(service, call)
+        else:
+            call.add_done_callback(partial(take, service))
 
 
 def _stop_beside(node: str) -> str:

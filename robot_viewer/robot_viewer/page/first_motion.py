@@ -112,13 +112,8 @@ class BusPlace:
         """
         if not self.is_here:
             raise ValueError(f'{self.path} was changed since the robot was started: restart it')
-        edit = partial(
-            edited,
-            device=self.device,
-            values=correction.values,
-            reason=correction.reason,
-            channel=self.channel,
-        )
+        values, why = correction.values, correction.reason
+        edit = partial(edited, device=self.device, values=values, reason=why, channel=self.channel)
         file = self.file
         replace_file(file, edit)
         return file
@@ -231,9 +226,10 @@ def announcement(request: MotionRequest, axis: Axis, position: float) -> Iterato
     """Yield what will happen, a paragraph each."""
     kind = axis.kind
     unit = 'rad' if kind is JointKind.TURNS else 'm'
+    source = 'the factor group' if axis.scales.scale_from_factor_group else 'bus.yml'
     yield (
         f'{request.joint} stands at {kind.shown(position)}; {axis.scales.scale_pos_to_dev:g} '
-        f'increments per {unit} by {_source(axis)}'
+        f'increments per {unit} by {source}'
     )
     yield (
         f'It will move {kind.shown(request.distance)}, with {kind.shown(request.speed)}/s, only '
@@ -241,10 +237,6 @@ def announcement(request: MotionRequest, axis: Axis, position: float) -> Iterato
         'other way: look at the real joint, keep the emergency stop in reach, and let go when it '
         'is enough.'
     )
-
-
-def _source(axis: Axis) -> str:
-    return 'the factor group' if axis.scales.scale_from_factor_group else 'bus.yml'
 
 
 def correction_of(axis: Axis, judgement: Judgement, cause: Cause | None) -> Correction | None:

@@ -102,52 +102,6 @@ warns long before."""
 NO_ANSWER = 'no answer from the robot: use the emergency stop'
 
 
-class Overlay:
-    """Answers requests for STOP, and adds itself to the page that viser serves."""
-
-    def __init__(self, stop: Callable[[], Future[Stop]], live: Live) -> None:
-        """Set what STOP does: in the server's thread, without waiting for the robot."""
-        self._stop, self.live = stop, live
-        self._html = Path(__file__).with_name('overlay.html').read_bytes()
-        self._page = b''
-
-    async def answer(self, request: Request) -> Response | None:
-        """Return what the robot answers to a request for STOP; None for other requests."""
-        if request.path.partition('?')[0] != STOP_PATH:
-            return None
-        if STOP_HEADER not in request.headers:
-            return text_response(HTTPStatus.FORBIDDEN, f'STOP needs the header {STOP_HEADER}')
-        try:
-            called = asyncio.shield(asyncio.wrap_future(self._stop()))
-            answer = await asyncio.wait_for(called, ANSWER_TIMEOUT)
-        except TimeoutError:
-            return text_response(HTTPStatus.GATEWAY_TIMEOUT, NO_ANSWER)
-        status = HTTPStatus.OK if answer.stands else HTTPStatus.BAD_GATEWAY
-        return text_response(status, answer.text)
-
-    def over(self, response: Response) -> Response:
-        """Return a response with the overlay in it, if it is the page.
-
-        Raises:
-            RuntimeError: The page has no end; it would be without STOP.
-        """
-        if not response.headers.get('Content-Type', '').startswith('text/html'):
-            return response
-        packed = response.headers.get('Content-Encoding') == 'gzip'
-        if not self._page:
-            body = gzip.decompress(response.body) if packed else bytes(response.body)
-            before, end, after = body.rpartition(END)
-            if not end:
-                raise RuntimeError('the page has no </body>: STOP has no place on it')
-            self._page = gzip.compress(before + self._html + end + after)
-        body = self._page if packed else gzip.decompress(self._page)
-        headers = Headers(response.headers.raw_items())
-        headers['Cache-Control'] = 'no-store'  # a page without STOP may be in a cache
-        del headers['Content-Length']
-        headers['Content-Length'] = str(len(body))
-        return Response(response.status_code, response.reason_phrase, headers, body)
-
-
 def text_response(
     status: HTTPStatus, text: str, headers: Mapping[str, str] | None = None
 ) -> Response:
@@ -173,7 +127,7 @@ LOGGER.addFilter(_is_failure)
 
 
 class Gate:
-    """Looks at each request before viser does.
+    """Looks at each request before viser does, answers STOP, and adds the overlay to the page.
 
     On loopback the Host and Origin headers have to name this host: no page of elsewhere, also
     under a name that was pointed here (DNS rebinding), moves the robot. Beyond it a token is
@@ -181,9 +135,11 @@ class Gate:
     token stays, so that the STOP of a page that is open works when its server was started again.
     """
 
-    def __init__(self, host: str, overlay: Overlay) -> None:
-        """Make a token where one is needed."""
-        self._overlay = overlay
+    def __init__(self, host: str, stop: Callable[[], Future[Stop]], live: Live) -> None:
+        """Make a token where one is needed; ``stop`` does not wait for the robot."""
+        self._stop, self._live = stop, live
+        self._html = Path(__file__).with_name('overlay.html').read_bytes()
+        self._page = b''  # with the overlay
         self.token = '' if is_loopback(host) else _lasting_token()
         self._serving = False
 
@@ -251,7 +207,7 @@ class Gate:
     ) -> None:
         request = connection.request
         if request is not None and request.path.partition('?')[0] == LIVE_PATH:
-            await self._overlay.live.serve(connection)
+            await self._live.serve(connection)
         else:
             await serve_viser(connection)
 
@@ -261,7 +217,7 @@ class Gate:
         connection: Any,  # noqa: ANN401
         request: Request,
     ) -> Response | None:
-        answer = self.answer(request.path, request.headers) or await self._overlay.answer(request)
+        answer = self.answer(request.path, request.headers) or await self._answer_stop(request)
         if connection.transport.is_closing():
             raise CancelledError  # a browser that waits no more; websockets would fail to answer
         if answer is not None or next_one is None:
@@ -270,7 +226,43 @@ class Gate:
         if isawaitable(result):
             result = await result
         page: Response | None = result
-        return page and self._overlay.over(page)
+        return page and self._over(page)
+
+    async def _answer_stop(self, request: Request) -> Response | None:
+        """Return what the robot answers to a request for STOP; None for other requests."""
+        if request.path.partition('?')[0] != STOP_PATH:
+            return None
+        if STOP_HEADER not in request.headers:
+            return text_response(HTTPStatus.FORBIDDEN, f'STOP needs the header {STOP_HEADER}')
+        try:
+            called = asyncio.shield(asyncio.wrap_future(self._stop()))
+            answer = await asyncio.wait_for(called, ANSWER_TIMEOUT)
+        except TimeoutError:
+            return text_response(HTTPStatus.GATEWAY_TIMEOUT, NO_ANSWER)
+        status = HTTPStatus.OK if answer.stands else HTTPStatus.BAD_GATEWAY
+        return text_response(status, answer.text)
+
+    def _over(self, response: Response) -> Response:
+        """Return a response with the overlay in it, if it is the page.
+
+        Raises:
+            RuntimeError: The page has no end; it would be without STOP.
+        """
+        if not response.headers.get('Content-Type', '').startswith('text/html'):
+            return response
+        packed = response.headers.get('Content-Encoding') == 'gzip'
+        if not self._page:
+            body = gzip.decompress(response.body) if packed else bytes(response.body)
+            before, end, after = body.rpartition(END)
+            if not end:
+                raise RuntimeError('the page has no </body>: STOP has no place on it')
+            self._page = gzip.compress(before + self._html + end + after)
+        body = self._page if packed else gzip.decompress(self._page)
+        headers = Headers(response.headers.raw_items())
+        headers['Cache-Control'] = 'no-store'  # a page without STOP may be in a cache
+        del headers['Content-Length']
+        headers['Content-Length'] = str(len(body))
+        return Response(response.status_code, response.reason_phrase, headers, body)
 
 
 def _lasting_token() -> str:

@@ -15,19 +15,19 @@ from dataclasses import dataclass, field
 from functools import partial
 from html import escape
 import math
-from typing import Protocol, TypeAlias, TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 from urdf_reader import Joint, JointKind, KinematicTree
 from viser import (
+    GuiApi,
     GuiDropdownHandle,
     GuiEvent,
     GuiFolderHandle,
     GuiSliderHandle,
     GuiTabHandle,
-    GuiUplotHandle,
     uplot,
-    ViserServer,
 )
 
 from ..robot_state import Stop
@@ -58,38 +58,23 @@ REST: Twist = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 BASE = 'base'  # the frame that a command has which names none
 
 
-class Actions(Protocol):
+@dataclass(frozen=True, slots=True)
+class Actions:
     """What a page may have done; any thread may call it, and none of it waits."""
 
-    def stop(self) -> Future[Stop]:
-        """Stop whatever moves; the future has the robot's answer."""
-
-    def act(self, action: str) -> None:
-        """Do the action that is wanted now, if it is still this one."""
-
-    def call(self, what: str, services: Sequence[str]) -> None:
-        """Call Trigger services at the same time; what they are for, in words."""
-
-    def walk(self, velocity: Velocity) -> None:
-        """Command a velocity in [m/s] and [rad/s] once."""
-
-    def set_mode(self, mode: str) -> None:
-        """Request a mode of a walking robot."""
-
-    def jog(self, twist: Twist, frame: str) -> None:
-        """Command a share of the speed of jogging once, -1 to 1, along the axes of a frame."""
-
-    def jog_joint(self, joint: str, share: float) -> None:
-        """Command a share of the speed of a joint once, -1 to 1."""
-
-    def grip(self, gripper: str, position: float) -> None:
-        """Move a gripper to a position of its joint in [m] or [rad]."""
-
-    def aim(self, targets: Mapping[str, float], share: float) -> None:
-        """Move joints to targets as long as this comes, at a share of their greatest velocity."""
-
-    def let_go(self) -> None:
-        """Stop a motion to targets."""
+    stop: Callable[[], Future[Stop]]  # stops whatever moves; the future has the robot's answer
+    act: Callable[[str], None]  # does the action that is wanted now, if it is still this one
+    call: Callable[[str, Sequence[str]], None]
+    """Calls Trigger services at the same time; what they are for, in words."""
+    walk: Callable[[Velocity], None]  # commands a velocity in [m/s] and [rad/s] once
+    set_mode: Callable[[str], None]  # requests a mode of a walking robot
+    jog: Callable[[Twist, str], None]
+    """Commands a share of the speed of jogging once, -1 to 1, along the axes of a frame."""
+    jog_joint: Callable[[str, float], None]  # the same for a joint
+    grip: Callable[[str, float], None]  # moves a gripper to a position in [m] or [rad]
+    aim: Callable[[Mapping[str, float], float], None]
+    """Moves joints to targets as long as this comes, at a share of their greatest velocity."""
+    let_go: Callable[[], None]  # stops a motion to targets
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,14 +106,14 @@ class JogPanel:
 
     def __init__(
         self,
-        server: ViserServer,
+        gui: GuiApi,
         robot: RobotScene,
         ways: tuple[Actions, Live, Share],
         place: Callable[[JogPanel], AbstractContextManager[None]],
     ) -> None:
         """Offer nothing yet."""
         self._actions, self._live, self._speed = ways
-        self._server, self._gui, self._robot = server, server.gui, robot
+        self._gui, self._robot = gui, robot
         self._joints = {joint.name: joint for joint in robot.tree.movable()}
         self.target: TargetPanel | None = None
         with place(self):
@@ -184,8 +169,8 @@ class JogPanel:
             self._gui.add_html(sentence('No trajectory controller moves these joints.'))
             return
         joints = [self._joints[name] for name in targets]
-        aiming = self._actions.aim, self._actions.let_go, self._speed, self._hold
-        self.target = TargetPanel(self._server, self._robot, joints, aiming)
+        ways = self._actions, self._speed, self._hold
+        self.target = TargetPanel(self._gui, self._robot, joints, ways)
 
     def _add_grippers(self, grippers: Sequence[tuple[str, str]]) -> None:
         for gripper, joint in grippers:
@@ -311,32 +296,25 @@ PEAK, PEAK_ACCELERATION = 15.0 / 8.0, 10.0 / math.sqrt(3.0)
 velocity, and of its way through the square of its time."""
 
 
-Move = Callable[[Mapping[str, float], float], None]
-"""Moves joints to targets as long as it is called, at a share of the greatest velocity."""
-
-
 class TargetPanel:
     """A slider for each joint; it moves a violet target, and the joint only while it is held."""
 
     def __init__(
         self,
-        server: ViserServer,
+        gui: GuiApi,
         robot: RobotScene,
         joints: Sequence[Joint],
-        ways: tuple[Move, Callable[[], None], Share, Callable[[Hold], tuple[int, str]]],
+        ways: tuple[Actions, Share, Callable[[Hold], tuple[int, str]]],
     ) -> None:
-        self._robot, self._links = (
-            robot,
-            links_beyond(robot.tree, frozenset(j.name for j in joints)),
-        )
-        self._aim, let_go, self._speed, hold = ways
+        self._robot = robot
+        self._links = links_beyond(robot.tree, frozenset(j.name for j in joints))
+        self._actions, self._speed, hold = ways
         self._ghost: RobotScene | None = None
         self._targets: dict[str, float] = {}
         self._sliders: dict[str, GuiSliderHandle[float]] = {}
         self.seen = True
-        gui = server.gui
         gui.add_html(sentence('Sliders move the violet target only.'))
-        self.hold, html = hold(Hold(HOLD_TARGET, self._move, let_go))
+        self.hold, html = hold(Hold(HOLD_TARGET, self._move, self._actions.let_go))
         gui.add_html(pad([html], 'rv-one'))
         for joint in joints:
             low, high = travel(joint)
@@ -377,17 +355,16 @@ class TargetPanel:
 
     def _move(self) -> None:
         if self._targets:
-            self._aim(dict(self._targets), self._speed())
+            self._actions.aim(dict(self._targets), self._speed())
 
 
 class PlotPanel:
     """Target, position and following error of one joint in the last half minute."""
 
-    def __init__(self, server: ViserServer, joints: Sequence[str]) -> None:
-        gui = server.gui
-        self._joint: GuiDropdownHandle[str] = gui.add_dropdown('Joint', tuple(joints))
+    def __init__(self, gui: GuiApi, joints: Sequence[str]) -> None:
+        self._joint = gui.add_dropdown('Joint', tuple(joints))
         times = {'x': uplot.Scale(time=False, auto=False, range=(-KEPT, 0.0))}
-        self._positions: GuiUplotHandle = gui.add_uplot(
+        self._positions = gui.add_uplot(
             (np.array([-KEPT, 0.0]), np.zeros(2), np.zeros(2)),
             (
                 uplot.Series(label='time [s]'),
@@ -398,7 +375,7 @@ class PlotPanel:
             scales=times,
             height=HEIGHT,
         )
-        self._errors: GuiUplotHandle = gui.add_uplot(
+        self._errors = gui.add_uplot(
             (np.array([-KEPT, 0.0]), np.zeros(2)),
             (
                 uplot.Series(label='time [s]'),
@@ -411,14 +388,10 @@ class PlotPanel:
 
     def show(self, history: History, now: float) -> None:
         """Draw the joint that is chosen."""
-        samples = history.of(self._joint.value)
-        if not samples:
-            return
-        times = np.array([sample.time - now for sample in samples])
-        targets = np.array([sample.target for sample in samples])
-        positions = np.array([sample.position for sample in samples])
-        self._positions.data = (times, targets, positions)
-        self._errors.data = (times, 1000.0 * (targets - positions))
+        times, targets, positions = history.of(self._joint.value)
+        if len(times):
+            self._positions.data = (times - now, targets, positions)
+            self._errors.data = (times - now, 1000.0 * (targets - positions))
 
 
 def motion_time(
@@ -443,21 +416,12 @@ def motion_time(
     return longest
 
 
-@dataclass(frozen=True, slots=True)
-class Sample:
-    """A joint at one time."""
-
-    time: float
-    target: float  # where it was to be
-    position: float  # where it was
-
-
 class History:
     """The samples of all joints in the last :data:`KEPT` seconds."""
 
     def __init__(self) -> None:
         """Begin with none."""
-        self._samples: dict[str, deque[Sample]] = {}
+        self._samples: dict[str, deque[tuple[float, float, float]]] = {}
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -470,12 +434,14 @@ class History:
         """Store joint positions; ones that come too soon after the last are ignored."""
         for name in (each for each in targets if each in positions):
             samples = self._samples.setdefault(name, deque())
-            if samples and now - samples[-1].time < STEP:
+            if samples and now - samples[-1][0] < STEP:
                 continue
-            samples.append(Sample(now, targets[name], positions[name]))
-            while samples[0].time < now - KEPT:
+            samples.append((now, targets[name], positions[name]))
+            while samples[0][0] < now - KEPT:
                 samples.popleft()
 
-    def of(self, joint: str) -> tuple[Sample, ...]:
-        """Return the samples of a joint, the oldest first."""
-        return tuple(self._samples.get(joint, ()))
+    def of(self, joint: str) -> npt.NDArray[np.float64]:
+        """Return rows of times, of where a joint was to be, and of where it was."""
+        samples = np.array(self._samples.get(joint, ()), float).reshape(-1, 3)
+        rows: npt.NDArray[np.float64] = samples.T.copy()
+        return rows

@@ -19,7 +19,6 @@ from viser import (
     ClientHandle,
     GuiButtonHandle,
     GuiDropdownHandle,
-    GuiFolderHandle,
     GuiHtmlHandle,
     GuiTabGroupHandle,
     GuiTabHandle,
@@ -28,7 +27,7 @@ from viser import (
 )
 
 from ..robot_state import BUS, drives_of, FOLLOWS, Level, RobotState, Status, Stop
-from .gate import Gate, Overlay, shown_host
+from .gate import Gate, shown_host
 from .jog_panel import Actions, History, JogPanel, joint_texts, Offered, PlotPanel, Velocity
 from .live import Hold, Live, RELEASED_AFTER
 from .robot_scene import feet_of, Ground, RobotScene
@@ -112,21 +111,14 @@ KEYS_MOVE = (
 )
 """The speed in words, and a box that each page has for itself."""
 COPY_LOG = '<button class="rv-copy">Copy log</button>'
-NOTHING: Mapping[str, str] = {
-    'Drive': 'No robot is here yet.',
-    'Plan': 'Start the bring-up with --plan.',
-    'Body': 'Nothing is known of the body yet.',
-    'See': '',
-    'Diagnose': '',
+GROUPS = {
+    'Drive': (Icon.DEVICE_GAMEPAD_2, 'No robot is here yet.'),
+    'Plan': (Icon.ROUTE, 'Start the bring-up with --plan.'),
+    'Body': (Icon.ROTATE_360, 'Nothing is known of the body yet.'),
+    'See': (Icon.EYE, ''),
+    'Diagnose': (Icon.STETHOSCOPE, ''),
 }
-"""What an empty group says."""
-ICONS = {
-    'Drive': Icon.DEVICE_GAMEPAD_2,
-    'Plan': Icon.ROUTE,
-    'Body': Icon.ROTATE_360,
-    'See': Icon.EYE,
-    'Diagnose': Icon.STETHOSCOPE,
-}
+"""Icons, and what an empty group says."""
 
 
 class Panel(Protocol):
@@ -142,7 +134,7 @@ class RobotPage:
     def __init__(self, host: str, port: int, actions: Actions) -> None:
         self._actions = actions
         self.live = Live(self._command)
-        gate = Gate(host, Overlay(self._stop, self.live))
+        gate = Gate(host, self._stop, self.live)
         with gate.before(), redirect_stdout(io.StringIO()):  # viser draws its own banner
             self.server = ViserServer(host, port, label='robot', verbose=False)
         # where it is, with the token where it needs one
@@ -179,9 +171,10 @@ class RobotPage:
         self._groups: dict[str, GuiTabHandle] = {}
         self._notes: dict[str, GuiHtmlHandle] = {}
         for group in groups:
-            self._groups[group] = self._tabs.add_tab(group, ICONS[group])
+            icon, nothing = GROUPS[group]
+            self._groups[group] = self._tabs.add_tab(group, icon)
             with self._groups[group]:
-                self._notes[group] = gui.add_html(sentence(NOTHING[group]))
+                self._notes[group] = gui.add_html(sentence(nothing))
         self._drives: dict[str, tuple[str, ...]] = {}
         self._jog: JogPanel | None = None
         self._plots: PlotPanel | None = None
@@ -193,19 +186,19 @@ class RobotPage:
             self.speed = add_speed(gui, ARM_SPEED if 'Plan' in groups else LEGS_SPEED)
             gui.add_html(KEYS_MOVE)
         with self._groups['See']:
-            self._see: GuiFolderHandle = gui.add_folder(None)
+            self._see = gui.add_folder(None)
         if 'Plan' in groups:
             self.offer_to_see('target', self._show_target)
         self.offer_to_see('frames', self._show_frames, seen=False)
         with self._groups['Diagnose']:
-            self._statuses: GuiHtmlHandle = gui.add_html('')
-            self._drive_panel: GuiFolderHandle = gui.add_folder(None)
+            self._statuses = gui.add_html('')
+            self._drive_panel = gui.add_folder(None)
             self._drive: GuiDropdownHandle[str] | None = None
             self._drive_state: GuiHtmlHandle | None = None
             log = gui.add_folder('Log')
             self.before_log = log.order - 0.5  # order of a folder before the log
             with log:
-                self._log_html: GuiHtmlHandle = gui.add_html('')
+                self._log_html = gui.add_html('')
 
     def offer_to_see(self, what: str, show: Callable[[bool], None], *, seen: bool = True) -> None:
         """Offer to show something in the picture, as long as this robot is shown."""
@@ -250,7 +243,7 @@ class RobotPage:
         if self.has('Plan'):
             ways = self._actions, self.live, self.speed
             place = partial(self.place, 'Drive')
-            self._jog = JogPanel(self.server, self.robot, ways, place)
+            self._jog = JogPanel(self.server.gui, self.robot, ways, place)
         self.say(f'robot {tree.name}')
         return self.robot.notes
 
@@ -311,7 +304,10 @@ class RobotPage:
         for mode, button in self._modes.items():
             able = state.movable or (faulty and mode in IN_FAULT)
             button.disabled = not able or self.live.stopped
-        tree = None if self.robot is None else self.robot.tree
+        tree, speed = None if self.robot is None else self.robot.tree, ''
+        if self.velocity is not None:
+            what = 'Forward' if self.has('Body') else 'Tool'
+            speed = f'{what}: {1000.0 * self.velocity(self.speed()):.0f} mm/s'
         self.live.show(
             {
                 'word': state.word,
@@ -325,23 +321,15 @@ class RobotPage:
                 'robot': '' if tree is None else tree.name,
                 'said': self.last,
                 'listens': listens,
-                'speed': self._velocity_text(),
+                'speed': speed,
                 'joints': {} if tree is None else joint_texts(tree, positions),
             }
         )
 
-    def _velocity_text(self) -> str:
-        if self.velocity is None:
-            return ''
-        what = 'Forward' if self.has('Body') else 'Tool'
-        return f'{what}: {1000.0 * self.velocity(self.speed()):.0f} mm/s'
-
     def show_mode(self, mode: str) -> None:
         """Show the mode of a walking robot, and which arrows move it then."""
         for name, button in self._modes.items():
-            color = PRESENT if name == mode else BUTTON_COLORS.get(name, NEUTRAL)
-            if button.color != color:
-                button.color = color
+            button.color = PRESENT if name == mode else BUTTON_COLORS.get(name, NEUTRAL)
         for number, (x, y, _) in self._walk_holds.items():
             self.live.off.pop(number, None)
             if mode not in FOLLOWS:
@@ -351,32 +339,26 @@ class RobotPage:
 
     def show_statuses(self, statuses: Sequence[Status]) -> None:
         """Show how everything is, what is worst first."""
-        self._show_drive(statuses)
         ordered = sorted(statuses, key=lambda status: (WORST.index(status.level), status.name))
-        html = ''.join(
+        self._statuses.content = ''.join(
             f'{status_line(status.name, status.level)}'
             f'<div style="{STATUS_BOX}">{escape(status.message)}</div>'
             for status in ordered
         )
-        if self._statuses.content != html:
-            self._statuses.content = html
-
-    def _show_drive(self, statuses: Sequence[Status]) -> None:
-        """Show what the chosen drive reports."""
         if self._drive is None or self._drive_state is None:
             return
         buses = [status for status in statuses if status.name.endswith(BUS)]
         chosen = drives_of(statuses).get(self._drive.value.rpartition('/')[2])
         bus = buses[0].values if len(buses) == 1 else {}
-        html = '' if chosen is None else drive_html(chosen.message, chosen.values, bus)
-        if self._drive_state.content != html:
-            self._drive_state.content = html
+        self._drive_state.content = (
+            '' if chosen is None else drive_html(chosen.message, chosen.values, bus)
+        )
 
     def plot(self, history: History, now: float) -> None:
         """Draw what the joints did until now."""
         if self._plots is None and history.joints:
             with self._see:
-                self._plots = PlotPanel(self.server, history.joints)
+                self._plots = PlotPanel(self.server.gui, history.joints)
         if self._plots is not None:
             self._plots.show(history, now)
 
@@ -405,7 +387,7 @@ class RobotPage:
                         if verb in verbs:
                             color = BUTTON_COLORS.get(verb, NEUTRAL)
                             button = gui.add_button(label, color=color)
-                            button.on_click(partial(self._press, drive, label, verb))
+                            button.on_click(partial(self._call, drive, label, verb))
                     if title and DISABLE in verbs:
                         self._add_disable(drive)
 
@@ -475,7 +457,7 @@ class RobotPage:
                     self._modes[mode] = button
                 self._modes['policy'].visible = policy
                 gait = gui.add_dropdown('Gait', GAITS)
-                gait.on_update(lambda _: self._request(f'gait:{gait.value}', None))
+                gait.on_update(lambda _: self._request(f'gait:{gait.value}'))
             with gui.add_folder('Hold to walk'):
                 gui.add_html(pad(holds[:WALK_BUTTONS]) + pad(holds[WALK_BUTTONS:], 'rv-keyed'))
 
@@ -501,10 +483,9 @@ class RobotPage:
         x, y, turn = (self.speed() * part for part in velocity)
         self._actions.walk((x, y, turn))
 
-    def _press(self, drive: GuiDropdownHandle[str], label: str, verb: str, _: object) -> None:
-        self._call(drive, label, verb)
-
-    def _call(self, drive: GuiDropdownHandle[str], label: str, verb: str) -> None:
+    def _call(
+        self, drive: GuiDropdownHandle[str], label: str, verb: str, _: object = None
+    ) -> None:
         if drive.value == NO_DRIVE:
             self.say(f'{label}: choose a drive first', failed=True)
         elif verb not in MOTIONS or not self.live.refuses(label):
@@ -512,7 +493,7 @@ class RobotPage:
             services = [f'{name}/{verb}' for name in chosen if verb in self._drives[name]]
             self._actions.call(f'{label} {drive.value.rpartition("/")[2]}', services)
 
-    def _request(self, mode: str, _: object) -> None:
+    def _request(self, mode: str, _: object = None) -> None:
         if not self.live.refuses(f'mode {mode}'):
             self._actions.set_mode(mode)
 
@@ -530,6 +511,4 @@ class RobotPage:
 
     def list_log(self) -> None:
         """Show what was said."""
-        html = f'{COPY_LOG}<div>{self._log.html}</div>'
-        if self._log_html.content != html:
-            self._log_html.content = html
+        self._log_html.content = f'{COPY_LOG}<div>{self._log.html}</div>'

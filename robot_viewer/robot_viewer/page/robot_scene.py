@@ -73,7 +73,6 @@ class RobotScene:
         self,
         scene: SceneApi,
         tree: KinematicTree,
-        folder: Path | None = None,
         look: Look | None = None,
         meshes: Meshes | None = None,
     ) -> None:
@@ -82,11 +81,14 @@ class RobotScene:
         self.notes: list[str] = []  # what cannot be shown, in words
         self._scene, self.tree = scene, tree
         self._links, self._tint = look.links or frozenset(tree.links), look.tint
-        self._meshes = meshes or Meshes(folder)
+        self._meshes = meshes or Meshes()
         self._movable = {joint.name: joint for joint in tree.movable()}
         self._base = scene.add_frame(look.path, show_axes=False)
         self._frames: dict[str, FrameHandle] = {}
-        self._paths = link_paths(tree, look.path)
+        # below the link that each hangs on; parents come first
+        self._paths = {tree.root: f'{look.path}/{tree.root}'}
+        for joint in parents_first(tree):
+            self._paths[joint.child] = f'{self._paths[joint.parent]}/{joint.child}'
         scene.add_frame(self._paths[tree.root], show_axes=False)
         self._shapes: dict[str, list[tuple[str, UrdfShape]]] = {}  # of each link, by its path
         self._marked: frozenset[str] = frozenset()
@@ -110,12 +112,11 @@ class RobotScene:
     def ghost(self, name: str, links: frozenset[str], tint: Tint) -> RobotScene:
         """Return the robot once more, on the same base, with joints of its own."""
         look = Look(f'{ROOT}/{name}', links, tint)
-        return RobotScene(self._scene, self.tree, look=look, meshes=self._meshes)
+        return RobotScene(self._scene, self.tree, look, self._meshes)
 
     def show(self, *, seen: bool) -> None:
         """Show or hide it."""
-        if self._base.visible is not seen:
-            self._base.visible = seen
+        self._base.visible = seen
 
     def show_frames(self, *, seen: bool) -> None:
         """Show or hide the axes of the joints' frames."""
@@ -258,9 +259,7 @@ def shapes_of(tree: KinematicTree) -> list[UrdfShape]:
 class Meshes:
     """Files of triangles, each of which is read once."""
 
-    def __init__(self, folder: Path | None = None) -> None:
-        """Begin without shapes."""
-        self._folder = folder
+    def __init__(self) -> None:
         self._read: dict[Path, trimesh.Trimesh] = {}
 
     def read(self, shape: UrdfShape) -> tuple[trimesh.Trimesh, tuple[float, float, float]]:
@@ -272,8 +271,15 @@ class Meshes:
         """
         import trimesh  # a third of the start of a page, and a robot without meshes needs none
 
-        path = find_mesh(shape.attributes.get('filename', ''), self._folder)
-        mesh = self._read.get(path) or _load(path)
+        path = find_mesh(shape.attributes.get('filename', ''))
+        try:
+            mesh = self._read.get(path) or trimesh.load(path, force='mesh')
+        except ModuleNotFoundError as error:
+            package = {'collada': 'pycollada'}.get(error.name or '', error.name)
+            raise MeshFileError(
+                f'{path}: it takes the Python package {package} to read it; install that, or '
+                'export the mesh as STL or OBJ'
+            ) from error
         if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
             raise MeshFileError(f'{path}: no triangles')
         self._read[path] = mesh
@@ -283,33 +289,12 @@ class Meshes:
         return mesh, (x, y, z)
 
 
-def _load(path: Path) -> object:
-    import trimesh
-
-    try:
-        return trimesh.load(path, force='mesh')
-    except ModuleNotFoundError as error:
-        package = {'collada': 'pycollada'}.get(error.name or '', error.name)
-        raise MeshFileError(
-            f'{path}: it takes the Python package {package} to read it; install that, or export '
-            'the mesh as STL or OBJ'
-        ) from error
-
-
 def moved(
     tree: KinematicTree, positions: Mapping[str, float], goals: Mapping[str, float]
 ) -> dict[str, float]:
     """Return positions with some joints at goals; what follows those is left out, to follow."""
     followers = {j.name for j in tree.movable() if j.mimic and j.mimic.source in goals}
     return {name: at for name, at in positions.items() if name not in followers} | dict(goals)
-
-
-def link_paths(tree: KinematicTree, base: str) -> dict[str, str]:
-    """Return a path of each link, below that of the link it hangs on; parents come first."""
-    paths = {tree.root: f'{base}/{tree.root}'}
-    for joint in parents_first(tree):
-        paths[joint.child] = f'{paths[joint.parent]}/{joint.child}'
-    return paths
 
 
 def links_beyond(tree: KinematicTree, joints: frozenset[str]) -> frozenset[str]:
