@@ -124,14 +124,6 @@ def test_sticks_move_only_with_the_deadman() -> None:
 
 
 @pytest.mark.slow
-def test_centred_stick_with_the_deadman_holds_the_robot() -> None:
-    """A held deadman keeps others away: it says zero as long as it is held."""
-    target = teleop()
-    target.feed(state(DEADMAN))
-    assert [target.step(0.05 * index) for index in range(10)] == [ZERO] * 10
-
-
-@pytest.mark.slow
 def test_without_a_deadman_button_rest_is_silence() -> None:
     """Where no button is needed, an untouched or unplugged gamepad does not stream zeros."""
     target = teleop(Deadman(enable=None, turbo=None))

@@ -92,30 +92,6 @@ def test_steady_velocity_is_repeated_at_the_rate() -> None:
     assert sum(velocity is not None for velocity in published) == pytest.approx(20, abs=1)
 
 
-def test_idle_source_is_silent() -> None:
-    """Nothing is published before anything is wanted, nor at the end of an idle program."""
-    stream = CommandStream(STREAM_PERIOD, lambda _: 0.0)
-    assert silence(stream, 0.0) == []
-    stream.end()
-    assert silence(stream, 10.0) == []
-
-
-def test_stop_speaks_even_when_idle() -> None:
-    """Another program may be driving: a person's stop is published."""
-    stream = CommandStream(STREAM_PERIOD, lambda _: 0.0)
-    stream.stop()
-    assert silence(stream, 0.0) == [0.0] * RESTS
-
-
-def test_end_says_zero_again_after_a_motion() -> None:
-    """A program that moved the robot says zero when it ends, even if it said so before."""
-    stream = CommandStream(STREAM_PERIOD, lambda _: 0.0)
-    stream.step(0.1, 0.0)
-    silence(stream, 0.1)
-    stream.end()
-    assert silence(stream, 10.0) == [0.0] * RESTS
-
-
 @pytest.mark.parametrize('period', [0.0, -1.0, math.inf, math.nan])
 def test_senseless_period_is_refused(period: float) -> None:
     """A period must be a time."""
