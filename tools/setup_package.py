@@ -30,6 +30,7 @@ REQUIREMENTS: Mapping[str, Sequence[str]] = {
     ],
     'python3-numpy': ['numpy>=1.26'],
     'python3-onnxruntime-pip': ['onnxruntime>=1.19'],
+    'python3-protobuf': ['protobuf>=4.21'],
     'python3-rich': ['rich>=13'],
     'python3-ruckig-pip': ['ruckig>=0.19'],
     'python3-serial': ['pyserial>=3.5'],

@@ -27,7 +27,7 @@ PACKAGES = {
     if package.build_type == 'ament_python'
 }
 DISTRIBUTIONS = {'can': 'python-can', 'pinocchio': 'pin', 'serial': 'pyserial', 'yaml': 'PyYAML'}
-DISTRIBUTIONS |= {'mujoco': 'mujoco-core'}
+DISTRIBUTIONS |= {'google': 'protobuf', 'mujoco': 'mujoco-core'}
 """Names on PyPI of what is imported under another one."""
 REQUIREMENTS: dict[str, list[str]] = runpy.run_path(str(LAYOUT.root / 'tools/setup_package.py'))[
     'REQUIREMENTS'

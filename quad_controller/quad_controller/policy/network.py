@@ -194,7 +194,10 @@ def _model_class() -> Any:  # noqa: ANN401  # made of the table
             made.options.packed = plain in {'float', 'double'}
     pool = descriptor_pool.DescriptorPool()
     pool.Add(file)
-    return message_factory.GetMessageClass(pool.FindMessageTypeByName('onnx.Model'))
+    model = pool.FindMessageTypeByName('onnx.Model')
+    if hasattr(message_factory, 'GetMessageClass'):
+        return message_factory.GetMessageClass(model)
+    return message_factory.MessageFactory(pool).GetPrototype(model)  # 4.21, of Ubuntu 24.04
 
 
 def _parsed(data: bytes) -> Any:  # noqa: ANN401  # made of the table
