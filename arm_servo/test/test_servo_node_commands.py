@@ -304,7 +304,7 @@ def test_a_displacement_that_does_not_fit_is_refused_alone(topics: Topics) -> No
         drives.run(1000)
     assert limit - drives.path[-1][0] == pytest.approx(0.005, abs=1e-6)
     # also when the one before it begins afterwards
-    assert 'panda_joint1: ' in topics._servo._refusals.fresh(0.0)
+    assert 'panda_joint1 at ' in topics._servo._refusals.fresh(0.0)
 
 
 def test_displacements_before_one_into_contact_are_carried_out(topics: Topics) -> None:
