@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of the servo.
+"""Figures of the servo, and beside them those of moveit_servo's documented algorithm.
 
 Run: ``python arm_servo/bench/bench_servo.py [COMMANDS]`` in the sourced workspace.
 
@@ -11,13 +11,14 @@ stuck (less than a twentieth of the asked way in 1 s) on a random walk and from 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import os
 import sys
 import time
 
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # before numpy is imported
 
+from collections import deque
 from functools import cache
 import re
 
@@ -87,6 +88,73 @@ def moved_by(model: RobotModel, start: Array, end: Array) -> Array:
     return np.concatenate((after.position - before.position, angular))
 
 
+LOWER, HARD_STOP, LEAVING = 17.0, 30.0, 2.0
+PROBE = 0.01
+PROXIMITY = 0.01  # [m]
+MARGIN = 0.1  # [rad]
+LATENCY = 0.1  # [s]
+
+
+class MoveitServoModel:
+    """Positions for twists by moveit_servo's documented algorithm (Jazzy); not its code.
+
+    Modelled: the pseudo-inverse of the Jacobian, the scaling by its condition number with metres
+    and radians mixed (slower from 17 on, half as strict when leaving, a halt at 30 both ways), the
+    common factor for joint speeds, the exponential slowing near a collision and the halt in one,
+    the margin at joint limits that halts all joints, and the latency of 100 ms. Parameters are the
+    defaults.
+    """
+
+    def __init__(self, model: RobotModel, start: Array, period: float) -> None:
+        self._model = model
+        self._period = period
+        self.position: Array = np.array(start)
+        waiting = round(LATENCY / period)
+        self._queue: deque[Array] = deque([self.position] * waiting, maxlen=waiting)
+
+    def step(self, twist: Array) -> Array:
+        """Advance by a cycle, and return the positions that are commanded now."""
+        late = self._queue[0]
+        self._queue.append(self._next(twist))
+        return late
+
+    def _next(self, twist: Array) -> Array:
+        model, limits = self._model, self._model.limits
+        jacobian = model.jacobian(self.position)
+        change = np.linalg.pinv(jacobian) @ twist * self._period
+        change *= self._singularity(jacobian, twist)
+        excess = np.abs(change) / (limits.velocity * self._period)
+        change /= max(1.0, float(excess.max()))
+        distance = model.clearance(self.position)
+        if distance <= 0.0:
+            return self.position
+        if distance < PROXIMITY:
+            change *= np.exp(np.log(0.001) / PROXIMITY * (PROXIMITY - distance))
+        after = self.position + change
+        outward = ((after > limits.upper - MARGIN) & (change > 0)) | (
+            (after < limits.lower + MARGIN) & (change < 0)
+        )
+        if not outward.any():
+            self.position = after
+        return self.position
+
+    def _singularity(self, jacobian: Array, twist: Array) -> float:
+        tool, values, joints = np.linalg.svd(jacobian)
+        condition = values[0] / max(values[-1], 1e-12)
+        if condition < LOWER:
+            return 1.0
+        if condition >= HARD_STOP:
+            return 0.0
+        direction = tool[:, len(values) - 1]
+        probe = self.position + PROBE * joints[len(values) - 1]
+        probed = np.linalg.svd(self._model.jacobian(probe))[1]
+        if probed[0] / max(probed[-1], 1e-12) < condition:
+            direction = -direction
+        toward = float(direction @ twist) > 0
+        upper = HARD_STOP if toward else LOWER + (HARD_STOP - LOWER) * LEAVING
+        return max(0.0, 1.0 - float(condition - LOWER) / (upper - LOWER))
+
+
 PERIOD = 0.01
 STUCK = 0.05
 CHECKS = 15
@@ -99,6 +167,7 @@ class Tally:
     commands: int = 0
     stuck: int = 0
     named: int = 0
+    factors: list[float] = field(default_factory=list)
 
     def __str__(self) -> str:
         """Describe it in a few words."""
@@ -163,6 +232,15 @@ def ours(core: MotionCore, twist: Array) -> tuple[float, bool]:
     return share(model, start, core.state.position, twist), named
 
 
+def theirs(model: RobotModel, start: Array, twist: Array) -> tuple[float, Array]:
+    """Carry out a command for 1 s with the model of moveit_servo, after its latency."""
+    servo = MoveitServoModel(model, start, PERIOD)
+    end = start
+    for _ in range(round(1.1 / PERIOD)):
+        end = servo.step(twist)
+    return share(model, start, end, twist), end
+
+
 def share(model: RobotModel, start: Array, end: Array, twist: Array) -> float:
     """Return the share of the asked way that was moved."""
     scale = 1.0 / SPEED
@@ -171,7 +249,7 @@ def share(model: RobotModel, start: Array, end: Array, twist: Array) -> float:
     return float(moved @ asked / (asked @ asked))
 
 
-def count(tally: Tally, moved: float, named: bool) -> None:
+def count(tally: Tally, moved: float, named: bool = False) -> None:
     """Count a command."""
     tally.commands += 1
     tally.stuck += moved < STUCK
@@ -188,26 +266,35 @@ def random_twist(rng: np.random.Generator) -> Array:
     return across
 
 
-def walk(model: RobotModel, commands: int) -> Tally:
-    """Give commands one after the other, each going on from where the arm is."""
-    rng, tally, core = np.random.default_rng(1), Tally(), MotionCore(model)
+def walk(model: RobotModel, commands: int) -> tuple[Tally, Tally]:
+    """Give both the same commands one after the other, each going on from where it is."""
+    rng, here, there = np.random.default_rng(1), Tally(), Tally()
+    core = MotionCore(model)
     core.reset(ready(model.name))
+    position = np.array(ready(model.name))
     for _ in range(commands):
-        count(tally, *ours(core, random_twist(rng)))
-    return tally
+        twist = random_twist(rng)
+        count(here, *ours(core, twist))
+        moved, position = theirs(model, position, twist)
+        count(there, moved)
+    return here, there
 
 
-def from_random_poses(model: RobotModel, commands: int) -> Tally:
-    """Give commands from random poses that are free of contact."""
-    rng, tally, core = np.random.default_rng(2), Tally(), MotionCore(model)
+def from_random_poses(model: RobotModel, commands: int) -> tuple[Tally, Tally]:
+    """Give both the same command from the same random pose that is free of contact."""
+    rng, here, there = np.random.default_rng(2), Tally(), Tally()
     lower = np.maximum(model.limits.lower, -np.pi)
     upper = np.minimum(model.limits.upper, np.pi)
-    while tally.commands < commands:
+    core = MotionCore(model)
+    while here.commands < commands:
         start = rng.uniform(lower, upper)
-        if model.clearance(start) >= 0.01:
-            core.reset(start)
-            count(tally, *ours(core, random_twist(rng)))
-    return tally
+        if model.clearance(start) < 0.01:
+            continue
+        twist = random_twist(rng)
+        core.reset(start)
+        count(here, *ours(core, twist))
+        count(there, theirs(model, start, twist)[0])
+    return here, there
 
 
 def speed_error(model: RobotModel) -> tuple[float, int]:
@@ -282,8 +369,8 @@ def main() -> None:
             f'  collisions on 10 s   {check:.0f} ms beside the cycle; {free} of {CHECKS} ways free'
         )
         for label, run in (('random walk', walk), ('random poses', from_random_poses)):
-            tally = run(model, commands)
-            print(f'  {label:20} {tally}, {tally.named} of them named')
+            here, there = run(model, commands)
+            print(f'  {label:20} {here}, {here.named} of them named; moveit_servo: {there}')
     places = {'far apart': 0.0, 'near each other': 0.75, 'held up by each other': 0.9}
     for label, turn in places.items():
         alone, late_alone = time_of_two_arms(turn, apart=False)
