@@ -293,7 +293,7 @@ class CanopenDrive:
         """Go to a position and wait until the drive stands there.
 
         In another mode than 1, 7 and 8 mode 1 (profile position) is selected first. A drive that
-        is late is halted, unless somebody else has begun another motion, which is an error here.
+        is late is halted, unless another client has begun a motion, which is an error here.
 
         Args:
             position: In user units.

@@ -56,7 +56,7 @@ class JointAggregator:
     Drives on one bus share the stamp of their SYNC, so a round is one SYNC. A sample of a later
     stamp, or a second one of the same joint, ends a round that is still incomplete. Joints that
     are silent are left out after a while instead of being invented; until then nothing is
-    published without them, so that nobody sees a robot of one joint at the start.
+    published without them, so that no subscriber sees a robot of one joint at the start.
     """
 
     def __init__(self, joints: Joints) -> None:

@@ -157,7 +157,7 @@ class DriveSource:
         self._axes = list(gateway.model.joints)
         self._released: dict[str, Refusal | str] = dict.fromkeys(self._axes, NOT_ATTACHED)
         self._left: set[str] = set()  # drives that dropped out since all of them followed
-        self._has_moved = False  # on behalf of anybody
+        self._has_moved = False  # for any client
 
     @property
     def axes(self) -> Sequence[str]:

@@ -223,7 +223,7 @@ class MotionCycle:
         self.at_rest = not self._state.moving
 
     def _kept(self, now: float) -> str:
-        """Return why the arm did not follow, as long as somebody goes on to command it."""
+        """Return why the arm did not follow, as long as a client goes on to command it."""
         if now - max(self._failed, self._gateway.refused) > RESYNC_SILENCE:
             self._failure = ''
         return self._failure

@@ -48,7 +48,7 @@ from canopen_core.standard import (
 TURN = 2.0 * math.pi  # a turn in [rad]
 SAME = 0.01  # share by which two scales may differ and still say the same
 FAR = 10.0
-"""How many times the increments of the factor group somebody may say without being asked."""
+"""How many times the increments of the factor group a user may enter without being asked."""
 
 
 class NewBusError(CanopenError):
@@ -57,13 +57,13 @@ class NewBusError(CanopenError):
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """How far an increment is, as somebody has said."""
+    """How far an increment is, as the user entered it."""
 
     # increments of the drive per rad or m of the joint; negative for the other direction
     scale: float
     said: str  # the same in words
     slides: bool = False  # the joint slides, so that the scale is per m
-    # velocity units of the drive per rad/s or m/s; None where nobody has said it
+    # velocity units of the drive per rad/s or m/s; None where the user has not entered it
     velocity: float | None = None
     velocity_said: str = ''  # the same in words
 
@@ -79,7 +79,7 @@ class NewDevice:
     mode: OperationMode | None = None
     units: Units | None = None  # units of the joint; None where the factor group says them
     # turns of what the drive counts in rpm, or in the unit of angles that it names in 0x60A9, for
-    # one turn or 1 m of the joint; None where nobody has said it
+    # one turn or 1 m of the joint; None where the user has not entered it
     rpm: float | None = None
 
     @property
@@ -99,7 +99,7 @@ class NewDevice:
 
     @property
     def has_open_units(self) -> bool:
-        """Whether neither its EDS nor anybody says how far an increment of its joint is."""
+        """Whether neither its EDS nor the user says how far an increment of its joint is."""
         return self.is_drive and said_units(self) is None and not says_units(self.factors)
 
     @property
@@ -130,7 +130,7 @@ def says_units(factors: FactorGroup) -> bool:
 
 
 def said_units(device: NewDevice) -> Units | None:
-    """Return the units that are written out: as somebody has said, else as named; or None."""
+    """Return the units that are written out: as the user entered them, else as named; or None."""
     units, named = _position_units(device), device.velocity_unit
     if units is None:
         return None
@@ -171,7 +171,7 @@ def velocity_scale(device: NewDevice, units: Units) -> tuple[float, str]:
 def contradiction(device: NewDevice, units: Units) -> str:
     """Return what to look at where the units and the factor group differ; else nothing.
 
-    What somebody says may differ by a gear that the drive does not know, but not by far; where it
+    A user's entry may differ by a gear that the drive does not know, but not by far; where it
     is far less than the factor group has, the check of the file warns.
     """
     factors = device.factors
@@ -187,7 +187,7 @@ def contradiction(device: NewDevice, units: Units) -> str:
 
 
 def _position_units(device: NewDevice) -> Units | None:
-    """Return the units that somebody has said, else those that the drive names; None for none.
+    """Return the units that the user entered, else those that the drive names; None for none.
 
     What an EDS names in 0x60A8 does not count: it is a default that the maker changes by
     parameters. Those of the factor group are written out where the
@@ -209,7 +209,7 @@ def _position_units(device: NewDevice) -> Units | None:
 def _is_of_joint(device: NewDevice, units: Units) -> bool:
     """Whether the velocity that 0x60A9 names is that of the joint.
 
-    It is of what the positions are of, by CiA 402-2. Where somebody else says what the joint is
+    It is of what the positions are of, by CiA 402-2. Where another source says what the joint is
     in increments, a turn may be one of the motor, unless the factor group says the same.
     """
     named, factors = device.velocity_unit, device.factors

@@ -5,7 +5,7 @@
 ::
 
     SimulationError (RuntimeError)   the robot cannot be simulated, or its physics blew up
-    ├── SetupError (ValueError)      an option of the simulated robot has no sense
+    ├── SetupError (ValueError)      an option of the simulated robot is wrong
     └── TargetError (ValueError)     targets of the servos are refused; nothing moves
 """
 
@@ -20,7 +20,7 @@ class SimulationError(RuntimeError):
 
 
 class SetupError(SimulationError, ValueError):
-    """An option of the simulated robot has no sense.
+    """An option of the simulated robot is wrong.
 
     Scenarios: a URDF without base_link, a link path that is a file, a rate of faults above one.
     """

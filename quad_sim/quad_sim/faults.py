@@ -84,7 +84,7 @@ def make_fault(
     """Return a fault from words ``name=value``; ``at`` and ``for`` go before the arguments [s].
 
     Raises:
-        SetupError: A word has no sense; the message lists the known ones.
+        SetupError: A word is unknown; the message lists the known ones.
     """
     try:
         kind = FaultKind(name)
@@ -119,7 +119,7 @@ def parse_fault(text: str) -> Fault:
     """Return a fault that is written ``KIND[,name=value...]``.
 
     Raises:
-        SetupError: The text has no sense; the message lists the known faults.
+        SetupError: The text is wrong; the message lists the known faults.
     """
     name, *settings = (word.strip() for word in text.split(','))
     return make_fault(name, settings)

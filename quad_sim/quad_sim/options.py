@@ -38,7 +38,7 @@ class Simulation:
 
 
 def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:
-    """Read the command line; ends the process with 2 for one that has no sense."""
+    """Read the command line; end the process with 2 where it is wrong."""
     parser = argparse.ArgumentParser(
         prog='fake_xgo',
         description='A simulated XGO on a pseudo-terminal that speaks both serial protocols.',
@@ -91,7 +91,7 @@ def build(options: argparse.Namespace) -> Simulation:
     """Make the robot that a command line describes; it is at rest when this returns.
 
     Raises:
-        SetupError: An option has no sense.
+        SetupError: An option is wrong.
         SimulationError: MuJoCo is not installed.
     """
     for name, most, unit in (('battery', 100, 'percent'), ('command_gap', 1, 'seconds')):
@@ -130,7 +130,7 @@ def parse_mount(text: str) -> tuple[int, Mount]:
     """Return a motor id and how its servo sits, from ``ID=SIGN[,DEGREES]``.
 
     Raises:
-        SetupError: The text has no sense; the message names what has.
+        SetupError: The text is wrong; the message names what is right.
     """
     motor, _, rest = text.partition('=')
     sign, _, offset = rest.partition(',')

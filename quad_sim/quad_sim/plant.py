@@ -108,7 +108,7 @@ def parse_servo(text: str) -> ServoParameters:
     """Return a servo from its name, or from ``name=value,...``.
 
     Raises:
-        SetupError: The text has no sense; the message names what has.
+        SetupError: The text is wrong; the message names what is right.
     """
     known = [model.value for model in ServoModel]
     if text in known:

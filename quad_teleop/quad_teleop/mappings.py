@@ -138,7 +138,7 @@ class WatchedRobot(Robot, Protocol):
 
     @property
     def has_subscriber(self) -> bool:
-        """Whether anybody listens to the velocities."""
+        """Whether the velocities have subscribers."""
 
     def report(self, now: float) -> ControllerReport | None:
         """Return what the controller reported last; None when that is long ago."""

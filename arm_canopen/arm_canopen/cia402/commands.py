@@ -216,7 +216,7 @@ class AxisCommands:
         try:
             await self._scheduler.until(lambda: lost() or arrived(), timeout)
         except TimeoutError:
-            if not lost():  # else the motion is that of somebody else
+            if not lost():  # else another client owns the motion
                 raise await self._halted(f'has not arrived within {timeout:g} s') from None
         if lost():
             raise self._steps.refused(ended)

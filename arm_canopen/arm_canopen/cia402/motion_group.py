@@ -155,7 +155,7 @@ class MotionGroup:
     def _notify(self, source: MotionSource, axis: str, refusal: Refusal) -> None:
         try:
             source.released(axis, refusal)
-        except Exception as error:  # noqa: BLE001  # whoever takes the drive away must not suffer
+        except Exception as error:  # noqa: BLE001  # the caller takes the drive away regardless
             name = type(source).__name__
             text = (
                 f'motion source {name} raised {type(error).__name__}: {error}, when it lost {axis}'

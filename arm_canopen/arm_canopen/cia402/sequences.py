@@ -292,7 +292,7 @@ async def _choose(steps: AxisSteps, method: int) -> None:
 
 
 class TargetStream:
-    """Targets on a topic, without an end that anybody announces.
+    """Targets on a topic, whose end no client announces.
 
     A publisher cannot know that its drive was halted, homed or switched to a mode in which its
     numbers mean something else, and a pause of it is no request: a stalled process and a network

@@ -362,7 +362,7 @@ class StopSequence:
         self._unseen_after = self._scheduler.now + UNSEEN_TIMEOUT + self.ramp_time()
 
     def _gives_up(self) -> bool:
-        """Return whether the step is in vain: the drive does not slow down, or shows nothing."""
+        """Return whether the step has failed: the drive does not slow down, or shows nothing."""
         view, now = self._view, self._scheduler.now
         if not view.seen:
             return now > self._unseen_after

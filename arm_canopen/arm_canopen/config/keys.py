@@ -68,7 +68,7 @@ class Key:
 
 
 def key(default: Any, text: str, span: tuple[float, float] | None = None, **more: Any) -> Any:  # noqa: ANN401
-    """Declare a field that a key fills, whose name and kind are its own where not given."""
+    """Declare a field that a key fills; the key has the field's name and type unless given."""
     return field(default=default, metadata={'key': Key(default, text, span, **more)})
 
 

@@ -405,7 +405,7 @@ class Startup:
         self._command_nmt = command_nmt
         self._report = report
         self._waiting: dict[RemoteNode, Promise[bool]] = {}
-        # all mandatory devices were configured, so nobody is held back any more
+        # all mandatory devices were configured, so no other device is held back any more
         self.complete = not self._missing()
         for node in nodes:
             if node.config.mandatory:

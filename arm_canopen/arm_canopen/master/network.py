@@ -77,7 +77,7 @@ class Network:
         # called with each received frame, for statistics
         self.on_frame: Callable[[Frame], None] = lambda frame: None
         self.controller = ControllerWatch(report)  # the CAN controller as its error frames show it
-        self.unknown_frames = 0  # frames with an identifier that nobody on this bus should use
+        self.unknown_frames = 0  # frames with an identifier that no device on this bus should use
         # sends a frame; a bus that refuses it is reported once until it works again
         self.send = BusSender(send, report).send
         self._report = report
@@ -208,7 +208,7 @@ class Network:
 
         Due at :attr:`next_update`: when all TPDOs of the SYNC have come, or half a period after
         it without those that are missing. The heartbeat leaves from here, so that devices stop by
-        themselves when nobody updates their set-points.
+        themselves when their set-points are no longer updated.
         """
         self.next_update = NEVER
         updated = self._contain(partial(self.on_cycle, now, period))

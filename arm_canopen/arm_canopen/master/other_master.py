@@ -83,7 +83,7 @@ class MasterFrames:
 
 
 class OtherMasterWatch:
-    """Says once of each kind of frame that somebody else sends what only the master sends."""
+    """Reports once for each kind of frame that another node sends what only the master sends."""
 
     def __init__(self, config: BusConfig, report: Report, *, expected: bool) -> None:
         """``expected``: the other master is meant to be there."""
@@ -98,7 +98,7 @@ class OtherMasterWatch:
         if kind is not None and kind not in self._reported:
             self._reported.add(kind)
             text = (
-                f'another master is on this bus: somebody else sends {kind.text}; two masters '
+                f'another master is on this bus: another node sends {kind.text}; two masters '
                 'command the same drives, so end one of them'
             )
             self._report(Event(EventKind.BUS, self._severity, '', text))

@@ -158,7 +158,7 @@ class SentRpdo:
 
     def __init__(self, config: PdoConfig, start: StartValue, *, cyclic: bool = True) -> None:
         self.config = config  # its configuration
-        # it leaves in every cycle; otherwise when somebody published one of its objects
+        # it leaves in every cycle; otherwise when a client published one of its objects
         self.cyclic = cyclic
         self.due = False  # it was published, and leaves with the next cycle
         # axes that are commanded by SDO; while there are any, it does not leave
@@ -181,7 +181,7 @@ class SentRpdo:
     def leaves(self, now: float) -> bool:
         """Return whether it leaves in this cycle, at a time in [s].
 
-        One with a deadline is repeated within it, once somebody has published it.
+        One with a deadline is repeated within it, once a client has published it.
         """
         if self.skips:
             self.skips = False

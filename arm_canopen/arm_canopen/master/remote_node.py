@@ -82,7 +82,7 @@ class RemoteNode:
         self.nmt_state: NmtState | None = None
         self.phase = BootPhase.WAITING  # how far it has booted
         self.phase_detail = ''  # what it is doing in that phase, or why it failed
-        # online, but somebody stopped it or sent it to pre-operational
+        # online, but another node stopped it or sent it to pre-operational
         self.left_operational = False
         # NMT state that was commanded last, by whomever on this bus; None when unknown
         self.wanted: NmtState | None = None
@@ -282,7 +282,7 @@ class RemoteNode:
         self.nmt_state = None
         self.online = False
         self._resting = None
-        self._stop_drivers(reason)  # first, so that nobody sends new SDOs when these end
+        self._stop_drivers(reason)  # first, so that no driver sends new SDOs when these end
         self.offline(reason)
         if severity is Severity.ERROR:
             self.on_gone()
@@ -306,7 +306,7 @@ class RemoteNode:
 
     @property
     def _being_reset(self) -> bool:
-        """Whether an NMT command of anybody on this bus has just reset it."""
+        """Whether an NMT command on this bus has just reset it."""
         recent = self._scheduler.now - self._commanded_at <= RESET_TIME
         return self._commanded in RESETS and recent
 

@@ -45,7 +45,7 @@ ReportOfDevice = Callable[[EventKind, Severity, str], None]
 def start_value(config: NodeConfig, mapped: MappedObject) -> Number:
     """Return the value that an object has by the files when the device is booted.
 
-    An object that nobody commands (a torque limit, a profile velocity, digital outputs) must keep
+    An object without commands (a torque limit, a profile velocity, digital outputs) must keep
     what bus.yml wrote or else what its EDS has as default.
 
     Returns:

@@ -181,7 +181,7 @@ class NetworkThread(BusThread):
             self._log_defects(partial(self.network.note_pause, cycle.late, now))
         self._log_defects(partial(self.network.cycle, now, self.period))
         self._take([frame for frame in frames if frame.timestamp >= now])
-        self._update_when_due(now)  # the deadline may have passed before anybody looks again
+        self._update_when_due(now)  # the deadline may have passed before the next look
 
     def _update_when_due(self, now: float) -> None:
         if now >= self.network.next_update:

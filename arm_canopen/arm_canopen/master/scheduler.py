@@ -127,7 +127,7 @@ class Task(Promise[T]):
             awaited = self._coroutine.send(None)
         except StopIteration as stop:
             self.resolve(stop.value)
-        except Exception as error:  # noqa: BLE001  # handed to whoever awaits the task
+        except Exception as error:  # noqa: BLE001  # handed to what awaits the task
             self.reject(error)
         else:
             if self.cancelled:
@@ -143,7 +143,7 @@ class Scheduler:
 
     def __init__(self, now: float = 0.0) -> None:
         self.now = now  # steady time of the last ``advance`` in [s]
-        # called with the error of a coroutine that nobody awaits
+        # called with the error of a coroutine that is not awaited
         self.on_defect: Callable[[BaseException], None] = lambda error: None
         self._timers: list[tuple[float, int, Promise[None]]] = []
         self._order = count()
@@ -158,7 +158,7 @@ class Scheduler:
             self._check_conditions()
 
     def set_time(self, now: float) -> None:
-        """Set the time without resuming anybody, so that what is begun now is timed from now."""
+        """Set the time without resuming a task, so that what is begun now is timed from now."""
         self.now = max(self.now, now)
 
     def next_deadline(self) -> float | None:
@@ -168,7 +168,7 @@ class Scheduler:
         return self._timers[0][0] if self._timers else None
 
     def spawn(self, coroutine: Coroutine[Promise[Any], None, T]) -> Task[T]:
-        """Start a coroutine now, for somebody who awaits it or looks at its result."""
+        """Start a coroutine now; the caller awaits it or looks at its result."""
         return Task(coroutine)
 
     def background(self, coroutine: Coroutine[Promise[Any], None, None]) -> Task[None]:
@@ -241,7 +241,7 @@ class Scheduler:
             condition, promise = entry
             try:
                 ready = condition()
-            except Exception as error:  # noqa: BLE001  # belongs to whoever waits for it
+            except Exception as error:  # noqa: BLE001  # belongs to what waits for it
                 promise.reject(error)
                 continue
             if ready:

@@ -128,7 +128,7 @@ class SdoChannel:
             self.counters.doubled += 1
 
     def note_other_client(self) -> None:
-        """Somebody else has sent a request, whose answer is not a second one to an own request."""
+        """Another client has sent a request; its answer is no second one to our own."""
         self._other_client_until = self._scheduler.now + OTHER_CLIENT_TIME
 
     def note_odd(self, kind: str, text: str) -> None:

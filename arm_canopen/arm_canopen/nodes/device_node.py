@@ -84,7 +84,7 @@ class DeviceTopics:
             self._nmt_state.publish(String(data=words))
 
     def update_listeners(self) -> None:
-        """Publish each received object on ~/rpdo while somebody listens, and only then."""
+        """Publish each received object on ~/rpdo while it has subscribers, and only then."""
         listened = self._rpdo.get_subscription_count() > 0
         if listened != self._listened:
             self._listened = listened

@@ -89,7 +89,7 @@ class DriveJointStates:
 
     def __init__(self, node: Node, axes: Sequence[AxisState | EncoderState]) -> None:
         self.axes = list(axes)  # the state of each axis
-        self.listened = False  # somebody listens to one of the topics
+        self.listened = False  # one of the topics has subscribers
         names = [axis.name for axis in axes]
         topics = {'~': slice(None)}
         if len(names) > 1:  # and each channel as a drive of its own
@@ -125,7 +125,7 @@ class RobotJointStates:
 
     def __init__(self, node: Node, joints: Joints) -> None:
         self.aggregator = JointAggregator(joints)  # the joints
-        self.listened = False  # somebody listens to the topic
+        self.listened = False  # the topic has subscribers
         self._clock = node.get_clock()
         self._publisher = node.create_publisher(JointState, 'joint_states', 10)
 

@@ -44,7 +44,7 @@ class OutputThread:
     def post(self, work: Callable[[], None]) -> None:
         """Queue a function; returns at once.
 
-        For what somebody waits for, such as answers of services: it is never left out.
+        For what a client waits for, such as answers of services: it is never left out.
         """
         self._queue.put(work)
 

@@ -131,7 +131,7 @@ class ReplayProcess:
         ``stop`` ends it, and is set at the end of the log.
 
         Raises:
-            CanopenError: Somebody else publishes the same meanwhile.
+            CanopenError: Another node publishes the same meanwhile.
             PlaybackError: The log cannot be played to its end.
         """
         self._node.create_timer(WATCH_PERIOD, partial(self._look_for_master, stop))

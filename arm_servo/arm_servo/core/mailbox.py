@@ -78,7 +78,7 @@ class DisplacementRequest:
         return not any(self.displacements.values())
 
     def beyond(self, before: MotionRequest) -> DisplacementRequest:
-        """Return it beyond another displacement; anything else it takes the place of."""
+        """Return this displacement added to an earlier one; any other motion is replaced."""
         if not isinstance(before, DisplacementRequest):
             return self
         if self.is_zero:

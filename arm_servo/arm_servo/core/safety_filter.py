@@ -219,7 +219,7 @@ class SafetyFilter:
         return self._neighbours.least(stop, begin, within).distance < within
 
     def _beyond(self, wanted: RobotState) -> tuple[Mask, Plan | None]:
-        """Return which joints could not stop any more within their limits, and how all would."""
+        """Return which joints can no longer stop within their limits, and the stop of all."""
         coasting = wanted.acceleration * np.abs(wanted.acceleration) / (2.0 * self._limits.jerk)
         peak = np.maximum(np.abs(wanted.velocity + coasting), np.abs(wanted.velocity))
         beyond: Mask = peak > self._fastest

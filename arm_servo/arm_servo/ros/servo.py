@@ -96,7 +96,7 @@ MAX_STAMP_AHEAD = 0.1  # how far ahead of this clock a stamp may be in [s]
 class ServoModes:
     """Says which commands are admitted.
 
-    Until somebody chooses a type every command is taken for what it is.
+    Until a client chooses a type, every command is taken for what it is.
     """
 
     def __init__(self, node: Node, stop: Callable[[str], None], renew: Callable[[], None]) -> None:

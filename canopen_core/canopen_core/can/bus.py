@@ -89,7 +89,7 @@ def wall_clock_offset() -> float:
 
 
 class WallClock:
-    """How far the wall clock is ahead of the steady clock, also while somebody sets it.
+    """How far the wall clock is ahead of the steady clock, also while it is being set.
 
     Both run at one rate, so what is known of the difference is kept within what is read anew. A
     thread that loses the processor between two readings gets a wider bound, and no error.
@@ -108,7 +108,7 @@ class WallClock:
         return now
 
 
-QUEUE_FRAMES = 100_000  # a bus object that nobody reads must not eat up the memory
+QUEUE_FRAMES = 100_000  # a bus object that is not read must not eat up the memory
 
 
 class VirtualWire:

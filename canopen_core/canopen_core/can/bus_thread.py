@@ -147,7 +147,7 @@ class BusThread:
             if future.set_running_or_notify_cancel():
                 try:
                     work()
-                except Exception as error:  # noqa: BLE001  # belongs to whoever holds the future
+                except Exception as error:  # noqa: BLE001  # belongs to the holder of the future
                     future.set_exception(error)
 
     def _hand_over(self, future: Future[Any], work: Callable[[], None]) -> None:

@@ -66,7 +66,7 @@ class LogWriter:
     """Writes frames to a log.
 
     Wall clock times are steady times plus the distance of the clocks at the start, so the log
-    runs evenly also when somebody sets the clock.
+    runs evenly also when the clock is set.
     """
 
     def __init__(self, path: Path, bus_name: str, wall_offset: float) -> None:

@@ -172,7 +172,7 @@ def _open_sender(name: str, group: str, port: int) -> socket.socket:
         sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(_LOOPBACK))
         sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
         sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
-        # a member that blocks nobody: without one the kernel drops for the whole interface what
+        # a member that blocks no source: without one the kernel drops for the whole interface what
         # our receiver blocks, also for python-can, which is a member on another interface
         sender.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, _membership(group))
         sender.setblocking(False)
@@ -189,7 +189,7 @@ def _bind_own_address(sender: socket.socket) -> None:
     for attempt in range(_SOURCE_TRIES + 1):
         # 127.1.0.0 to 127.254.255.255, so neither the usual addresses nor the broadcast
         address = ipaddress.IPv4Address(0x7F01_0000 + chosen.randrange(0xFE_0000))
-        last = attempt == _SOURCE_TRIES  # somebody holds the port on all addresses
+        last = attempt == _SOURCE_TRIES  # another program holds the port on all addresses
         try:
             sender.bind((str(address), 0 if last else _SOURCE_PORT))
         except OSError:

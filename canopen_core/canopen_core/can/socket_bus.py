@@ -190,7 +190,7 @@ def loss_text(name: str, granted: int) -> str:
 class TimestampReader:
     """Turns ancillary data of received datagrams into steady time and a count of losses.
 
-    The kernel stamps with the wall clock. Stamps never go back, also when somebody sets it.
+    The kernel stamps with the wall clock. Stamps never go back, also when it is set.
     """
 
     def __init__(self) -> None:

@@ -84,7 +84,7 @@ def decode_text(data: bytes) -> str:
 
 
 def _utf_16(data: bytes) -> str:
-    """Name the encoding of a text in which every other byte is 0, as that of ASCII is."""
+    """Name the UTF-16 encoding of a text whose every other byte is 0."""
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return 'utf-16'
     head = data[:NUL_SAMPLE]

@@ -51,7 +51,7 @@ class ConsumerHeartbeatTime(NamedTuple):
 
     @property
     def used(self) -> bool:
-        """Whether it awaits anybody; no time, or no node id, is an entry that is not used."""
+        """Whether it awaits a node; an entry without a time or a node id is not used."""
         return bool(self.time_ms) and NODE_ID_MIN <= self.node_id <= NODE_ID_MAX
 
 

@@ -658,7 +658,7 @@ def test_an_emergency_of_a_device_whose_eds_has_no_node_id_is_received(cob_id: i
     assert [emcy.code for _, emcy in net.network.nodes['a'].emergencies.history] == [0x2310]
     assert len(net.frames(0x082)) == 1
     net.network.receive(Frame(0x080, b'', net.now))
-    assert any('somebody else sends SYNC' in text for text in net.reported())
+    assert any('another node sends SYNC' in text for text in net.reported())
     assert len(net.network.nodes['a'].emergencies.history) == 1
 
 
@@ -1015,7 +1015,7 @@ BUS = bus_config(drive_config('a', 2), drive_config('b', 3))
 
 
 class SharedBus(VirtualBus):
-    """A bus on which somebody else sends a frame again and again, whenever it is read."""
+    """A bus on which another node sends a frame again and again, whenever it is read."""
 
     def __init__(self, frame: Frame) -> None:
         wire = VirtualWire()

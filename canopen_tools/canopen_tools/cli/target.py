@@ -40,7 +40,7 @@ from .arguments import UsageError, warn
 T = TypeVar('T')
 
 IDLE_WAIT = 0.1  # [s] longest wait for frames when nothing else is due
-QUIET = 0.02  # [s] without SDO frames, after which a transfer of somebody else counts as ended
+QUIET = 0.02  # [s] without SDO frames, after which a transfer of another client counts as ended
 QUIET_WAIT = 2.0  # [s]
 
 

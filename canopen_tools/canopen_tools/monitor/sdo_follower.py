@@ -294,7 +294,7 @@ class SdoText:
     """A frame of a transfer in words."""
 
     text: str  # the words
-    is_abort: bool = False  # somebody ended the transfer
+    is_abort: bool = False  # one side ended the transfer
 
 
 class _Transfer:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The guardian: a small process that stops the others when their supervisor was killed.
 
-A supervisor that gets SIGKILL (or is the victim of the memory killer) cannot stop anybody, and its
+A supervisor that gets SIGKILL (or is the victim of the memory killer) stops no process, and its
 processes would go on: a master with enabled drives. So the supervisor starts this process first
 and keeps one end of a pipe to it. When the pipe ends without ``bye``, the supervisor is gone,
 and the guardian stops the processes in the same order and by the same signals: both do so by

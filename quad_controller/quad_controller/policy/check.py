@@ -51,7 +51,7 @@ def check_contract(
         document: Where the values of the contract come from.
         hold_missing: Joints that the robot lacks count as being at their default.
         period: Time between two steps of the control loop in [s].
-        servo: How the servos of the robot follow; None when nobody knows.
+        servo: How the servos of the robot follow; None when they are unknown.
     """
     count = len(contract.joint_names)
     inputs, outputs = observation_ports(network, contract.recurrence, contract.action.output)

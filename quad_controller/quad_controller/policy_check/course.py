@@ -47,7 +47,7 @@ SPEEDS = 3
 
 
 def axis_of(command: Velocity) -> str:
-    """Return along which axis a command goes mainly: a key of :data:`AXES`."""
+    """Return the main axis of a command: a key of :data:`AXES`."""
     shares = [abs(part) / top for part, top in zip(command, TOP, strict=True)]
     return list(AXES)[shares.index(max(shares))]
 

@@ -54,7 +54,7 @@ def shipped_walkers() -> dict[str, Candidate]:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """A course that somebody walks."""
+    """A course that a robot walks."""
 
     who: Candidate
     commands: tuple[Velocity, ...]  # one after the other

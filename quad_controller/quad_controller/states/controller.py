@@ -90,7 +90,7 @@ class Controller:
                     'give <limit velocity="..."> of the URDF in rad/s'
                 )
         poses = Poses(robot, states.lie_height, arm_pose)
-        # positions of all joints that are assumed of those that nobody has measured [rad]
+        # positions of all joints that are assumed of those that are not measured [rad]
         self.fallback_positions = poses.fallback_positions
         self._generator = GaitGenerator(robot, gait, poses.fallback_positions)
         self._generator.choose(first_gait)
@@ -288,7 +288,7 @@ class Controller:
         return self._limiter.last
 
     def _moved_unseen(self) -> bool:
-        """Whether joints that are held were moved by something else while nobody knew it."""
+        """Whether joints that are held were moved by something else while unmeasured."""
         joints, last = self._health.joints, self._limiter.last
         if joints is None or self._health.held:
             self._unseen.lose()
@@ -309,7 +309,7 @@ class Controller:
 
     @property
     def _held(self) -> bool:
-        """Whether nothing moves on, because nobody knows any more where the joints are."""
+        """Whether nothing moves on, because the places of the joints are no longer known."""
         return self._health.held and Fault.JOINTS not in self._tolerated
 
     def _wake(self, pause: float, last: Targets) -> list[Event]:

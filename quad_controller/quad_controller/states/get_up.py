@@ -187,7 +187,7 @@ WITH_AN_ARM = (
 
 
 def stands(imu: ImuSample | None) -> bool:
-    """Return whether the body of a robot is upright; also when nobody knows."""
+    """Return whether the body of a robot is upright; also when that is unknown."""
     return imu is None or imu.is_uncertain or imu.tilt < LEVEL
 
 

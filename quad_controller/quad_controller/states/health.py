@@ -166,7 +166,7 @@ class Health:
             yield Fault.SERVO, self.servo_problem
 
     def unmeasured(self, policy: PolicyRunner | None) -> str:
-        """Return what a policy would need and nobody measures; nothing for none."""
+        """Return what a policy needs and no sensor measures; nothing for none."""
         if policy is None:
             return ''
         if self.uncertainty:

@@ -52,7 +52,7 @@ class Poses:
             )
         self.robot = robot
         self._arm = dict(zip(robot.others, arm_pose, strict=True)) if arm_pose else {}
-        # positions of all joints that are assumed of those that nobody has measured [rad]
+        # positions of all joints that are assumed of those that are not measured [rad]
         self.fallback_positions = self.with_arm([0.0] * len(robot.names))
         self._lying = robot.solve(robot.footprint(lie_height, self.fallback_positions))
 

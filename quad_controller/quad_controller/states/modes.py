@@ -39,7 +39,7 @@ class Fault(Enum):
 
 
 REACTIONS: Mapping[Fault, Reaction] = {
-    Fault.JOINTS: Reaction.HOLD,  # nobody knows where the legs are
+    Fault.JOINTS: Reaction.HOLD,  # where the legs are is unknown
     Fault.IMU: Reaction.STAND,
     Fault.FALLEN: Reaction.HOLD,  # legs in the air find no ground, and may be jammed
     Fault.BATTERY: Reaction.LIE_DOWN,

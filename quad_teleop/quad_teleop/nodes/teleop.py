@@ -227,7 +227,7 @@ class RobotLink:
 
     @property
     def has_subscriber(self) -> bool:
-        """Whether anybody listens to the velocities."""
+        """Whether the velocities have subscribers."""
         return any(publisher.get_subscription_count() for publisher in self._publishers)
 
     def report(self, now: float) -> ControllerReport | None:

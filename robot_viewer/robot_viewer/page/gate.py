@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Who may open the page: this host's own pages, and from elsewhere who has the token; and STOP.
 
-viser serves whoever reaches its port, and any page that a browser of this host has open may
+viser serves all that reach its port, and any page that a browser of this host has open may
 connect to a loopback port. So each request is looked at before viser sees it.
 
 viser has its controls in a panel, which may be folded, scrolled or busy. STOP goes its own way: a

@@ -229,7 +229,7 @@ def greatest_velocities(tree: KinematicTree) -> dict[str, float]:
 
 
 def start_position(joint: Joint) -> float:
-    """Return the position of a joint in [rad] or [m] before anybody says it."""
+    """Return the position of a joint in [rad] or [m] before it is known."""
     lower, upper = travel(joint)
     return min(max(0.0, lower), upper)
 

@@ -41,7 +41,7 @@ class OffsetTarget:
     """A target object that is written less its offset, so that the drive does what is commanded.
 
     The offset counts as it is when a target is preloaded: one that is written while the drive is
-    enabled moves the axis by itself, as whoever writes it intends.
+    enabled moves the axis by itself, as the author of the driver intends.
     """
 
     def __init__(self, target: Writer, offset: Callable[[], int]) -> None:

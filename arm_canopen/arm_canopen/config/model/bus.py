@@ -43,7 +43,7 @@ from .drive import DriveConfig
 
 PERIODS_MISSED = 3  # periods of a TPDO, or of a poll, without a new value
 STALE_AFTER = 0.5  # [s] without a new value, where its period is shorter
-EVENT_TIME_MAX = 0.1  # [s] of an event timer that nobody has chosen
+EVENT_TIME_MAX = 0.1  # [s] of an event timer by default
 INHIBIT_FACTOR = 2.0  # inhibit times that an event timer lasts at least
 INHIBIT_TIME_SUBINDEX = 3  # of the communication parameter
 EVENT_TIMER_SUBINDEX = 5

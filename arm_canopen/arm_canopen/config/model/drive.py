@@ -105,7 +105,7 @@ def _named(
 
 
 REVOLUTION = 2.0 * math.pi  # [rad]
-UNSET = 1.0  # value of 0x6096 and 0x6097 that nobody has set
+UNSET = 1.0  # default value of 0x6096 and 0x6097
 
 FACTOR_OBJECTS: dict[str, Index] = {
     'resolution': Index.POSITION_ENCODER_RESOLUTION,
@@ -234,7 +234,7 @@ class RecoveryPolicy(Enum):
     """What becomes of a drive that was enabled when its device was lost and booted again."""
 
     MANUAL = 'manual'
-    """It stays disabled until somebody calls ~/recover or ~/enable."""
+    """It stays disabled until a client calls ~/recover or ~/enable."""
     AUTO = 'auto'
     """It is enabled again in the mode that it had, holding where it is; it moves nowhere."""
 

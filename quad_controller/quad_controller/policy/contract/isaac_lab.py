@@ -54,7 +54,7 @@ def read_env(values: Mapping[str, Any], origin: str, joints: Sequence[str]) -> C
     """Read ``params/env.yaml`` of a training with Isaac Lab.
 
     Args:
-        joints: Names of the joints in the policy's order; empty while nobody knows them. Patterns
+        joints: Names of the joints in the policy's order; empty while they are unknown. Patterns
             of the file are matched with them.
     """
     group = _mapping(_mapping(values, 'observations'), 'policy')

@@ -181,8 +181,8 @@ class PolicyContract:
     newest: Newest = Newest.LAST  # where the newest step is
     history_start: HistoryStart = HistoryStart.REPEAT  # what a history begins with
     recurrence: tuple[RecurrentState, ...] = ()  # inputs that are outputs of the step before
-    commands: CommandRanges | None = None  # what it was trained for; None where nobody said
-    gains: Gains | None = None  # of its training; None where nobody said
+    commands: CommandRanges | None = None  # what it was trained for; None if unknown
+    gains: Gains | None = None  # of its training; None if unknown
     robot: str = ''  # what it was trained for, for people
     kind: str = ''  # how it was made, for people
 

@@ -26,7 +26,7 @@ _SHORT_WINDOW = 100
 
 
 def spread(values: Collection[int]) -> str:
-    """Return the second line of `topic hz` and `topic delay`, of values in [ns]."""
+    """Return the second line of `topic hz` and `topic delay` for values in [ns]."""
     count, least, most = len(values), min(values) / NANOSECONDS, max(values) / NANOSECONDS
     mean = sum(values) / count
     deviation = math.sqrt(sum((value - mean) ** 2 for value in values) / count) / NANOSECONDS
