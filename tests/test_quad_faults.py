@@ -125,6 +125,7 @@ def test_a_controller_killed_in_mid_trot_leaves_no_leg_in_the_air(quad: Simulate
     quad.spin(0.5)  # commands that were only held up raise no robot, either
     quad.processes['hardware'].wait_for('the robot was laid down, and ')
     quad.client.node.destroy_timer(goes_on)
+    quad.spin(0.1)  # a call of the timer may wait in the executor
     quad.client.node.destroy_publisher(stray)
     assert len(quad.tap.targets) == count
     quad.start('controller')

@@ -18,7 +18,7 @@ import threading
 import time
 from typing import Any
 
-from can_addresses import free_multicast
+from can_addresses import free_multicast, unstamped
 import canopen
 from drive_samples import bus_config, drive_config
 import pytest
@@ -42,7 +42,8 @@ from arm_canopen import (
     SdoAbortError,
     Severity,
 )
-from canopen_core.can import Frame
+from canopen_core.can import Bus, Frame
+from canopen_core.can.multicast import MulticastBus
 from canopen_core.can.plugin import ArmCanopenBus
 from canopen_core.standard import ObjectDictionary
 from canopen_sim import DeviceRunner
@@ -206,6 +207,44 @@ def test_what_there_is_not_is_answered_with_what_there_is(master: CanopenMaster)
     for mode in modes:
         with pytest.raises(DriveError, match=r'mode of operation .*PROFILE_POSITION \(1\), '):
             master.drive('joint1').select_mode(mode)
+
+
+def test_compiled_and_python_reader_receive_the_same_bus(
+    drives: object, bus_yml: Path, bus: str
+) -> None:
+    """Boot, enabling, a motion and the end of a master, frame by frame."""
+    last = Frame(0x1FFF_FFF0, b'last', is_extended=True)
+
+    def received(reader: Bus) -> list[Frame]:
+        frames: list[Frame] = []
+        while last not in frames[-50:]:
+            more = reader.receive(TIMEOUT)
+            assert more, 'the bus is silent'
+            frames += unstamped(more)
+        return frames[: frames.index(last)]
+
+    with (
+        open_bus(bus) as compiled,
+        open_bus(bus) as reference,
+        open_bus(bus) as ending,
+        ThreadPoolExecutor(2) as pool,
+    ):
+        assert isinstance(compiled, MulticastBus)
+        assert compiled._reader is not None  # machines for tests have a compiler
+        assert isinstance(reference, MulticastBus)
+        reference._reader = None
+        both = [pool.submit(received, each) for each in (compiled, reference)]
+        with CanopenMaster.from_bus_yml(bus_yml, bus) as master:
+            master.boot(TIMEOUT)
+            drive = master.drive('joint1')
+            drive.enable()
+            drive.select_mode(1)
+            drive.move_to(0.2)
+        ending.send(last)
+        frames, again = (each.result(TIMEOUT) for each in both)
+        assert frames == again
+        assert compiled.counters == reference.counters
+        assert {frame.can_id & 0x780 for frame in frames} >= {0x80, 0x180, 0x200, 0x580, 0x600}
 
 
 def test_a_late_motion_is_halted(master: CanopenMaster) -> None:
