@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 import logging
 import math
 from pathlib import Path
@@ -52,7 +51,7 @@ class ReplayedRobot(ObservedRobot):
 
     def status(self) -> LinkStatus:
         """Return how the link was."""
-        return replace(self._status, age=self._now - self._reported_at)
+        return self._status.at(self._now - self._reported_at)
 
     def take(self, entry: Entry, now: float) -> None:
         """Process the next entry of the log.

@@ -237,9 +237,7 @@ class Plan(ArmDemo):
         node.create_subscription(JointState, 'joint_states', self._take_joints, QUEUE)
         path, scene = 'display_planned_path', 'monitored_planning_scene'
         node.create_subscription(DisplayTrajectory, path, self.paths.append, LATCHED)
-        node.create_subscription(
-            PlanningScene, scene, lambda message: setattr(self, 'scene', message), LATCHED
-        )
+        node.create_subscription(PlanningScene, scene, self._take_scene, LATCHED)
         return client
 
     def line(self) -> str:
@@ -597,6 +595,9 @@ class Plan(ArmDemo):
     def _take_joints(self, message: JointState) -> None:
         self.positions.update(zip(message.name, message.position, strict=False))
         self.states += 1
+
+    def _take_scene(self, message: PlanningScene) -> None:
+        self.scene = message
 
 
 def _ms(duration: float) -> str:

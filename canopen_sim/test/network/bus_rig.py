@@ -38,7 +38,14 @@ from arm_canopen import (
 from arm_canopen.master.runner import Clock
 from canopen_core.can import Bus, Frame
 from canopen_core.can.frame import checked
-from canopen_core.standard import Controlword, ObjectDictionary, Statusword
+from canopen_core.standard import (
+    Controlword,
+    ObjectDictionary,
+    POSITION_MODES,
+    Statusword,
+    TORQUE_MODES,
+    VELOCITY_MODES,
+)
 from canopen_sim import Device, ServoModel
 from canopen_sim import Drive as SimulatedDrive
 
@@ -47,17 +54,6 @@ START = 100.0  # [s] of virtual steady time; not 0, which means "never" in place
 BOOT_TIME_MAX = 5.0  # [s]
 NEVER = float('inf')
 JOINT = 'joint1'  # the drive of tests with one drive
-POSITION_MODES = (
-    OperationMode.PROFILE_POSITION,
-    OperationMode.INTERPOLATED_POSITION,
-    OperationMode.CYCLIC_POSITION,
-)
-VELOCITY_MODES = (
-    OperationMode.VELOCITY,
-    OperationMode.PROFILE_VELOCITY,
-    OperationMode.CYCLIC_VELOCITY,
-)
-TORQUE_MODES = (OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE)
 MODES = (*POSITION_MODES, *VELOCITY_MODES, *TORQUE_MODES)
 
 

@@ -9,7 +9,7 @@ import math
 import struct
 from typing import Any
 
-from bus_rig import booted, JOINT, Leader, TORQUE_MODES, VirtualNetwork
+from bus_rig import booted, JOINT, Leader, VirtualNetwork
 from drive_samples import (
     bus_config,
     drive_config,
@@ -28,7 +28,7 @@ from arm_canopen.cia402.modes.profile_position import Move, QUEUE_MAX
 from arm_canopen.cia402.sequences import HomingProgress
 from arm_canopen.config import DriveConfig, RecoveryPolicy
 from canopen_core.can import Frame
-from canopen_core.standard import NmtCommand, ObjectDictionary
+from canopen_core.standard import NmtCommand, ObjectDictionary, TORQUE_MODES
 from canopen_sim import Fault, FaultInjection, ServoModel
 
 pytestmark = pytest.mark.slow

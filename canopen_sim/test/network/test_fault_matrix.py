@@ -15,7 +15,7 @@ import itertools
 import re
 from typing import Any
 
-from bus_rig import MODES, POSITION_MODES, TORQUE_MODES, VELOCITY_MODES, VirtualNetwork, with_modes
+from bus_rig import MODES, VirtualNetwork, with_modes
 from diagnostic_msgs.msg import DiagnosticStatus
 from drive_samples import (
     bus_config,
@@ -51,6 +51,9 @@ from canopen_core.standard import (
     NmtCommand,
     ObjectDictionary,
     ObjectEntry,
+    POSITION_MODES,
+    TORQUE_MODES,
+    VELOCITY_MODES,
 )
 from canopen_sim import Device, FaultInjection, ServoModel
 from canopen_sim import Drive as SimulatedDrive

@@ -35,12 +35,9 @@ from bus_rig import (
     JOINT,
     Leader,
     MODES,
-    POSITION_MODES,
     Sent,
     SetPointKind,
     SetPoints,
-    TORQUE_MODES,
-    VELOCITY_MODES,
     VirtualNetwork,
 )
 from drive_samples import (
@@ -59,7 +56,15 @@ from arm_canopen.cia402.modes import Move
 from arm_canopen.cia402.motion_group import stop_all, StopReport
 from arm_canopen.config import RecoveryPolicy
 from canopen_core.can import Frame
-from canopen_core.standard import Controlword, drive_state, NmtCommand, TARGET_OBJECTS
+from canopen_core.standard import (
+    Controlword,
+    drive_state,
+    NmtCommand,
+    POSITION_MODES,
+    TARGET_OBJECTS,
+    TORQUE_MODES,
+    VELOCITY_MODES,
+)
 from canopen_sim import Fault, FaultInjection, ServoModel
 
 pytestmark = pytest.mark.slow

@@ -13,12 +13,13 @@ from itertools import pairwise
 import math
 import struct
 
-from bus_rig import booted, JOINT, Leader, MODES, POSITION_MODES, TORQUE_MODES, VirtualNetwork
+from bus_rig import booted, JOINT, Leader, MODES, VirtualNetwork
 from drive_samples import bus_config, drive_config, every_mode, pdo, PERIOD, SCALE, sdo_write
 import pytest
 
 from arm_canopen import DriveError, DriveState, OperationMode, Promise, RefusalCause, Severity
 from arm_canopen.config import RecoveryPolicy
+from canopen_core.standard import POSITION_MODES, TORQUE_MODES
 
 pytestmark = pytest.mark.slow
 

@@ -74,7 +74,7 @@ class SemanticDescription:
         )
 
     def group(self, name: str) -> Group:
-        """Return a group."""
+        """Return a group; an unknown name is a DescriptionError."""
         if name not in self.groups:
             known = ', '.join(self.groups) or 'none'
             raise DescriptionError(f'there is no group {name!r} in the SRDF; groups: {known}')
@@ -82,7 +82,7 @@ class SemanticDescription:
 
 
 def parse_srdf(text: str) -> SemanticDescription:
-    """Read an SRDF."""
+    """Read an SRDF; what is none is a DescriptionError."""
     try:
         root = ET.fromstring(text)  # noqa: S314  a robot's own description, not from the network
     except ET.ParseError as error:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 import math
 from typing import Any
@@ -62,6 +62,11 @@ class LinkStatus:
     # what parser and dialect saw in this connection
     parser: ParserCounters = field(default_factory=ParserCounters)
     dialect: DialectCounters = field(default_factory=DialectCounters)
+
+    def at(self, age: float) -> LinkStatus:
+        """Return a copy at an age of the last report [s]; its counters count no more."""
+        counters = replace(self.parser), replace(self.dialect)
+        return replace(self, age=age, parser=counters[0], dialect=counters[1])
 
     def reason(self, otherwise: str) -> str:
         """Return why it is not running; another reason where it runs again by now."""

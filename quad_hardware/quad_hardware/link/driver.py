@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import replace
 import logging
 import os
 import select
@@ -132,7 +131,7 @@ class Driver:
 
     def status(self) -> LinkStatus:
         """Return how the link is now."""
-        return replace(self._status, age=time.monotonic() - self._reported_at)
+        return self._status.at(time.monotonic() - self._reported_at)
 
     def _wake(self) -> None:
         with suppress(BlockingIOError):  # a full pipe wakes as well
