@@ -192,101 +192,10 @@ def data_text(index: int, subindex: int, data_type: DataType | None, data: bytes
     return value_text(index, subindex, value)
 
 
-_DOWNLOAD_CLIENT, _UPLOAD_CLIENT = 6, 5  # client command specifiers
-_DOWNLOAD_SERVER, _UPLOAD_SERVER = 5, 6  # server command specifiers
-_ABORT = 0x80  # as a segment it would have number 0, which there is not
+_BLOCK_SENDER, _BLOCK_RECEIVER = 6, 5  # command specifiers of the sides of a block transfer
+_ABORT = 0x80  # as a segment of a block it would have number 0, which there is not
 _LAST = 0x80
 _FRAME_SIZE = 8  # [byte]
-
-
-class BlockFollower:
-    """Describes block transfers of one device; frames of others it ignores."""
-
-    def __init__(self, names: ObjectNames) -> None:
-        self._names = names
-        self._title = ''
-        self._block_size = 0
-        self._last_number: int | None = None  # of the segment that is marked as the last
-        self._client_streams = False
-        self._server_streams = False
-
-    def request(self, data: bytes) -> str | None:
-        """Put a frame to the device into words; None when it is of no block transfer."""
-        if len(data) != _FRAME_SIZE:
-            return None
-        if self._client_streams and data[0] != _ABORT:
-            text, self._client_streams = self._segment(data)
-            return text
-        specifier, sub = data[0] >> 5, data[0] & 0x03
-        if specifier == _DOWNLOAD_CLIENT:
-            if sub & 0x01:
-                return f'end of block write {self._title}'
-            self._begin(data)
-            size = f', {int.from_bytes(data[4:], "little")} bytes' if sub & 0x02 else ''
-            return f'block write {self._title}{size}'
-        if specifier != _UPLOAD_CLIENT:
-            self._stop()
-            return None
-        return self._upload_request(data, sub)
-
-    def _upload_request(self, data: bytes, sub: int) -> str:
-        if sub == 0:
-            self._begin(data)
-            self._block_size = data[4]
-            return f'block read {self._title}, {data[4]} segments a block'
-        if sub == 1:
-            return f'end of block read {self._title}'
-        self._server_streams = sub == 3 or not self._is_complete(data[1])
-        if sub == 3:
-            return f'start block read {self._title}'
-        self._block_size = data[2]
-        return f'block taken up to segment {data[1]}, {data[2]} segments next'
-
-    def response(self, data: bytes) -> str | None:
-        """Put a frame from the device into words; None when it is of no block transfer."""
-        if len(data) != _FRAME_SIZE:
-            return None
-        if self._server_streams and data[0] != _ABORT:
-            text, self._server_streams = self._segment(data)
-            return text
-        specifier, sub = data[0] >> 5, data[0] & 0x03
-        if specifier == _DOWNLOAD_SERVER:
-            return self._download_response(data, sub)
-        if specifier != _UPLOAD_SERVER:
-            self._stop()
-            return None
-        if sub & 0x01:
-            return f'end of block read {self._title}'
-        size = f', {int.from_bytes(data[4:], "little")} bytes' if sub & 0x02 else ''
-        return f'block read {self._title}{size}'
-
-    def _download_response(self, data: bytes, sub: int) -> str:
-        if sub == 0:
-            self._block_size, self._client_streams = data[4], True
-            return f'block write {self._title}, {data[4]} segments a block'
-        if sub == 1:
-            return f'accepts block write {self._title}'
-        self._client_streams = not self._is_complete(data[1])
-        self._block_size = data[2]
-        return f'block taken up to segment {data[1]}, {data[2]} segments next'
-
-    def _begin(self, data: bytes) -> None:
-        self._stop()
-        self._title = self._names.title(int.from_bytes(data[1:3], 'little'), data[3])
-
-    def _stop(self) -> None:
-        self._client_streams = self._server_streams = False
-        self._last_number = None
-
-    def _segment(self, data: bytes) -> tuple[str, bool]:
-        """Return the text of a segment, and whether more come before an answer."""
-        number, is_last = data[0] & 0x7F, bool(data[0] & _LAST)
-        self._last_number = number if is_last else None
-        text = f'{"last " if is_last else ""}block segment {number} of {self._title}'
-        return text, not is_last and number < self._block_size
-
-    def _is_complete(self, acknowledged: int) -> bool:
-        return self._last_number is not None and acknowledged == self._last_number
 
 
 @dataclass(frozen=True, slots=True)
@@ -297,34 +206,22 @@ class SdoText:
     is_abort: bool = False  # one side ended the transfer
 
 
-class _Transfer:
-    """A segmented transfer on its way."""
-
-    def __init__(self, index: int, subindex: int, size: int | None) -> None:
-        self.index = index
-        self.subindex = subindex
-        self.size = size
-        self.data = b''
-
-    def take(self, segment: sdo.Segment) -> str:
-        """Add a segment and return how far it is."""
-        self.data += segment.data
-        total = f' of {self.size}' if self.size is not None else ''
-        return f'{len(segment.data)} bytes ({len(self.data)}{total})'
-
-
 class SdoFollower:
     """Puts the SDO frames of one device into words."""
 
     def __init__(self, names: ObjectNames) -> None:
         self._names = names
-        self._transfer: _Transfer | None = None
-        self._block = BlockFollower(names)
+        self._object: tuple[int, int] | None = None  # of a segmented transfer that has begun
+        self._size: int | None = None  # its size in [byte], where that was announced
+        self._data = b''  # what of it has come
+        self._block_title = ''  # object of a block transfer
+        self._block_size = 0  # segments before an answer
+        self._block_last: int | None = None  # of the segment that is marked as the last
+        self._sends_block: bool | None = None  # the client, or the device (False), sends segments
 
     def request(self, data: bytes) -> SdoText:
         """Put a frame to the device into words."""
-        block = self._block.request(data)
-        if block is not None:
+        if block := self._block(data, from_client=True):
             return SdoText(block)
         try:
             message = sdo.decode_request(data)
@@ -332,7 +229,7 @@ class SdoFollower:
             return SdoText(str(error))
         match message:
             case sdo.UploadRequest(index, subindex):
-                self._transfer = None
+                self._object = None
                 return SdoText(f'read {self._names.title(index, subindex)}')
             case sdo.DownloadRequest(index, subindex, content, size):
                 return SdoText(f'write {self._initiated(index, subindex, content, size)}')
@@ -345,8 +242,7 @@ class SdoFollower:
 
     def response(self, data: bytes) -> SdoText:
         """Put a frame from the device into words."""
-        block = self._block.response(data)
-        if block is not None:
+        if block := self._block(data, from_client=False):
             return SdoText(block)
         try:
             message = sdo.decode_response(data)
@@ -370,36 +266,71 @@ class SdoFollower:
             case sdo.Abort():
                 return self._abort(message)
 
+    def _block(self, data: bytes, *, from_client: bool) -> str:
+        """Put a frame of a block transfer into words; it is empty of others."""
+        if len(data) != _FRAME_SIZE:
+            return ''
+        if self._sends_block is from_client and data[0] != _ABORT:
+            number, is_last = data[0] & ~_LAST, bool(data[0] & _LAST)
+            self._block_last = number if is_last else None
+            if is_last or number >= self._block_size:
+                self._sends_block = None
+            return f'{"last " * is_last}block segment {number} of {self._block_title}'
+        specifier, sub = data[0] >> 5, data[0] & 0x03
+        if specifier not in {_BLOCK_SENDER, _BLOCK_RECEIVER}:
+            self._sends_block = None
+            return ''
+        verb = 'write' if (specifier == _BLOCK_SENDER) is from_client else 'read'
+        if from_client and (sub == 0 or (sub == 2 and specifier == _BLOCK_SENDER)):
+            self._sends_block = self._block_last = None
+            self._block_title = self._names.title(int.from_bytes(data[1:3], 'little'), data[3])
+        what = f'block {verb} {self._block_title}'
+        if specifier == _BLOCK_SENDER:
+            size = f', {int.from_bytes(data[4:], "little")} bytes' if sub & 0x02 else ''
+            return f'end of {what}' if sub & 0x01 else f'{what}{size}'
+        if sub == 1:
+            return f'{"end of" if from_client else "accepts"} {what}'
+        if sub == 0:
+            self._block_size = data[4]
+            self._sends_block = None if from_client else True
+            return f'{what}, {data[4]} segments a block'
+        if sub == 3 and from_client:
+            self._sends_block = False
+            return f'start {what}'
+        self._sends_block = None if data[1] == self._block_last else not from_client
+        self._block_size = data[2]
+        return f'block taken up to segment {data[1]}, {data[2]} segments next'
+
     def _initiated(
         self, index: int, subindex: int, content: bytes | None, size: int | None
     ) -> str:
         title = self._names.title(index, subindex)
         if content is not None:
-            self._transfer = None
+            self._object = None
             return f'{title} = {self._value(index, subindex, content)}'
-        self._transfer = _Transfer(index, subindex, size)
+        self._object, self._size, self._data = (index, subindex), size, b''
         return f'{title}, {size} bytes in segments' if size is not None else f'{title} in segments'
 
     def _segment(self, segment: sdo.Segment) -> str:
-        transfer = self._transfer
-        if transfer is None:
-            return f'segment of a transfer whose start was not seen, {len(segment.data)} bytes'
-        progress = transfer.take(segment)
+        size = len(segment.data)
+        if self._object is None:
+            return f'segment of a transfer whose start was not seen, {size} bytes'
+        self._data += segment.data
         if not segment.last:
-            return f'segment{self._of_transfer()}, {progress}'
-        self._transfer = None
-        value = self._value(transfer.index, transfer.subindex, transfer.data)
-        return f'last segment, {self._names.title(transfer.index, transfer.subindex)} = {value}'
+            total = f' of {self._size}' if self._size is not None else ''
+            return f'segment{self._of_transfer()}, {size} bytes ({len(self._data)}{total})'
+        index, subindex = self._object
+        self._object = None
+        value = self._value(index, subindex, self._data)
+        return f'last segment, {self._names.title(index, subindex)} = {value}'
 
     def _of_transfer(self) -> str:
-        if self._transfer is None:
-            return ''
-        return f' of {self._names.title(self._transfer.index, self._transfer.subindex)}'
+        return f' of {self._names.title(*self._object)}' if self._object else ''
 
     def _value(self, index: int, subindex: int, data: bytes) -> str:
         return data_text(index, subindex, self._names.data_type(index, subindex), data)
 
     def _abort(self, message: sdo.Abort) -> SdoText:
-        self._transfer = None
+        self._object = None
         title = self._names.title(message.index, message.subindex)
         return SdoText(f'abort {title}: {abort_text(message.code)}', is_abort=True)
