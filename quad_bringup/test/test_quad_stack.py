@@ -152,7 +152,7 @@ def test_hardware_has_no_simulator_and_simulation_has(tmp_path: Path) -> None:
     assert set(real) == {'hardware', 'controller', 'robot_state'}
     assert set(simulated) == {'fake_xgo', *real, 'viewer'}
     assert not simulated['viewer'].required
-    compensated = controller_of(real).gait.servo, controller_of(simulated).gait.servo
+    compensated = controller_of(real).tuning.servo, controller_of(simulated).tuning.servo
     assert [servo and servo.kp for servo in compensated] == [2.45, 1.1]
     argv = simulated['fake_xgo'].argv
     assert argv[argv.index('--servo') + 1] == 'vendor_rl'
@@ -209,9 +209,9 @@ def test_both_ends_of_the_line_speak_the_same_protocol(tmp_path: Path, protocol:
 def test_gait_and_policy_reach_the_controller(tmp_path: Path) -> None:
     """A policy, and a folder for recordings, only where there is one."""
     settings = controller_of(processes(tmp_path, Stack('p', gait='crawl')))
-    assert (settings.first_gait.value, settings.policy) == ('crawl', '')
+    assert (settings.gait.value, settings.policy) == ('crawl', '')
     settings = controller_of(processes(tmp_path, Stack('p', policy=Path('/a.onnx'))))
-    assert (settings.first_gait.value, settings.policy) == ('trot', '/a.onnx')
+    assert (settings.gait.value, settings.policy) == ('trot', '/a.onnx')
     assert settings.record == ''
     settings = controller_of(processes(tmp_path, Stack('p', record=Path('/runs'))))
     assert settings.record == '/runs'

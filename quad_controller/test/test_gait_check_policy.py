@@ -163,7 +163,7 @@ def test_a_wrong_layout_of_the_history_is_found(
         (['--walk', 'nan', '0', '0'], 'nan is not a finite number'),
         (['--duration', '0'], 'must be 0.5 to 600'),
         (['--duration', '-1'], 'must be 0.5 to 600'),
-        (['--phase-period', '-0.1'], 'must be 0 or more'),
+        (['--phase-period', '-0.1'], 'must be 0 to 10'),
         (['--report', '/nowhere/at/all.csv'], 'No such file'),
         (['--minutes', '0.1'], 'must be 0.8 to 120'),
         (['--servo', 'soft'], 'give nominal or firm'),

@@ -147,6 +147,10 @@ class Interrupted(PhysicsArena):
         self.times -= 1
         return 'a pause of 0.7 s' if self.times >= 0 else ''
 
+    @interruption.setter
+    def interruption(self, _: str) -> None:
+        pass
+
 
 @pytest.mark.slow
 def test_what_the_machine_does_is_no_fall_of_the_robot(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -208,12 +212,12 @@ def walk_on(arena: SerialArena, walker: CourseWalker, end: float) -> Watched:
     if walker.is_down:
         walker.restart()
         walker.stand_up()
-        arena.begin()
+        arena.robot.begin()
     for _ in range(50):
         if walker.is_down or time.monotonic() > end:
             break
         walker.step(Velocity(0.2))
-    return arena.read()
+    return arena.robot.read()
 
 
 # --- what is judged

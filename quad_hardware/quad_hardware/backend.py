@@ -313,7 +313,7 @@ class JointBytes:
 
     def reset(self) -> None:
         """Forget the positions so far."""
-        self._rate = JointRate(EstimatorSettings().joint_cutoff)
+        self._rate = JointRate(EstimatorSettings().joint_velocity_cutoff)
 
     def rounded(self, positions: Sequence[float]) -> tuple[float, ...]:
         """Return positions in the order of the URDF [rad] after a byte each."""

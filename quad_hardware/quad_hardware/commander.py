@@ -6,26 +6,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from enum import Enum
 import math
 
 from quad_description import MAX_TILT, Pose, pose_positions
 
 from .exceptions import CommandError
-from .joints import Command, CommandLimiter, JointMap, LimiterSettings, MAX_PERIOD
+from .joints import (
+    Command,
+    CommandLimiter,
+    JointMap,
+    LimiterSettings,
+    LossReaction,
+    MAX_PERIOD,
+)
 
 START_BAND = 0.3  # [rad] between leg and target; a controller that is relaxed keeps to 0.25
 MIN_STREAM = 0.5  # [s] a person who tries out a servo sends no stream
 SPEED = 1.0  # [rad/s] of the fastest joint on the way down
 MIN_DURATION = 1.0  # [s]
 REPORT_TIMEOUT = 0.4  # [s] for a report after commands broke off; a stall delays both
-
-
-class LossReaction(Enum):
-    """What the robot does; the value is that of the parameter."""
-
-    LIE = 'lie'  # folds its legs
-    HOLD = 'hold'  # stays as it is
 
 
 @dataclass(slots=True)
@@ -54,7 +53,6 @@ class JointCommander:
         self,
         joints: JointMap,
         limiter: LimiterSettings,
-        reaction: LossReaction,
         *,
         raised: Callable[[Sequence[float]], Sequence[str]],
         send: Callable[[Mapping[int, float]], bool],
@@ -65,7 +63,6 @@ class JointCommander:
         """Begin without a stream.
 
         Args:
-            reaction: What the robot does when commands break off while its legs move.
             raised: Names the feet that are in the air at targets of the legs [rad].
             send: Has servo angles sent, by motor id [deg]; returns whether they are.
             waits: Says whether the last angles have not left yet; newer ones replace them.
@@ -78,7 +75,7 @@ class JointCommander:
         pose = pose_positions(Pose.LIE)
         self._lying = {s.joint: min(max(pose[s.joint], s.lower), s.upper)
                        for s in joints.servos[: joints.leg_count] if s.joint in pose}  # fmt: skip
-        self._raised, self._reaction = raised, reaction
+        self._raised, self._reaction = raised, limiter.command_loss
         self._limiter = CommandLimiter(joints, limiter)
         self._limits_descent = False  # the last command was one of the way down
         self._send_angles, self._waits = send, waits

@@ -48,6 +48,7 @@ from quad_description.rotations import (
     Vector,
     yaw_of,
 )
+from robot_primitives import setting, switch
 
 from .exceptions import CommandError
 from .filters import AttitudeRate, FULL, GravityCheck, JointRate, low_pass_share, MedianFilter
@@ -118,15 +119,15 @@ SCALES = (0.1, 10.0)
 class OdometrySettings:
     """How the legs are read."""
 
-    # by which the servos follow their commands [s]: 0.02 until they have them, 0.04 of lag
-    delay: float = 0.06
-    # height above the lowest foot up to which a foot is taken to stand [m]
-    tolerance: float = 0.002
-    margin: float = 0.02  # before and after a swing in which a foot does not count [s]
+    # 0.02 until servos have their commands, 0.04 until they have followed
+    delay: float = setting(0.06, 0.0, 0.3, 'lag of servos [s]')
+    # above the lowest foot
+    tolerance: float = setting(0.002, 0.0, 0.05, 'height of a foot down [m]')
+    margin: float = setting(0.02, 0.0, 0.1, 'around a swing, not counted [s]')
     cutoff: float = 5.0  # of the low-pass of the velocity that is published [Hz]
     command_age: float = 0.3  # commands older than that are not looked at [s]
-    scale_x: float = 1.0  # what the way forward is multiplied by
-    scale_y: float = 1.0  # what the way sideways is multiplied by
+    scale_x: float = setting(1.0, *SCALES, 'factor of the way forward')
+    scale_y: float = setting(1.0, *SCALES, 'factor of the way sideways')
 
 
 class LegOdometry:
@@ -319,9 +320,11 @@ class RateSource(Enum):
 class EstimatorSettings:
     """How reports are read."""
 
-    rate_source: RateSource = RateSource.AUTO  # where the angular velocity is from
-    rate_cutoff: float = 12.0  # of the low-pass of differentiated angular velocities [Hz]
-    joint_cutoff: float = 25.0  # of the low-pass of differentiated joint velocities [Hz]
+    angular_velocity_source: RateSource = switch(  # noqa: RUF009  # a field
+        RateSource.AUTO, 'auto: the gyro where it is reported, else differentiated attitude'
+    )
+    rate_cutoff: float = setting(12.0, 0.5, 25.0, 'of its low-pass [Hz]')
+    joint_velocity_cutoff: float = setting(25.0, 0.5, 25.0, 'of differentiated velocities [Hz]')
     odometry: OdometrySettings = field(default_factory=OdometrySettings)  # how the legs are read
     mounting: ImuMounting = field(default_factory=ImuMounting)  # how the IMU sits on the body
 
@@ -348,7 +351,7 @@ class Estimator:
         motors = [servo.motor for servo in joints.servos]
         self._plausibility, self._servos = Plausibility(motors), ServoWatch(motors)
         self._rate = AttitudeRate(settings.rate_cutoff)
-        self._joint_rate = JointRate(settings.joint_cutoff)
+        self._joint_rate = JointRate(settings.joint_velocity_cutoff)
         self._charge, self._voltage = MedianFilter(), MedianFilter()
         self._gravity = GravityCheck()
         pose, radius = pose_positions(Pose.LIE), self._robot.foot_radius
@@ -437,7 +440,8 @@ class Estimator:
         orientation = mounting.attitude(report.attitude)
         acceleration = None if felt is None else mounting.acceleration(felt)
         self._gravity.take(orientation, acceleration)
-        source, differentiated = self._settings.rate_source, self._rate.update(time, orientation)
+        source = self._settings.angular_velocity_source
+        differentiated = self._rate.update(time, orientation)
         gyro = report.rates if source is RateSource.AUTO else None
         rate = differentiated if gyro is None else mounting.rate(gyro)
         checked = mounting.checked and (mounting.rates_checked or gyro is None)

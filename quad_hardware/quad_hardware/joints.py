@@ -11,9 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
 import math
 
 from quad_description import Joint, STREAM_TIMEOUT
+from robot_primitives import setting, switch
 
 from .exceptions import CommandError
 from .protocol import ANGLE_SPANS, LEG_MOTORS, Model, MOTOR_OF_JOINT, MOTOR_ORDER, Span
@@ -170,15 +172,26 @@ NOMINAL_PERIOD = 0.02  # [s]
 MAX_PERIOD = 0.03  # [s] a pause between two commands does not add up to a jump
 
 
+class LossReaction(Enum):
+    """What the robot does; the value is that of the parameter."""
+
+    LIE = 'lie'  # folds its legs
+    HOLD = 'hold'  # stays as it is
+
+
 @dataclass(frozen=True, slots=True)
 class LimiterSettings:
-    """How fast targets may move."""
+    """How fast targets may move, and what follows when they break off."""
 
-    speed: float = 12.0  # fastest [rad/s]; of the gripper, times its travel in a radian of servo
-    # fastest at the beginning of a stream of commands [rad/s]; never above speed
-    start_speed: float = 2.0
-    start_time: float = 0.5  # after which ``speed`` is reached [s]
+    # of the gripper, times its travel in a radian of servo
+    max_joint_speed: float = setting(12.0, 0.1, 100.0, 'of targets [rad/s]')
+    # never above the other one
+    start_joint_speed: float = setting(2.0, 0.1, 100.0, 'of targets when commands begin [rad/s]')
+    start_time: float = 0.5  # after which ``max_joint_speed`` is reached [s]
     stream_timeout: float = STREAM_TIMEOUT  # a pause that ends a stream [s]
+    command_loss: LossReaction = switch(  # noqa: RUF009  # a field
+        LossReaction.LIE, 'what the robot does when commands break off with a leg in the air'
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,8 +303,8 @@ class CommandLimiter:
     def _speed(self, now: float) -> float:
         settings = self._settings
         share = min((now - self._began_at) / settings.start_time, 1.0)
-        start = min(settings.start_speed, settings.speed)
-        return start + share * (settings.speed - start)
+        start = min(settings.start_joint_speed, settings.max_joint_speed)
+        return start + share * (settings.max_joint_speed - start)
 
     def _approach(self, positions: Sequence[float], step: float) -> Command:
         clamped, slowed, outside, unseen = [], [], [], []

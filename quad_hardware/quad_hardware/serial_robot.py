@@ -13,7 +13,7 @@ import time
 from black_box import BlackBox, BlackBoxSettings
 from quad_description import preset_of, RobotState
 
-from .commander import JointCommander, LossReaction
+from .commander import JointCommander
 from .estimation import Estimator, EstimatorSettings
 from .exceptions import CommandError
 from .joints import JointMap, LimiterSettings, NOMINAL_PERIOD
@@ -39,9 +39,8 @@ class RobotSettings:
     link: LinkOptions  # where the robot is
     urdf: str  # what it is
     joints: JointMap  # its servos
-    limiter: LimiterSettings = field(default_factory=LimiterSettings)  # how fast targets may move
-    # what the robot does when commands break off with a leg in the air
-    command_loss: LossReaction = LossReaction.LIE
+    # how fast targets may move, and what follows when they break off
+    limiter: LimiterSettings = field(default_factory=LimiterSettings)
     # how its reports are read
     estimator: EstimatorSettings = field(default_factory=EstimatorSettings)
     # how the last bytes are written when a fault happens; None for not at all
@@ -121,7 +120,6 @@ class SerialRobot(ObservedRobot):
         self._commander = JointCommander(
             settings.joints,
             settings.limiter,
-            settings.command_loss,
             raised=self._estimator.raised_feet,
             send=self._send_angles,
             waits=lambda: self._driver.waits,

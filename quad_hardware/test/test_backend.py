@@ -278,7 +278,7 @@ def test_commands_that_could_not_leave_add_up_to_no_jump(peer: PtyPeer) -> None:
     angles = [command[12] for command in peer.commands]
     assert angles[-1] == pytest.approx(math.degrees(0.9), abs=0.1)
     steps = [abs(b - a) for a, b in pairwise(angles)]
-    assert max(steps) <= math.degrees(LimiterSettings().speed * MAX_PERIOD) + 0.01
+    assert max(steps) <= math.degrees(LimiterSettings().max_joint_speed * MAX_PERIOD) + 0.01
 
 
 def test_what_is_no_command_is_refused(peer: PtyPeer) -> None:

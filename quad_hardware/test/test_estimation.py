@@ -151,7 +151,7 @@ def test_signs_are_checked_when_those_of_the_gyro_are(
     """Where a gyro is reported and used, gravity alone proves nothing about it."""
     urdf = robot_urdf('lite')
     joints = JointMap(map(servo_of, movable_joints(urdf)))
-    settings = EstimatorSettings(rate_source=source, mounting=mounting)
+    settings = EstimatorSettings(angular_velocity_source=source, mounting=mounting)
     state = Estimator(urdf, joints, settings).step(replace(STATE, rates=gyro))
     assert state is not None
     assert state.imu is not None

@@ -47,15 +47,15 @@ from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.link import LinkState, LinkStatus
 from quad_hardware.nodes import robot_topics
 from quad_hardware.nodes.diagnostics import command_diagnostic, LinkDiagnostic, robot_diagnostic
-from quad_hardware.nodes.parameters import Deviations, Frames
+from quad_hardware.nodes.parameters import Deviations, FootprintMode, Frames
 from quad_hardware.protocol import Fault, LEG_MOTORS, ParserCounters
 from quad_hardware.report import Report
 from quad_msgs.msg import FootContacts
 
 STAMP = Time(sec=1)
-FRAMES = Frames('odom', 'base_link', 'base_footprint', 'imu_link', False, True)
-PARENT = replace(FRAMES, footprint_is_parent=True)
-DEVIATIONS = Deviations(orientation=0.02, rate=0.15, gyro=0.02, acceleration=0.3)
+FRAMES = Frames()
+PARENT = replace(FRAMES, footprint_mode=FootprintMode.PARENT)
+DEVIATIONS = Deviations(angular_velocity_stddev=0.15)
 COMMANDED = ContactSource.COMMANDED_HEIGHT
 PLACE = OdometryState(1.0, 2.0, 0.11, IDENTITY, 0.2, 0.05, 3.0, (True,) * 4, COMMANDED)
 IMU = ImuSample(IDENTITY, (0.1, 0.2, 0.3), (0.0, 0.0, 9.8), rate_differentiated=True)
@@ -200,7 +200,7 @@ FORMS: list[MessageTemplate] = [
     robot_topics.imu(IMU, DEVIATIONS, 'imu_link')[0],
     robot_topics.imu(BARE, DEVIATIONS, '')[0],
     robot_topics.odometry(IMU, PLACE, DEVIATIONS, FRAMES)[0],
-    robot_topics.odometry(BARE, PLACE, DEVIATIONS, replace(FRAMES, base='a longer name'))[0],
+    robot_topics.odometry(BARE, PLACE, DEVIATIONS, replace(FRAMES, base_frame='a longer name'))[0],
     robot_topics.transforms(PLACE, FRAMES)[0],
     robot_topics.transforms(PLACE, PARENT)[0],
 ]
@@ -317,7 +317,7 @@ def test_the_level_of_the_robot(
 def test_an_orientation_whose_signs_nobody_checked_is_uncertain(checked: bool) -> None:
     """In /imu and /odom, so that nobody levels by it, and in the diagnostics."""
     sample = replace(IMU, deviation=0.0 if checked else UNCHECKED_DEVIATION)
-    expected = DEVIATIONS.orientation if checked else math.pi / 2
+    expected = DEVIATIONS.orientation_stddev if checked else math.pi / 2
     template, numbers = robot_topics.odometry(sample, PLACE, DEVIATIONS, FRAMES)
     pose_covariance = template.message(STAMP, numbers).pose.covariance
     assert pose_covariance[21] == pytest.approx(expected**2)

@@ -74,7 +74,7 @@ def on_node(test: Callable[..., None]) -> Callable[..., None]:
 
 HOME = [0.0] * 12
 POSE = [0.0, 0.6, -0.3] * 4
-LARGEST_STEP = math.degrees(LimiterSettings().speed * MAX_PERIOD)  # [deg]
+LARGEST_STEP = math.degrees(LimiterSettings().max_joint_speed * MAX_PERIOD)  # [deg]
 LEGS_ORDER = [13, 12, 11, 23, 22, 21, 43, 42, 41, 33, 32, 31]
 
 

@@ -48,7 +48,7 @@ def test_no_target_jumps_or_goes_farther_beyond_its_limits(
         command = limiter.step(wanted, last, now)
         targets = list(command.targets)
         steps = [abs(b - a) for a, b in zip(last, targets, strict=True)]
-        assert max(steps) <= LimiterSettings().speed * MAX_PERIOD + 1e-9
+        assert max(steps) <= LimiterSettings().max_joint_speed * MAX_PERIOD + 1e-9
         for servo, before, target in zip(JOINTS.servos, last, targets, strict=True):
             assert min(servo.lower, before) <= target <= max(servo.upper, before)
             inside = servo.lower <= target <= servo.upper
@@ -87,7 +87,7 @@ def test_a_robot_with_arm_takes_legs_or_all() -> None:
 
 def test_a_stream_begins_slowly_where_the_robot_is() -> None:
     """The first step is small, later ones are large, and it is reported that they are slowed."""
-    limiter = CommandLimiter(JOINTS, LimiterSettings(speed=10.0, start_speed=1.0, start_time=0.5))
+    limiter = CommandLimiter(JOINTS, LimiterSettings(10.0, 1.0, start_time=0.5))
     wanted = [*HOME[:1], 1.0, *HOME[2:]]
     first = limiter.step(wanted, HOME, 0.0)
     assert first.targets[1] == pytest.approx(0.02)
@@ -101,7 +101,7 @@ def test_a_stream_begins_slowly_where_the_robot_is() -> None:
 @given(st.floats(0.1, 100.0), st.floats(0.1, 100.0))
 def test_no_target_is_faster_than_the_fastest(speed: float, start_speed: float) -> None:
     """Also at the beginning of a stream, where someone allows less than the usual start."""
-    limiter = CommandLimiter(JOINTS, LimiterSettings(speed=speed, start_speed=start_speed))
+    limiter = CommandLimiter(JOINTS, LimiterSettings(speed, start_speed))
     last = HOME
     for tick in range(40):
         targets = limiter.step([0.5] * 12, HOME, tick * 0.02).targets

@@ -23,11 +23,10 @@ from quad_description import (
 )
 from quad_hardware.commander import (
     JointCommander,
-    LossReaction,
     REPORT_TIMEOUT,
     SPEED,
 )
-from quad_hardware.joints import JointMap, LimiterSettings, MAX_PERIOD, servo_of
+from quad_hardware.joints import JointMap, LimiterSettings, LossReaction, MAX_PERIOD, servo_of
 
 JOINTS = JointMap(servo_of(joint) for joint in movable_joints(robot_urdf('lite')))
 NAMES = JOINTS.names
@@ -203,7 +202,7 @@ class Line:
         self.warned: list[str] = []
         self.obstacle = ''
         self.commander = JointCommander(
-            joints, LimiterSettings(), reaction,
+            joints, LimiterSettings(command_loss=reaction),
             raised=raised, send=self._send, waits=lambda: False,
             obstacle=lambda: self.obstacle, warn=self.warned.append,
         )  # fmt: skip

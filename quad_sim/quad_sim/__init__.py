@@ -20,7 +20,7 @@ damage.
 from .exceptions import SetupError, SimulationError, TargetError
 from .plant import parse_servo, ServoModel, ServoParameters
 from .robot_line import CommandTiming
-from .served import ServedRobot, Watched
+from .served import ServedRobot, Watched, WatchedRobot
 from .state import Terrain
 
 __all__ = [
@@ -33,5 +33,6 @@ __all__ = [
     'TargetError',
     'Terrain',
     'Watched',
+    'WatchedRobot',
     'parse_servo',
 ]

@@ -7,7 +7,7 @@ What runs against it goes the whole way: servos, board, serial line, and clocks 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -25,12 +25,13 @@ from quad_description import Pose, pose_positions, robot_urdf
 
 from .exceptions import SetupError, SimulationError
 from .options import build, parse_arguments, Simulation
-from .robot_line import CommandTiming
+from .robot_line import CommandTiming, RobotLine
 from .server import PseudoTerminal, Server
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
+    from .physics import Meter, Robot
     from .physics.backend import Metered
 
 START_TIME = 120.0  # [s] in which the process has to be there, on a machine that has much to do
@@ -48,6 +49,37 @@ class Watched:
     def __add__(self, other: Watched) -> Watched:
         """Return both together."""
         return Watched(self.metered + other.metered, self.timing + other.timing)
+
+
+class WatchedRobot:
+    """A robot in physics that is put on its feet, kicked and measured."""
+
+    def __init__(self, robot: Robot, meter: Meter, line: RobotLine | None = None) -> None:
+        """Measure a robot, and when its commands come where it has a line."""
+        self._robot, self._meter, self._line = robot, meter, line
+        # how it stands up: arguments of its reset
+        self.start: Mapping[str, Any] = {}
+
+    def stand(self) -> None:
+        """Put the robot on its feet where it began, whatever it did before."""
+        self._robot.reset(**self.start)
+        self.begin()
+
+    def kick(self, x: float, y: float) -> None:
+        """Change its velocity at once, ahead and to the left [m/s]."""
+        self._robot.kick((x, y, 0.0))
+
+    def begin(self) -> None:
+        """Begin to watch it anew."""
+        self._meter.begin()
+        if self._line is not None:
+            self._line.command_times.clear()
+
+    def read(self) -> Watched:
+        """Return what was seen since."""
+        line = self._line
+        timing = CommandTiming() if line is None else line.command_times.timing()
+        return Watched(self._meter.read(), timing)
 
 
 class ServedRobot:
@@ -95,19 +127,19 @@ class ServedRobot:
         self._folder.cleanup()
 
     def stand(self) -> None:
-        """Put the robot on its feet where it began, whatever it did before."""
+        """Do as :meth:`WatchedRobot.stand`."""
         self._ask('stand')
 
     def kick(self, x: float, y: float) -> None:
-        """Change its velocity at once, ahead and to the left [m/s]."""
+        """Do as :meth:`WatchedRobot.kick`."""
         self._ask('kick', x, y)
 
     def begin(self) -> None:
-        """Begin to watch it anew."""
+        """Do as :meth:`WatchedRobot.begin`."""
         self._ask('begin')
 
     def read(self) -> Watched:
-        """Return what was seen since."""
+        """Do as :meth:`WatchedRobot.read`."""
         return cast('Watched', self._ask('read'))
 
     def _ask(self, request: str, *arguments: float) -> object:
@@ -154,11 +186,10 @@ class _Watch:
         if not isinstance(robot, Robot):
             raise SetupError('a robot without physics goes nowhere; leave out --physics none')
         options = parse_arguments(argv)
-        urdf = robot_urdf(options.preset, options.arm, options.trunk_mass)
-        self._robot, self._line = robot, simulation.line
-        self._meter = Meter(robot, urdf)
-        self._pose = pose_positions(Pose.STAND, options.arm)
-        self._server = Server(robot, simulation.line, terminal, self._meter.sample)
+        meter = Meter(robot, robot_urdf(options.preset, options.arm, options.trunk_mass))
+        self._robot = WatchedRobot(robot, meter, simulation.line)
+        self._robot.start = {'pose': pose_positions(Pose.STAND, options.arm)}
+        self._server = Server(robot, simulation.line, terminal, meter.sample)
 
     def answer(self, pipe: Connection) -> None:
         """Carry requests out until there will be no more."""
@@ -176,26 +207,8 @@ class _Watch:
             life.result()
 
     def _do(self, request: str, arguments: tuple[Any, ...]) -> object:
-        action = partial(getattr(self, request), *arguments)
+        action = partial(getattr(self._robot, request), *arguments)
         try:
             return self._server.submit(action).result(ANSWER_TIME / 2)
         except (SimulationError, TimeoutError) as error:
             return SimulationError(f'{request}: {error}')
-
-    def stand(self) -> None:
-        """Put the robot on its feet."""
-        self._robot.reset(pose=self._pose)
-        self.begin()
-
-    def kick(self, x: float, y: float) -> None:
-        """Change its velocity [m/s]."""
-        self._robot.kick((x, y, 0.0))
-
-    def begin(self) -> None:
-        """Begin to watch it anew."""
-        self._meter.begin()
-        self._line.command_times.clear()
-
-    def read(self) -> Watched:
-        """Return what was seen since."""
-        return Watched(self._meter.read(), self._line.command_times.timing())

@@ -14,6 +14,7 @@ import math
 
 from operator_input import StatusPart, Style
 from quad_description.rotations import from_rpy, Quaternion
+from robot_primitives import setting
 
 from .exceptions import SettingError
 
@@ -130,10 +131,10 @@ class PoseSteps:
         SettingError: A step is not positive, or above its limit.
     """
 
-    height_step: float = 0.005
-    height_limit: float = 0.03
-    angle_step: float = 0.05
-    angle_limit: float = 0.3
+    height_step: float = setting(0.005, 0.0005, 0.1, 'Lift of a stroke [m]')
+    height_limit: float = setting(0.03, 0.0005, 0.3, 'Highest lift [m]')
+    angle_step: float = setting(0.05, 0.001, 0.5, 'Tilt of a stroke [rad]')
+    angle_limit: float = setting(0.3, 0.001, 0.8, 'Largest tilt [rad]')
 
     def __post_init__(self) -> None:
         for name, step, limit in (

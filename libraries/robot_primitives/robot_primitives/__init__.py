@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from .c_library import cache_folder, load_c_library
 from .joint_states import JointSample, JointStateStore
+from .settings import setting, settings_of, settings_problem, switch
 from .stream_gate import StreamGate, StreamRules
 
 __all__ = [
@@ -15,4 +16,8 @@ __all__ = [
     'StreamRules',
     'cache_folder',
     'load_c_library',
+    'setting',
+    'settings_of',
+    'settings_problem',
+    'switch',
 ]

@@ -6,17 +6,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 import difflib
+from enum import Enum
 from functools import partial
 import math
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from robot_primitives import settings_of
+
 ALIKE = 0.8  # of SequenceMatcher: one letter in five; short names for other nodes pass
 RCLPY_PREFIX = 'qos_overrides.'  # declared with a topic, so some of them later than our look
 Choice = TypeVar('Choice')
+Kind = TypeVar('Kind')
 Number = TypeVar('Number', int, float)
 Value = TypeVar('Value')
 _ALIKE = 0.6  # what is chosen from is known, so the suggestion may be a bold one
@@ -88,6 +92,27 @@ class ParameterReader:
         self._node = node
         self._prefix = prefix
         self._fixed = fixed
+
+    def settings(self, kind: type[Kind], prefix: str = '', **given: Any) -> Kind:  # noqa: ANN401
+        """Declare and read the typed settings of a dataclass; given ones are not declared."""
+        values = given
+        for name, default, span, meaning in settings_of(kind):
+            path = prefix + name
+            if name in given:
+                continue
+            if isinstance(default, bool):
+                values[name] = self.flag(path, meaning, default=default)
+            elif isinstance(default, Enum):
+                choices = {choice.value: choice for choice in type(default)}
+                values[name] = self.choice(path, default.value, choices, meaning)
+            elif isinstance(default, str):
+                values[name] = self.text(path, default, meaning)
+            elif isinstance(default, int) and span is not None:
+                ends = int(span[0]), int(span[1])
+                values[name] = self.whole(path, default, ends, meaning)
+            else:
+                values[name] = self.number(path, default, span, meaning)
+        return kind(**values)
 
     def text(self, name: str, default: str, meaning: str) -> str:
         """Declare and read a text."""

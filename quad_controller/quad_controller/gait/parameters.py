@@ -10,8 +10,9 @@ from enum import Enum
 import math
 
 from quad_description import Feet, jacobian, Quadruped, Targets
+from robot_primitives import setting
 
-from ..exceptions import check_settings, ParameterError, setting
+from ..exceptions import check_settings, ParameterError
 from .velocity import BodyLimits, VelocityLimits
 
 

@@ -92,12 +92,12 @@ class ControllerNode(Node):
         policy, refusal = self._load_first_policy()
         self._controller = Controller(
             settings.robot,
-            settings.gait,
+            settings.tuning,
             settings.states,
             policy=policy,
             policy_refusal=refusal,
             dry_run=settings.policy_dry_run,
-            first_gait=settings.first_gait,
+            first_gait=settings.gait,
             arm_pose=settings.arm_pose,
         )
         self._loop = ControlLoop(
@@ -144,7 +144,7 @@ class ControllerNode(Node):
             '~/load_policy',
             lambda request: self._loader.submit(self._take_load_request, request),
         )
-        self._gait = settings.gait
+        self._gait = settings.tuning
         self.add_on_set_parameters_callback(self._tune)
         self.create_timer(settings.diagnostics_period, self._publish_diagnostics)
         self._types = self.create_timer(TYPE_PERIOD, self._check_for_stamped)
@@ -202,7 +202,7 @@ class ControllerNode(Node):
     def _load_policy(self, text: str) -> LoadedPolicy:
         """Load and check a policy by its path or name; the log has the table in either case."""
         settings = self._settings
-        gait = GaitGenerator(settings.robot, settings.gait)
+        gait = GaitGenerator(settings.robot, settings.tuning)
         try:
             loaded = load_policy(
                 find_policy(text),

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +13,9 @@ from rclpy.node import Node
 
 from node_runner import declare_thread_priority, ParameterReader, refuse_misspelt
 from quad_description import DescriptionError, PRESETS, Quadruped, quadruped, robot_urdf
+from robot_primitives import setting, settings_of, switch
 
-from ..exceptions import settings_of
 from ..gait.parameters import Gait, GaitParameters, ServoModel
-from ..gait.velocity import BodyLimits
 from ..policy.options import PolicyOptions
 from ..states.modes import StateParameters
 
@@ -29,17 +27,19 @@ class NodeSettings:
     """All parameters."""
 
     robot: Quadruped
-    gait: GaitParameters  # tuning of the gait
-    first_gait: Gait  # gait to begin with
+    tuning: GaitParameters  # of the gait
     states: StateParameters  # limits of states, watchdogs and protections
+    policy_options: PolicyOptions  # how the policy is run
     # positions of the joints that are no legs' in [rad]; empty leaves them
     arm_pose: tuple[float, ...]
-    policy: str  # path of an ONNX file, or name of one of :func:`shipped_policies`; empty for none
-    policy_options: PolicyOptions  # how it is run
-    policy_dry_run: bool  # whether the policy is only watched
-    record: str  # folder in which each run is recorded; empty for none
-    diagnostics_period: float  # in [s]
     thread_priority: int  # SCHED_FIFO priority of the thread of its loop; 0 requests none
+    gait: Gait = switch(Gait.TROT, 'gait to begin with')  # noqa: RUF009  # a field
+    policy: str = switch('', 'ONNX file that the mode policy follows, or name of a shipped one')
+    policy_dry_run: bool = switch(
+        False, 'the policy runs, but its targets go to joint_command_shadow only'
+    )
+    record: str = switch('', 'folder for recordings of all steps (MCAP); empty: none')
+    diagnostics_period: float = setting(1.0, 0.1, 60.0, 'period [s]')
 
 
 def declare_parameters(node: Node) -> NodeSettings:
@@ -51,27 +51,15 @@ def declare_parameters(node: Node) -> NodeSettings:
         DescriptionError: The robot description is no quadruped's.
     """
     read = ParameterReader(node)
-    settings = NodeSettings(
+    settings = read.settings(
+        NodeSettings,
         robot=_robot(read),
-        gait=_gait(node, read),
-        first_gait=read.choice(
-            'gait', Gait.TROT.value, {gait.value: gait for gait in Gait}, 'gait to begin with'
-        ),
+        tuning=ParameterReader(node, fixed=False).settings(GaitParameters, servo=_servo(read)),
         states=_states(read),
+        policy_options=_policy_options(read),
         arm_pose=read.numbers(
             'arm_pose', 'positions of the joints of the arm when it stands [rad]'
         ),
-        policy=read.text(
-            'policy', '', 'ONNX file that the mode policy follows, or name of one that is shipped'
-        ),
-        policy_options=_policy_options(read),
-        policy_dry_run=read.flag(
-            'policy_dry_run',
-            default=False,
-            meaning='the policy runs, but its targets go to joint_command_shadow only',
-        ),
-        record=read.text('record', '', 'folder for recordings of all steps (MCAP); empty: none'),
-        diagnostics_period=read.number('diagnostics_period', 1.0, (0.1, 60.0), 'period [s]'),
         thread_priority=declare_thread_priority(read, THREAD_PRIORITY),
     )
     refuse_misspelt(node)
@@ -104,43 +92,23 @@ def _robot(read: ParameterReader) -> Quadruped:
         raise DescriptionError(f'robot_description: {error}') from error
 
 
-def _read(read: ParameterReader, kind: type, prefix: str = '') -> dict[str, Any]:
-    """Declare and read all settings of a dataclass; the period is set as a rate."""
-    values: dict[str, Any] = {}
-    for name, default, span, meaning in settings_of(kind):
-        path = prefix + name
-        if isinstance(default, bool):
-            values[name] = read.flag(path, meaning, default=default)
-        elif isinstance(default, Enum):
-            choices = {choice.value: choice for choice in type(default)}
-            values[name] = read.choice(path, default.value, choices, meaning)
-        elif name != 'period':
-            values[name] = read.number(path, default, span, meaning)
-    return values
-
-
-def _gait(node: Node, read: ParameterReader) -> GaitParameters:
-    values = _read(ParameterReader(node, fixed=False), GaitParameters)
-    return GaitParameters(**values, servo=_servo(read), body=BodyLimits())
-
-
 def _servo(read: ParameterReader) -> ServoModel | None:
     enabled = read.flag(
         'servo_compensation.enabled', default=True, meaning='set-points ahead of soft servos'
     )
-    values = _read(read, ServoModel, 'servo_compensation.')
-    return ServoModel(**values) if enabled else None
+    model = read.settings(ServoModel, 'servo_compensation.')
+    return model if enabled else None
 
 
 def _policy_options(read: ParameterReader) -> PolicyOptions:
     contract = read.text(
         'policy_contract', '', 'YAML file with the contract of the policy, or what its file lacks'
     )
-    values = _read(read, PolicyOptions, 'policy_')
-    return PolicyOptions(Path(contract).expanduser() if contract else None, **values)
+    path = Path(contract).expanduser() if contract else None
+    return read.settings(PolicyOptions, 'policy_', contract=path)
 
 
 def _states(read: ParameterReader) -> StateParameters:
     default = StateParameters()
     rate = read.number('loop_rate', 1.0 / default.period, (10.0, 200.0), 'steps a second [Hz]')
-    return StateParameters(period=1.0 / rate, **_read(read, StateParameters))
+    return read.settings(StateParameters, period=1.0 / rate)

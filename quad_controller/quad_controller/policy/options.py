@@ -18,7 +18,9 @@ import math
 from pathlib import Path
 from typing import Any
 
-from ..exceptions import check_settings, ParameterError, setting, settings_of, switch
+from robot_primitives import setting, settings_of, switch
+
+from ..exceptions import check_settings, ParameterError
 from .contract.model import Gains
 
 

@@ -7,7 +7,7 @@ The only part of this package that knows the simulator.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 import time
@@ -16,7 +16,7 @@ from quad_description import Backend, robot_urdf, RobotState
 from quad_hardware import CommandError, HardwareError, NoAnswerError
 from quad_hardware.backend import JointBytes, robot_at
 from quad_hardware.protocol import Model, V2
-from quad_sim import parse_servo, ServedRobot, SimulationError, Terrain, Watched
+from quad_sim import parse_servo, ServedRobot, SimulationError, Terrain, WatchedRobot
 from quad_sim.physics import Meter, PhysicsBackend, Robot, Variation
 
 from ..exceptions import CheckError
@@ -78,8 +78,8 @@ def servo_response(servo: str) -> ServoResponse:
 class BytesBackend(PhysicsBackend):
     """A robot in physics behind the bytes of protocol v1, in virtual time."""
 
-    def __init__(self, robot: Robot, choice: RobotChoice) -> None:
-        super().__init__(robot)
+    def __init__(self, robot: Robot, choice: RobotChoice, watch: Callable[[], None]) -> None:
+        super().__init__(robot, watch=watch)
         self._bytes = JointBytes(choice.urdf, Model(choice.preset))
 
     def reset(self) -> RobotState:
@@ -101,44 +101,25 @@ class BytesBackend(PhysicsBackend):
 class PhysicsArena:
     """A robot in physics, in virtual time."""
 
+    interruption = ''  # virtual time waits
+
     def __init__(self, choice: RobotChoice, conditions: Conditions = AS_MADE) -> None:
         """Make robot and ground."""
         urdf = choice.urdf
         ground = Terrain(roughness=conditions.roughness, seed=1)
-        self._robot = Robot(urdf, parse_servo(choice.servo), ground)
-        self._variation = Variation(trunk_mass=conditions.trunk_mass)
-        self.backend: Backend = (
-            BytesBackend(self._robot, choice) if conditions.v1 else PhysicsBackend(self._robot)
-        )
-        self._meter = Meter(self._robot, urdf)
+        robot = Robot(urdf, parse_servo(choice.servo), ground)
+        meter = Meter(robot, urdf)
+        self.robot = WatchedRobot(robot, meter)
+        self.robot.start = {'variation': Variation(trunk_mass=conditions.trunk_mass)}
+        self.backend: Backend = PhysicsBackend(robot, watch=meter.sample)
+        if conditions.v1:
+            self.backend = BytesBackend(robot, choice, meter.sample)
 
     def stand(self) -> RobotState:
         """Put the robot on its feet."""
         self.backend.reset()
-        self._robot.reset(variation=self._variation)
-        self._meter.begin()
+        self.robot.stand()
         return self.backend.observe()
-
-    def kick(self, x: float, y: float) -> None:
-        """Change its velocity at once [m/s]."""
-        self._robot.kick((x, y, 0.0))
-
-    def watch(self) -> None:
-        """Look at it."""
-        self._meter.sample()
-
-    def begin(self) -> None:
-        """Measure from now on."""
-        self._meter.begin()
-
-    def read(self) -> Watched:
-        """Return what was measured."""
-        return Watched(self._meter.read())
-
-    @property
-    def interruption(self) -> str:
-        """Nothing: virtual time waits."""
-        return ''
 
 
 class SerialArena(Backend):
@@ -149,7 +130,7 @@ class SerialArena(Backend):
 
     def __init__(self, served: ServedRobot, driver: Backend) -> None:
         """Watch a robot by the driver of its serial port."""
-        self._served, self._driver = served, driver
+        self.robot, self._driver = served, driver
         self.names, self.period = driver.names, driver.period
         self.backend: Backend = self
         # what the machine did since the robot stood or was measured; empty for nothing
@@ -193,27 +174,11 @@ class SerialArena(Backend):
 
     def stand(self) -> RobotState:
         """Put the robot on its feet."""
-        self._served.stand()
+        self.robot.stand()
         for _ in range(FRESH):
             state = self.step(None)
         self.interruption = ''
         return state
-
-    def kick(self, x: float, y: float) -> None:
-        """Change its velocity at once [m/s]."""
-        self._served.kick(x, y)
-
-    def watch(self) -> None:
-        """Do nothing: the process of the robot looks at it."""
-
-    def begin(self) -> None:
-        """Measure from now on."""
-        self._served.begin()
-        self.interruption = ''
-
-    def read(self) -> Watched:
-        """Return what was measured."""
-        return self._served.read()
 
 
 @contextmanager

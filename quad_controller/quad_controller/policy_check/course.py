@@ -214,7 +214,6 @@ class CourseWalker:
             self.observed.append(output.asked.answer.observation[0])
         if output.targets is not None:
             self._add_targets(np.array(output.targets))
-        self._arena.watch()
 
     def _add_targets(self, targets: np.ndarray) -> None:
         self._targets = [*self._targets[-2:], targets]
@@ -258,7 +257,8 @@ class CourseWalker:
         while steps < total and falls < most:
             ready, began = not self.is_down or self._stand_again(), steps
             fell = not ready or not self._settle(command)
-            self._arena.begin()
+            self._arena.interruption = ''
+            self._arena.robot.begin()
             self.forget()
             while not fell and steps < total:
                 steps += 1
@@ -266,14 +266,14 @@ class CourseWalker:
                 fell = self.is_down
                 if push and steps % between == 0:
                     angle = random.uniform(0.0, math.tau)
-                    self._arena.kick(push * math.cos(angle), push * math.sin(angle))
+                    self._arena.robot.kick(push * math.cos(angle), push * math.sin(angle))
             if fell and self._excused():
                 steps = began
                 continue
             if fell and ready:
                 self.failure = self.trouble or 'it fell'
             if steps > began:
-                parts.append(self._arena.read())
+                parts.append(self._arena.robot.read())
                 bends = max(bends, self.smoothness)
             falls += fell
             if not ready:

@@ -7,7 +7,8 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from enum import IntEnum
+from enum import Enum, IntEnum
+import json
 import logging
 import math
 from pathlib import Path
@@ -15,6 +16,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from quad_description import DescriptionError, PRESETS, quadruped, robot_urdf, run_command
+from robot_primitives import settings_of
 
 from ..exceptions import CheckError, PolicyError, QuadControllerError
 from ..gait.generator import GaitGenerator
@@ -22,7 +24,7 @@ from ..gait.parameters import GaitParameters
 from ..gait.velocity import Velocity
 from ..policy.load import find_policy, load_policy, LoadedPolicy
 from ..policy.network import OnnxNetwork
-from ..policy.options import GravitySource, ImuFrame, PolicyOptions, table_text
+from ..policy.options import PolicyOptions, table_text
 from ..states.modes import StateParameters
 from .course import course_for, CourseWalker
 from .findings import (
@@ -109,13 +111,8 @@ def _load(options: argparse.Namespace) -> LoadedPolicy:
 
 
 def _policy_options(options: argparse.Namespace) -> PolicyOptions:
-    plain = PolicyOptions(
-        contract=options.contract,
-        phase_period=options.phase_period,
-        imu_frame=ImuFrame(options.imu_frame),
-        gravity_source=GravitySource(options.gravity_source),
-        hold_missing=options.hold_missing,
-    )
+    values = {name: getattr(options, name) for name, *_ in settings_of(PolicyOptions)}
+    plain = PolicyOptions.from_json(json.dumps(values), options.contract)
     try:
         from .arenas import servo_response
     except ImportError:  # the table alone needs no simulator
@@ -204,24 +201,21 @@ def _parser() -> argparse.ArgumentParser:
         epilog='exit code: 0 it stands up, 1 it does not, 2 wrong use, 3 it could not be tried',
         allow_abbrev=False,
     )
-    add, chosen = parser.add_argument, PolicyOptions()
+    add = parser.add_argument
     add('policy', help='ONNX file, or the name of one that is shipped')
     add('--preset', choices=list(PRESETS), default='lite', help='the robot')
     add('--arm', action='store_true', help='the robot has its arm')
     files = 'YAML, deploy.yaml, env.yaml, config.yaml, config.json'
     add('--contract', type=Path, metavar='FILE', help=f'contract of the policy: {files}')
-    time = number('time in [s]', 0.0)
-    add('--phase-period', type=time, default=0.0, help='[s]; 0: that of the file')
-    add(
-        '--imu-frame',
-        choices=[each.value for each in ImuFrame],
-        default=chosen.imu_frame.value,
-        help='of the angular velocity (policy_imu_frame); needed where the file does not have it',
-    )
-    sources = [each.value for each in GravitySource]
-    add('--gravity-source', choices=sources, default=chosen.gravity_source.value)
-    held = 'accept a robot without some joints of the policy'
-    add('--hold-missing', action='store_true', help=held)
+    for name, default, span, meaning in settings_of(PolicyOptions):
+        option = f'--{name.replace("_", "-")}'
+        if isinstance(default, Enum):
+            choices = [each.value for each in type(default)]
+            add(option, choices=choices, default=default.value, help=meaning)
+        elif span is not None:
+            add(option, type=number(name.replace('_', ' '), *span), default=default, help=meaning)
+        else:
+            add(option, action='store_true', help=meaning)
     servo = 'of the simulation: nominal, firm, vendor_rl, or kp=4,...'
     add('--servo', type=_servo, default=NOMINAL, help=servo)
     ways = parser.add_argument_group('ways to try it, beside the gait but for the first')

@@ -10,8 +10,9 @@ from enum import Enum, IntEnum
 import math
 
 from quad_description import EMPTY_BATTERY, MAX_TILT, Targets
+from robot_primitives import setting, switch
 
-from ..exceptions import check_settings, ParameterError, setting, switch
+from ..exceptions import check_settings, ParameterError
 from ..gait.parameters import Gait
 from ..gait.velocity import Velocity
 from ..policy.observation import Situation

@@ -12,6 +12,7 @@ import time
 from typing import NamedTuple
 
 from quad_description import PRESETS
+from robot_primitives import setting
 
 from ..exceptions import LinkError, NoAnswerError
 from ..protocol import (
@@ -63,10 +64,10 @@ class LinkOptions:
 
     path: str  # device file
     protocols: tuple[Protocol, ...] = PROTOCOLS  # what to try, in this order
-    baud: int = 0  # speed [bit/s]; 0 takes each protocol's own
+    baud: int = setting(0, 0, 4_000_000, 'speed [bit/s]; 0: that of the protocol')
     model: Model | None = None  # whose ranges scale bytes in protocol v1; None asks the firmware
     preset: str = ''  # that the URDF is of; a firmware of another one is refused
-    rate: int = 50  # reports a second [Hz]
+    rate: int = setting(50, 10, 100, 'reports a second [Hz]')
     vendor: bool = False  # go through the vendor's own library, and try nothing else
     vendor_method: str = ''  # name of its method that writes a servo angle
 

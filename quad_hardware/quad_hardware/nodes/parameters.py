@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import Enum
 from pathlib import Path
+from typing import Any
 
 from rclpy.node import Node
 
@@ -17,9 +19,9 @@ from node_runner import (
 )
 from quad_description import DescriptionError, Joint, movable_joints, PRESETS, robot_urdf
 from quad_description.rotations import from_rpy, Vector
+from robot_primitives import setting, switch
 
-from ..commander import LossReaction
-from ..estimation import EstimatorSettings, ImuMounting, OdometrySettings, RateSource, SCALES
+from ..estimation import EstimatorSettings, ImuMounting, OdometrySettings
 from ..exceptions import CommandError
 from ..joints import JointMap, JointServo, LimiterSettings, servo_of
 from ..link import AUTO, DEFAULT_PORT, LinkOptions, MODEL_CHOICES, PROTOCOL_CHOICES
@@ -30,26 +32,36 @@ from ..serial_robot import JOINTS_CHECKED, RobotSettings
 THREAD_PRIORITY = 50  # SCHED_FIFO: replies of the robot are read and commands sent at once
 
 
+class FootprintMode(Enum):
+    """How the frames hang together."""
+
+    CHILD = 'child'  # odom, base_link, base_footprint
+    PARENT = 'parent'  # odom, base_footprint, base_link
+
+
 @dataclass(frozen=True, slots=True)
 class Frames:
     """Names of the frames, and how they hang together."""
 
-    odom: str  # fixed where the robot began
-    base: str  # the body
-    footprint: str  # on the ground below the body
-    imu: str  # of the IMU
-    footprint_is_parent: bool  # odom, footprint, base; else odom, base, footprint
-    publish: bool  # transforms are published
+    odom_frame: str = switch('odom', 'where the robot began')
+    base_frame: str = switch('base_link', 'the body')
+    footprint_frame: str = switch('base_footprint', 'on the ground below the body')
+    imu_frame: str = switch('imu_link', 'the IMU')
+    footprint_mode: FootprintMode = switch(  # noqa: RUF009  # a field
+        FootprintMode.CHILD,
+        'child: odom, base_link, base_footprint; parent: odom, base_footprint, base_link',
+    )
+    publish_tf: bool = switch(True, 'publish the transforms')
 
 
 @dataclass(frozen=True, slots=True)
 class Deviations:
     """Standard deviations that are published with the IMU."""
 
-    orientation: float  # [rad]
-    rate: float  # of the differentiated angular velocity [rad/s]
-    gyro: float  # of the angular velocity of a gyro [rad/s]
-    acceleration: float  # [m/s²]
+    orientation_stddev: float = setting(0.02, 0.0, 10.0, '[rad]')
+    angular_velocity_stddev: float = setting(0.2, 0.0, 10.0, 'differentiated [rad/s]')
+    gyro_stddev: float = setting(0.02, 0.0, 10.0, 'of a gyro [rad/s]')
+    linear_acceleration_stddev: float = setting(0.3, 0.0, 10.0, '[m/s²]')
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +71,8 @@ class NodeSettings:
     robot: RobotSettings  # which robot it is, and how it is read and commanded
     frames: Frames  # names of the frames
     deviations: Deviations  # published with the IMU
-    diagnostics_period: float  # [s]
     thread_priority: int  # SCHED_FIFO priority of the thread of its loop; 0 requests none
+    diagnostics_period: float = setting(1.0, 0.1, 60.0, 'period [s]')
 
 
 def declare_parameters(node: Node) -> NodeSettings:
@@ -78,32 +90,20 @@ def declare_parameters(node: Node) -> NodeSettings:
         'auto: detected; vendor: through the vendor’s xgo_lib2',
     )
     method = read.text('vendor_servo_method', '', 'of the vendor’s XgoDog, writes one servo angle')
-    link = LinkOptions(
+    link = read.settings(
+        LinkOptions,
         path=read.text('port', DEFAULT_PORT, 'serial port of the robot'),
         protocols=protocols,
-        baud=read.whole('baud', 0, (0, 4_000_000), 'speed [bit/s]; 0: that of the protocol'),
         model=read.choice(
             'model', AUTO, MODEL_CHOICES, 'ranges of protocol v1; auto: by firmware'
         ),
-        rate=read.whole('rate', 50, (10, 100), 'reports a second [Hz]'),
         vendor=_vendor(protocols, method),
         vendor_method=method,
     )
-    described = declare_robot(read, link)
-    robot = replace(
-        described,
-        limiter=LimiterSettings(
-            speed=read.number('max_joint_speed', 12.0, (0.1, 100.0), 'of targets [rad/s]'),
-            start_speed=read.number(
-                'start_joint_speed', 2.0, (0.1, 100.0), 'of targets when commands begin [rad/s]'
-            ),
-        ),
-        command_loss=read.choice(
-            'command_loss',
-            LossReaction.LIE.value,
-            {reaction.value: reaction for reaction in LossReaction},
-            'what the robot does when commands break off with a leg in the air',
-        ),
+    robot = declare_robot(
+        read,
+        link,
+        limiter=read.settings(LimiterSettings),
         black_box=declare_black_box(read),
         joints_checked=read.flag(
             JOINTS_CHECKED,
@@ -112,28 +112,32 @@ def declare_parameters(node: Node) -> NodeSettings:
         ),
         serial_log=_serial_log(read),
     )
-    settings = NodeSettings(
+    settings = read.settings(
+        NodeSettings,
         robot=robot,
         frames=declare_frames(read),
-        deviations=declare_deviations(read),
-        diagnostics_period=read.number('diagnostics_period', 1.0, (0.1, 60.0), 'period [s]'),
+        deviations=read.settings(Deviations),
         thread_priority=declare_thread_priority(read, THREAD_PRIORITY),
     )
     refuse_misspelt(node)
     return settings
 
 
-def declare_robot(read: ParameterReader, link: LinkOptions) -> RobotSettings:
-    """Declare which robot it is and how its reports are read; return the rest as its defaults.
+def declare_robot(read: ParameterReader, link: LinkOptions, **given: Any) -> RobotSettings:  # noqa: ANN401
+    """Declare which robot it is and how its reports are read.
 
     Raises:
         ParameterError: One is of another kind or out of its range.
         CommandError: They do not fit the robot; the message names the remedy.
     """
     urdf = _urdf(read)
-    return RobotSettings(
-        link=link, urdf=urdf, joints=_joint_map(read, urdf), estimator=_estimator(read)
+    estimator = read.settings(
+        EstimatorSettings,
+        odometry=read.settings(OdometrySettings, 'odometry.'),
+        mounting=_mounting(read),
     )
+    joints = _joint_map(read, urdf)
+    return RobotSettings(link=link, urdf=urdf, joints=joints, estimator=estimator, **given)
 
 
 def _serial_log(read: ParameterReader) -> Path | None:
@@ -193,35 +197,6 @@ def _servo(read: ParameterReader, joint: Joint) -> JointServo:
     )
 
 
-def _estimator(read: ParameterReader) -> EstimatorSettings:
-    sources = {source.value: source for source in RateSource}
-    default = OdometrySettings()
-    return EstimatorSettings(
-        rate_source=read.choice(
-            'angular_velocity_source',
-            RateSource.AUTO.value,
-            sources,
-            'auto: the gyro where it is reported, else differentiated attitude',
-        ),
-        rate_cutoff=read.number('rate_cutoff', 12.0, (0.5, 25.0), 'of its low-pass [Hz]'),
-        joint_cutoff=read.number(
-            'joint_velocity_cutoff', 25.0, (0.5, 25.0), 'of differentiated velocities [Hz]'
-        ),
-        odometry=OdometrySettings(
-            delay=read.number('odometry.delay', default.delay, (0.0, 0.3), 'lag of servos [s]'),
-            tolerance=read.number(
-                'odometry.tolerance', default.tolerance, (0.0, 0.05), 'height of a foot down [m]'
-            ),
-            margin=read.number(
-                'odometry.margin', default.margin, (0.0, 0.1), 'around a swing, not counted [s]'
-            ),
-            scale_x=read.number('odometry.scale_x', 1.0, SCALES, 'factor of the way forward'),
-            scale_y=read.number('odometry.scale_y', 1.0, SCALES, 'factor of the way sideways'),
-        ),
-        mounting=_mounting(read),
-    )
-
-
 def _mounting(read: ParameterReader) -> ImuMounting:
     roll, pitch, yaw = _three(
         read, 'imu.mounting', (0.0, 0.0, 0.0), 'roll, pitch, yaw of the IMU in base_link [rad]'
@@ -261,33 +236,7 @@ def _three(read: ParameterReader, name: str, default: Vector, meaning: str) -> V
 
 def declare_frames(read: ParameterReader) -> Frames:
     """Declare the names of the frames."""
-    modes = {'child': False, 'parent': True}
     prefix = read.text('frame_prefix', '', 'before each frame, as of robot_state_publisher')
-
-    def frame(parameter: str, default: str, meaning: str) -> str:
-        return prefix + read.text(parameter, default, meaning)
-
-    return Frames(
-        odom=frame('odom_frame', 'odom', 'where the robot began'),
-        base=frame('base_frame', 'base_link', 'the body'),
-        footprint=frame('footprint_frame', 'base_footprint', 'on the ground below the body'),
-        imu=frame('imu_frame', 'imu_link', 'the IMU'),
-        footprint_is_parent=read.choice(
-            'footprint_mode',
-            'child',
-            modes,
-            'child: odom, base_link, base_footprint; parent: odom, base_footprint, base_link',
-        ),
-        publish=read.flag('publish_tf', default=True, meaning='publish the transforms'),
-    )
-
-
-def declare_deviations(read: ParameterReader) -> Deviations:
-    """Declare what is published with the IMU."""
-    span = (0.0, 10.0)
-    return Deviations(
-        orientation=read.number('orientation_stddev', 0.02, span, '[rad]'),
-        rate=read.number('angular_velocity_stddev', 0.2, span, 'differentiated [rad/s]'),
-        gyro=read.number('gyro_stddev', 0.02, span, 'of a gyro [rad/s]'),
-        acceleration=read.number('linear_acceleration_stddev', 0.3, span, '[m/s²]'),
-    )
+    frames = read.settings(Frames)
+    names = {name: getattr(frames, name) for name in Frames.__slots__ if name.endswith('_frame')}
+    return replace(frames, **{name: prefix + frame for name, frame in names.items()})

@@ -33,7 +33,7 @@ from ..calibration.main import read_parameters
 from ..exceptions import HardwareError, RecordingError
 from ..link import LinkOptions, LinkState
 from ..recording import Entry, read_serial_log
-from .parameters import declare_deviations, declare_frames, declare_robot
+from .parameters import declare_frames, declare_robot, Deviations
 from .robot_topics import log_link, RobotTopics, WARN_PERIOD
 
 RECORDED = 'hardware_node'  # whose topics these are
@@ -88,7 +88,7 @@ class Replay:
         self._robot = robot = ReplayedRobot(declare_robot(read, LinkOptions(log)))
         robot.on_state, robot.on_change = self._publish, self._log_change
         robot.on_refusal = self._log_refusal
-        frames, deviations = declare_frames(read), declare_deviations(read)
+        frames, deviations = declare_frames(read), read.settings(Deviations)
         self._diagnostics_period = read.number(
             'diagnostics_period', 1.0, (0.05, 60.0), 'time between two /diagnostics messages [s]'
         )

@@ -34,7 +34,7 @@ from quad_msgs.msg import FootContacts
 from ..link import LinkState
 from ..serial_robot import ObservedRobot, ROBOT
 from .diagnostics import LinkDiagnostic, robot_diagnostic
-from .parameters import Deviations, Frames
+from .parameters import Deviations, FootprintMode, Frames
 
 NOT_THERE = [-1.0, *([0.0] * 8)]  # covariance of what is not measured (REP 145)
 UNUSED = 1e6  # variance of what is not measured
@@ -81,7 +81,7 @@ def _joint_states(stamp: Time, numbers: Numbers, *names: str) -> JointState:
 
 def imu(sample: ImuSample, deviations: Deviations, frame: str) -> tuple[Template, Numbers]:
     """Return attitude, angular velocity and specific force; zeros for what is not measured."""
-    acceleration = None if sample.acceleration is None else deviations.acceleration
+    acceleration = None if sample.acceleration is None else deviations.linear_acceleration_stddev
     known = _tilt(sample, deviations), _rate(sample, deviations), acceleration
     rate, felt = sample.angular_velocity or _ZERO, sample.acceleration or _ZERO
     return Template(_imu, 10, (frame, known)), (*sample.orientation, *rate, *felt)
@@ -111,16 +111,17 @@ def odometry(
     """Return the pose in odom and the velocity in base_link (or in the footprint)."""
     rotation, height = state.rotation, state.height
     rate = sample.angular_velocity or _ZERO  # in the body
-    child, velocity = frames.base, state.velocity_in_base
-    if frames.footprint_is_parent:
-        child, velocity = frames.footprint, (state.velocity_x, state.velocity_y, 0.0)  # level
+    child, velocity = frames.base_frame, state.velocity_in_base
+    if frames.footprint_mode is FootprintMode.PARENT:
+        # level
+        child, velocity = frames.footprint_frame, (state.velocity_x, state.velocity_y, 0.0)
         rate = rotate(_level(rotation), rate)
         rotation, height = about_z(yaw_of(rotation)), 0.0
     known = _tilt(sample, deviations), _rate(sample, deviations)
     place = state.x, state.y, height
     variances = state.position_variance, known[0] ** 2 + state.yaw_variance
     numbers = (*place, *rotation, *velocity, *rate, *variances)
-    return Template(_odometry, len(numbers), (frames.odom, child, known)), numbers
+    return Template(_odometry, len(numbers), (frames.odom_frame, child, known)), numbers
 
 
 def _odometry(
@@ -162,12 +163,13 @@ def _foot_contacts(stamp: Time, _numbers: Numbers, source: str, *contacts: bool)
 def transforms(state: OdometryState, frames: Frames) -> tuple[Template, Numbers]:
     """Return odom to base_link and base_link to base_footprint, or the other way round."""
     tilt, place = _level(state.rotation), (state.x, state.y)
-    if frames.footprint_is_parent:
-        names = frames.odom, frames.footprint, frames.base
+    if frames.footprint_mode is FootprintMode.PARENT:
+        names = frames.odom_frame, frames.footprint_frame, frames.base_frame
         heading = about_z(yaw_of(state.rotation))
         numbers = (*place, 0.0, *heading, 0.0, 0.0, state.height, *tilt)
     else:
-        names, upright = (frames.odom, frames.base, frames.footprint), conjugate(tilt)
+        names = frames.odom_frame, frames.base_frame, frames.footprint_frame
+        upright = conjugate(tilt)
         below = rotate(upright, (0.0, 0.0, -state.height))
         numbers = (*place, state.height, *state.rotation, *below, *upright)
     return Template(_transforms, len(numbers), names), numbers
@@ -202,13 +204,14 @@ def battery(state: RobotState, stamp: Time) -> BatteryState:
 
 
 def _tilt(sample: ImuSample, deviations: Deviations) -> float:
-    return max(deviations.orientation, sample.deviation)
+    return max(deviations.orientation_stddev, sample.deviation)
 
 
 def _rate(sample: ImuSample, deviations: Deviations) -> float | None:
     if sample.angular_velocity is None:
         return None
-    return deviations.rate if sample.rate_differentiated else deviations.gyro
+    gyro = not sample.rate_differentiated
+    return deviations.gyro_stddev if gyro else deviations.angular_velocity_stddev
 
 
 def _level(rotation: Rotation) -> Rotation:
@@ -313,12 +316,12 @@ class RobotTopics:
             return
         deviations, frames, stamp = self._deviations, self._frames, self._stamp(state.time)
         for publisher, (template, numbers) in (
-            (self._imu, imu(measured, deviations, frames.imu)),
+            (self._imu, imu(measured, deviations, frames.imu_frame)),
             (self._odom, odometry(measured, way, deviations, frames)),
             (self._contacts, foot_contacts(way)),
         ):
             publisher.publish(template, stamp, numbers)
-        if frames.publish:
+        if frames.publish_tf:
             template, numbers = transforms(way, frames)
             self._tf.publish(template, stamp, numbers)
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 import math
 
@@ -123,9 +123,10 @@ class PhysicsBackend(Backend):
         self,
         robot: Robot,
         period: float = PERIOD,
+        watch: Callable[[], None] = lambda: None,
     ) -> None:
-        """Observe a robot."""
-        self.robot, self.period = robot, period
+        """Observe a robot; ``watch`` is called after each step."""
+        self.robot, self.period, self._watch = robot, period, watch
         self.names = robot.joint_names
 
     def reset(self) -> RobotState:
@@ -142,6 +143,7 @@ class PhysicsBackend(Backend):
         if targets is not None:
             self.robot.set_targets(targets)
         self.robot.step(self.period)
+        self._watch()
         return self.observe()
 
     def observe(self) -> RobotState:

@@ -68,17 +68,6 @@ def declare_speeds(node: Node, defaults: Mapping[str, Speeds]) -> list[Speeds]:
     ]
 
 
-def declare_steps(node: Node) -> PoseSteps:
-    """Declare how far a stroke tilts and lifts the body."""
-    read, default = ParameterReader(node), PoseSteps()
-    return PoseSteps(
-        read.number('height_step', default.height_step, (0.0005, 0.1), 'Lift of a stroke [m]'),
-        read.number('height_limit', default.height_limit, (0.0005, 0.3), 'Highest lift [m]'),
-        read.number('angle_step', default.angle_step, (0.001, 0.5), 'Tilt of a stroke [rad]'),
-        read.number('angle_limit', default.angle_limit, (0.001, 0.8), 'Largest tilt [rad]'),
-    )
-
-
 def declare_stream(node: Node) -> CommandStream[Velocity]:
     """Declare how often to publish."""
     read = ParameterReader(node)
@@ -314,7 +303,7 @@ class TeleopKeyboard(TeleopNode):
         self.source, held = declare_keyboard(self)
         robot = RobotLink(self, self.get_logger().info)
         (speeds,) = declare_speeds(self, {'': Speeds()})
-        steps = declare_steps(self)
+        steps = ParameterReader(self).settings(PoseSteps)
         self.mapping = KeyboardTeleop(robot, held, declare_stream(self), speeds, steps)
         refuse_misspelt(self)
 
@@ -344,7 +333,7 @@ class TeleopGamepad(TeleopNode):
             declare_stream(self),
             normal,
             turbo,
-            steps=declare_steps(self),
+            steps=ParameterReader(self).settings(PoseSteps),
             warn=self.get_logger().warning,
         )
         refuse_misspelt(self)
