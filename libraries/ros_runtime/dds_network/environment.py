@@ -5,12 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, MutableMapping
-import hashlib
 import os
 from pathlib import Path
 import stat
-import tempfile
-import xml.etree.ElementTree as ET
+from typing import TYPE_CHECKING
 
 from .reach import (
     LOCALHOST_PROFILE,
@@ -20,6 +18,9 @@ from .reach import (
     read_interfaces,
     resolve_reach,
 )
+
+if TYPE_CHECKING:
+    from xml.etree import ElementTree as ET
 
 # RTPS 2.2, 9.6.1.4.1; naming peers takes the place of this default
 _DISCOVERY_GROUP = '239.255.0.1'
@@ -32,6 +33,9 @@ def profile_file(reach: Reach) -> Path:
     Raises:
         NetworkChoiceError: It cannot be written.
     """
+    import hashlib
+    import tempfile
+
     text = profile_text(reach)
     name = f'{PREFIX}{hashlib.sha256(text.encode()).hexdigest()[:16]}.xml'
     folder = Path(tempfile.gettempdir()) / f'dds_network-{os.getuid()}'
@@ -43,6 +47,8 @@ def profile_file(reach: Reach) -> Path:
 
 def profile_text(reach: Reach) -> str:
     """Return a profile as XML; arguments as of :func:`profile_file`."""
+    from xml.etree import ElementTree as ET
+
     ET.register_namespace('', _NAMESPACE)
     root = ET.parse(LOCALHOST_PROFILE).getroot()  # noqa: S314  # our own file
     allowed = _find(root, 'interfaceWhiteList')
@@ -63,6 +69,8 @@ def _find(root: ET.Element, tag: str) -> ET.Element:
 
 
 def _add(parent: ET.Element, tag: str) -> ET.Element:
+    from xml.etree import ElementTree as ET
+
     return ET.SubElement(parent, f'{{{_NAMESPACE}}}{tag}')
 
 
@@ -77,6 +85,8 @@ def _private(folder: Path) -> Path:
 
 
 def _write(path: Path, text: str) -> Path:
+    import tempfile
+
     if not path.exists():
         descriptor, written = tempfile.mkstemp(dir=path.parent)
         with os.fdopen(descriptor, 'w', encoding='utf-8') as file:

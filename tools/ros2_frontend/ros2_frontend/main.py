@@ -13,6 +13,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import gc
 import importlib
 import os
 import signal
@@ -20,8 +21,8 @@ import sys
 from types import ModuleType
 from typing import Any
 
-from .cli.commands import build
 from .cli.interrupts import signals_interrupt
+from .ros.joining import joined_early
 
 _BROKEN_PIPE = 128 + signal.SIGPIPE
 
@@ -47,10 +48,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         SystemExit: From argparse, for `--help` (0) and for wrong arguments (2).
     """
     words = list(sys.argv[1:] if argv is None else argv)
+    gc.disable()  # a tenth of the time of imports; what runs for long joins the graph
     for name in ('numpy', 'yaml'):
         sys.modules.setdefault(name, _Later(name))
     try:
-        with signals_interrupt():
+        with signals_interrupt(), joined_early(words):
             code = _run(words)
         sys.stdout.flush()
     except KeyboardInterrupt:
@@ -64,6 +66,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(words: list[str]) -> int:
+    from .cli.commands import build  # when DDS discovers already
+
     parser, help_of, verb = build(words)
     args = parser.parse_args(words)
     if not args.use_python_default_buffering and hasattr(sys.stdout, 'reconfigure'):

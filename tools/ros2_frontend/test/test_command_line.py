@@ -102,6 +102,36 @@ def test_commands_import_only_what_they_need(words: list[str], needless: set[str
 
 
 @pytest.mark.scenario
+def test_a_command_is_in_the_graph_before_rclpy_and_leaves_if_it_is_refused(
+    zoo_env: Mapping[str, str], ros2: Ros2, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Discovery goes on during the imports; a wrong argument leaves no node behind."""
+    code = (
+        'import sys; from ros2_frontend import main\n'
+        'def refuse(words):\n'
+        '    assert "rclpy" not in sys.modules\n'
+        '    print("joined", flush=True); sys.stdin.readline(); sys.exit(2)\n'
+        'main._run = refuse\n'
+        'main.main(["topic", "list"])'
+    )
+    monkeypatch.setenv('ROS_DOMAIN_ID', zoo_env['ROS_DOMAIN_ID'])
+    with subprocess.Popen(
+        [sys.executable, '-c', code],
+        env=zoo_env,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == 'joined\n'
+        name = f'/_ros2cli_{process.pid}_joining'
+        assert name in ros2('node', 'list', '--all').lines
+        process.communicate('\n')
+        assert process.returncode == 2
+    assert name not in ros2('node', 'list', '--all').lines
+
+
+@pytest.mark.scenario
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_interrupts_are_quiet(zoo_env: Mapping[str, str], number: signal.Signals) -> None:
     """Ctrl-C, and SIGTERM, end a command at once with ros2cli's exit code and no traceback.

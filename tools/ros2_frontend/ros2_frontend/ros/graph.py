@@ -15,6 +15,7 @@ from __future__ import annotations
 from argparse import Namespace
 from collections.abc import Callable, Iterator
 import contextlib
+import gc
 import importlib
 import math
 import os
@@ -33,8 +34,7 @@ from message_definitions import load_type_support
 from ..cli.commands import Argument, FrontendError, GRAPH_ARGUMENTS, NoAnswerError, Verb
 from ..cli.interrupts import deferred_interrupts
 from ..names import Handle, is_hidden, Message, NamesAndTypes, NodeName
-
-NODE_PREFIX = '_ros2cli'  # a leading underscore hides a node from `ros2 node list`
+from .joining import ARGUMENTS, early_context, NODE_PREFIX
 
 # Python sees Ctrl-C only between two waits
 _LONGEST_WAIT = 0.1  # [s]
@@ -88,6 +88,7 @@ def open_session(args: Namespace, node_name: str | None = None) -> Iterator[Sess
     from rclpy.context import Context
     from rclpy.exceptions import NameValidationException
     from rclpy.executors import SingleThreadedExecutor
+    from rclpy.impl.implementation_singleton import rclpy_implementation
     from rclpy.node import Node as RclpyNode
     from rclpy.parameter import Parameter
     from rclpy.signals import SignalHandlerOptions
@@ -98,12 +99,12 @@ def open_session(args: Namespace, node_name: str | None = None) -> Iterator[Sess
     except NetworkChoiceError as error:
         raise FrontendError(f'{NETWORK_VARIABLE}: {error}') from None
     context = Context()
-    # no log file per command
-    rclpy.init(  # noqa: TID251  # restricted above
-        args=['--ros-args', '--disable-external-lib-logs'],
-        context=context,
-        signal_handler_options=SignalHandlerOptions.NO,
-    )
+    with early_context(rclpy_implementation) as end_early_node:
+        rclpy.init(  # noqa: TID251  # restricted above
+            args=list(ARGUMENTS),
+            context=context,
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
     try:
         sim_time = getattr(args, 'use_sim_time', False)
         name = node_name or f'{NODE_PREFIX}_{os.getpid()}'
@@ -114,8 +115,10 @@ def open_session(args: Namespace, node_name: str | None = None) -> Iterator[Sess
             start_parameter_services=False,
             parameter_overrides=[Parameter('use_sim_time', value=True)] if sim_time else None,
         )
+        end_early_node()
         executor = SingleThreadedExecutor(context=context)
         executor.add_node(node)
+        gc.enable()  # main() leaves it off for the imports
         try:
             yield Session(node, executor)
         finally:

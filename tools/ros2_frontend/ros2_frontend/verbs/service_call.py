@@ -55,9 +55,10 @@ _GRACE = 0.02  # [s]; ros2cli, too, prints nothing when the service is there at 
 )
 def call(args: Namespace) -> None:
     """Call once, or at a rate until Ctrl-C."""
-    type_ = class_of(args.service_type, Kind.SERVICE, 'The passed service type is invalid')
-    request = filled(type_.Request(), sys.stdin.read() if args.stdin else args.values)
-    with open_graph(args) as graph:
+    values = sys.stdin.read() if args.stdin else args.values
+    with open_graph(args) as graph:  # it discovers others while type and values are loaded
+        type_ = class_of(args.service_type, Kind.SERVICE, 'The passed service type is invalid')
+        request = filled(type_.Request(), values)
         client = graph.session.node.create_client(type_, absolute(args.service_name))
         _await(client, graph, args)
         while True:

@@ -154,8 +154,6 @@ _FORMAT = (
 )
 def echo(args: Namespace) -> None:
     """Print messages until Ctrl-C, `--once` or `--timeout`."""
-    from rclpy.event_handler import SubscriptionEventCallbacks
-
     show = printer(args)
     wanted = message_class(args.message_type) if args.message_type else None
     topic = absolute(args.topic_name)
@@ -165,8 +163,12 @@ def echo(args: Namespace) -> None:
         nonlocal printed
         printed = show(message, info) or printed
 
-    events = SubscriptionEventCallbacks(message_lost=None if args.no_lost_messages else print_lost)
     with open_graph(args) as graph:
+        from rclpy.event_handler import SubscriptionEventCallbacks
+
+        lost = None if args.no_lost_messages else print_lost
+        events = SubscriptionEventCallbacks(message_lost=lost)
+        to_yaml('')  # loads YAML while DDS discovers
         if wanted is None:
             wanted = class_of_topic(args.topic_name, graph)
         graph.wait_for(lambda: graph.publishers(topic) or None)
