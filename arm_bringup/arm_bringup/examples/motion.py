@@ -46,16 +46,8 @@ for 0.1 s, of which its way to the servo takes some."""
 SETTLE = 0.35  # least pause after a motion in [s]
 MOTION_TIMEOUT = 60.0  # longest time of a trajectory in [s]
 
-SIDE, SPEED = 0.08, 0.1  # side of a square in [m], and greatest speed of the tool on it in [m/s]
+SIDE, SPEED = 0.08, 0.1  # side of a square in [m], and speed of the tool on it in [m/s]
 SIDES = ((1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0))  # directions of the sides of a square
-MAX_RUN_UP = 0.3  # greatest part of a side on which the joints may accelerate
-STEPS, SPEED_SHARE, MARGIN = 8, 0.6, 0.03
-"""Steps in which a side is gone through on the model, the share of a joint's speed that it may
-need there, and the share of a joint's range that it keeps from the ends."""
-OFF_LINE = 0.01  # share of the speed that may lead off a line on the model
-CLEARANCE, NEARER = 0.015, 0.001
-"""Least distance of links on a square in [m], and how much nearer links may come that are near
-each other where it begins."""
 
 OUTWARDS, DOWN, FAST = 0.866, 0.5, 0.2
 """Way to the singular pose: shares of outwards and down, and its speed in [m/s]."""
@@ -74,7 +66,9 @@ SLOW = 0.3  # speed override
 WORST_LINE, WORST_SPEED = 3e-3, 0.01
 """Greatest distance of the tool from the line that it is jogged along in [m], and difference of
 its speed from the asked one as a share."""
-LEAST_RETURN = 0.9  # share of the way that the tool must come back from the singular pose
+LEAST_WAY, LEAST_RETURN = 1e-3, 0.9
+"""Way of the tool outwards in [m] below which it does not go there at all, and the share of it
+that it must come back from the singular pose."""
 WORST_PATH = 5e-3  # greatest distance of a set-point from the path of a trajectory in [rad]
 
 
@@ -148,19 +142,12 @@ class Motion(ArmDemo):
 
     def _parts(self) -> None:
         self.go_to_start()
-        if all(square_fits(self.model, self.pose, each) for each in self._frames):
-            for name, frame in zip(('base frame', 'tool frame'), self._frames, strict=True):
-                self.square(name, frame)
-        else:
-            self.add('squares', 'left out: they are not possible from the start pose')
+        for name, frame in (('base frame', self.model.base), ('tool frame', self.model.tip)):
+            self.square(name, frame)
         self.singularity()
         self.go_to_start()
         self.trajectory()
         self.cancel()
-
-    @property
-    def _frames(self) -> tuple[str, str]:
-        return self.model.base, self.model.tip
 
     @property
     def last(self) -> Sample:
@@ -181,13 +168,12 @@ class Motion(ArmDemo):
     def square(self, name: str, frame: str) -> None:
         """Jog the tool along the sides of a square in a frame."""
         self.enter(f'a square in the {name}')
-        speed = square_speed(self.model, self.pose)
         speeds, commanded, measured, gap, missed = [], 0.0, 0.0, 0.0, self.missed
         self.limited.clear()
         for way in SIDES:
             begin, first = self.last, len(self.samples)
             direction = self.model.pose(begin.position, frame).rotation @ np.array(way, float)
-            gap = max(gap, self._jog(speed * np.array(way), frame, SIDE / speed))
+            gap = max(gap, self._jog(SPEED * np.array(way), frame, SIDE / SPEED))
             moving = self.samples[first:]
             speeds.append(tool_speed(moving[len(moving) // 2 : -(len(moving) // 4)], self.period))
             self._rest()
@@ -195,27 +181,27 @@ class Motion(ArmDemo):
             tools, seen = [each.tool for each in side], [each.measured_tool for each in side]
             commanded = max(commanded, off_line(tools, begin.tool, direction))
             measured = max(measured, off_line(seen, begin.measured_tool, direction))
-        reached = max(speeds, key=lambda each: abs(each - speed))
+        reached = max(speeds, key=lambda each: abs(each - SPEED))
         # PDOs of drives that came late: joints of different times are not where the tool is
         worst = commanded if self.missed > missed else measured
         limited = (self.limited or [''])[-1]
         figures = (
-            f'TCP speed asked {speed:.3f} m/s, reached {reached:.4f} m/s; off the line '
+            f'TCP speed asked {SPEED:.3f} m/s, reached {reached:.4f} m/s; off the line '
             f'{1e3 * commanded:.2f} mm commanded, {1e3 * measured:.2f} mm measured'
         )
         problem = ''
         if worst > WORST_LINE:
             problem = f'the tool was {1e3 * worst:.1f} mm off its line'
-        elif abs(reached - speed) > WORST_SPEED * speed:
+        elif abs(reached - SPEED) > WORST_SPEED * SPEED:
             if gap > LATE_COMMANDS:
                 figures += (
                     f'; speed not judged: jog commands were up to {gap:.2f} s apart, this '
                     'computer is too busy'
                 )
-            elif limited and reached < speed:
+            elif limited and reached < SPEED:
                 figures += f'; the limits of this arm allow no more: {limited}'
             else:
-                problem = f'the tool moved at {reached:.4f} m/s instead of {speed:.3f} m/s'
+                problem = f'the tool moved at {reached:.4f} m/s instead of {SPEED:.3f} m/s'
         self.add(f'square, {name}', figures, problem)
 
     def singularity(self) -> None:
@@ -225,10 +211,6 @@ class Motion(ArmDemo):
         ahead = np.array([begin[0], begin[1], 0.0])
         ahead /= max(float(np.linalg.norm(ahead)), 1e-6)
         outwards = OUTWARDS * ahead - np.array([0.0, 0.0, DOWN])
-        if not can_go(self.model, self.last.position, outwards):
-            why = 'left out: this arm cannot lead its tool along a line outwards'
-            self.add('singularity', why)
-            return
         self.limited.clear()
 
         def out() -> float:
@@ -242,7 +224,10 @@ class Motion(ArmDemo):
         self._jog(-FAST * outwards, self.model.base, 2.0 * LONGEST, lambda: out() <= 0.0)
         self._rest()
         back, problem = reached - out(), ''
-        if reached <= 0.0 or back < LEAST_RETURN * reached:
+        if reached < LEAST_WAY and text:
+            self.add('singularity', f'left out: {text}')  # an arm of few joints leads no line
+            return
+        if reached < LEAST_WAY or back < LEAST_RETURN * reached:
             why = text or 'no reason given'
             problem = f'the tool came back {back:.3f} m of {reached:.3f} m; {why}'
         figures = f'{reached:.3f} m out, {back:.3f} m back; there: {text or "nothing limits"}'
@@ -435,60 +420,6 @@ def duration_of(model: RobotModel, begin: Array, end: Array) -> float:
         np.cbrt(60 * way / (LIMIT_SHARE * limits.jerk)),
     )
     return float(max(SHORTEST, *(each.max() for each in needed)))
-
-
-def square_fits(model: RobotModel, start: Array, frame: str) -> bool:
-    """Return whether the tool can go along a square in a frame: within all limits, and free."""
-    limits, positions = model.limits, start.copy()
-    least = min(CLEARANCE, model.clearance(start, CLEARANCE) - NEARER)
-    margin = np.where(limits.continuous, 0.0, MARGIN * (limits.upper - limits.lower))
-    for side in SIDES:
-        velocity = SPEED * model.pose(positions, frame).rotation @ np.array(side, float)
-        for _ in range(STEPS):
-            shares, off = joint_shares(model, positions, velocity)
-            positions = positions + limits.velocity * shares * (SIDE / SPEED) / STEPS
-            inside = (positions >= limits.lower + margin) & (positions <= limits.upper - margin)
-            slow = np.abs(shares) <= SPEED_SHARE
-            if off > OFF_LINE * SPEED or not (inside & slow).all():
-                return False
-            if model.clearance(positions, CLEARANCE) < least:
-                return False
-    return True
-
-
-def can_go(model: RobotModel, start: Array, direction: Array) -> bool:
-    """Return whether the tool can be led along a direction in the base frame.
-
-    An arm of few joints cannot: its tool would leave the line, so that jogging does not move it.
-    """
-    _, off = joint_shares(model, start, direction)
-    return off <= OFF_LINE * float(np.linalg.norm(direction))
-
-
-def joint_shares(model: RobotModel, positions: Array, velocity: Array) -> tuple[Array, float]:
-    """Return speeds of the joints for a velocity of the tool, and what they miss of it in [m/s].
-
-    The speeds are shares of the limits, the velocity of the tool is in [m/s] in the base.
-    """
-    jacobian, twist = model.jacobian(positions), np.concatenate([velocity, np.zeros(3)])
-    shares = np.linalg.lstsq(jacobian * model.limits.velocity, twist, rcond=1e-3)[0]
-    off = (jacobian @ (model.limits.velocity * shares) - twist)[:3]
-    return shares, float(np.linalg.norm(off))
-
-
-def square_speed(model: RobotModel, start: Array) -> float:
-    """Return a speed for the squares that is reached early on each side in [m/s].
-
-    A joint that moves r for each metre reaches its speed in r v/a + a/j.
-    """
-    limits = model.limits
-    scaled = np.linalg.pinv(model.jacobian(start) * limits.velocity, rcond=1e-3)[:, :3]
-    frames = (model.base, model.tip)
-    axes = np.hstack([model.pose(start, each).rotation[:, :2] for each in frames])
-    rates = limits.velocity * np.abs(scaled @ axes).max(axis=1)
-    build_up, length = limits.acceleration / limits.jerk, MAX_RUN_UP * SIDE
-    root = np.sqrt(build_up**2 + 4.0 * length * rates / limits.acceleration)
-    return min(SPEED, float(np.min(2.0 * length / (build_up + root))))
 
 
 def is_free(model: RobotModel, begin: Array, end: Array) -> bool:
