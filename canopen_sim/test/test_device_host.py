@@ -7,7 +7,6 @@ It may have stood still, and gives no power where others have the node ids.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import partial
 import logging
 import math
@@ -15,7 +14,7 @@ from pathlib import Path
 import threading
 import time
 
-from can_addresses import free_multicast, free_virtual
+from can_addresses import free_virtual
 from device_rig import drive_dictionary, NODE_ID, with_defaults
 import pytest
 
@@ -108,33 +107,6 @@ def expect(bus: Bus, wanted: Frame) -> None:
             if (frame.can_id, frame.data) == (wanted.can_id, wanted.data):
                 return
     pytest.fail(f'{wanted} did not come')
-
-
-@pytest.fixture(params=[free_virtual, free_multicast], ids=['virtual', 'multicast'])
-def buses(request: pytest.FixtureRequest) -> Iterator[tuple[Bus, Bus]]:
-    """Two connections to one bus."""
-    name = request.param()
-    with open_bus(name) as ours, open_bus(name) as theirs:
-        yield ours, theirs
-
-
-def test_runner_serves_a_real_bus(buses: tuple[Bus, Bus]) -> None:
-    """Frames and deadlines of real time reach the devices; stop ends the thread."""
-    bus, master = buses
-    runner = DeviceRunner(bus)
-    for node_id in IDS:
-        runner.host.add(node_id, drive_dictionary(), boot_time=0.01)
-    before = threading.active_count()
-    runner.start()
-    expect(master, Frame(0x708, b'\x00'))
-    request = sdo.DownloadRequest(0x1017, 0, b'\x32\x00', 2).encode()
-    master.send(Frame(0x605, request))
-    expect(master, Frame(0x585, b'\x60\x17\x10\x00\x00\x00\x00\x00'))
-    expect(master, Frame(0x705, b'\x7f'))
-    expect(master, Frame(0x705, b'\x7f'))
-    runner.stop()
-    runner.stop()
-    assert threading.active_count() == before
 
 
 class FlakyBus(VirtualBus):

@@ -433,14 +433,3 @@ def test_a_loss_is_handled_as_0x1029_says(
         assert rig.times(EMCY) == pytest.approx([start + 0.3])
         beat(rig) if kind == 'heartbeat' else guard(rig)
         assert rig.get(0x1001) == 0
-
-
-def test_enabled_drive_stops_when_its_guard_is_gone() -> None:
-    """The drive faults (0x6007 = 1), as when a heartbeat is lost."""
-    rig = guarded()
-    rig.nmt(NmtCommand.START)
-    rig.enable(3)
-    guard(rig)
-    rig.run(1.0)
-    assert rig.state is DriveState.FAULT
-    assert rig.get(0x603F) == 0x8130

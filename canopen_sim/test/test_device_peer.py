@@ -10,7 +10,6 @@ after a reset and sends no PDOs by itself, hence the test goes as far as it does
 from __future__ import annotations
 
 from collections.abc import Iterator
-import configparser
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,22 +36,6 @@ from canopen_sim.object_store import Integer, ObjectStore
 
 TWO_AXES = EDS.with_name('cia402_two_axes.eds')
 FILES = pytest.mark.parametrize('path', [EDS, TWO_AXES], ids=lambda path: path.stem)
-DEVICE_INFO = [
-    *('VendorName', 'VendorNumber', 'ProductName', 'ProductNumber', 'RevisionNumber', 'OrderCode'),
-    *(f'BaudRate_{rate}' for rate in (10, 20, 50, 125, 250, 500, 800, 1000)),
-    *('SimpleBootUpMaster', 'SimpleBootUpSlave', 'Granularity', 'DynamicChannelsSupported'),
-    *('GroupMessaging', 'NrOfRXPDO', 'NrOfTXPDO', 'LSS_Supported'),
-]
-"""Entries that CiA 306-1, 4.5.2 requires."""
-
-
-def ini(path: Path) -> configparser.ConfigParser:
-    """Read the file as an INI file; a section or key that stands twice is an error."""
-    parser = configparser.ConfigParser(strict=True, interpolation=None)
-    parser.optionxform = str  # type: ignore[assignment,method-assign]
-    with path.open(encoding='ascii') as file:
-        parser.read_file(file)
-    return parser
 
 
 @FILES
@@ -75,41 +58,6 @@ def test_others_read_the_same(path: Path) -> None:
         ), str(entry)
         assert variable.default == entry.default, str(entry)
         assert (variable.min, variable.max) == (entry.low_limit, entry.high_limit), str(entry)
-
-
-@FILES
-def test_lists_and_sections_agree(path: Path) -> None:
-    """Each listed object has its section, each section is listed once, counts are right."""
-    file = ini(path)
-    listed: list[int] = []
-    for name in ('MandatoryObjects', 'OptionalObjects', 'ManufacturerObjects'):
-        count = int(file[name]['SupportedObjects'])
-        indices = [int(file[name][str(number)], 16) for number in range(1, count + 1)]
-        assert len(file[name]) == count + 1
-        assert indices == sorted(indices)
-        listed += indices
-    sections = {int(name, 16) for name in file.sections() if len(name) == 4}
-    assert len(listed) == len(set(listed))
-    assert set(listed) == sections
-    for index in sections:
-        subs = [s for s in file.sections() if s.startswith(f'{index:04X}sub')]
-        assert int(file[f'{index:04X}'].get('SubNumber', '0')) == len(subs)
-
-
-@FILES
-def test_device_info_is_complete_and_true(path: Path) -> None:
-    """The device information has what the standard requires, and agrees with the objects."""
-    assert max(map(len, path.read_bytes().decode('ascii').splitlines())) <= 255  # 306-1
-    file = ini(path)
-    info = file['DeviceInfo']
-    assert [key for key in DEVICE_INFO if key not in info] == []
-    assert int(info['VendorNumber'], 0) == int(file['1018sub1']['DefaultValue'], 0)
-    assert int(info['ProductNumber'], 0) == int(file['1018sub2']['DefaultValue'], 0)
-    assert int(info['RevisionNumber'], 0) == int(file['1018sub3']['DefaultValue'], 0)
-    assert info['ProductName'] == file['1008']['DefaultValue']
-    assert int(info['NrOfRXPDO']) == sum(name.startswith('140') for name in file if len(name) == 4)
-    assert int(info['NrOfTXPDO']) == sum(name.startswith('180') for name in file if len(name) == 4)
-    assert file['FileInfo']['FileName'] == path.name
 
 
 def test_second_axis_mirrors_the_first() -> None:

@@ -146,18 +146,6 @@ def test_statusword(word: int | None, low_bits: int) -> None:
     assert rig.statusword & ~0x400 == low_bits
 
 
-def test_voltage_is_needed_to_switch_on() -> None:
-    """Without voltage the drive stays Ready; when it comes, the waiting command is obeyed."""
-    rig = rig_in(READY)
-    rig.drive.set_voltage(False)
-    assert rig.state is READY
-    assert not rig.statusword & 0x10
-    rig.command(SWITCH_ON)
-    assert rig.state is READY
-    rig.drive.set_voltage(True)
-    assert rig.state is ON
-
-
 @pytest.mark.parametrize('state', [SOD, READY, ON, OE, QS])
 def test_loss_of_voltage_is_a_fault_when_switched_on(state: State) -> None:
     """A drive that is switched on faults with under-voltage; one that is off does not mind."""
