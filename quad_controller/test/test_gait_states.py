@@ -761,6 +761,11 @@ moments = st.fixed_dictionaries(
 )  # fmt: skip
 
 
+def apart(one: Targets, other: Targets | None) -> float:
+    """Return how far the farthest joint is from another place [rad]."""
+    return max((abs(a - b) for a, b in zip(one, other or (), strict=False)), default=math.inf)
+
+
 @settings(max_examples=60)
 @given(script=st.lists(moments, min_size=1, max_size=12))
 def test_no_sequence_of_events_makes_a_target_jump(script: list[dict[str, object]]) -> None:
@@ -797,7 +802,9 @@ def test_no_sequence_of_events_makes_a_target_jump(script: list[dict[str, object
                 begins_anew |= dt > 0.5 and not controller._unseen.is_pending
                 seen = measured
                 continue
-            found = lost and holds and targets == measured == seen
+            # what is requested then may move them in the same step
+            found = lost and holds and measured == seen
+            found = found and apart(targets, measured) < apart(targets, previous)
             if begins_anew or found:  # after a pause of its own or of theirs, where joints are
                 assert measured is not None
                 previous, begins_anew = measured, False
