@@ -112,9 +112,9 @@ def inputs_of(step: Step) -> Situation | None:
     return Situation(
         JointSample(positions, vector('velocity')),
         ImuSample(orientation, vector('angular_velocity'), vector('acceleration')),
-        Velocity(*step['command'].tolist()),
-        vector('linear_velocity'),
-        contacts and tuple(map(bool, contacts)),
+        linear_velocity=vector('linear_velocity'),
+        foot_contacts=contacts and tuple(map(bool, contacts)),
+        velocity=Velocity(*step['command'].tolist()),
     )
 
 

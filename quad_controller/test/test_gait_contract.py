@@ -97,8 +97,8 @@ def recorded(random: np.random.Generator) -> tuple[Situation, Step]:
     inputs = Situation(
         JointSample(tuple(positions.tolist()), tuple(velocities.tolist())),
         ImuSample((x, y, z, w), tuple(angular.tolist()), None),
-        Velocity(*command.tolist()),
-        tuple(linear.tolist()),
+        linear_velocity=tuple(linear.tolist()),
+        velocity=Velocity(*command.tolist()),
     )
     measured = (linear, angular, gravity, command, positions[ORDER], velocities[ORDER])
     step = Step(*(np.array(values, np.float32) for values in measured))
@@ -509,7 +509,8 @@ def test_contacts_of_feet_are_observed_in_the_order_of_the_training(tmp_path: Pa
 
 def standing(velocity: Velocity) -> Situation:
     """Return what a robot that stands measures."""
-    return Situation(JointSample(STAND, (0.0,) * 12), UPRIGHT, velocity, (0.0, 0.0, 0.0))
+    still = JointSample(STAND, (0.0,) * 12)
+    return Situation(still, UPRIGHT, linear_velocity=(0.0, 0.0, 0.0), velocity=velocity)
 
 
 @pytest.mark.parametrize(

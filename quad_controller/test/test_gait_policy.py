@@ -22,7 +22,6 @@ from quad_controller import (
     PolicyOptions,
     Velocity,
 )
-from quad_controller.gait.velocity import REST
 from quad_controller.policy.contract.mjlab import VENDOR
 from quad_controller.policy.load import LoadedPolicy
 from quad_controller.policy.network import OnnxNetwork
@@ -199,9 +198,7 @@ def test_joints_are_permuted_by_name(order: list[int], moved: int) -> None:
         angle + (0.05 if index == moved else 0.0) for index, angle in enumerate(STAND)
     )
     velocities = tuple(1.0 if index == moved else 0.0 for index in range(12))
-    targets = runner.step(
-        Situation(JointSample(positions, velocities), UPRIGHT, REST), PERIOD
-    ).targets
+    targets = runner.step(Situation(JointSample(positions, velocities), UPRIGHT), PERIOD).targets
     assert targets is not None
     for index, target in enumerate(targets):
         assert target == pytest.approx(STAND[index] + (0.1 if index == moved else 0.0), abs=1e-3)
@@ -219,7 +216,7 @@ def test_the_observation_is_as_agreed() -> None:
     imu = ImuSample(tilted(0.1).orientation, (0.1, 0.2, 0.3), (0.0, 0.0, 20.0))
     for _ in range(2):
         runner.step(
-            Situation(STILL, imu, Velocity(0.2, -0.1, 0.3)), 0.07
+            Situation(STILL, imu, velocity=Velocity(0.2, -0.1, 0.3)), 0.07
         )  # a quarter of the period
     observed = network.asked[-1][0]
     assert observed[:3] == pytest.approx([0.1, 0.2, 0.3])
@@ -238,18 +235,18 @@ def test_a_policy_gives_no_targets_for_what_is_not_measured() -> None:
         (replace(STILL, velocities=None), UPRIGHT, 'velocities of the joints'),
         (STILL, replace(UPRIGHT, angular_velocity=None), 'angular velocity'),
     ):
-        step = runner.step(Situation(joints, imu, REST), PERIOD)
+        step = runner.step(Situation(joints, imu), PERIOD)
         assert step.targets is None
         assert reason in step.reason
     network.action[0, 3] = np.nan
-    step = runner.step(Situation(STILL, UPRIGHT, REST), PERIOD)
+    step = runner.step(Situation(STILL, UPRIGHT), PERIOD)
     assert (step.targets, step.reason) == (None, 'the action is not finite')
 
     def broken(_observation: object) -> None:
         raise RuntimeError('out of order')
 
     network.run = broken  # type: ignore[method-assign, assignment]
-    assert 'out of order' in runner.step(Situation(STILL, UPRIGHT, REST), PERIOD).reason
+    assert 'out of order' in runner.step(Situation(STILL, UPRIGHT), PERIOD).reason
 
 
 def test_the_vendors_imu_is_turned_around() -> None:
@@ -257,7 +254,7 @@ def test_the_vendors_imu_is_turned_around() -> None:
     network = FakeNetwork(metadata())
     runner = check(network, PolicyOptions(imu_frame=ImuFrame.YAWED)).runner
     imu = replace(UPRIGHT, angular_velocity=(1.0, 0.5, 0.25))
-    runner.step(Situation(STILL, imu, REST), PERIOD)
+    runner.step(Situation(STILL, imu), PERIOD)
     assert network.asked[-1][0][:3] == pytest.approx([-1.0, -0.5, 0.25])
     assert network.asked[-1][0][3:6] == pytest.approx([0.0, 0.0, -1.0])
 
@@ -266,9 +263,9 @@ def test_a_slow_command_has_no_phase() -> None:
     """Below the threshold the phase is (0, 0), and above it goes on as if it never was."""
     network = FakeNetwork(metadata())
     runner = check(network).runner
-    runner.step(Situation(STILL, UPRIGHT, Velocity(0.05)), 0.07)
+    runner.step(Situation(STILL, UPRIGHT, velocity=Velocity(0.05)), 0.07)
     assert network.asked[-1][0][9:11].tolist() == [0.0, 0.0]
-    runner.step(Situation(STILL, UPRIGHT, Velocity(0.2)), 0.07)
+    runner.step(Situation(STILL, UPRIGHT, velocity=Velocity(0.2)), 0.07)
     assert network.asked[-1][0][9:11] == pytest.approx([0.0, -1.0], abs=1e-6)
 
 
@@ -289,15 +286,15 @@ def test_targets_stay_within_soft_limits() -> None:
     network = FakeNetwork(metadata())
     runner = check(network).runner
     network.action[0] = 50.0
-    targets = runner.step(Situation(STILL, UPRIGHT, REST), PERIOD).targets
+    targets = runner.step(Situation(STILL, UPRIGHT), PERIOD).targets
     assert targets is not None
     for target, limits in zip(targets, ROBOT.limits, strict=True):
         middle = (limits.lower + limits.upper) / 2
         assert abs(target - middle) <= 0.9 * (limits.upper - limits.lower) / 2 + 1e-6
-    runner.step(Situation(STILL, UPRIGHT, REST), PERIOD)
+    runner.step(Situation(STILL, UPRIGHT), PERIOD)
     assert network.asked[-1][0][35:].tolist() == [50.0] * 12
     runner.reset(STAND)
-    runner.step(Situation(STILL, UPRIGHT, REST), PERIOD)
+    runner.step(Situation(STILL, UPRIGHT), PERIOD)
     assert not network.asked[-1][0][35:].any()
 
 
@@ -311,7 +308,7 @@ def test_joints_that_the_robot_lacks_may_be_held() -> None:
         check(FakeNetwork(values, 13))
     network = FakeNetwork(values, 13)
     runner = check(network, PolicyOptions(hold_missing=True)).runner
-    targets = runner.step(Situation(STILL, UPRIGHT, REST), PERIOD).targets
+    targets = runner.step(Situation(STILL, UPRIGHT), PERIOD).targets
     assert targets == pytest.approx(STAND, abs=1e-3)
     assert network.asked[-1][0][11 + 12] == 0.0
 
@@ -323,7 +320,7 @@ def test_joints_that_the_policy_lacks_stay() -> None:
     loaded = load_policy(network, ARM_ROBOT, (*STAND, 0.7), options, PERIOD)
     loaded.runner.reset((*STAND, 0.7))
     joints = JointSample((*STAND, 0.1), (0.0,) * 13)
-    targets = loaded.runner.step(Situation(joints, UPRIGHT, REST), PERIOD).targets
+    targets = loaded.runner.step(Situation(joints, UPRIGHT), PERIOD).targets
     assert targets is not None
     assert targets[12] == 0.7
 
@@ -332,9 +329,9 @@ def test_a_low_pass_smooths_the_targets() -> None:
     """A step of the action comes through in part first."""
     network = FakeNetwork(metadata())
     runner = check(network, PolicyOptions(low_pass=5.0)).runner
-    runner.step(Situation(STILL, UPRIGHT, REST), PERIOD)
+    runner.step(Situation(STILL, UPRIGHT), PERIOD)
     network.action[0] = 1.0
-    first = runner.step(Situation(STILL, UPRIGHT, REST), PERIOD).targets
+    first = runner.step(Situation(STILL, UPRIGHT), PERIOD).targets
     assert first is not None
     assert 0.05 < first[0] - STAND[0] < 0.2
 

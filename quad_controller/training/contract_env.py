@@ -143,7 +143,7 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
         else:
             turning = self._attitude_rate.update(state.time, imu.orientation)
             imu = ImuSample(imu.orientation, turning, imu.acceleration)
-        self.inputs = Situation(joints, imu, Velocity(*self.simulation.command))
+        self.inputs = Situation(joints, imu, velocity=Velocity(*self.simulation.command))
 
     def _observe(self) -> Floats:
         seen: Floats = self._runner.observe(self.inputs)[0].copy()

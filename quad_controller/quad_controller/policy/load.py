@@ -12,7 +12,6 @@ import re
 from quad_description import FEET, ImuSample, JointSample, Quadruped, Targets
 
 from ..exceptions import PolicyError
-from ..gait.velocity import REST
 from .check import check_answers, check_contract
 from .contract.build import build_contract
 from .contract.configs import read_playground, read_rl_sar
@@ -169,7 +168,9 @@ def _observed(runner: PolicyRunner, stand: Targets) -> Floats:
     """Return what a policy observes of a robot that stands."""
     runner.reset(stand)
     still = JointSample(stand, (0.0,) * len(stand))
-    return runner.observe(Situation(still, UPRIGHT, REST, (0.0, 0.0, 0.0), (True,) * len(FEET)))
+    contacts = (True,) * len(FEET)
+    known = Situation(still, UPRIGHT, linear_velocity=(0.0, 0.0, 0.0), foot_contacts=contacts)
+    return runner.observe(known)
 
 
 def shipped_policies() -> dict[str, Path]:

@@ -11,10 +11,10 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from quad_description import FEET, ImuSample, JointSample
+from quad_description import FEET, ImuSample, RobotState
 from quad_description.rotations import Vector
 
-from ..gait.velocity import BodyPose, UPRIGHT, Velocity
+from ..gait.velocity import BodyPose, REST, UPRIGHT, Velocity
 from .contract.model import (
     BodyFrame,
     HistoryLayout,
@@ -56,18 +56,11 @@ def gravity(imu: ImuSample, source: GravitySource) -> Vector:
 
 
 @dataclass(frozen=True, slots=True)
-class Situation:
-    """What a motion, by the gait or by a policy, may know of the world in one step."""
+class Situation(RobotState):
+    """What a motion, by the gait or by a policy, may know in one step: nothing that is too old."""
 
-    joints: JointSample | None  # the joints, None when they are not known any more
-    imu: ImuSample | None  # attitude and turning, None when they are not known any more
-    velocity: Velocity  # velocity that is requested
-    # of the body in its own frame in [m/s], None while it is not estimated
-    linear_velocity: Vector | None = None
-    # which feet are on the ground, in the order of :data:`quad_description.FEET`; None while it
-    # is not estimated
-    foot_contacts: tuple[bool, ...] | None = None
-    pose: BodyPose = UPRIGHT  # pose of the body that is requested
+    velocity: Velocity = REST  # that is requested
+    pose: BodyPose = UPRIGHT  # of the body that is requested
 
 
 def _in_frame(vector: Vector | None, frame: BodyFrame) -> Vector:

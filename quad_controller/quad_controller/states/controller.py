@@ -233,9 +233,9 @@ class Controller:
             velocity=self._generator.velocity,
             faults=self._latch.texts,
             warnings=(*health.warnings, *filter(None, more)),
-            joints_age=health.joints_age,
-            imu_age=health.imu_age,
-            battery=health.battery,
+            joints_age=health.ages['joints'],
+            imu_age=health.ages['imu'],
+            battery=health.newest.battery,
             refused=health.refused + self._commands.refused,
             limited=self._limiter.limited,
             unreachable=self._unreachable,
@@ -264,8 +264,8 @@ class Controller:
         wanted = self._move(situation, dt_motion, last, events)
         shadow = self._policies.watch(situation, dt_motion, last)
         targets = self._limiter.step(wanted, dt)
-        if self._health.joints is not None:
-            self._tracking.step(targets, self._health.joints.positions, dt)
+        if self._health.newest.joints is not None:
+            self._tracking.step(targets, self._health.newest.joints.positions, dt)
         return Output(
             targets,
             shadow,
@@ -283,13 +283,13 @@ class Controller:
             self._unseen.lose()
         if self._moved_unseen():
             self._limiter.reset()
-        if self._limiter.last is None and self._health.joints is not None:
-            self._machine.hold(self._limiter.start(self._health.joints.positions))
+        if self._limiter.last is None and self._health.newest.joints is not None:
+            self._machine.hold(self._limiter.start(self._health.newest.joints.positions))
         return self._limiter.last
 
     def _moved_unseen(self) -> bool:
         """Whether joints that are held were moved by something else while unmeasured."""
-        joints, last = self._health.joints, self._limiter.last
+        joints, last = self._health.newest.joints, self._limiter.last
         if joints is None or self._health.held:
             self._unseen.lose()
             return False
@@ -351,14 +351,14 @@ class Controller:
         if stale := self._commands.warning(state):
             conditions['command'] = stale
         if self._held and (state in UPRIGHT_STATES or not self._machine.motion.finished):
-            age = self._health.joints_age * 1e3
+            age = self._health.ages['joints'] * 1e3
             conditions['held'] = f'joint states are {age:.0f} ms old; holding the last targets'
         if self._tracking.text:
             conditions['following'] = self._tracking.text
         if self._health.uncertainty and state in UPRIGHT_STATES:
             conditions['uncertain'] = self._health.uncertainty
         policy = self.policy if state is State.POLICY else None
-        if policy is not None and (inexact := policy.inexact(self._health.joints)):
+        if policy is not None and (inexact := policy.inexact(self._health.newest.joints)):
             conditions['velocities'] = inexact
         if (getting_up := self._machine.getting_up) is not None:
             conditions[getting_up.text] = f'get_up: {getting_up.text}'
@@ -402,21 +402,14 @@ class Controller:
 
     def _situation(self, dt: float) -> Situation:
         """Collect what a motion may know; a way to another state goes through rest."""
-        health, machine = self._health, self._machine
+        machine = self._machine
         state = machine.state if machine.state is machine.goal else State.STAND
         velocity = self._commands.velocity(state)
         if state is State.POLICY:  # the gait does so itself; a stop needs no slope
             limits = self._generator.limits
             velocity = limits.approach(self._policy_velocity, limits.clamp(velocity), dt)
         self._policy_velocity = velocity if state is State.POLICY else REST
-        return Situation(
-            joints=None if health.held else health.joints,
-            imu=health.attitude,
-            velocity=velocity,
-            pose=self._commands.pose,
-            linear_velocity=health.linear_velocity,
-            foot_contacts=health.foot_contacts,
-        )
+        return self._health.situation(velocity, self._commands.pose)
 
     def _refusal(self, request: ModeRequest) -> str:
         """Return why a mode cannot be entered, nothing when it can."""

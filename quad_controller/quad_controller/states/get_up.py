@@ -202,7 +202,7 @@ def get_up_refusal(health: Health, latch: FaultLatch, *, swings: bool) -> str:
         if fault is not Fault.FALLEN:
             return f'{fault.value}: {reason}'
     imu = health.attitude
-    if health.joints is None or imu is None:
+    if health.newest.joints is None or imu is None:
         return 'getting up needs joint states and an attitude; there are none'
     if health.uncertainty:
         return health.uncertainty

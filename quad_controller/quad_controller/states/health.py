@@ -9,10 +9,11 @@ still while their targets move have frozen sensors, or servos without power.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 import math
+from typing import Any
 
 from quad_description import ImuSample, JointSample, RobotState, Targets
-from quad_description.rotations import Vector
 
 from ..gait.velocity import BodyPose, REST, UPRIGHT, Velocity
 from ..policy.observation import Situation
@@ -22,6 +23,9 @@ from .modes import Answer, Fault, MOVING_STATES, State, StateParameters
 REFUSAL_LIFE = 0.2
 """How long a message of no use is a reason for silence in [s]; then nothing comes at all."""
 MAX_PAUSE = 0.1  # [s] that counts of a single step that came late
+AGED = ('joints', 'imu', 'linear_velocity', 'foot_contacts')
+"""Values of a RobotState that are of no use when they are old."""
+SUBJECTS = {'joints': Fault.JOINTS, 'imu': Fault.IMU}
 
 
 class Health:
@@ -31,15 +35,8 @@ class Health:
         """Start without a measurement."""
         self._count = count
         self._parameters = parameters
-        self.joints: JointSample | None = None  # the newest usable ones
-        self.imu: ImuSample | None = None  # the newest usable attitude
-        self.battery: float | None = None  # the newest charge, 0 to 1
-        self.servo_problem = ''  # why the servos may carry the robot no longer
-        self.joints_age = self.imu_age = math.inf  # time since they were measured in [s]
-        self._linear_velocity: Vector | None = None
-        self._linear_velocity_age = math.inf
-        self._foot_contacts: tuple[bool, ...] | None = None
-        self._foot_contacts_age = math.inf
+        self.newest = RobotState()  # the newest usable values, however old
+        self.ages = dict.fromkeys(AGED, math.inf)  # time since they came in [s]
         self.refused = 0  # samples that could not be used
         self._refusals: dict[Fault, tuple[str, float]] = {}  # reason, and its age [s]
         self._late = False
@@ -49,35 +46,23 @@ class Health:
     def take(self, measurement: RobotState, dt: float) -> list[str]:
         """Record new values; return what was refused and why."""
         waited = self._waited(dt, received=measurement.joints is not None)
-        self.joints_age += waited
-        self.imu_age += waited
         self._refusals = {
             what: (reason, age + waited)
             for what, (reason, age) in self._refusals.items()
             if age + waited <= REFUSAL_LIFE
         }
-        self._linear_velocity_age += waited
-        self._foot_contacts_age += waited
-        if measurement.foot_contacts is not None:
-            self._foot_contacts, self._foot_contacts_age = measurement.foot_contacts, 0.0
-        joints, imu, velocity = measurement.joints, measurement.imu, measurement.linear_velocity
         problems: list[str] = []
-        if joints and self._usable(Fault.JOINTS, joints.problem(self._count), problems):
-            self.joints, self.joints_age = joints, 0.0
-        if imu and self._usable(Fault.IMU, imu.problem(), problems):
-            self.imu, self.imu_age = imu, 0.0
-        if velocity and all(map(math.isfinite, velocity)):
-            self._linear_velocity, self._linear_velocity_age = velocity, 0.0
-        elif velocity:
-            problems.append('refused a velocity of the body that is not finite')
+        taken: dict[str, Any] = {}
+        for name in (*AGED, 'battery', 'servo_problem'):
+            value = getattr(measurement, name)
+            if value is not None and self._usable(name, value, problems):
+                taken[name] = value
+        ages = self.ages.items()
+        self.ages = {name: 0.0 if name in taken else age + waited for name, age in ages}
+        self.newest = replace(self.newest, **taken)
         self.refused += len(problems)
-        if measurement.servo_problem is not None:
-            self.servo_problem = measurement.servo_problem
-        battery = measurement.battery
-        if battery is not None and math.isfinite(battery):
-            self.battery = battery
-        parameters = self._parameters
-        low = self.battery is not None and self.battery < parameters.low_battery
+        battery = self.newest.battery
+        low = battery is not None and battery < self._parameters.low_battery
         self._low_for = _longer(self._low_for, waited) if low else None
         self._falling_for = _longer(self._falling_for, waited) if self._falls() else None
         return problems
@@ -88,24 +73,21 @@ class Health:
 
     def forget_joints(self) -> None:
         """Wait for the next joint states: something else has moved the joints meanwhile."""
-        self.joints, self.joints_age = None, math.inf
+        self.newest = replace(self.newest, joints=None)
+        self.ages['joints'] = math.inf
+
+    def situation(self, velocity: Velocity = REST, pose: BodyPose = UPRIGHT) -> Situation:
+        """Return what is new enough to act upon, and what is requested."""
+        fresh = {name: getattr(self.newest, name) for name in AGED if self._is_fresh(name)}
+        return Situation(**fresh, velocity=velocity, pose=pose)
 
     @property
     def attitude(self) -> ImuSample | None:
         """The newest attitude, None when it is too old to act upon."""
-        return self.imu if self.imu_age <= self._parameters.hold_age else None
+        return self.newest.imu if self._is_fresh('imu') else None
 
-    @property
-    def linear_velocity(self) -> Vector | None:
-        """That of the body in [m/s], None when it is too old to act upon."""
-        fresh = self._linear_velocity_age <= self._parameters.hold_age
-        return self._linear_velocity if fresh else None
-
-    @property
-    def foot_contacts(self) -> tuple[bool, ...] | None:
-        """Which feet are on the ground, None when that is too old to act upon."""
-        fresh = self._foot_contacts_age <= self._parameters.hold_age
-        return self._foot_contacts if fresh else None
+    def _is_fresh(self, name: str) -> bool:
+        return self.ages[name] <= self._parameters.hold_age
 
     @property
     def spins(self) -> bool:
@@ -116,22 +98,23 @@ class Health:
     @property
     def complete(self) -> bool:
         """Whether everything has been received that a robot on its legs needs."""
-        return self.joints is not None and (
-            self.imu is not None or not self._parameters.require_imu
+        return self.newest.joints is not None and (
+            self.newest.imu is not None or not self._parameters.require_imu
         )
 
     @property
     def held(self) -> bool:
         """Whether the joint states are too old to move on."""
-        return self.joints_age > self._parameters.hold_age
+        return not self._is_fresh('joints')
 
     @property
     def uncertainty(self) -> str:
         """Why the attitude is not acted upon, nothing when it is."""
-        if self.imu is None or not self.imu.is_uncertain:
+        imu = self.newest.imu
+        if imu is None or not imu.is_uncertain:
             return ''
         return (
-            f'/imu is uncertain by {self.imu.deviation:.2f} rad (orientation_covariance), so '
+            f'/imu is uncertain by {imu.deviation:.2f} rad (orientation_covariance), so '
             'nothing is levelled, no heading held and no policy followed; check how the IMU is '
             'mounted: ros2 run quad_hardware calibrate imu'
         )
@@ -140,12 +123,13 @@ class Health:
     def warnings(self) -> tuple[str, ...]:
         """What is not right, but no fault yet."""
         late = self._parameters.warn_age
-        texts = []
-        if late < self.joints_age < math.inf:
-            texts.append(f'joint states are {self.joints_age * 1e3:.0f} ms old')
-        if late < self.imu_age < math.inf:
-            texts.append(f'the attitude is {self.imu_age * 1e3:.0f} ms old')
-        if self.imu is not None and self.imu.angular_velocity is None:
+        imu = self.newest.imu
+        texts = [
+            f'{what} {self.ages[name] * 1e3:.0f} ms old'
+            for name, what in (('joints', 'joint states are'), ('imu', 'the attitude is'))
+            if late < self.ages[name] < math.inf
+        ]
+        if imu is not None and imu.angular_velocity is None:
             texts.append('/imu has no angular velocity, so max_turn_rate is not watched')
         if self.uncertainty:
             texts.append(self.uncertainty)
@@ -154,16 +138,16 @@ class Health:
     def faults(self) -> Iterator[tuple[Fault, str]]:
         """Yield what keeps the robot from moving its legs, each with its reason and remedy."""
         parameters = self._parameters
-        if self.joints_age > parameters.fault_age:
-            yield Fault.JOINTS, self._silence(Fault.JOINTS, self.joints_age, '/joint_states')
-        if parameters.require_imu and self.imu_age > parameters.fault_age:
-            yield Fault.IMU, self._silence(Fault.IMU, self.imu_age, '/imu')
-        if self.imu is not None and (self._falling_for or 0.0) > parameters.fall_time:
-            yield Fault.FALLEN, self._fall(self.imu)
-        if self.battery is not None and (self._low_for or 0.0) > parameters.battery_time:
-            yield Fault.BATTERY, f'{self.battery:.0%} left; charge it'
-        if self.servo_problem:
-            yield Fault.SERVO, self.servo_problem
+        if self.ages['joints'] > parameters.fault_age:
+            yield Fault.JOINTS, self._silence(Fault.JOINTS, self.ages['joints'], '/joint_states')
+        if parameters.require_imu and self.ages['imu'] > parameters.fault_age:
+            yield Fault.IMU, self._silence(Fault.IMU, self.ages['imu'], '/imu')
+        if self.newest.imu is not None and (self._falling_for or 0.0) > parameters.fall_time:
+            yield Fault.FALLEN, self._fall(self.newest.imu)
+        if self.newest.battery is not None and (self._low_for or 0.0) > parameters.battery_time:
+            yield Fault.BATTERY, f'{self.newest.battery:.0%} left; charge it'
+        if self.newest.servo_problem:
+            yield Fault.SERVO, self.newest.servo_problem
 
     def unmeasured(self, policy: PolicyRunner | None) -> str:
         """Return what a policy needs and no sensor measures; nothing for none."""
@@ -171,9 +155,9 @@ class Health:
             return ''
         if self.uncertainty:
             return self.uncertainty
-        return policy.missing(
-            Situation(self.joints, self.imu, REST, self.linear_velocity, self.foot_contacts)
-        ) or policy.inexact(self.joints, stated=True)
+        joints, imu = self.newest.joints, self.newest.imu
+        seen = replace(self.situation(), joints=joints, imu=imu)
+        return policy.missing(seen) or policy.inexact(joints, stated=True)
 
     def _silence(self, what: Fault, age: float, topic: str) -> str:
         """Return why nothing was received for a time [s]."""
@@ -212,12 +196,22 @@ class Health:
         rates = f'{_turn_rate(imu):.1f} rad/s, faster than {fastest:g}'
         return f'the body turns at {rates}; when it does not, /imu is wrong: look at the cable'
 
-    def _usable(self, what: Fault, problem: str, problems: list[str]) -> bool:
-        """Whether a sample has no problem; one that has is refused."""
+    def _usable(self, name: str, value: Any, problems: list[str]) -> bool:  # noqa: ANN401
+        """Whether a value has no problem; one that has is refused."""
+        if name == 'battery':
+            return math.isfinite(value)
+        problem, what = '', SUBJECTS.get(name)
+        if isinstance(value, JointSample):
+            problem = value.problem(self._count)
+        elif isinstance(value, ImuSample):
+            problem = value.problem()
+        elif name == 'linear_velocity' and not all(map(math.isfinite, value)):
+            problem = 'a velocity of the body that is not finite'
         if problem:
-            self.refuse(what, problem)
             problems.append(f'refused {problem}')
-        else:
+        if what and problem:
+            self.refuse(what, problem)
+        elif what:
             self._refusals.pop(what, None)
         return not problem
 
