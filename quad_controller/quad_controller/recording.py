@@ -264,12 +264,6 @@ def report(loaded: LoadedPolicy, steps: list[Step]) -> tuple[str, bool]:
     return '\n'.join(lines), agrees
 
 
-def _options_for(model: str | None, contract: Path | None, recorded: PolicyRun) -> PolicyOptions:
-    """Return how a policy is run: as it was recorded, unless it is another one."""
-    options = recorded.options if model in {None, recorded.policy} else PolicyOptions()
-    return options if contract is None else replace(options, contract=contract)
-
-
 def _model_of(recorded: PolicyRun, recording: Path) -> str:
     """Return the policy that a recording was begun with."""
     if recorded.policy is None:
@@ -288,11 +282,14 @@ def run(arguments: Sequence[str]) -> int:
     try:
         steps, recorded = read_recording(options.recording), PolicyRun.of(options.recording)
         robot = quadruped(robot_urdf(options.preset, arm=options.arm))
+        # as it was recorded, unless it is another one
+        is_recorded = options.model in {None, recorded.policy}
+        chosen = recorded.options if is_recorded else PolicyOptions()
         loaded = load_policy(
             find_policy(options.model or _model_of(recorded, options.recording)),
             robot,
             GaitGenerator(robot, GaitParameters()).stand_targets,
-            _options_for(options.model, options.contract, recorded),
+            replace(chosen, contract=options.contract or chosen.contract),
             recorded.period,
         )
         text, fine = report(loaded, steps)

@@ -186,7 +186,7 @@ def test_odometry_is_less_sure_the_farther_it_went() -> None:
     assert (level.child_frame_id, level.pose.pose.position.z) == ('base_footprint', 0.0)
 
 
-def joint_template(count: int) -> robot_topics.Template:
+def joint_template(count: int) -> MessageTemplate:
     """Return the template of joint states."""
     return robot_topics.joint_states(
         tuple('abcdefghijkl'[:count]), JointSample((0.0,) * count, ())

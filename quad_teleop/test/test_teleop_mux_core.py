@@ -34,18 +34,6 @@ def test_source_that_falls_silent_is_stopped_once() -> None:
     assert not target.zero_due(5.0)
 
 
-def test_lock_stops_what_is_below_it() -> None:
-    """A lock silences lower priorities at once, with a zero; equal and higher ones pass."""
-    target = mux(Input('pause', 'pause', 0.0, 90))
-    target.velocity(NAVIGATION, FORWARD, 0.0)
-    target.lock('pause', True, 0.1)
-    assert target.zero_due(0.1)
-    assert not target.velocity(NAVIGATION, FORWARD, 0.2)
-    assert target.velocity(KEYBOARD, FORWARD, 0.2)
-    target.lock('pause', False, 1.0)
-    assert target.velocity(NAVIGATION, FORWARD, 1.0)
-
-
 def test_lock_with_a_time_out_closes_by_silence() -> None:
     """A heartbeat that stops locks, and so does one that was never received."""
     target = mux(Input('heartbeat', 'heartbeat', 1.0, 255))

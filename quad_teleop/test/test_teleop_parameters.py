@@ -104,6 +104,7 @@ def make(isolation: Isolation, node: Callable[[], Node], *parameters: str) -> se
         (TeleopKeyboard, 'speeed:=0.2', "unknown parameter 'speeed'; did you mean 'speed'?"),
         (TeleopKeyboard, 'speed:=9', 'speed is 9: it must be 0.01 to 3.0'),
         (TeleopKeyboard, 'speed:=1.0', 'speed is 1.0: it must be between 0.01 and its limit 0.4'),
+        (TeleopKeyboard, 'turn:=3.0', 'turn is 3.0: it must be between 0.01 and its limit 2.0'),
         (TeleopKeyboard, 'twist:=false', 'nothing would be published'),
         (TeleopKeyboard, 'angle_step:=0.4', 'angle_step is 0.4: it must be above 0 and at most'),
         (gamepad, 'preset:=xbux', "did you mean 'xbox'? There are: auto, xbox, ps, generic"),

@@ -9,13 +9,13 @@ place of its numbers; where the marks are found, the numbers of all others stand
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import reduce
 from operator import itemgetter
 import struct
-from typing import Any, Protocol
+from typing import Any
 
 from builtin_interfaces.msg import Time
 from rclpy.publisher import Publisher
@@ -28,15 +28,17 @@ _SECONDS_MARK, _NANOSECONDS_MARK = 0x5EC0ABCD, 0xA0ABCDEF
 _ENCAPSULATION, _LITTLE_ENDIAN = 1, 1  # byte of a serialized message of its order [B]
 
 
-class MessageTemplate(Hashable, Protocol):
-    """The form of messages that differ in their numbers only."""
+@dataclass(frozen=True, slots=True)
+class MessageTemplate:
+    """The form of messages that differ in their stamp and numbers only."""
 
-    @property
-    def count(self) -> int:
-        """How many numbers a message takes."""
+    make: Callable[..., Any]  # of stamp, numbers, and the arguments
+    count: int  # how many numbers a message takes
+    arguments: tuple[Hashable, ...] = ()  # what does not change from one message to the next
 
     def message(self, stamp: Time, numbers: Sequence[float]) -> Any:  # noqa: ANN401  any message
         """Make a message; each number stands in it as it is, once or several times."""
+        return self.make(stamp, numbers, *self.arguments)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from builtin_interfaces.msg import Time
 from hypothesis import given
@@ -15,7 +14,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import Imu, JointState, LaserScan
 from std_msgs.msg import Header
 
-from message_templates import FastReader, serialized, SerializedTemplate
+from message_templates import FastReader, MessageTemplate, serialized, SerializedTemplate
 
 pytestmark = pytest.mark.slow
 
@@ -24,18 +23,14 @@ STAMPS = st.builds(Time, sec=st.integers(0, 2**31 - 1), nanosec=st.integers(0, 1
 TEXTS = st.text('abc/_é', max_size=9)
 
 
-@dataclass(frozen=True)
-class Pair:
-    """A form of two numbers, of which it may lose the second."""
+def pair(frame: str, *, loses: bool = False) -> MessageTemplate:
+    """Return a form of two numbers, of which it may lose the second."""
 
-    frame: str
-    loses: bool = False
-    count: int = 2
+    def message(stamp: Time, numbers: Sequence[float]) -> JointState:
+        kept = numbers[:1] if loses else [numbers[0], *numbers]
+        return JointState(header=Header(stamp=stamp, frame_id=frame), position=kept)
 
-    def message(self, stamp: Time, numbers: Sequence[float]) -> JointState:
-        """Make a message."""
-        kept = numbers[:1] if self.loses else [numbers[0], *numbers]
-        return JointState(header=Header(stamp=stamp, frame_id=self.frame), position=kept)
+    return MessageTemplate(message, 2)
 
 
 @given(TEXTS, STAMPS, st.floats(allow_nan=False), st.floats(allow_nan=False))
@@ -43,19 +38,13 @@ def test_a_template_is_received_as_its_message(
     frame: str, stamp: Time, one: float, two: float
 ) -> None:
     """Whatever its numbers and stamp; a number may stand in several places."""
-    data = SerializedTemplate(Pair(frame)).fill(10**9 * stamp.sec + stamp.nanosec, (one, two))
-    assert deserialize_message(data, JointState) == Pair(frame).message(stamp, (one, two))
+    data = SerializedTemplate(pair(frame)).fill(10**9 * stamp.sec + stamp.nanosec, (one, two))
+    assert deserialize_message(data, JointState) == pair(frame).message(stamp, (one, two))
 
 
-@dataclass(frozen=True)
-class Scan:
-    """A form of short numbers."""
-
-    count: int = 3
-
-    def message(self, stamp: Time, numbers: Sequence[float]) -> LaserScan:
-        """Make a message."""
-        return LaserScan(header=Header(stamp=stamp), range_max=numbers[0], ranges=numbers[1:])
+def scan(stamp: Time, numbers: Sequence[float]) -> LaserScan:
+    """Return a message of short numbers."""
+    return LaserScan(header=Header(stamp=stamp), range_max=numbers[0], ranges=numbers[1:])
 
 
 SHORT = st.lists(st.floats(width=32, allow_nan=False), min_size=3, max_size=3)
@@ -64,7 +53,8 @@ SHORT = st.lists(st.floats(width=32, allow_nan=False), min_size=3, max_size=3)
 @given(SHORT, SHORT, STAMPS)
 def test_float32_goes_both_ways(one: list[float], two: list[float], stamp: Time) -> None:
     """Written by a template, and read."""
-    reader, template = FastReader(LaserScan, 'range_max', 'ranges'), SerializedTemplate(Scan())
+    reader = FastReader(LaserScan, 'range_max', 'ranges')
+    template = SerializedTemplate(MessageTemplate(scan, 3))
     for numbers in (one, two):
         message, found = reader.read(template.fill(10**9 * stamp.sec + stamp.nanosec, numbers))
         assert list(found) == numbers
@@ -74,7 +64,7 @@ def test_float32_goes_both_ways(one: list[float], two: list[float], stamp: Time)
 def test_a_form_that_loses_a_number_is_refused() -> None:
     """Before anything is published; the message says which number."""
     with pytest.raises(ValueError, match='number 1 of 2'):
-        SerializedTemplate(Pair('', loses=True))
+        SerializedTemplate(pair('', loses=True))
 
 
 def joints(names: Sequence[str], numbers: Sequence[float], stamp: Time) -> JointState:

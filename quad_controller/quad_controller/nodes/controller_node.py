@@ -25,7 +25,7 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
-from message_templates import FastPublisher, FastReader
+from message_templates import FastPublisher, FastReader, MessageTemplate
 from node_runner import (
     create_deferred_service,
     destroyed_when_refused,
@@ -406,9 +406,10 @@ class ControllerNode(Node):
             now = self.get_clock().now().nanoseconds
             self._targets = output.targets
             sent = self._filter.select(output.targets, output.title, self._joints.unreported)
-            self._commands.publish(messages.JointCommands(len(sent)), now, sent)
-            if shadow := output.shadow:
-                self._shadow.publish(messages.JointCommands(len(shadow)), now, shadow)
+            for publisher, targets in ((self._commands, sent), (self._shadow, output.shadow)):
+                if targets:
+                    form = MessageTemplate(messages.joint_command, len(targets))
+                    publisher.publish(form, now, targets)
         if output.ready and not self._ready:
             self._ready = True
             logger.info('ready: joints and attitude are known; set_mode makes the robot move')

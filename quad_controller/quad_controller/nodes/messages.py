@@ -8,7 +8,6 @@ from array import array
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass
 import math
 from pathlib import Path
 import threading
@@ -195,15 +194,9 @@ class CommandFilter:
         return targets
 
 
-@dataclass(frozen=True, slots=True)
-class JointCommands:
-    """Targets of joints."""
-
-    count: int  # how many joints
-
-    def message(self, stamp: Time, numbers: Sequence[float]) -> JointCommand:
-        """Make a message of targets [rad]."""
-        return JointCommand(header=Header(stamp=stamp), position=numbers)
+def joint_command(stamp: Time, targets: Sequence[float]) -> JointCommand:
+    """Return the message of targets [rad]."""
+    return JointCommand(header=Header(stamp=stamp), position=targets)
 
 
 def state_diagnostic(node: str, status: Status) -> DiagnosticStatus:
@@ -383,27 +376,22 @@ class OtherTypeSubscription:
         self._context = Context()
         init_ros([], self._context)
         try:
-            self._subscribe(node, kind, topic, take, qos)
+            self._node = Node(
+                f'{node.get_name()}_{topic.rpartition("/")[2]}',
+                context=self._context,
+                namespace=node.get_namespace(),
+                use_global_arguments=False,
+                enable_rosout=False,
+                start_parameter_services=False,
+            )
+            self._node.create_subscription(kind, topic, take, qos)
+            self._executor = SingleThreadedExecutor(context=self._context)
+            self._executor.add_node(self._node)
         except BaseException:
             rclpy.shutdown(context=self._context)
             raise
         self._thread = threading.Thread(target=self._spin, name=topic, daemon=True)
         self._thread.start()
-
-    def _subscribe(
-        self, node: Node, kind: type, topic: str, take: Callable[[Any], None], qos: int
-    ) -> None:
-        self._node = Node(
-            f'{node.get_name()}_{topic.rpartition("/")[2]}',
-            context=self._context,
-            namespace=node.get_namespace(),
-            use_global_arguments=False,
-            enable_rosout=False,
-            start_parameter_services=False,
-        )
-        self._node.create_subscription(kind, topic, take, qos)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
 
     def close(self) -> None:
         """End it."""

@@ -249,7 +249,7 @@ def _commands(contract: PolicyContract) -> Iterator[Row]:
     if commands is not None:
         found = ', '.join(
             f'{axis} {low:g} to {high:g}'
-            for axis, (low, high) in zip(('x', 'y', 'yaw'), commands.axes, strict=True)
+            for axis, (low, high) in zip(('x', 'y', 'yaw'), commands, strict=True)
         )
         yield Row('commands', 'any', f'clamped to {found}', Verdict.OK)
 

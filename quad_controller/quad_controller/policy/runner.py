@@ -177,7 +177,7 @@ class PolicyRunner:
         """Return a velocity within what the policy was trained for."""
         if self.contract.commands is None:
             return velocity
-        axes = zip(velocity, self.contract.commands.axes, strict=True)
+        axes = zip(velocity, self.contract.commands, strict=True)
         return Velocity(*(min(max(value, low), high) for value, (low, high) in axes))
 
     def _targets(self, wanted: Floats, dt: float) -> Targets:

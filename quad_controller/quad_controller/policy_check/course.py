@@ -112,13 +112,14 @@ class CourseFigures:
     @property
     def timing(self) -> CommandTiming | None:
         """When commands came on the wire; None without real clocks."""
-        return _together([each.timing for each in self.passages])
+        there = [each.timing for each in self.passages if each.timing is not None]
+        return functools.reduce(operator.add, there) if there else None
 
 
 def course_for(ranges: CommandRanges | None) -> tuple[Velocity, ...]:
     """Return three speeds of each axis that a policy was trained for, and one backward."""
     commands = []
-    limits = [(-math.inf, math.inf)] * len(AXES) if ranges is None else ranges.axes
+    limits = ranges or [(-math.inf, math.inf)] * len(AXES)
     for axis, (least, most) in zip(AXES.values(), limits, strict=True):
         for reach, sign, parts in ((most, 1.0, range(1, SPEEDS + 1)), (-least, -1.0, [2])):
             top = min(getattr(TOP, axis), reach)
@@ -334,8 +335,3 @@ def _passage_of(
         cost_of_transport=way.energy / way.weight / way.path if over_ground else nothing,
         timing=whole.timing if whole.timing.latencies else None,
     )
-
-
-def _together(timings: Sequence[CommandTiming | None]) -> CommandTiming | None:
-    there = [timing for timing in timings if timing is not None]
-    return functools.reduce(operator.add, there) if there else None

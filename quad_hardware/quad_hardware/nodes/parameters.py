@@ -100,6 +100,7 @@ def declare_parameters(node: Node) -> NodeSettings:
         vendor=_vendor(protocols, method),
         vendor_method=method,
     )
+    log = read.text('serial_log', '', 'file that all bytes are written to; empty for none')
     robot = declare_robot(
         read,
         link,
@@ -110,7 +111,7 @@ def declare_parameters(node: Node) -> NodeSettings:
             default=False,
             meaning='each joint of the legs has moved as its servo says (calibrate first-motion)',
         ),
-        serial_log=_serial_log(read),
+        serial_log=Path(log).expanduser() if log else None,
     )
     settings = read.settings(
         NodeSettings,
@@ -138,11 +139,6 @@ def declare_robot(read: ParameterReader, link: LinkOptions, **given: Any) -> Rob
     )
     joints = _joint_map(read, urdf)
     return RobotSettings(link=link, urdf=urdf, joints=joints, estimator=estimator, **given)
-
-
-def _serial_log(read: ParameterReader) -> Path | None:
-    name = read.text('serial_log', '', 'file that all bytes are written to; empty for none')
-    return Path(name).expanduser() if name else None
 
 
 def _vendor(protocols: tuple[Protocol, ...], method: str) -> bool:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 import sys
@@ -27,6 +28,7 @@ from node_runner import (
     spin_beside,
 )
 from quad_description import RobotState
+from robot_primitives import setting, settings_of, switch
 
 from ..backend import ReplayedRobot
 from ..calibration.main import read_parameters
@@ -39,8 +41,27 @@ from .robot_topics import log_link, RobotTopics, WARN_PERIOD
 RECORDED = 'hardware_node'  # whose topics these are
 CALIBRATED = ('joints', 'imu', 'odometry')  # parameters of hardware_node that belong to a robot
 WATCH_PERIOD = 0.5  # [s] between two looks for a hardware_node
-RATES = (0.01, 100.0)
-HELP = """\
+
+
+@dataclass(frozen=True, slots=True)
+class ReplaySettings:
+    """Parameters of the replay itself."""
+
+    log: str = switch('', 'file of a black box, or of serial_log of hardware_node (required)')
+    rate: float = setting(1.0, 0.01, 100.0, 'how many seconds of the log go by in one')
+    start: float = setting(0.0, 0.0, 1e6, 'where it begins, after the first entry [s]')
+    loop: bool = switch(False, 'begin again at the end')
+    calibration: str = switch('', 'YAML file that quad_hardware calibrate has made')
+    diagnostics_period: float = setting(
+        1.0, 0.05, 60.0, 'time between two /diagnostics messages [s]'
+    )
+
+
+ROWS = [
+    f'  {name:<20}{meaning}' + (f' (default {default})' if default else '')
+    for name, default, _, meaning in settings_of(ReplaySettings)
+]
+HELP = f"""\
 Publish what hardware_node had published while a log of its serial line was recorded; nothing is
 written to a port, and the robot of a log takes no commands.
 
@@ -50,12 +71,7 @@ example:
   ros2 run quad_hardware replay --ros-args -p log:=serial.log -p rate:=0.2 -p start:=40.0
 
 parameters:
-  log                 file of a black box, or of hardware_node's parameter serial_log (required)
-  rate                how many seconds of the log go by in one (default 1.0)
-  start               where it begins, in [s] after the first entry (default 0.0)
-  loop                begin again at the end (default false)
-  calibration         YAML file of `ros2 run quad_hardware calibrate` (default none)
-  diagnostics_period  time between two /diagnostics messages in [s] (default 1.0)
+{chr(10).join(ROWS)}
 
 Those of hardware_node for the robot, its frames and its estimation are there, too:
 robot_description, preset, arm, joints.*, imu.*, odometry.*, odom_frame, publish_tf ...
@@ -75,25 +91,16 @@ class Replay:
         self._refusal: Exception | None = None
         self._node = node
         read = ParameterReader(node)
-        log = read.text('log', '', 'file of a black box, or of serial_log of hardware_node')
-        self._log = Path(log).expanduser()
-        rate = read.number('rate', 1.0, RATES, 'how many seconds of the log go by in one')
-        start = read.number('start', 0.0, (0.0, 1e6), 'where it begins, after the first entry [s]')
-        self._loop = read.flag('loop', 'begin again at the end', default=False)
-        calibration = read.text(
-            'calibration', '', 'YAML file that quad_hardware calibrate has made'
-        )
-        if calibration:
-            give_defaults(node, dict(_calibrated(Path(calibration).expanduser())))
-        self._robot = robot = ReplayedRobot(declare_robot(read, LinkOptions(log)))
+        self._settings = settings = read.settings(ReplaySettings)
+        self._log = Path(settings.log).expanduser()
+        if settings.calibration:
+            give_defaults(node, dict(_calibrated(Path(settings.calibration).expanduser())))
+        self._robot = robot = ReplayedRobot(declare_robot(read, LinkOptions(settings.log)))
         robot.on_state, robot.on_change = self._publish, self._log_change
         robot.on_refusal = self._log_refusal
         frames, deviations = declare_frames(read), read.settings(Deviations)
-        self._diagnostics_period = read.number(
-            'diagnostics_period', 1.0, (0.05, 60.0), 'time between two /diagnostics messages [s]'
-        )
         refuse_misspelt(node)
-        if not log:
+        if not settings.log:
             raise RecordingError('give a log: --ros-args -p log:=FILE')
         if not self._log.is_file():
             raise RecordingError(f'{self._log}: there is no such file')
@@ -101,8 +108,8 @@ class Replay:
             self._robot,
             lambda: ((entry.time, entry) for entry in read_serial_log(self._log)),
             name=str(self._log),
-            rate=rate,
-            start=start,
+            rate=settings.rate,
+            start=settings.start,
         )
         self._player.on_tick = self._tick
         self._topics = RobotTopics(node, self._robot, frames, deviations, self._player.steady)
@@ -126,7 +133,7 @@ class Replay:
     def _run(self, stop: threading.Event) -> None:
         notify_ready()
         self._node.get_logger().info(f'replay of {self._log}')
-        self._player.play(stop, loop=self._loop)
+        self._player.play(stop, loop=self._settings.loop)
         self._node.get_logger().info(f'{self._log.name}: end of the log')
 
     def _look_for_robot(self, stop: threading.Event) -> None:
@@ -151,7 +158,7 @@ class Replay:
     def _tick(self) -> None:
         now = time.monotonic()
         if now >= self._diagnostics_due:
-            self._diagnostics_due = now + self._diagnostics_period
+            self._diagnostics_due = now + self._settings.diagnostics_period
             log = str(self._log)
             self._topics.publish_diagnostics(
                 RECORDED, self._log.name, lambda subject: '' if subject else log

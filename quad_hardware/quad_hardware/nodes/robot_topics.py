@@ -9,11 +9,9 @@ not measured.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 import math
 import time
-from typing import Any, TypeAlias
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -24,7 +22,7 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import Float64, Header, String
 from tf2_msgs.msg import TFMessage
 
-from message_templates import FastPublisher
+from message_templates import FastPublisher, MessageTemplate
 from node_runner import LATCHED
 from quad_description import FEET, ImuSample, JointSample, OdometryState, RobotState
 from quad_description.rotations import about_z, conjugate, multiply, rotate, yaw_of
@@ -43,31 +41,17 @@ HEIGHT_VARIANCE = 0.01**2  # [m²]
 _ZERO = (0.0, 0.0, 0.0)
 
 Numbers = Sequence[float]
-Message: TypeAlias = Any
 
 
-@dataclass(frozen=True, slots=True)
-class Template:
-    """What messages that differ by stamp and numbers have in common."""
-
-    make: Callable[..., Message]  # of stamp, numbers, and the arguments
-    count: int  # of the numbers
-    arguments: tuple[Hashable, ...]  # what does not change from one message to the next
-
-    def message(self, stamp: Time, numbers: Numbers) -> Message:
-        """Make a message."""
-        return self.make(stamp, numbers, *self.arguments)
-
-
-def joint_states(names: tuple[str, ...], joints: JointSample) -> tuple[Template, Numbers]:
+def joint_states(names: tuple[str, ...], joints: JointSample) -> tuple[MessageTemplate, Numbers]:
     """Return the joints that are measured, of all joints by name; efforts are not known."""
     columns = joints.positions, joints.velocities or ()
     if joints.unmeasured:
         names = tuple(joints.measured(names))
         left_out = joints.unmeasured
         numbers = [n for column in columns for i, n in enumerate(column) if i not in left_out]
-        return Template(_joint_states, 2 * len(names), names), numbers
-    return Template(_joint_states, 2 * len(names), names), (*columns[0], *columns[1])
+        return MessageTemplate(_joint_states, 2 * len(names), names), numbers
+    return MessageTemplate(_joint_states, 2 * len(names), names), (*columns[0], *columns[1])
 
 
 def _joint_states(stamp: Time, numbers: Numbers, *names: str) -> JointState:
@@ -79,12 +63,12 @@ def _joint_states(stamp: Time, numbers: Numbers, *names: str) -> JointState:
     )
 
 
-def imu(sample: ImuSample, deviations: Deviations, frame: str) -> tuple[Template, Numbers]:
+def imu(sample: ImuSample, deviations: Deviations, frame: str) -> tuple[MessageTemplate, Numbers]:
     """Return attitude, angular velocity and specific force; zeros for what is not measured."""
     acceleration = None if sample.acceleration is None else deviations.linear_acceleration_stddev
     known = _tilt(sample, deviations), _rate(sample, deviations), acceleration
     rate, felt = sample.angular_velocity or _ZERO, sample.acceleration or _ZERO
-    return Template(_imu, 10, (frame, known)), (*sample.orientation, *rate, *felt)
+    return MessageTemplate(_imu, 10, (frame, known)), (*sample.orientation, *rate, *felt)
 
 
 def _imu(
@@ -107,7 +91,7 @@ def _imu(
 
 def odometry(
     sample: ImuSample, state: OdometryState, deviations: Deviations, frames: Frames
-) -> tuple[Template, Numbers]:
+) -> tuple[MessageTemplate, Numbers]:
     """Return the pose in odom and the velocity in base_link (or in the footprint)."""
     rotation, height = state.rotation, state.height
     rate = sample.angular_velocity or _ZERO  # in the body
@@ -121,7 +105,7 @@ def odometry(
     place = state.x, state.y, height
     variances = state.position_variance, known[0] ** 2 + state.yaw_variance
     numbers = (*place, *rotation, *velocity, *rate, *variances)
-    return Template(_odometry, len(numbers), (frames.odom_frame, child, known)), numbers
+    return MessageTemplate(_odometry, len(numbers), (frames.odom_frame, child, known)), numbers
 
 
 def _odometry(
@@ -149,9 +133,9 @@ def _odometry(
     return message
 
 
-def foot_contacts(state: OdometryState) -> tuple[Template, Numbers]:
+def foot_contacts(state: OdometryState) -> tuple[MessageTemplate, Numbers]:
     """Return which feet are taken to stand, and how that is known."""
-    return Template(_foot_contacts, 0, (state.contact_source.value, *state.standing)), ()
+    return MessageTemplate(_foot_contacts, 0, (state.contact_source.value, *state.standing)), ()
 
 
 def _foot_contacts(stamp: Time, _numbers: Numbers, source: str, *contacts: bool) -> FootContacts:
@@ -160,7 +144,7 @@ def _foot_contacts(stamp: Time, _numbers: Numbers, source: str, *contacts: bool)
     )
 
 
-def transforms(state: OdometryState, frames: Frames) -> tuple[Template, Numbers]:
+def transforms(state: OdometryState, frames: Frames) -> tuple[MessageTemplate, Numbers]:
     """Return odom to base_link and base_link to base_footprint, or the other way round."""
     tilt, place = _level(state.rotation), (state.x, state.y)
     if frames.footprint_mode is FootprintMode.PARENT:
@@ -172,7 +156,7 @@ def transforms(state: OdometryState, frames: Frames) -> tuple[Template, Numbers]
         upright = conjugate(tilt)
         below = rotate(upright, (0.0, 0.0, -state.height))
         numbers = (*place, state.height, *state.rotation, *below, *upright)
-    return Template(_transforms, len(numbers), names), numbers
+    return MessageTemplate(_transforms, len(numbers), names), numbers
 
 
 def _transforms(stamp: Time, numbers: Numbers, odom: str, first: str, second: str) -> TFMessage:

@@ -101,9 +101,10 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         self, *, seed: Seed = None, options: dict[str, Any] | None = None
     ) -> tuple[Floats, dict[str, Any]]:
         """Begin an episode in all of them; seeds go up by one from the first, or are a list."""
-        seeds = seed if isinstance(seed, list) else self._seeds(seed)
+        if not isinstance(seed, list):
+            seed = [None if seed is None else seed + index for index in range(self.num_envs)]
         for worker in self._workers:
-            worker.order('reset', [seeds[index] for index in worker.indices], options)
+            worker.order('reset', [seed[index] for index in worker.indices], options)
         infos = self._infos(self._answers())
         return self._rows['observations'].copy(), infos
 
@@ -135,9 +136,6 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
             worker.hang_up()
         for worker in self._workers:
             worker.join()
-
-    def _seeds(self, seed: int | None) -> list[int | None]:
-        return [None if seed is None else seed + index for index in range(self.num_envs)]
 
     def _answers(self) -> list[tuple[int, Any]]:
         """Wait for all processes; return index and answer of those environments that have one."""

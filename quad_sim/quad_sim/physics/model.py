@@ -240,7 +240,8 @@ def _add_servo(spec: mujoco.MjSpec, joint: Joint, servo: ServoParameters) -> Non
     if hinge.type == mujoco.mjtJoint.mjJNT_SLIDE:
         servo = JAW
     # a number in one version of MuJoCo, coefficients of a polynomial in another
-    hinge.damping = servo.damping if np.isscalar(hinge.damping) else _linear(servo.damping)
+    plain = np.isscalar(hinge.damping)
+    hinge.damping = servo.damping if plain else [servo.damping, 0.0, 0.0]
     hinge.armature = servo.armature
     hinge.frictionloss = servo.friction
     spec.add_actuator(
@@ -256,10 +257,6 @@ def _add_servo(spec: mujoco.MjSpec, joint: Joint, servo: ServoParameters) -> Non
         ctrllimited=True,
         ctrlrange=[joint.limits.lower, joint.limits.upper],
     )
-
-
-def _linear(coefficient: float) -> list[float]:
-    return [coefficient, 0.0, 0.0]
 
 
 def _padded(*values: float) -> list[float]:

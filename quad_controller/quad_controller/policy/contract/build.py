@@ -161,7 +161,7 @@ def _contract(top: _Section) -> PolicyContract:
     defaults = top.required('default_positions', _numbers(count), (0.0,) * count)
     observation = top.section('observation')
     history = observation.section('history')
-    section = observation.section('terms')
+    section, states = observation.section('terms'), top.section('recurrence')
     terms = tuple(_term(name, section.section(name), count) for name in section.keys)
     if not terms:
         observation.missing('terms')
@@ -183,7 +183,9 @@ def _contract(top: _Section) -> PolicyContract:
         newest=needed('newest', _choice(Newest), Newest.LAST),
         history_start=history.optional('start', _choice(HistoryStart), HistoryStart.REPEAT),
         action=_action(top.section('action'), count, defaults),
-        recurrence=_recurrence(top.section('recurrence')),
+        recurrence=tuple(
+            RecurrentState(name, states.optional(name, str, '')) for name in states.keys
+        ),
         commands=_commands(top.section('commands')),
         gains=_gains(top.section('gains'), count),
         robot=top.optional('robot', str, ''),
@@ -248,10 +250,6 @@ def _action(section: _Section, joints: int, defaults: tuple[float, ...]) -> Acti
     )
     section.end()
     return action
-
-
-def _recurrence(section: _Section) -> tuple[RecurrentState, ...]:
-    return tuple(RecurrentState(name, section.optional(name, str, '')) for name in section.keys)
 
 
 def _commands(section: _Section) -> CommandRanges | None:

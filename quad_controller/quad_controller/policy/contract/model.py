@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import Any, NamedTuple
 
 
 class Source(Enum):
@@ -144,18 +144,12 @@ class RecurrentState:
     output: str
 
 
-@dataclass(frozen=True, slots=True)
-class CommandRanges:
+class CommandRanges(NamedTuple):
     """Commands that the policy was trained for: lowest and highest, [m/s] and [rad/s]."""
 
     x: tuple[float, float]
     y: tuple[float, float]
     yaw: tuple[float, float]
-
-    @property
-    def axes(self) -> tuple[tuple[float, float], ...]:
-        """Ranges of x, y and yaw."""
-        return self.x, self.y, self.yaw
 
 
 @dataclass(frozen=True, slots=True)
