@@ -18,14 +18,19 @@ from typing import TYPE_CHECKING
 
 from process_supervisor import (
     CallError,
+    Executable,
     find_executable,
+    ForkServer,
     GivenUpError,
     join_in_time,
     parse_with_ros,
+    Phase,
     RosOptions,
+    STATE_PUBLISHERS,
     supervise,
     SupervisorError,
     USAGE_ERROR,
+    VIEWER,
     write_parameters,
 )
 from process_supervisor.ros_options import apply_network
@@ -40,10 +45,12 @@ from .session import (
     locate,
     MASTER,
     no_files,
+    PLANNER,
     REAL_BUS,
     robots_epilog,
     session,
     SIMULATED_BUS,
+    SLAVES,
 )
 
 if TYPE_CHECKING:
@@ -59,13 +66,21 @@ AGAIN = 1.0  # pause after a refusal in [s]: a drive that has not booted yet say
 
 @contextlib.contextmanager
 def enabling(
-    drives: Sequence[str], mode_service: str, say: Callable[[str], None], namespace: str = ''
+    drives: Sequence[str],
+    mode_service: str,
+    say: Callable[[str], None],
+    namespace: str = '',
+    booted: threading.Event | None = None,
 ) -> Iterator[None]:
-    """Enable drives beside what runs in the block; ``say`` is called in any thread."""
+    """Enable drives beside what runs in the block; ``say`` is called in any thread.
+
+    ``booted`` is set when all drives have, which their heartbeats may show up to 1 s later.
+    """
     ended = threading.Event()
     thread = threading.Thread(
         target=_enable,
         args=[drives, mode_service, say, ended, namespace],
+        kwargs={'booted': booted or threading.Event()},
         name='enabling',
         daemon=True,
     )
@@ -84,6 +99,8 @@ def _enable(
     say: Callable[[str], None],
     ended: threading.Event,
     namespace: str,
+    *,
+    booted: threading.Event,
 ) -> None:
     from .service_client import ServiceClient
 
@@ -93,7 +110,7 @@ def _enable(
     try:
         client.prepare(itertools.chain(*groups))
         with contextlib.suppress(CallError):  # their services say why
-            _await_boot(client, groups[0])
+            _await_boot(client, groups[0], booted)
         while (refusal := _refusal(client, groups)) and time.monotonic() < deadline:
             client.wait_until(_after(AGAIN), 2 * AGAIN, 'another try')
         if refusal:
@@ -106,7 +123,7 @@ def _enable(
         client.close()
 
 
-def _await_boot(client: ServiceClient, services: Sequence[str]) -> None:
+def _await_boot(client: ServiceClient, services: Sequence[str], booted: threading.Event) -> None:
     """Wait until the devices of drives are operational, of those that publish ``nmt_state``."""
     from std_msgs.msg import String
 
@@ -125,14 +142,14 @@ def _await_boot(client: ServiceClient, services: Sequence[str]) -> None:
 
     topics = {service: watch(service) for service in services}
 
-    def booted() -> bool:
-        return all(
+    def have_booted() -> bool:
+        return booted.is_set() or all(
             states.get(topic) == OPERATIONAL
             or (client.is_ready(service) and not node.count_publishers(topic))
             for service, topic in topics.items()
         )
 
-    client.wait_until(booted, BOOT_TIMEOUT, 'the boot of the drives')
+    client.wait_until(have_booted, BOOT_TIMEOUT, 'the boot of the drives')
 
 
 def _refusal(client: ServiceClient, groups: Sequence[list[str]]) -> str:
@@ -261,15 +278,18 @@ def _arm(arguments: argparse.Namespace, ros: RosOptions) -> int:
         controllers = controller_names(robot, groups)
     elif arguments.plan:
         raise RobotError(f'--plan: nothing would execute a plan: {no_motion}')
-    with session(
-        robot,
-        arguments,
-        ros,
-        simulate=arguments.simulate,
-        master=master,
-        master_files=files,
-        plan=arguments.plan,
-    ) as arm:
+    with (
+        ForkServer(_programs(arguments, master)) as fork_server,
+        session(
+            robot,
+            arguments,
+            ros,
+            simulate=arguments.simulate,
+            master=master,
+            master_files=files,
+            plan=arguments.plan,
+        ) as arm,
+    ):
         offered = f'no motion ({no_motion})' if no_motion else 'trajectories and jogging'
         offered += ', planning' if arguments.plan else ''
         place = f' in namespace /{arm.ros.namespace}' if arm.ros.namespace else ''
@@ -288,11 +308,28 @@ def _arm(arguments: argparse.Namespace, ros: RosOptions) -> int:
             )
         )
         with contextlib.ExitStack() as stack:
+            running = threading.Event()
             if arguments.enable:
                 stack.enter_context(
-                    enabling(arm.drives, arm.mode_service, _say, arm.ros.namespace)
+                    enabling(arm.drives, arm.mode_service, _say, arm.ros.namespace, running)
                 )
-            return supervise(arm.processes).exit_code
+
+            def note(phase: Phase) -> None:
+                if phase is Phase.RUNNING:
+                    running.set()
+
+            return supervise(arm.processes, on_phase=note, fork_server=fork_server).exit_code
+
+
+def _programs(arguments: argparse.Namespace, master: Executable) -> Iterator[Executable]:
+    """Yield the programs that will be started, those first that are started first."""
+    if arguments.simulate:
+        yield SLAVES
+    yield from (master, STATE_PUBLISHERS[-1])
+    if arguments.plan:
+        yield PLANNER
+    if arguments.view:
+        yield VIEWER
 
 
 def _controllers(arguments: argparse.Namespace, ros: RosOptions) -> int:

@@ -4,13 +4,15 @@
 
 The decisions are in :mod:`.supervision`, which knows no process, no clock and no signal handler:
 it gets what happened and when, and acts through callables. :mod:`.runner` does it with real
-processes; :mod:`.guardian` stops them in order, also when the runner was killed.
+processes, which :mod:`.fork_server` starts in less time; :mod:`.guardian` stops them in order,
+also when the runner was killed.
 
 Around it stands what the bring-ups of all robots need: :mod:`.nodes` finds the executables of ROS
 packages and keeps a second bring-up away, :mod:`.ros_options` reads the arguments that all share,
 :mod:`.terminal` shows what the processes write.
 """
 
+from .fork_server import ForkServer
 from .nodes import (
     add_view,
     bring_up_place,
@@ -25,7 +27,9 @@ from .nodes import (
     parameters_by_node,
     ros_domain,
     state_publisher,
+    STATE_PUBLISHERS,
     view_process,
+    VIEWER,
     write_parameters,
 )
 from .ros_options import add_namespace, parse_with_ros, RosOptions, split_ros_arguments
@@ -53,10 +57,13 @@ from .terminal import (
 
 __all__ = [
     'EVERY_NODE',
+    'STATE_PUBLISHERS',
     'USAGE_ERROR',
+    'VIEWER',
     'CallError',
     'Executable',
     'FindExecutable',
+    'ForkServer',
     'GivenUpError',
     'LineWriter',
     'Notice',

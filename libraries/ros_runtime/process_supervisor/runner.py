@@ -18,8 +18,9 @@ import time
 from types import TracebackType
 from typing import final
 
+from .fork_server import ForkServer
 from .guardian import GuardianLink
-from .spec import ProcessSpec, ReadinessSocket, StartError, VARIABLE
+from .spec import ProcessSpec, ReadinessSocket, StartError, TRACES, VARIABLE
 from .supervision import Notice, Outcome, Phase, Supervision
 
 LONGEST_LINE = 16384
@@ -28,8 +29,6 @@ LONGEST_LINE = 16384
 CHUNK = 65536  # bytes read from a pipe at once
 LAST_CHUNKS = 64
 """How often a pipe is read after its process has ended; what it left behind may go on."""
-TRACES = 'PYTHONFAULTHANDLER'
-"""Variable by which Python prints what its threads are doing when it crashes, or gets SIGABRT."""
 LEAVE_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # signals that end the supervisor
 
 
@@ -61,31 +60,33 @@ def _decode(line: bytes) -> str:
 class _Child:
     """A running process with its pipe and the handle that becomes readable at its end."""
 
-    def __init__(self, spec: ProcessSpec) -> None:
+    def __init__(self, spec: ProcessSpec, fork_server: ForkServer | None) -> None:
         self.readiness = ReadinessSocket() if spec.notifies_ready else None
         environment = {**os.environ, TRACES: '1', **spec.environment}
         environment.pop(VARIABLE, None)  # this process may have a supervisor itself
         if self.readiness is not None:
             environment[VARIABLE] = self.readiness.address
+        self.output, output = os.pipe()
         try:
-            self.process = subprocess.Popen(
+            forked = fork_server and fork_server.start(spec.argv, environment, output)
+            self.process = forked or subprocess.Popen(
                 spec.argv,
                 stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
+                stdout=output,
                 stderr=subprocess.STDOUT,
                 env=environment,
                 start_new_session=True,  # Ctrl-C of the terminal reaches the supervisor only
             )
         except OSError as error:
+            os.close(self.output)
             if self.readiness is not None:
                 self.readiness.close()
             raise StartError(f'{spec.argv[0]}: {error.strerror}') from error
+        finally:
+            os.close(output)
         self.name = spec.name
         self.pidfd = os.pidfd_open(self.process.pid)
         self.splitter = LineSplitter()
-        if self.process.stdout is None:
-            raise StartError(f'{self.name}: no pipe for its output')
-        self.output = self.process.stdout.fileno()
         os.set_blocking(self.output, False)
 
     def send(self, number: signal.Signals) -> None:
@@ -93,15 +94,13 @@ class _Child:
             os.killpg(self.process.pid, number)
 
     def reap(self) -> int:
-        """Collect the exit code; what it left behind in its group is killed first."""
-        os.waitid(os.P_PID, self.process.pid, os.WEXITED | os.WNOWAIT)
+        """Collect the exit code of one that has ended; what it left in its group is killed."""
         self.send(signal.SIGKILL)
         returncode = self.process.wait()
         os.close(self.pidfd)
         if self.readiness is not None:
             self.readiness.close()
-        if self.process.stdout is not None:
-            self.process.stdout.close()
+        os.close(self.output)
         return returncode
 
 
@@ -120,8 +119,10 @@ class Runner:
         *,
         on_interrupt: Callable[[], bool] | None = None,
         on_phase: Callable[[Phase], None] = lambda _: None,
+        fork_server: ForkServer | None = None,
     ) -> None:
         """Plan the run; nothing is started yet. ``write`` gets a process and each line of it."""
+        self._fork_server = fork_server
         self._write = write
         self._children: dict[str, _Child] = {}
         self._guardian: GuardianLink | None = None
@@ -197,7 +198,7 @@ class Runner:
             self._supervision.advance(time.monotonic())
 
     def _start(self, spec: ProcessSpec) -> None:
-        child = _Child(spec)
+        child = _Child(spec, self._fork_server)
         if self._guardian is not None:
             steps = [(step.signal, step.timeout) for step in spec.stop_steps]
             self._guardian.watch(spec.name, child.process.pid, spec.stop_order, steps)

@@ -56,6 +56,8 @@ class GivenUpError(SupervisorError):
 
 
 VARIABLE = 'NOTIFY_SOCKET'  # names the socket in the environment of the process
+TRACES = 'PYTHONFAULTHANDLER'
+"""Variable by which Python prints what its threads are doing when it crashes, or gets SIGABRT."""
 _READY = b'READY=1'
 _STATUS = b'STATUS='
 _MAX_MESSAGE = 4096

@@ -16,6 +16,7 @@ from tempfile import TemporaryFile
 import threading
 from typing import TextIO
 
+from .fork_server import ForkServer
 from .runner import Runner
 from .spec import ProcessSpec, ServiceManager
 from .supervision import Notice, Outcome, Phase, Severity
@@ -60,12 +61,19 @@ def leave() -> None:
     os._exit(1)
 
 
-def supervise(processes: Sequence[ProcessSpec], shutdown: Shutdown | None = None) -> Outcome:
+def supervise(
+    processes: Sequence[ProcessSpec],
+    shutdown: Shutdown | None = None,
+    *,
+    on_phase: Callable[[Phase], None] = lambda _: None,
+    fork_server: ForkServer | None = None,
+) -> Outcome:
     """Run processes with their output on standard output, until Ctrl-C or one ends.
 
     That all are ready, and that all are stopped, is reported to systemd, or what else
     ``NOTIFY_SOCKET`` names, as in sd_notify(3). ``shutdown`` is done in a thread before they are
-    stopped, if all had got ready.
+    stopped, if all had got ready. ``on_phase`` is called when a phase begins; ``fork_server``
+    starts what it can.
     """
     names = [spec.name for spec in processes]
     painter = Painter('bringup', names, wants_colour(sys.stdout, os.environ))
@@ -79,6 +87,7 @@ def supervise(processes: Sequence[ProcessSpec], shutdown: Shutdown | None = None
     def report(phase: Phase) -> None:
         if phase in REPORTED_STATES:
             manager.report(REPORTED_STATES[phase])
+        on_phase(phase)
 
     def interrupted() -> bool:
         report(Phase.STOPPING)
@@ -105,6 +114,7 @@ def supervise(processes: Sequence[ProcessSpec], shutdown: Shutdown | None = None
         notify,
         on_interrupt=interrupted,
         on_phase=report,
+        fork_server=fork_server,
     ) as runner:
         outcome = runner.run()
         late = join_in_time(thread) if thread.ident is not None else ''
