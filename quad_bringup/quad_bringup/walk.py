@@ -20,18 +20,16 @@ from typing import Any, NamedTuple
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
-from rclpy.qos import qos_profile_sensor_data, QoSProfile
+from rclpy.qos import qos_profile_sensor_data
 from rich.console import RenderableType
 from rich.text import Text
-from sensor_msgs.msg import BatteryState, Imu, JointState
+from sensor_msgs.msg import BatteryState, Imu
 
 from process_supervisor import CallError, parse_with_ros, RosOptions, SupervisorError, USAGE_ERROR
 from process_supervisor.demo import Demo, make_table, run_demo, signed
 from process_supervisor.ros_options import seconds_from
 from quad_controller import Gait, GaitParameters, Velocity
-from quad_description import LEGS, movable_joints, robot_urdf
 from quad_description.rotations import tilt_of, yaw_of
-from quad_msgs.msg import JointCommand
 
 from .bringup import add_arguments, BringupError, session, Stack
 from .mode_client import ModeClient
@@ -59,9 +57,6 @@ TILT_WARNING, TILT_LIMIT = math.radians(10.0), math.radians(15.0)
 """A tilt in [rad] that is shown in red, and one with which a body did not walk, it stumbled."""
 MIN_RATE = 45.0
 """Joint commands per second below which the loop did not hold its 50 Hz."""
-PARTS = ('hip', 'thigh', 'calf')
-"""Joints of a leg, from the body outward."""
-
 
 STANDSTILL = Velocity()
 SEGMENTS = (
@@ -138,8 +133,8 @@ class Segment(NamedTuple):
 class Walk(Demo[ModeClient]):
     """Stand up, walk, turn, strafe, stop, lie down."""
 
-    # title, speeds (5), blank, legs (6), blank, body and loop (2), and one that is left free
-    lines = 17
+    # title, speeds (5), blank, body and loop (2), and one that is left free
+    lines = 10
 
     def __init__(self, quad: Stack, ros: RosOptions, arguments: argparse.Namespace) -> None:
         commands = [
@@ -148,8 +143,6 @@ class Walk(Demo[ModeClient]):
             f'ros2 run quad_hardware doctor --port {quad.port}{ros.hint}',
         ]
         super().__init__(quad.title, commands)
-        urdf = robot_urdf(quad.preset, arm=quad.arm)
-        self.joints = [joint.name for joint in movable_joints(urdf)]  # as in /joint_command
         self.namespace = ros.namespace
         self.duration: float | None = arguments.duration
         self.mode, self.share = 'policy', 1.0  # share of the velocities of a trot
@@ -161,8 +154,6 @@ class Walk(Demo[ModeClient]):
         self.commanded: Velocity | None = None
         self.fault = ''
         self.tilt = self.tilt_max = self.battery = math.nan
-        self.targets: Mapping[str, float] = {}
-        self.positions: Mapping[str, float] = {}
         self.segments: deque[Segment] = deque(maxlen=KEPT_SEGMENTS)
         self.loop: Mapping[str, float] = {}  # how the controller keeps its time [1/s], [s]
 
@@ -176,9 +167,7 @@ class Walk(Demo[ModeClient]):
             (Odometry, GROUND_TRUTH, self.truth.take, sensor),
             (Odometry, 'odom', self.odometry.take, sensor),
             (Imu, 'imu', self._take_imu, sensor),
-            (JointState, 'joint_states', self._take_joints, sensor),
             (BatteryState, 'battery_state', self._take_battery, sensor),
-            (JointCommand, 'joint_command', self._take_targets, QoSProfile(depth=1)),
             (DiagnosticArray, 'diagnostics', self._take_diagnostics, 50),
         )
         for kind, topic, callback, qos in topics:
@@ -265,8 +254,6 @@ class Walk(Demo[ModeClient]):
             'ground truth of the simulator': math.isfinite(self.truth.stamp),
             '/odom': math.isfinite(self.odometry.stamp),
             '/imu': math.isfinite(self.tilt),
-            '/joint_states': bool(self.positions),
-            '/joint_command': bool(self.targets),
             'a subscriber of /cmd_vel': self._twist.get_subscription_count() > 0,
         }
         return [name for name, is_there in there.items() if not is_there]
@@ -330,7 +317,7 @@ class Walk(Demo[ModeClient]):
         self.problems = problems
 
     def table(self, width: int) -> Sequence[RenderableType]:
-        """Draw velocities, legs, body and loop."""
+        """Draw velocities, body and loop."""
         del width  # it has the width of the narrowest terminal
         columns = ('commanded', 'in physics', 'by /odom')
         speeds = make_table(('velocity', 16, False), *((name, 16, True) for name in columns))
@@ -338,15 +325,7 @@ class Walk(Demo[ModeClient]):
         for row, title in enumerate(('forward [m/s]', 'left [m/s]', 'turn [rad/s]')):
             cells = (signed(math.nan if each is None else each[row]) for each in velocities)
             speeds.add_row(Text(title, style='bold'), *map(Text, cells))
-        legs = make_table(('leg', 9, False), *((f'{part} target/is', 20, True) for part in PARTS))
-        for leg in LEGS:
-            joints = [f'{leg}_{part}_joint' for part in PARTS]
-            both = (self.targets, self.positions)
-            pairs = (
-                ' '.join(signed(each.get(joint, math.nan)) for each in both) for joint in joints
-            )
-            legs.add_row(Text(leg, style='bold'), *map(Text, pairs))
-        return [speeds, Text(''), legs, Text(''), self._body_text(), self._loop_row()]
+        return [speeds, Text(''), self._body_text(), self._loop_row()]
 
     def _body_text(self) -> Text:
         fault, state = self.fault if self._in_fault else '', self.state or 'unknown'
@@ -378,14 +357,8 @@ class Walk(Demo[ModeClient]):
         self.tilt = tilt_of(_rotation(message.orientation))
         self.tilt_max = max(self.tilt, self.tilt_max)
 
-    def _take_joints(self, message: JointState) -> None:
-        self.positions = dict(zip(message.name, message.position, strict=False))
-
     def _take_battery(self, message: BatteryState) -> None:
         self.battery = 100.0 * message.percentage
-
-    def _take_targets(self, message: JointCommand) -> None:
-        self.targets = dict(zip(self.joints, message.position, strict=False))
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
         """Keep the errors of the controller, the reason of a fault, and how its loop does."""

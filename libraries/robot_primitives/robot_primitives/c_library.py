@@ -12,15 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 import contextlib
-import ctypes
-import hashlib
 import logging
 import os
 from pathlib import Path
-import shlex
-import shutil
-import subprocess
-import tempfile
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import ctypes
 
 FLAGS = ('-O3', '-march=native', '-std=gnu11', '-shared', '-fPIC')
 BUILD_TIME = 60.0  # time that the compiler is given in [s]
@@ -45,6 +43,9 @@ def load_c_library(
     """
     if os.environ.get(f'{package.upper()}_COMPILED') == '0':
         return None
+    # only here and below: most programs that import this package load no library
+    import subprocess
+
     try:
         return _load(package, source, flags)
     except (OSError, ValueError, subprocess.SubprocessError) as error:
@@ -59,6 +60,11 @@ def _load(package: str, source: Path, flags: Sequence[str]) -> ctypes.CDLL:
     Raises:
         OSError, ValueError, SubprocessError: It cannot be built, or not be loaded.
     """
+    import ctypes
+    import hashlib
+    import shlex
+    import shutil
+
     compiler = shlex.split(os.environ.get('CC', ''))
     compiler = compiler or [each for each in ('cc', 'gcc') if shutil.which(each)][:1]
     if not compiler:
@@ -84,6 +90,10 @@ def _load(package: str, source: Path, flags: Sequence[str]) -> ctypes.CDLL:
 
 def _build(command: Sequence[str], source: Path, kept: Path | None = None) -> ctypes.CDLL:
     """Build the library and load it; keep it as a file, written whole or not at all."""
+    import ctypes
+    import subprocess
+    import tempfile
+
     place = None if kept is None else kept.parent
     with tempfile.TemporaryDirectory(prefix='compiled-', dir=place) as folder:
         made = Path(folder) / 'made.so'
