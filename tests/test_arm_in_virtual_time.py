@@ -21,8 +21,7 @@ from servo_commands import InlineWorker, outcome, SteppedWorker
 
 from arm_canopen import DriveState, MotionSource, OperationMode
 from arm_servo import DisplacementRequest, MotionCore
-from arm_servo.core.gateway import CommandGateway
-from arm_servo.core.motion_queue import MotionCommand
+from arm_servo.core.gateway import CommandGateway, MotionCommand
 from arm_servo.drive_source import DriveSource
 from arm_trajectory import GoalPoint, TrajectoryGoal
 

@@ -26,7 +26,9 @@ from .controllers.controller import (
 from .controllers.jog import JointCommand, PoseCommand, ServoSettings, TwistCommand
 from .controllers.trajectory import Execution, ExecutionSettings, Feedback, Phase
 from .controllers.velocity_ik import IkSettings, VelocityBoundsSettings
-from .core.mailbox import (
+from .core.motion_core import check_arm, MotionCore
+from .core.preparation import CoreSettings
+from .core.requests import (
     DisplacementRequest,
     JogRequest,
     PauseRequest,
@@ -34,8 +36,6 @@ from .core.mailbox import (
     StopRequest,
     TargetRequest,
 )
-from .core.motion_core import check_arm, MotionCore
-from .core.preparation import CoreSettings
 from .ros.parameter_check import check_parameters
 
 __all__ = [

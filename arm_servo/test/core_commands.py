@@ -30,7 +30,7 @@ from arm_servo import (
     TwistCommand,
 )
 from arm_servo.controllers.jog import Command, ServoSource
-from arm_servo.core.mailbox import by_joint, ImmediateRequest, MotionRequest
+from arm_servo.core.requests import by_joint, ImmediateRequest, MotionRequest
 from arm_servo.core.safety_filter import SafetyFilter
 from arm_trajectory import GoalPoint, OnlineTrajectoryGenerator, TrajectoryGoal
 

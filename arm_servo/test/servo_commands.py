@@ -25,9 +25,8 @@ from arm_servo import (
     SetPoint,
     TwistCommand,
 )
-from arm_servo.core.gateway import CommandGateway
-from arm_servo.core.mailbox import by_joint
-from arm_servo.core.motion_queue import MotionCommand
+from arm_servo.core.gateway import CommandGateway, MotionCommand
+from arm_servo.core.requests import by_joint
 from arm_servo.drive_source import DriveSource
 from arm_servo.motion_thread import FollowingLimits, FollowingWatch, JointFeedback, MotionCycle
 from arm_trajectory import GoalPoint, TrajectoryGoal

@@ -21,8 +21,7 @@ from arm_canopen import Refusal, RefusalCause
 from arm_model import Array, combined, Pose
 from arm_servo import JogRequest, PauseRequest, PoseCommand, Source, StopRequest, TwistCommand
 from arm_servo.controllers.controller import JOGGING
-from arm_servo.core.gateway import CommandGateway
-from arm_servo.core.motion_queue import MotionCommand
+from arm_servo.core.gateway import CommandGateway, MotionCommand
 from arm_trajectory import GoalPoint, TrajectoryGoal
 
 pytestmark = pytest.mark.slow

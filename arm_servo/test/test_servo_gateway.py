@@ -29,10 +29,9 @@ from arm_servo import (
     StopRequest,
 )
 from arm_servo.controllers.controller import SingleTarget
-from arm_servo.core.gateway import start_worker
-from arm_servo.core.mailbox import by_joint, MAX_CYCLE_AGE
-from arm_servo.core.motion_queue import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand
+from arm_servo.core.gateway import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand, start_worker
 from arm_servo.core.preparation import CommandBasis, Motion
+from arm_servo.core.requests import by_joint, MAX_CYCLE_AGE
 from arm_trajectory import GoalCode, GoalError, GoalPoint, StateMovedError, TrajectoryGoal
 
 pytestmark = pytest.mark.slow

@@ -26,7 +26,7 @@ from arm_model import (
     RobotState,
 )
 from arm_servo import JogRequest, JointCommand, MotionCore, Outcome, SetPoint
-from arm_servo.core.mailbox import by_joint
+from arm_servo.core.requests import by_joint
 from arm_servo.core.safety_filter import MovingArms, SafetyFilter
 from arm_trajectory import GoalCode, GoalPoint, OnlineTrajectoryGenerator, TrajectoryGoal
 
@@ -252,7 +252,7 @@ def test_an_arm_whose_drives_others_have_counts_where_it_is(is_known: bool) -> N
     pair.jog('left', -0.8, 0.0)
     for cycle in range(300):
         place = RobotState.at_rest(np.array([0.2 + 0.001 * cycle, 0.0]))
-        right.stands(place if is_known else None)
+        right.abandon('', place if is_known else None)
         point = left.step(pair.now, PERIOD)
         pair.now += PERIOD
     assert ('right_' in str(point.report)) == is_known

@@ -16,7 +16,7 @@ from std_srvs.srv import Trigger
 
 from arm_servo import Source, SpeedRequest, StopRequest, TargetRequest
 from arm_servo.controllers.controller import Outcome
-from arm_servo.core.motion_queue import MotionCommand
+from arm_servo.core.gateway import MotionCommand
 from arm_servo.ros import trajectory as controller
 from arm_servo.ros.trajectory import TrajectoryAction, TrajectoryPause
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal

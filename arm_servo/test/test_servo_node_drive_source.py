@@ -13,7 +13,7 @@ from servo_commands import Drives, outcome, PERIOD
 
 from arm_canopen import CanopenError, Refusal, RefusalCause
 from arm_servo import MotionCore, NotReadyError, Phase, Source, SpeedRequest
-from arm_servo.core.motion_queue import MotionCommand
+from arm_servo.core.gateway import MotionCommand
 from arm_servo.drive_source import NOT_ATTACHED, why_not
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
 

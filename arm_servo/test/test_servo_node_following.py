@@ -28,7 +28,7 @@ from servo_commands import (
 from arm_model import ArmError, JointLimits
 from arm_servo import JogRequest, PauseRequest, PoseCommand, SpeedRequest, StopRequest
 from arm_servo.controllers.controller import MOTIONS
-from arm_servo.core.mailbox import ImmediateRequest
+from arm_servo.core.requests import ImmediateRequest
 from arm_servo.motion_thread import FollowingLimits, FollowingWatch
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
 

@@ -15,7 +15,7 @@ from servo_nodes import Listener
 
 from arm_model import CommandError, RobotModel
 from arm_servo import TargetRequest
-from arm_servo.core.motion_queue import MotionCommand
+from arm_servo.core.gateway import MotionCommand
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
 
 pytestmark = pytest.mark.slow

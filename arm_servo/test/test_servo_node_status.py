@@ -39,7 +39,7 @@ from arm_servo import (
     VelocityBoundsSettings,
 )
 from arm_servo.core.gateway import CommandGateway
-from arm_servo.core.mailbox import CommandType
+from arm_servo.core.requests import CommandType
 from arm_servo.ros.canopen_backend import CanopenMotion
 from arm_servo.ros.group_motion import Offers
 from arm_servo.ros.motion_goals import Refusals, REPEAT_PERIOD, STATUS_PERIOD
@@ -318,7 +318,7 @@ def test_what_stops_a_trajectory_is_reported_too() -> None:
     report = MotionReport(0.0, (Limiter(Cause.COLLISION, 'hand - arm', 0.01, 0.0),))
     for source in (Source.TARGET, Source.TRAJECTORY):
         point = replace(snapshot.set_point, source=source, report=report)
-        code, words = status_of(replace(snapshot, source=source, set_point=point), '', '', '')
+        code, words = status_of(replace(snapshot, set_point=point), '', '', '')
         assert code == ServoStatus.HALT_FOR_COLLISION
         assert 'hand - arm' in words
 

@@ -23,7 +23,7 @@ from arm_model import (
     SceneError,
 )
 from arm_servo import Source
-from arm_servo.core.motion_queue import MAX_ATTEMPTS, MotionCommand
+from arm_servo.core.gateway import MAX_ATTEMPTS, MotionCommand
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
 
 pytestmark = pytest.mark.slow

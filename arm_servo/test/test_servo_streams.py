@@ -24,7 +24,8 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from arm_canopen import Refusal, RefusalCause
 from arm_model import JointLimits
 from arm_servo import CoreSettings, ExecutionSettings, JogRequest, JointCommand, Source
-from arm_servo.core.mailbox import by_joint, TOGETHER
+from arm_servo.core.gateway import TOGETHER
+from arm_servo.core.requests import by_joint
 from arm_servo.ros.trajectory import TrajectoryController
 from arm_servo.ros.trajectory_goals import declare_trajectory, goal_of_action
 from arm_trajectory import GoalCode, GoalError, GoalRules

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_model import ArmNames
-from arm_servo.core.mailbox import CommandType
+from arm_servo.core.requests import CommandType
 from arm_servo.teleop import CartesianJog, Frame, JointJog, KeyboardTeleop, Scales
 from arm_servo.teleop.jog import Jog, rest_of, ServoRequest, Steps
 from arm_servo.teleop.keyboard_teleop import HELP, JOINTS, TOOL

@@ -19,6 +19,7 @@ import numpy as np
 from arm_model import (
     Array,
     checked,
+    Clearances,
     CommandError,
     frozen,
     ModelError,
@@ -26,7 +27,7 @@ from arm_model import (
     RobotModel,
     RobotState,
 )
-from arm_trajectory import GoalCode, OnlineTrajectoryGenerator, StateMovedError
+from arm_trajectory import GoalCode, OnlineTrajectoryGenerator, PathCheck, StateMovedError
 
 from ..controllers.controller import (
     ArmState,
@@ -43,7 +44,8 @@ from ..controllers.controller import (
 )
 from ..controllers.jog import Jog
 from ..controllers.trajectory import Execution
-from .mailbox import (
+from .preparation import CommandBasis, CoreSettings, Motion, Preparation, PreparedScene
+from .requests import (
     by_joint,
     check_limits,
     check_request,
@@ -55,7 +57,6 @@ from .mailbox import (
     PauseRequest,
     StopRequest,
 )
-from .preparation import CommandBasis, CoreSettings, Motion, Preparation, PreparedScene
 from .safety_filter import Neighbours, SafetyFilter
 
 PREPARED_STATE_TOLERANCE = 0.01
@@ -126,7 +127,7 @@ class MotionCore:
         self._still = frozen(np.zeros(len(model)))
         self._sequence = 0
         self._last_change = ''
-        self.scene = self.prepare_scene(model.scene, 0, None)
+        self.scene = self.prepare_scene(model.scene)
 
     @property
     def state(self) -> RobotState:
@@ -143,12 +144,6 @@ class MotionCore:
     def source(self) -> Source:
         """What moves the arm."""
         return Source.NONE if self._active is None else self._active.source
-
-    @property
-    def motion(self) -> Motion | None:
-        """The trajectory or the single target that moves the arm; None without one."""
-        active = self._active
-        return active if isinstance(active, Execution | SingleTarget) else None
 
     @property
     def speed_scaling(self) -> float:
@@ -191,13 +186,7 @@ class MotionCore:
         """Heed from now on how other arms of the robot move; before the first step."""
         self._filter.keep_apart(neighbours)
 
-    def stands(self, measured: RobotState | None) -> None:
-        """Pass a cycle in which something else has the drives; other arms heed where it is."""
-        self._filter.stands(measured)
-
-    def prepare_scene(
-        self, scene: PlanningScene, version: int, near: Array | None
-    ) -> PreparedScene:
+    def prepare_scene(self, scene: PlanningScene, near: Array | None = None) -> PreparedScene:
         """Measure a scene beside the cycle.
 
         Args:
@@ -207,8 +196,12 @@ class MotionCore:
             SceneError: It is of another arm.
         """
         self.model.check_scene(scene)
-        checks_paths = self._settings.check_self_collision
-        return PreparedScene.of(scene, version, near=near, checks_paths=checks_paths)
+        clearances = Clearances(scene)
+        if near is not None:  # all pairs are measured, so that the cycle has not to
+            clearances.least(near, 0.0)
+        return PreparedScene(
+            clearances, PathCheck(scene) if self._settings.check_self_collision else None
+        )
 
     def use_scene(self, scene: PreparedScene) -> Execution | None:
         """Use another scene from now on, for jogs, targets and trajectories.
@@ -307,8 +300,7 @@ class MotionCore:
         if is_old and not in_any_scene:
             raise StateMovedError(
                 GoalCode.INVALID_GOAL,
-                f'the scene changed (version {basis.scene.version} to {self.scene.version}) while'
-                ' this motion was prepared; send it again',
+                'the scene changed while this motion was prepared; send it again',
             )
         if isinstance(motion, Execution):
             self._check_place(basis.state, self.state)
@@ -368,8 +360,13 @@ class MotionCore:
         """Come to rest, a trajectory on its path, because something has gone wrong."""
         self._end(Outcome(code, reason))
 
-    def abandon(self, reason: str) -> None:
-        """End at once what moves the arm, which does not follow any more."""
+    def abandon(self, reason: str, measured: RobotState | None) -> None:
+        """End at once what moves the arm; something else has the drives, and other arms heed it.
+
+        Args:
+            measured: Where the drives are; None while that is not known.
+        """
+        self._filter.stands(measured)
         if self.source is not Source.NONE:
             self._changed('the arm did not follow')
             self._release(reason)

@@ -14,7 +14,6 @@ from arm_model import (
     Clearances,
     CommandError,
     Mask,
-    PlanningScene,
     RobotModel,
     RobotState,
 )
@@ -30,7 +29,7 @@ from arm_trajectory import (
 from ..controllers.controller import SingleTarget, Source
 from ..controllers.jog import ServoSettings
 from ..controllers.trajectory import Execution, ExecutionSettings
-from .mailbox import by_joint, check_limits, DisplacementRequest, MotionRequest
+from .requests import by_joint, check_limits, DisplacementRequest, MotionRequest
 
 Motion = Execution | SingleTarget  # what has a goal, and an outcome once it ended
 
@@ -52,20 +51,9 @@ class CoreSettings:
 class PreparedScene:
     """What measures a scene: one thing for each thread."""
 
-    version: int  # number of the scene; 0 is the robot alone
     clearances: Clearances  # of the cycle
     # looks for contact on paths, in the thread that prepares motions; None without such checks
     check: PathCheck | None
-
-    @classmethod
-    def of(
-        cls, scene: PlanningScene, version: int, *, near: Array | None, checks_paths: bool
-    ) -> PreparedScene:
-        """Prepare a scene: all pairs are measured ``near`` [rad], so that the cycle has not to."""
-        clearances = Clearances(scene)
-        if near is not None:
-            clearances.least(near, 0.0)
-        return cls(version, clearances, PathCheck(scene) if checks_paths else None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -26,7 +26,7 @@ from node_runner import ParameterReader
 from robot_primitives import JointSample, JointStateStore
 
 from ..core.gateway import CommandGateway
-from ..core.mailbox import Snapshot
+from ..core.requests import Snapshot
 from .trajectory_goals import RATE_RANGE
 
 

@@ -25,9 +25,8 @@ from node_runner import ParameterReader
 from node_runner.action_goals import Ending
 
 from ..controllers.controller import CONTINUED, Outcome, refused, Source
-from ..core.gateway import CommandGateway
-from ..core.mailbox import TargetRequest
-from ..core.motion_queue import MotionCommand
+from ..core.gateway import CommandGateway, MotionCommand
+from ..core.requests import TargetRequest
 from .motion_goals import MotionGoal, MotionGoals
 
 

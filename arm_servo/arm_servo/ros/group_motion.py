@@ -21,8 +21,8 @@ from node_runner import ParameterReader, refuse_misspelt
 
 from ..controllers.controller import Source
 from ..core.gateway import CommandGateway
-from ..core.mailbox import StopRequest
 from ..core.preparation import CoreSettings
+from ..core.requests import StopRequest
 from .controller_manager import Controller
 from .gripper import declare_gripper, GripperController
 from .servo import Servo

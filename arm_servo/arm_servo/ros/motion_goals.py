@@ -25,8 +25,7 @@ from arm_trajectory import GoalCode
 from node_runner.action_goals import Ending, GoalServer, ServedGoal
 
 from ..controllers.controller import Outcome, Source
-from ..core.gateway import CommandGateway
-from ..core.motion_queue import MotionCommand
+from ..core.gateway import CommandGateway, MotionCommand
 
 START_TIMEOUT = 5.0  # time in which a goal must be planned and taken by the cycle in [s]
 REST_TIMEOUT = 10.0  # time after which a goal that has failed is answered without rest in [s]

@@ -31,7 +31,7 @@ from arm_trajectory import GoalCode
 
 from ..controllers.controller import Cause, JOGGING, MotionReport, NotReadyError, Outcome, Source
 from ..core.gateway import CommandGateway
-from ..core.mailbox import CommandType, DisplacementRequest, JogRequest, Snapshot, StopRequest
+from ..core.requests import CommandType, DisplacementRequest, JogRequest, Snapshot, StopRequest
 from .motion_goals import Refusals
 from .servo_commands import CommandConverter, PREFIX, read_scales, ServoParameters, Units
 

@@ -27,7 +27,7 @@ from node_runner import ParameterReader
 
 from ..controllers.jog import JointCommand, PoseCommand, ServoSettings, TwistCommand
 from ..controllers.velocity_ik import IkSettings, VelocityBoundsSettings
-from ..core.mailbox import by_joint, DisplacementRequest, JogRequest
+from ..core.requests import by_joint, DisplacementRequest, JogRequest
 
 PREFIX = 'moveit_servo.'
 

@@ -33,9 +33,8 @@ from node_runner.action_goals import Ending
 
 from ..controllers.controller import NotReadyError, Outcome, refused, Source
 from ..controllers.trajectory import Execution
-from ..core.gateway import CommandGateway
-from ..core.mailbox import PauseRequest, Snapshot, SpeedRequest, StopRequest
-from ..core.motion_queue import MotionCommand
+from ..core.gateway import CommandGateway, MotionCommand
+from ..core.requests import PauseRequest, Snapshot, SpeedRequest, StopRequest
 from .motion_goals import LoggedReasons, MotionGoal, MotionGoals, START_TIMEOUT
 from .trajectory_goals import (
     difference,

@@ -18,7 +18,7 @@ from operator_input import (
     Style,
 )
 
-from ..core.mailbox import CommandType
+from ..core.requests import CommandType
 from .jog import CartesianJog, Frame, Jog, JointJog, ServoReport, ServoRequest, Steps, Vector
 
 if TYPE_CHECKING:

@@ -27,7 +27,7 @@ from arm_model import ArmNames, ModelError, names_of
 from node_runner import LATCHED, ParameterReader
 from operator_input import CommandStream
 
-from ..core.mailbox import CommandType
+from ..core.requests import CommandType
 from .jog import (
     Frame,
     Jog,

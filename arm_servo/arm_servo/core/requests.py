@@ -1,16 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What passes between any thread and the cycle: requests, the mailbox of orders, the snapshot.
+"""What passes between any thread and the cycle: requests, and the snapshot on the way back.
 
 A request is a value and moves nothing; a trajectory is requested by a
-:class:`arm_trajectory.TrajectoryGoal`. The :class:`Mailbox` is the one way to the cycle, and knows
-the order in which commands count. A :class:`Snapshot` is the way back.
+:class:`arm_trajectory.TrajectoryGoal`.
 """
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
 from enum import IntEnum
 import math
@@ -29,11 +27,9 @@ from arm_model import (
     RobotState,
 )
 from arm_trajectory import TrajectoryGoal
-from robot_primitives import StreamGate, StreamRules
 
-from ..controllers.controller import Controller, MOTIONS, NotReadyError, SetPoint, Source
+from ..controllers.controller import Controller, SetPoint, Source
 from ..controllers.jog import Command, JointCommand, PoseCommand, TwistCommand
-from ..controllers.trajectory import Execution
 
 ROTATION_TOLERANCE = 1e-3  # how far a rotation may be from one, for rounding of quaternions
 
@@ -203,89 +199,6 @@ def _check_rotation(values: Array, what: str) -> None:
         raise CommandError(f'{what}: not a rotation; is the quaternion of unit length?')
 
 
-BEGINS = 'the arm has just begun to follow'
-
-TOGETHER = 1.0
-"""Trajectories of a topic that follow each other within so many [s] are a stream; so long it has
-to be silent before it can be let in again."""
-
-GONE_AFTER = 10.0  # silence after which who had to let go has done so in [s]
-
-RULES = {
-    Source.JOG: StreamRules(
-        'a jog that was held before moves nothing: release and jog again, with a command of zero'
-        f' between (silence counts after {GONE_AFTER:g} s only), or call ~/start_servo',
-        gone_after=GONE_AFTER,
-    ),
-    Source.TRAJECTORY: StreamRules(
-        'a stream of trajectories does not go on after that: send none for'
-        f' {TOGETHER:g} s, then an empty one, or none for {GONE_AFTER:g} s',
-        together=TOGETHER,
-        let_go=GONE_AFTER,
-        gone_after=GONE_AFTER,
-        begin_margin=5.0,  # in which drives are got back
-    ),
-}
-"""Clients that send streams: those that jog, and the topic of trajectories."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Cycle:
-    """What an order sees of its cycle."""
-
-    now: float  # steady time in [s]
-    period: float  # time to the next cycle in [s]
-    blocked: str  # why the arm takes no commands; empty when it does
-
-
-Order = Callable[[Cycle], bool]  # carried out in a cycle; False for again in the next one
-
-
-class Mailbox:
-    """Orders from any thread, carried out by the thread of the cycle."""
-
-    def __init__(self) -> None:
-        self._orders: deque[Order] = deque()
-        self.post = self._orders.append
-        # refuses what a stop or a newer command has made void
-        self.gate = StreamGate[Source](MOTIONS, RULES)
-        # when a motion was refused last, as the arm did not follow, in [s]
-        self.refused = -math.inf
-
-    def __len__(self) -> int:
-        """Return how many orders wait."""
-        return len(self._orders)
-
-    def carry_out(self, cycle: Cycle) -> None:
-        """Carry out what was there at the begin of the cycle."""
-        for _ in range(len(self._orders)):
-            order = self._orders.popleft()
-            if not order(cycle):
-                self._orders.append(order)
-
-    def check(self, source: Source, number: int) -> None:
-        """Refuse what another command or a stop has made void.
-
-        Raises:
-            NotReadyError: It is void.
-        """
-        if reason := self.gate.refusal(source, number):
-            raise NotReadyError(reason)
-
-    def admit(self, source: Source, number: int, since: float, cycle: Cycle) -> None:
-        """Refuse a motion that is void before it began, or that the arm cannot follow.
-
-        Raises:
-            NotReadyError: It is refused.
-        """
-        self.check(source, number)
-        if cycle.blocked:
-            self.refused = cycle.now
-            raise NotReadyError(cycle.blocked)
-        if (age := cycle.now - since) > MAX_CYCLE_AGE:
-            raise NotReadyError(f'the cycle stood still for {age:.2f} s')
-
-
 MAX_CYCLE_AGE = 0.25
 """Age of a cycle at which the cycle stands still: commands are refused, as they would surprise."""
 
@@ -298,16 +211,16 @@ class Snapshot:
     set_point: SetPoint | None  # what was commanded; None while the arm does not follow
     measured: RobotState | None  # what was measured; None before the first feedback
     blocked: str  # why the arm does not follow, with the remedy; empty while it does
-    source: Source = Source.NONE  # what moves it
     paused: bool = False  # whether it is paused
     speed: float = 1.0  # speed override, 0 to 1
-    cycles: int = 0  # cycles so far in which the arm followed
-    period: float = 0.01  # period of the cycle in [s]
-    # the trajectory that was followed last; None before the first
-    execution: Execution | None = None
     # how old the measured values of each joint were in the cycle in [s]; None where they are as
     # old as the cycle
     ages: Array | None = None
+
+    @property
+    def source(self) -> Source:
+        """What moves the arm."""
+        return Source.NONE if self.set_point is None else self.set_point.source
 
     @property
     def speed_scaling(self) -> float:
