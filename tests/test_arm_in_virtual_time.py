@@ -45,6 +45,7 @@ class VirtualArm:
         ]
         self.net = VirtualNetwork(bus_config(*nodes))  # the network
         self.gateway = CommandGateway(core, worker, lambda: self.net.now)  # commands to the arm
+        self.gateway.get_ready = self.attach
         self._source = DriveSource(self.gateway)
         self.net.boot()
         for name in self.joints:
@@ -59,10 +60,12 @@ class VirtualArm:
         drives = [self.net.devices[name].drive for name in self.joints]
         return np.array([drive.position / SCALE for drive in drives if drive is not None])
 
-    def attach(self) -> None:
-        """Attach the core where it is not."""
-        if self._source.detached:
+    def attach(self) -> bool:
+        """Attach the core where it is not; return whether it was not."""
+        is_detached = self._source.detached
+        if is_detached:
             self._source.attach(self._attach)
+        return is_detached
 
     def _attach(self, source: MotionSource) -> Future[None]:
         self.net.master.attach(source)
@@ -182,10 +185,10 @@ class HaltedArm(VirtualArm):
     def request(self, kind: str) -> MotionCommand:
         """Request a motion, as the servers of actions and topics do."""
         if kind == 'displacement':
-            return self.gateway.request(DisplacementRequest({FIRST: SWING}), self.attach)
+            return self.gateway.request(DisplacementRequest({FIRST: SWING}))
         there = self.begin + SWING * np.eye(len(self.joints))[0]
         goal = TrajectoryGoal(self.joints, [GoalPoint(1.0, there.tolist())])
-        return self.gateway.request(goal, self.attach)
+        return self.gateway.request(goal)
 
     def take(self, steps: list[str]) -> None:
         """Step the worker and the cycle."""

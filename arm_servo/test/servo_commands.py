@@ -70,6 +70,13 @@ class Drives:
         """Give the source its drives."""
         self.source.attach(self._attached)
 
+    def get_ready(self) -> bool:
+        """Give the source its drives if they are away; return whether they were."""
+        is_detached = self.source.detached
+        if is_detached:
+            self.attach()
+        return is_detached
+
     def following(self, cycles: int = 2) -> Drives:
         """Give the source its drives, and run some cycles."""
         self.attach()

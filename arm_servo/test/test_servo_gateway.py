@@ -209,12 +209,14 @@ def test_a_jog_does_not_overtake_a_stop_that_comes_while_its_drives_are_fetched(
     drives = Drives().following()
     before = drives.path[-1].tolist()
 
-    def stop() -> None:
+    def stop() -> bool:
         for request in stops:
             drives.gateway.command(request)
+        return False
 
+    drives.gateway.get_ready = stop
     command = JointCommand(*by_joint(drives.gateway.model, {JOINT: 0.4}, 'velocities'))
-    jogged = drives.gateway.command(JogRequest(command, drives.now + 1.0), stop)
+    jogged = drives.gateway.command(JogRequest(command, drives.now + 1.0))
     drives.run(20)
     with pytest.raises(NotReadyError, match='stopped before it had begun'):
         jogged.result(0.0)
@@ -225,11 +227,13 @@ def test_the_time_in_which_drives_are_fetched_is_no_age_of_a_jog() -> None:
     """The cycle did not stand still; the jog itself says how long it counts."""
     drives = Drives().following()
 
-    def fetch() -> None:
+    def fetch() -> bool:
         drives.now += 2.0 * MAX_CYCLE_AGE
+        return True
 
+    drives.gateway.get_ready = fetch
     command = JointCommand(*by_joint(drives.gateway.model, {JOINT: 0.4}, 'velocities'))
-    jogged = drives.gateway.command(JogRequest(command, drives.now + 5.0), fetch)
+    jogged = drives.gateway.command(JogRequest(command, drives.now + 5.0))
     drives.run(2)
     assert jogged.exception(0.0) is None
     assert drives.gateway.snapshot.source is Source.JOG
@@ -342,6 +346,7 @@ def test_a_long_goal_that_is_refused_at_rest_does_not_end_a_jog(
 def test_a_goal_that_is_refused_takes_no_drive_from_anyone(is_wrong: bool) -> None:
     """Others move the arm: it is tried from where the arm stands before they are thrown out."""
     drives = Drives().following()
+    drives.gateway.get_ready = drives.get_ready
     goal = wave(drives, 20)
     if is_wrong:
         beyond = replace(goal.points[-1], positions=[9.0] * 7)
@@ -350,7 +355,7 @@ def test_a_goal_that_is_refused_takes_no_drive_from_anyone(is_wrong: bool) -> No
     drives.run(3)
     assert drives.gateway.snapshot.blocked
     before = len(drives.attachments)
-    command = drives.gateway.request(goal, drives.attach)
+    command = drives.gateway.request(goal)
     begun(drives, command)
     if is_wrong:
         assert isinstance(command.future.exception(0.0), GoalError)
@@ -365,10 +370,11 @@ def test_a_motion_that_a_stop_made_void_takes_no_drive_from_anyone() -> None:
     """The stop came while it was tried from where the arm stands."""
     worker = SteppedWorker()
     drives = Drives(worker=worker).following()
+    drives.gateway.get_ready = drives.get_ready
     drives.source.released(JOINT, Refusal(RefusalCause.SINGLE_TARGET))
     drives.run(3)
     before = len(drives.attachments)
-    command = drives.gateway.request(wave(drives, 20), drives.attach)
+    command = drives.gateway.request(wave(drives, 20))
     drives.gateway.command(StopRequest())
     while worker.run():
         drives.run()
@@ -379,12 +385,13 @@ def test_a_motion_that_a_stop_made_void_takes_no_drive_from_anyone() -> None:
 def test_a_motion_is_tried_from_where_the_arm_is_when_its_turn_comes() -> None:
     """The one before has got the drives back, and leads to where there is room for this one."""
     drives = Drives().following()
+    drives.gateway.get_ready = drives.get_ready
     begin = drives.path[-1][0]
     drives.source.released(JOINT, Refusal(RefusalCause.SINGLE_TARGET))
     drives.run(3)
     room = begin - drives.gateway.model.limits.lower[0]
-    there = drives.gateway.request(DisplacementRequest({JOINT: 0.3}), drives.attach)
-    back = drives.gateway.request(DisplacementRequest({JOINT: -room - 0.1}), drives.attach)
+    there = drives.gateway.request(DisplacementRequest({JOINT: 0.3}))
+    back = drives.gateway.request(DisplacementRequest({JOINT: -room - 0.1}))
     drives.run(600)
     assert there.future.exception(0.0) is None
     assert back.future.exception(0.0) is None

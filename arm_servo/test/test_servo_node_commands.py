@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future
 import math
 import time
@@ -208,19 +208,22 @@ class Topics:
         self.requests: list[JogRequest] = []  # jogs so far
         self.drives = Drives(model=HELD).following()
         gateway = self.drives.gateway
-        monkeypatch.setattr(gateway, 'command', self._jog)
+        command = gateway.command
+
+        def noted(request: JogRequest) -> Future[None]:
+            self.requests.append(request)
+            return command(request)
+
+        monkeypatch.setattr(gateway, 'command', noted)
+        gateway.get_ready = self._get_ready
         timeout = parameter('incoming_command_timeout', TIMEOUT)
         node._parameter_overrides[timeout.name] = timeout
         parameters = declare_servo(node, gateway.model)
-        self._servo = Servo(node, gateway, parameters, self._prepare)
+        self._servo = Servo(node, gateway, parameters)
 
-    def _prepare(self) -> None:
+    def _get_ready(self) -> bool:
         self.prepared += 1
-
-    def _jog(self, request: JogRequest, get_ready: Callable[[], None]) -> Future[None]:
-        get_ready()
-        self.requests.append(request)
-        return Future()
+        return False
 
     def send(self, topic: str, message: Any, age: float = 0.0) -> None:
         """Deliver a message that was sent some time ago in [s]."""

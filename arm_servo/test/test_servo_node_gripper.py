@@ -16,10 +16,10 @@ from servo_nodes import GoalNode
 
 from arm_model import CommandError
 from arm_servo import NotReadyError, PauseRequest, SpeedRequest, TargetRequest
+from arm_servo.controllers.controller import MOTIONS
 from arm_servo.ros import gripper as controller
 from arm_servo.ros import motion_goals
 from arm_servo.ros.gripper import GripperController, GripperParameters, PARALLEL, SINGLE
-from arm_servo.ros.group_motion import set_tool_active
 from arm_servo.ros.trajectory import TrajectoryController
 
 pytestmark = pytest.mark.slow
@@ -39,7 +39,6 @@ class Gripper:
             self._node,
             self.drives.gateway,
             GripperParameters(0.002, 0.001, 1.0, allow_stalling),
-            lambda: None,
             lambda: None,
         )
 
@@ -253,12 +252,12 @@ def test_a_deactivated_controller_moves_no_gripper() -> None:
     drives = Drives().following()
     node = SimpleNamespace(get_name=lambda: 'hand_controller')
     controller = object.__new__(TrajectoryController)
-    vars(controller).update(_node=node, _gateway=drives.gateway, active=True)
+    vars(controller).update(_node=node, _gateway=drives.gateway, active=True, _sources=MOTIONS)
     controller.check_active()
     command = drives.gateway.request(TargetRequest({JOINT: 1.0}, 0.1))
     drives.run(20)
     assert not command.ended.done()
-    set_tool_active(controller, drives.gateway, False)
+    controller.set_active(False)
     drives.run(20)
     assert command.ended.result().canceled
     with pytest.raises(NotReadyError, match='hand_controller is inactive'):

@@ -59,8 +59,7 @@ class Commands:
         servo: Any = object.__new__(Servo)
         logger = SimpleNamespace(error=lambda text, **_: self.logged.append(text))
         servo._node = SimpleNamespace(get_logger=lambda: logger)
-        servo._modes = SimpleNamespace(admit=lambda _kind: None)
-        servo._prepare = lambda: None
+        servo._paused, servo._kind = '', None
         servo._gateway, servo._refusals = self.drives.gateway, Refusals()
         self.servo = servo
 
@@ -103,10 +102,11 @@ def test_whatever_a_command_raises_ends_that_command_only() -> None:
     commands.servo._take(CommandType.TWIST, fail, TwistStamped())
     assert 'ZeroDivisionError: no such luck' in commands.servo._refusals.fresh(0.0)
     assert 'Traceback' in commands.logged[0]
-    commands.servo._prepare = lambda: 1 // 0
+    gateway = commands.drives.gateway
+    gateway.get_ready = lambda: bool(1 // 0)
     commands.send([0.0, 0.05, 0.0, 0.0, 0.0, 0.0])
     assert len(commands.logged) == 2
-    commands.servo._prepare = lambda: None
+    gateway.get_ready = lambda: False
     commands.send([0.0, 0.05, 0.0, 0.0, 0.0, 0.0])
     commands.drives.run()
     assert commands.drives.gateway.snapshot.source is Source.JOG

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from itertools import pairwise
 import math
@@ -42,9 +42,8 @@ class Arm:
         self.drives = Drives(settings=CoreSettings(execution=ExecutionSettings(rules)))
         joints = self.drives.gateway.model.joints
         parameters = declare_trajectory(node, joints)
-        self.controller = TrajectoryController(
-            node, self.drives.gateway, parameters, self._get_ready
-        )
+        self.drives.gateway.get_ready = self._get_ready
+        self.controller = TrajectoryController(node, self.drives.gateway, parameters)
         self.taken_back = 0
         self._joints = list(joints)
         (self._subscription,) = (
@@ -87,10 +86,8 @@ class Arm:
         return self.drives.axes[0].setpoint
 
     def _get_ready(self) -> bool:
-        is_detached = self.drives.source.detached
-        if is_detached:
-            self.taken_back += 1
-            self.drives.attach()
+        is_detached = self.drives.get_ready()
+        self.taken_back += is_detached
         return is_detached
 
 
@@ -121,7 +118,8 @@ def test_the_tolerance_at_the_goal_is_by_the_range_of_the_joint(node: Any) -> No
     low, high = np.array([0.0, -3.0, -np.inf]), np.array([0.5, 3.0, np.inf])
     one = np.ones(3)
     limits = JointLimits(names, low, high, one, one, one)
-    goal = declare_trajectory(node, names, limits).goal
+    goal = declare_trajectory(node, names, limits).execution.goal
+    assert isinstance(goal, Mapping)
     assert [goal[name].position for name in names] == pytest.approx([0.01, 0.05, 0.05])
 
 
@@ -129,20 +127,27 @@ def test_the_tolerance_at_the_goal_is_by_the_range_of_the_joint(node: Any) -> No
 @pytest.mark.parametrize(
     ('joint', 'position', 'code', 'words'),
     [
-        ('elbow', 0.1, GoalCode.INVALID_JOINTS, ": no joint 'elbow'; joints: slide, turn"),
-        ('turn', math.nan, GoalCode.INVALID_GOAL, ' of turn is not a number'),
+        ('elbow', 0.1, GoalCode.INVALID_JOINTS, ": no joint 'elbow'; joints: panda_joint1, .*"),
+        ('panda_joint1', math.nan, GoalCode.INVALID_GOAL, ' of panda_joint1 is not a number'),
     ],
 )
-def test_a_tolerance_that_cannot_be_kept_is_refused_when_the_goal_is_read(
-    *, node: Any, field: str, joint: str, position: float, code: GoalCode, words: str
+def test_a_tolerance_that_cannot_be_kept_is_refused_before_drives_are_got_back(
+    *, arm: Arm, field: str, joint: str, position: float, code: GoalCode, words: str
 ) -> None:
-    """With the name of the field: before drives are got back or anything else is prepared."""
-    parameters = declare_trajectory(node, ('slide', 'turn'))
+    """With the name of the field."""
+    halts(arm)
+    arm.drives.run(3)
+    point = JointTrajectoryPoint(positions=[axis.setpoint for axis in arm.drives.axes])
+    point.time_from_start.sec = 1
+    names = arm.drives.gateway.model.joints
     goal = FollowJointTrajectory.Goal()
+    goal.trajectory = JointTrajectory(joint_names=names, points=[point])
     setattr(goal, field, [JointTolerance(name=joint, position=position)])
+    command = arm.drives.gateway.request(goal_of_action(goal, 0.0))
     with pytest.raises(GoalError, match=f'^{field}{words}$') as refused:
-        goal_of_action(goal, 0.0, parameters)
+        command.future.result(0.0)
     assert refused.value.code is code
+    assert arm.taken_back == 0
 
 
 def halts(arm: Arm) -> None:
@@ -268,6 +273,7 @@ class Stick:
 
     def __init__(self, client: str = 'stick') -> None:
         self.drives = Drives().following()
+        self.drives.gateway.get_ready = self.drives.get_ready
         self.client = client
         self.refusals: list[str] = []
 
@@ -277,7 +283,7 @@ class Stick:
             velocities = {'panda_joint1': speed}
             command = JointCommand(*by_joint(self.drives.gateway.model, velocities, 'velocities'))
             request = JogRequest(command, self.drives.now + 0.1, client=self.client)
-            future = self.drives.gateway.command(request, self._get_ready)
+            future = self.drives.gateway.command(request)
             self.drives.run()
             if (error := future.exception(0.0)) is not None:
                 self.refusals.append(str(error))
@@ -290,10 +296,6 @@ class Stick:
     def position(self) -> float:
         """Where the joint was sent in [rad]."""
         return self.drives.axes[0].setpoint
-
-    def _get_ready(self) -> None:
-        if self.drives.source.detached:
-            self.drives.attach()
 
 
 def halt(stick: Stick) -> None:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from .execution import CatchUpInterpolator, TimerState, TrajectoryTimer
 from .goal import (
-    check_tolerances,
+    DefaultTolerances,
     GoalCode,
     GoalError,
     GoalPoint,
@@ -35,6 +35,7 @@ from .time_scaling import Demand, Timing
 
 __all__ = [
     'CatchUpInterpolator',
+    'DefaultTolerances',
     'Demand',
     'Excess',
     'GoalCode',
@@ -55,7 +56,6 @@ __all__ = [
     'TrajectoryTimer',
     'brakeable',
     'build_path',
-    'check_tolerances',
     'cubics',
     'farthest_beyond',
     'hard_brake',

@@ -66,6 +66,9 @@ class JointTolerance:
     velocity: float = 0.0  # in [rad/s]
 
 
+DefaultTolerances = JointTolerance | Mapping[str, JointTolerance]  # of each joint, or by joint
+
+
 @dataclass(frozen=True, slots=True)
 class TrajectoryGoal:
     """A trajectory to follow."""
@@ -316,26 +319,10 @@ def _distinct(error: float, tolerance: float) -> tuple[str, str]:
     return off, most
 
 
-def check_tolerances(
-    joints: Sequence[str], given: Mapping[str, JointTolerance], what: str
-) -> None:
-    """Check the tolerances of a goal, whose field ``what`` they are.
-
-    Raises:
-        GoalError: A joint is unknown, or a tolerance is not a number.
-    """
-    for name, asked in given.items():
-        if name not in joints:
-            reason = f'{what}: no joint {name!r}; joints: {", ".join(joints)}'
-            raise GoalError(GoalCode.INVALID_JOINTS, reason)
-        if math.isnan(asked.position) or math.isnan(asked.velocity):
-            raise GoalError(GoalCode.INVALID_GOAL, f'{what} of {name} is not a number')
-
-
 def merge_tolerances(
     limits: JointLimits,
     given: Mapping[str, JointTolerance] | None,
-    default: JointTolerance,
+    default: DefaultTolerances,
     what: str = 'tolerance',
 ) -> Tolerances:
     """Put tolerances together: those of a goal, else the default.
@@ -343,17 +330,23 @@ def merge_tolerances(
     Args:
         given: The goal's tolerances by joint: above 0 counts, 0 keeps the default, below takes it
             away.
-        default: The default of each joint; 0 is none.
+        default: The default of each joint, or by joint; 0 is none.
         what: Name of the goal's field, for the words of a refusal.
 
     Raises:
         GoalError: A joint is unknown, or a tolerance is not a number.
     """
-    check_tolerances(limits.names, given or {}, what)
-    rows = [
-        (_one(asked.position, default.position), _one(asked.velocity, default.velocity))
-        for asked in ((given or {}).get(name, JointTolerance()) for name in limits.names)
-    ]
+    for name, asked in (given or {}).items():
+        if name not in limits.names:
+            reason = f'{what}: no joint {name!r}; joints: {", ".join(limits.names)}'
+            raise GoalError(GoalCode.INVALID_JOINTS, reason)
+        if math.isnan(asked.position) or math.isnan(asked.velocity):
+            raise GoalError(GoalCode.INVALID_GOAL, f'{what} of {name} is not a number')
+    rows = []
+    for name in limits.names:
+        asked = (given or {}).get(name, JointTolerance())
+        usual = default if isinstance(default, JointTolerance) else default[name]
+        rows.append((_one(asked.position, usual.position), _one(asked.velocity, usual.velocity)))
     return Tolerances(np.array([row[0] for row in rows]), np.array([row[1] for row in rows]))
 
 

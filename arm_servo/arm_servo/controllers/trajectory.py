@@ -14,6 +14,7 @@ from arm_model import Array, JointLimits, RobotState
 from arm_trajectory import (
     build_path,
     CatchUpInterpolator,
+    DefaultTolerances,
     GoalCode,
     GoalRules,
     JointTolerance,
@@ -50,10 +51,10 @@ class ExecutionSettings:
     """How trajectories are accepted and followed."""
 
     rules: GoalRules = field(default_factory=GoalRules)  # what is accepted
-    # tolerance of each joint on the way; 0 is none
-    path: JointTolerance = field(default_factory=JointTolerance)
-    # tolerance of each joint at the end; 0 is none
-    goal: JointTolerance = field(default_factory=lambda: JointTolerance(0.0, 0.01))
+    # tolerances on the way, by joint or of each; 0 is none
+    path: DefaultTolerances = field(default_factory=JointTolerance)
+    # tolerances at the end, by joint or of each; 0 is none
+    goal: DefaultTolerances = field(default_factory=lambda: JointTolerance(0.0, 0.01))
     # time to come within the goal's tolerance after the end in [s]; 0 is without end
     goal_time: float = 0.0
 

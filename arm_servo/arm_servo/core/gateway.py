@@ -13,7 +13,7 @@ state that the cycle hands out, and begun in the cycle.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Generator, Hashable
+from collections.abc import Callable, Generator, Hashable, Sequence
 from concurrent.futures import (
     CancelledError,
     Executor,
@@ -51,6 +51,7 @@ from .requests import (
     JogRequest,
     MAX_CYCLE_AGE,
     MotionRequest,
+    moves_nothing,
     PauseRequest,
     Snapshot,
     StopRequest,
@@ -141,10 +142,10 @@ class MotionCommand:
     request: MotionRequest  # what is asked
     number: int  # its place among all commands and stops
     requested: float  # steady time of the request in [s]
-    get_ready: Callable[[], object] = lambda: None  # gets the drives back
     stream: Hashable = None  # where each newer one replaces those that wait; None for nowhere
     # the sum of displacements that it added to, which counts where this one is refused
     before: MotionCommand | None = None
+    takes_drives: bool = True  # whether it gets back drives that others have
     # its execution, or None for a single target, once it began; else why it is refused
     future: Future[Execution | None] = field(default_factory=Future)
     # how it ended, whatever became of it; set once, at the latest when the cycle fails
@@ -196,6 +197,9 @@ class CommandGateway:
         self.refused = -math.inf
         self.keep_apart = core.keep_apart  # before the first cycle
         self.reset = core.reset  # where others have moved the arm while it was at rest
+        # gets back drives that others have, for what is not refused, in any thread; returns
+        # whether there were any
+        self.get_ready: Callable[[], bool] = lambda: False
         self._lost = ''  # why an arm that followed comes to rest
         self._core, self._worker, self._clock = core, worker, clock
         # refuses what a stop or a newer command has made void
@@ -211,15 +215,10 @@ class CommandGateway:
         braking = limits.velocity / limits.acceleration + limits.acceleration / limits.jerk
         self._rest_timeout = REST_MARGIN + float(braking.max())
 
-    def command(
-        self, request: ImmediateRequest, get_ready: Callable[[], object] = lambda: None
-    ) -> Future[None]:
+    def command(self, request: ImmediateRequest) -> Future[None]:
         """Apply a jog, a stop, a pause or a speed override from the next cycle on.
 
         A stop refuses from the moment of the call what was requested before it, a pause what jogs.
-
-        Args:
-            get_ready: Gets back drives that others have; called for a request that is not refused.
 
         Returns:
             Nothing once it counts; the ArmError with which it was refused.
@@ -230,10 +229,9 @@ class CommandGateway:
         try:
             check_request(self.model, request)
             if isinstance(request, JogRequest):
-                if len(self._orders) >= MAX_QUEUED_JOGS:
-                    raise NotReadyError(f'{MAX_QUEUED_JOGS} commands wait for the cycle')
-                self.stream(Source.JOG, request.client, is_zero=not moves, expires=request.expires)
-            get_ready()
+                self._check_jog(request)
+            if moves:
+                self.get_ready()
         except ArmError as error:
             future.set_exception(error)
             return future
@@ -258,22 +256,29 @@ class CommandGateway:
         self._orders.append(commit)
         return future
 
+    def _check_jog(self, request: JogRequest) -> None:
+        if len(self._orders) >= MAX_QUEUED_JOGS:
+            raise NotReadyError(f'{MAX_QUEUED_JOGS} commands wait for the cycle')
+        client, is_zero = request.client, request.is_zero
+        self.stream(Source.JOG, client, is_zero=is_zero, expires=request.expires)
+
     def request(
         self,
         request: MotionRequest,
-        get_ready: Callable[[], object] = lambda: None,
         number: int | None = None,
         stream: Hashable = None,
+        *,
+        takes_drives: bool = True,
     ) -> MotionCommand:
         """Prepare a motion, and begin it when its path is clear.
 
         Args:
-            get_ready: Gets back drives that others have, where the arm does not follow; called in
-                any thread, and only for a motion that is not refused from where the arm stands.
             number: Its place among all commands and stops, where it came before; by default it
                 comes now.
             stream: Where it comes from, if it replaces those from there that wait. Displacements
                 add up; one that would lead a sum beyond limits is refused alone.
+            takes_drives: Whether it gets back drives that others have, where the arm does not
+                follow; one that is refused from where the arm stands takes none.
         """
         error: ArmError | None = None
         before: MotionCommand | None = None
@@ -281,18 +286,18 @@ class CommandGateway:
             number = self._gate.number() if number is None else number
             replaced = [each for each in self._waiting if stream and each.stream == stream]
             try:
-                for each in replaced:
-                    if isinstance(request, DisplacementRequest) and not self._is_void(each):
-                        before = each.before if request.is_zero else each
-                        get_ready = each.get_ready if request.is_zero else get_ready
-                        request = request.beyond(each.request)
+                if moves_nothing(self.model, request):
+                    command = MotionCommand(request, number, self._clock())
+                    command.future.set_result(None)
+                    command.end(NOTHING)
+                    return command
                 if isinstance(request, DisplacementRequest) and stream:
-                    self._check_displacement(request)
+                    request, before = self._sum(request, replaced)
             except ArmError as refusal:
                 error, replaced, before = refusal, [], None
             for each in replaced:
                 self._waiting.remove(each)
-            command = MotionCommand(request, number, self._clock(), get_ready, stream, before)
+            command = MotionCommand(request, number, self._clock(), stream, before, takes_drives)
             if len(self._waiting) >= MAX_QUEUED_MOTIONS:
                 error = error or NotReadyError(
                     f'{MAX_QUEUED_MOTIONS} motions wait already; send them more slowly'
@@ -337,14 +342,6 @@ class CommandGateway:
             self._gate.release(source, client)
         elif reason := self._gate.command(source, client, self._clock(), expires):
             raise NotReadyError(reason)
-
-    def get_ready_for(
-        self, source: Source, client: Hashable, get_ready: Callable[[], bool]
-    ) -> None:
-        """Get back the drives, if they are away, for a client whose stream begins."""
-        self._gate.ask(source, client, self._clock())  # first: the cycle may be quicker
-        if not get_ready():
-            self._gate.ask(source, client, -math.inf)
 
     def renew(self, source: Source) -> None:
         """Treat the next command as a new one: a person has requested it.
@@ -459,11 +456,13 @@ class CommandGateway:
     ) -> None:
         """Report how motions have ended, and what was done in a cycle."""
         for command in self._begun.copy():
-            if command.motion is None or command.motion.outcome is not None:
+            if command.motion is not None and command.motion.outcome is not None:
                 self._begun.remove(command)
-                command.end((command.motion and command.motion.outcome) or NOTHING)
-        paused, speed = self._core.paused, self._core.speed
-        self.snapshot = Snapshot(cycle.now, point, measured, cycle.blocked, paused, speed, ages)
+                command.end(command.motion.outcome)
+        core, now, blocked = self._core, cycle.now, cycle.blocked
+        self.snapshot = Snapshot(
+            now, point, measured, blocked, core.paused, core.speed, ages, core.execution
+        )
 
     def _check(self, source: Source, number: int) -> None:
         """Refuse what another command or a stop has made void.
@@ -496,19 +495,24 @@ class CommandGateway:
         """Return whether a motion was canceled or stopped before its begin."""
         return command.is_canceled or bool(self._gate.refusal(command.source, command.number))
 
-    def _check_displacement(self, request: DisplacementRequest) -> None:
-        """Check that it stays within limits, behind the one that is being prepared.
+    def _sum(
+        self, request: DisplacementRequest, replaced: Sequence[MotionCommand]
+    ) -> tuple[DisplacementRequest, MotionCommand | None]:
+        """Add a displacement to those that it replaces; return the last of them, too.
 
         Raises:
-            CommandError: It leads beyond them.
+            CommandError: The sum, behind what is being prepared, leads beyond limits.
         """
-        if request.is_zero:
-            return
-        now = self._preparing
+        before = None
+        for each in replaced:
+            if not self._is_void(each):
+                before, request = each, request.beyond(each.request)
+        now, whole = self._preparing, request
         if now is not None and now.motion is None and not self._is_void(now):
-            request = request.beyond(now.request)
+            whole = request.beyond(now.request)
         with suppress(NotReadyError):  # where the arm is not known yet, that is refused later
-            self._core.check_displacement(request, self._rest())
+            self._core.check_displacement(whole, self._rest())
+        return request, before
 
     def _prepare_next(self) -> None:
         """Begin with the next motion, once the one before has begun or was refused."""
@@ -542,7 +546,10 @@ class CommandGateway:
             yield Turn.WORKER
             self._core.plan(command.request, basis)
         self._check(command.source, command.number)
-        command.get_ready()
+        if command.takes_drives:  # for a stream that begins, too
+            self._gate.ask(command.source, command.stream, self._clock())  # the cycle is quick
+            if not self.get_ready():
+                self._gate.ask(command.source, command.stream, -math.inf)
         for _ in range(MAX_ATTEMPTS - 1):
             with suppress(StateMovedError):
                 return (yield from self._attempt(command))
@@ -573,8 +580,8 @@ class CommandGateway:
         while planned > cycle.now + 0.5 * cycle.period and not cycle.blocked:
             cycle = yield Turn.CYCLE
         self._admit(command.source, command.number, ordered, cycle)
-        if motion is not None:  # a scene that changes all the time holds none up
-            self._core.begin(motion, basis, cycle.now - planned, in_any_scene=is_last)
+        # a scene that changes all the time holds none up
+        self._core.begin(motion, basis, cycle.now - planned, in_any_scene=is_last)
         command.motion = motion
         if basis.scene is not self._core.scene and command.execution is not None:
             self._recheck(command.execution)

@@ -54,6 +54,7 @@ from .requests import (
     in_base,
     JogRequest,
     MotionRequest,
+    moves_nothing,
     PauseRequest,
     StopRequest,
 )
@@ -235,14 +236,11 @@ class MotionCore:
         """Bring a jog or a single target to rest for what is prepared, or let it go on."""
         self._held = is_held
 
-    def plan(self, request: MotionRequest, basis: CommandBasis) -> Motion | None:
+    def plan(self, request: MotionRequest, basis: CommandBasis) -> Motion:
         """Plan a motion, and check its path; for one thread at a time, whichever. Nothing moves.
 
         Args:
             basis: The arm where the motion begins: :attr:`basis`, or foreseen from it.
-
-        Returns:
-            None for a displacement by nothing.
 
         Raises:
             CommandError: The request is refused.
@@ -351,9 +349,10 @@ class MotionCore:
             check_request(self.model, request)
             self.apply(request, now)
             return None
+        if moves_nothing(self.model, request):
+            return None
         motion = self.plan(request, basis)
-        if motion is not None:
-            self.begin(motion, basis)
+        self.begin(motion, basis)
         return motion
 
     def fail(self, reason: str, code: GoalCode = GoalCode.INVALID_GOAL) -> None:

@@ -96,11 +96,8 @@ class Preparation:
             model.limits
         )  # that of the cycle is for the cycle
 
-    def prepare(self, request: MotionRequest, basis: CommandBasis) -> Motion | None:
+    def prepare(self, request: MotionRequest, basis: CommandBasis) -> Motion:
         """Plan a motion from a state of the arm, and check its path.
-
-        Returns:
-            None for a displacement by nothing.
 
         Raises:
             CommandError: The request is refused.
@@ -109,8 +106,6 @@ class Preparation:
             return self._trajectory(request, basis)
         if isinstance(request, DisplacementRequest):
             target = self._displaced(request.displacements, basis)
-            if request.is_zero:
-                return None
         else:
             target = self._aimed(*by_joint(self._model, request.positions, 'positions'), basis)
         return self._single_target(target, request.max_speed, basis)

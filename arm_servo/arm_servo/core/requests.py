@@ -30,6 +30,7 @@ from arm_trajectory import TrajectoryGoal
 
 from ..controllers.controller import Controller, SetPoint, Source
 from ..controllers.jog import Command, JointCommand, PoseCommand, TwistCommand
+from ..controllers.trajectory import Execution
 
 ROTATION_TOLERANCE = 1e-3  # how far a rotation may be from one, for rounding of quaternions
 
@@ -77,8 +78,6 @@ class DisplacementRequest:
         """Return this displacement added to an earlier one; any other motion is replaced."""
         if not isinstance(before, DisplacementRequest):
             return self
-        if self.is_zero:
-            return before
         ways = {name: before.displacements.get(name, 0.0) for name in self.displacements}
         sums = {name: way + ways[name] for name, way in self.displacements.items()}
         return replace(self, displacements={**before.displacements, **sums})
@@ -153,6 +152,18 @@ def by_joint(model: RobotModel, values: Mapping[str, float], what: str) -> tuple
     return ordered, mask
 
 
+def moves_nothing(model: RobotModel, request: MotionRequest) -> bool:
+    """Return whether a motion is a displacement by nothing, which changes nothing.
+
+    Raises:
+        CommandError: It is one, of an unknown joint or none.
+    """
+    if not isinstance(request, DisplacementRequest) or not request.is_zero:
+        return False
+    by_joint(model, request.displacements, 'displacements')
+    return True
+
+
 def check_request(model: RobotModel, request: ImmediateRequest) -> None:
     """Check a request for which nothing is planned.
 
@@ -216,6 +227,8 @@ class Snapshot:
     # how old the measured values of each joint were in the cycle in [s]; None where they are as
     # old as the cycle
     ages: Array | None = None
+    # the trajectory that was followed last; None before the first
+    execution: Execution | None = None
 
     @property
     def source(self) -> Source:

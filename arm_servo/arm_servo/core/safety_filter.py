@@ -9,6 +9,7 @@ keep apart also while all of them stop: :class:`MovingArms`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from itertools import count, pairwise
@@ -115,19 +116,20 @@ class SafetyFilter:
         self._floor = ClearanceFloor(self._least, generator.brake)
         self._fastest: Array = model.limits.velocity * (1.0 + 1e-6)
         self._neighbours: Neighbours | None = None
+        self._lock: AbstractContextManager[object] = nullcontext()
         self._apart = self._floor
         self._version = 0
         self.is_near_neighbour = False
 
     def keep_apart(self, neighbours: Neighbours) -> None:
         """Heed from now on how other arms move."""
-        self._neighbours = neighbours
+        self._neighbours, self._lock = neighbours, neighbours.lock
         self._apart = ClearanceFloor(neighbours.least, self._generator.brake)
 
     def stands(self, state: RobotState | None) -> None:
         """Publish to other arms where the arm is while something else has its drives."""
         if self._neighbours is not None:
-            with self._neighbours.lock:
+            with self._lock:
                 self._neighbours.stands(state)
 
     def reset(self, state: RobotState) -> None:
@@ -164,52 +166,38 @@ class SafetyFilter:
         Returns:
             The state to command, and what held the wanted one up.
         """
-        if self._neighbours is None:
-            return self._filtered(state, wanted, period, clearance, now=now, apart=apart)
-        with self._neighbours.lock:  # none of them steps meanwhile
-            if self._neighbours.version != self._version:
+        with self._lock:  # no other arm steps meanwhile
+            if self._neighbours is not None and self._neighbours.version != self._version:
                 self._version = self._neighbours.version
                 self._apart.forget()
-            return self._filtered(state, wanted, period, clearance, now=now, apart=apart)
-
-    def _filtered(
-        self,
-        state: RobotState,
-        wanted: RobotState,
-        period: float,
-        clearance: float | None,
-        *,
-        now: float,
-        apart: float | None,
-    ) -> tuple[RobotState, Limiter | None]:
-        beyond, stop = self._beyond(wanted)
-        limiter, end = None, now + period
-        self.is_near_neighbour = False
-        if beyond.any():  # these joints brake, each for itself; the others go on
-            limiter = self._limit(wanted, int(np.argmax(beyond)))
-            slower = self._brake(state, period, now)
-            wanted = RobotState(
-                np.where(beyond, slower.position, wanted.position),
-                np.where(beyond, slower.velocity, wanted.velocity),
-                np.where(beyond, slower.acceleration, wanted.acceleration),
-            )
             beyond, stop = self._beyond(wanted)
-        if stop is not None and not beyond.any():
-            if clearance is None and self._may_meet(stop, end, apart):
-                clearance = 0.0  # it may have to leave its path for the other arm
-            near = self._floor.too_near(stop, end, state, now, clearance)
-            if near is None and self._neighbours is not None:
-                near = self._apart.too_near(stop, end, state, now, apart)
-                self.is_near_neighbour = near is not None
-            if near is None:
-                self._remember(stop)
-                self._announce(stop, end)
-                return wanted, limiter
-            limiter = Limiter(Cause.COLLISION, ' - '.join(near.links), near.distance, 0.0)
-            eased = self._eased(state, period, now)
-            if eased is not None:
-                return eased, limiter
-        return self._brake(state, period, now), limiter
+            limiter, end = None, now + period
+            self.is_near_neighbour = False
+            if beyond.any():  # these joints brake, each for itself; the others go on
+                limiter = self._limit(wanted, int(np.argmax(beyond)))
+                slower = self._brake(state, period, now)
+                wanted = RobotState(
+                    np.where(beyond, slower.position, wanted.position),
+                    np.where(beyond, slower.velocity, wanted.velocity),
+                    np.where(beyond, slower.acceleration, wanted.acceleration),
+                )
+                beyond, stop = self._beyond(wanted)
+            if stop is not None and not beyond.any():
+                if clearance is None and self._may_meet(stop, end, apart):
+                    clearance = 0.0  # it may have to leave its path for the other arm
+                near = self._floor.too_near(stop, end, state, now, clearance)
+                if near is None and self._neighbours is not None:
+                    near = self._apart.too_near(stop, end, state, now, apart)
+                    self.is_near_neighbour = near is not None
+                if near is None:
+                    self._remember(stop)
+                    self._announce(stop, end)
+                    return wanted, limiter
+                limiter = Limiter(Cause.COLLISION, ' - '.join(near.links), near.distance, 0.0)
+                eased = self._eased(state, period, now)
+                if eased is not None:
+                    return eased, limiter
+            return self._brake(state, period, now), limiter
 
     def _may_meet(self, stop: Plan, begin: float, apart: float | None) -> bool:
         """Whether another arm may soon be in the way of a stop."""
@@ -398,7 +386,8 @@ class MovingArms:
         joints = scene.kinematics.joints
         self._columns = [np.array([joints.index(name) for name in g]) for g in self._groups]
         self._clearances = Clearances(scene)
-        self._stops: list[_Stop | None] = [None for _ in models]
+        # how each would come to rest; None while that is not known
+        self.stops: list[_Stop | None] = [None for _ in models]
 
     def neighbours(self, joints: Sequence[str]) -> Neighbours:
         """Return the other arms as one of them sees them."""
@@ -429,13 +418,9 @@ class MovingArms:
             self._clearances = clearances
             self.version += 1
 
-    def put(self, number: int, stop: _Stop | None) -> None:
-        """Publish to the others how an arm would come to rest; None while that is unknown."""
-        self._stops[number] = stop
-
     def least(self, number: int, plan: Plan, begin: float, within: float) -> LeastClearance:
         """Return the least distance of an arm that stops to the others, which stop too."""
-        stops = [*self._stops]
+        stops = [*self.stops]
         stops[number] = _Stop.of(plan, begin)
         known = [
             (columns, stop)
@@ -488,7 +473,7 @@ class MovingArms:
     def _ends(self) -> Array:
         """Return where all joints would stand in [rad]."""
         places = np.zeros(self._clearances.scene.distance_rate_bounds.shape[1])
-        for columns, stop in zip(self._columns, self._stops, strict=True):
+        for columns, stop in zip(self._columns, self.stops, strict=True):
             if stop is not None:
                 places[columns] = stop.end
         return places
@@ -512,8 +497,8 @@ class Neighbours:
 
     def stops(self, plan: Plan, begin: float) -> None:
         """Publish to the others the stop behind a step."""
-        self._arms.put(self._number, _Stop.of(plan, begin))
+        self._arms.stops[self._number] = _Stop.of(plan, begin)
 
     def stands(self, state: RobotState | None) -> None:
         """Publish to the others where the arm is while something else may move it."""
-        self._arms.put(self._number, None if state is None else _Stop(state.position))
+        self._arms.stops[self._number] = None if state is None else _Stop(state.position)

@@ -50,38 +50,6 @@ def serve_canopen(stop: threading.Event, offers: Offers) -> None:
         raise BackendError(str(error)) from error
 
 
-class BusDrives:
-    """The drives of a group under a core of their own."""
-
-    def __init__(self, master: MasterProcess, model: RobotModel, settings: CoreSettings) -> None:
-        """Build the core; nothing moves yet.
-
-        Raises:
-            ModelError: A joint has no drive, or the core cannot move such a group.
-        """
-        drives = master.bus.joints
-        if missing := [name for name in model.joints if name not in drives]:
-            raise ModelError(
-                f'{master.bus.file} has no drive {missing[0]!r}; drives have the names of the'
-                f' joints, and there are: {", ".join(drives) or "none"}'
-            )
-        self._master = master
-        self.gateway = CommandGateway(MotionCore(model, settings), start_worker())
-        self._source = DriveSource(self.gateway)
-
-    @property
-    def running(self) -> bool:
-        """Whether the cycle asks for set-points."""
-        return bool(self.gateway.snapshot.time)
-
-    def prepare(self) -> bool:
-        """Get back the drives that were taken away, for the motion that follows."""
-        is_detached = self._source.detached
-        if is_detached:
-            self._source.attach(self._master.attach)
-        return is_detached
-
-
 class CanopenMotion:
     """The nodes of a robot whose drives are on one bus."""
 
@@ -104,19 +72,14 @@ class CanopenMotion:
         main = models.arms[0]
         name, broadcasts = declare_manager(manager, main)
 
-        self._drives: list[BusDrives] = []
-
-        def on_bus(_: Node, model: RobotModel, settings: CoreSettings) -> BusDrives:
-            self._drives.append(BusDrives(self._master, model, settings))
-            return self._drives[-1]
-
-        groups = build_groups(models, name, make_node, offers, on_bus)
+        groups = build_groups(models, name, make_node, offers, self._drive)
+        self._gateways = [group.gateway for group in groups]
         SceneListener(manager, *by_check(groups))
         broadcaster = make_node('joint_state_broadcaster')
         followers = read_urdf(manager.get_parameter('robot_description').value).movable()
         self._broadcaster = JointStateBroadcaster(
             broadcaster,
-            self._drives[0].gateway,
+            self._gateways[0],
             [name for name in self._master.bus.joints if name not in main.joints],
             {each.name: each.mimic for each in followers if each.mimic is not None},
             active=broadcasts,
@@ -129,9 +92,33 @@ class CanopenMotion:
         for note in models.notes:
             manager.get_logger().warning(note)
 
+    def _drive(self, _: Node, model: RobotModel, settings: CoreSettings) -> CommandGateway:
+        """Build the core of a group over its drives; nothing moves yet.
+
+        Raises:
+            ModelError: A joint has no drive, or the core cannot move such a group.
+        """
+        bus = self._master.bus
+        if missing := [name for name in model.joints if name not in bus.joints]:
+            raise ModelError(
+                f'{bus.file} has no drive {missing[0]!r}; drives have the names of the'
+                f' joints, and there are: {", ".join(bus.joints) or "none"}'
+            )
+        gateway = CommandGateway(MotionCore(model, settings), start_worker())
+        source = DriveSource(gateway)
+
+        def get_ready() -> bool:
+            is_detached = source.detached
+            if is_detached:
+                source.attach(self._master.attach)
+            return is_detached
+
+        gateway.get_ready = get_ready
+        return gateway
+
     def _attach_first(self) -> None:
-        waiting = [drives for drives in self._drives if not drives.running]
-        for drives in waiting:
-            drives.prepare()
+        waiting = [gateway for gateway in self._gateways if not gateway.snapshot.time]
+        for gateway in waiting:
+            gateway.get_ready()
         if not waiting:  # the cycle asks for set-points
             self._manager.destroy_timer(self._attaching)

@@ -168,12 +168,11 @@ class GripperController:
         gateway: CommandGateway,
         parameters: GripperParameters,
         check_active: Callable[[], None],  # raises an ArmError where no motion may begin
-        prepare: Callable[[], object],
     ) -> None:
         """Offer them; the first only for a gripper of one joint."""
         self._node, self._gateway = node, gateway
         self._parameters = parameters
-        self._check_active, self._prepare = check_active, prepare
+        self._check_active = check_active
         self._joints = gateway.model.joints
         self._newest: MotionCommand | None = None  # of those that have begun
         self._abandoned: MotionCommand | None = None  # drives still have its set-points
@@ -204,7 +203,7 @@ class GripperController:
         if interface.asks_effort(goal.handle.request) and not self._has_warned:
             self._has_warned = True
             self._node.get_logger().warning(NO_EFFORT_LIMIT)
-        return self._gateway.request(request, self._prepare, goal.number)
+        return self._gateway.request(request, goal.number)
 
     def _watch(self) -> None:
         for interface, goals in self._servers:
@@ -261,7 +260,8 @@ class GripperController:
             limits = self._gateway.model.limits
             there = np.clip(measured.position, limits.lower, limits.upper)
             self._gateway.request(
-                TargetRequest(dict(zip(self._joints, there.tolist(), strict=True)))
+                TargetRequest(dict(zip(self._joints, there.tolist(), strict=True))),
+                takes_drives=False,
             )
 
     def _look(self, goal: _Goal, measured: RobotState) -> GripperState:

@@ -10,8 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Protocol
 
 from rclpy.node import Node
 
@@ -22,7 +20,6 @@ from node_runner import ParameterReader, refuse_misspelt
 from ..controllers.controller import Source
 from ..core.gateway import CommandGateway
 from ..core.preparation import CoreSettings
-from ..core.requests import StopRequest
 from .controller_manager import Controller
 from .gripper import declare_gripper, GripperController
 from .servo import Servo
@@ -41,23 +38,7 @@ class Offers:
     trajectories: bool = True  # the trajectory controller
 
 
-class Drives(Protocol):
-    """The drives of a group under a core of their own."""
-
-    @property
-    def gateway(self) -> CommandGateway:
-        """Commands to the core."""
-
-    def prepare(self) -> bool:
-        """Get back drives that were taken away, for the motion that follows.
-
-        Returns:
-            Whether there were any.
-        """
-        ...
-
-
-MakeDrives = Callable[[Node, RobotModel, CoreSettings], Drives]
+MakeGateway = Callable[[Node, RobotModel, CoreSettings], CommandGateway]
 """Builds the core of a group over its drives; its first node may say how."""
 
 MakeNode = Callable[[str], Node]  # makes the node of a name
@@ -83,7 +64,7 @@ class MovedGroup:
 
 
 def build_arm(
-    model: RobotModel, controller: Node | None, servo: Node | None, make_drives: MakeDrives
+    model: RobotModel, controller: Node | None, servo: Node | None, make_gateway: MakeGateway
 ) -> MovedGroup:
     """Offer a trajectory controller and a servo, or one of both.
 
@@ -111,16 +92,16 @@ def build_arm(
         default.clearance if jogging is None else jogging.clearance,
         check_self_collision=check,
     )
-    drives = make_drives(nodes[0], model, settings)
+    gateway = make_gateway(nodes[0], model, settings)
     if servo is not None and jogging is not None:
-        Servo(servo, drives.gateway, jogging, drives.prepare)
+        Servo(servo, gateway, jogging)
     if controller is None or trajectory is None:
-        return MovedGroup(nodes, drives.gateway, None)
-    following = TrajectoryController(controller, drives.gateway, trajectory, drives.prepare)
-    return MovedGroup(nodes, drives.gateway, following.set_active)
+        return MovedGroup(nodes, gateway, None)
+    following = TrajectoryController(controller, gateway, trajectory)
+    return MovedGroup(nodes, gateway, following.set_active)
 
 
-def build_tool(model: RobotModel, node: Node, make_drives: MakeDrives) -> MovedGroup:
+def build_tool(model: RobotModel, node: Node, make_gateway: MakeGateway) -> MovedGroup:
     """Offer a gripper and a trajectory controller of an end effector on one node.
 
     Its links may touch, as a gripper holds something, unless ``check_self_collision`` is set.
@@ -134,25 +115,16 @@ def build_tool(model: RobotModel, node: Node, make_drives: MakeDrives) -> MovedG
     settings = CoreSettings(
         execution=trajectory.execution, clearance=None, check_self_collision=trajectory.check
     )
-    drives = make_drives(node, model, settings)
-    gateway, prepare = drives.gateway, drives.prepare
-    controller = TrajectoryController(node, gateway, trajectory, prepare)
-    GripperController(node, gateway, gripper, controller.check_active, prepare)
-    set_active = partial(set_tool_active, controller, gateway)
-    return MovedGroup((node,), gateway, set_active, is_checked=trajectory.check)
-
-
-def set_tool_active(
-    controller: TrajectoryController, gateway: CommandGateway, active: bool
-) -> None:
-    """Accept trajectories and gripper goals, or come to rest and accept none."""
-    controller.set_active(active)
-    if not active:
-        gateway.command(StopRequest('the controller was deactivated', (Source.TARGET,)))
+    gateway = make_gateway(node, model, settings)
+    controller = TrajectoryController(
+        node, gateway, trajectory, (Source.TRAJECTORY, Source.TARGET)
+    )
+    GripperController(node, gateway, gripper, controller.check_active)
+    return MovedGroup((node,), gateway, controller.set_active, is_checked=trajectory.check)
 
 
 def build_groups(
-    models: GroupModels, main: str, make_node: MakeNode, offers: Offers, make_drives: MakeDrives
+    models: GroupModels, main: str, make_node: MakeNode, offers: Offers, make_gateway: MakeGateway
 ) -> list[MovedGroup]:
     """Make the nodes and cores of all groups, the main arm first; nothing moves yet.
 
@@ -177,13 +149,13 @@ def build_groups(
         jogging = make_node(servo) if offers.jogging else None
         if jogging is not None:
             same_robot(jogging, model)
-        return build_arm(model, trajectories, jogging, make_drives)
+        return build_arm(model, trajectories, jogging, make_gateway)
 
     return [
         arm(first, main, 'servo_node'),
         *(arm(each, f'{each.group}_controller', f'{each.group}_servo_node') for each in others),
         *(
-            build_tool(each, make_node(f'{each.group}_controller'), make_drives)
+            build_tool(each, make_node(f'{each.group}_controller'), make_gateway)
             for each in models.tools
         ),
     ]

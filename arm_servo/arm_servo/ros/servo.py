@@ -93,88 +93,21 @@ Convert = Callable[[Any, float], JogRequest | DisplacementRequest]
 MAX_STAMP_AHEAD = 0.1  # how far ahead of this clock a stamp may be in [s]
 
 
-class ServoModes:
-    """Says which commands are admitted.
+class Servo:
+    """``~/delta_twist_cmds``, ``~/delta_joint_cmds``, ``~/pose_target_cmds``, and services.
 
     Until a client chooses a type, every command is taken for what it is.
     """
-
-    def __init__(self, node: Node, stop: Callable[[str], None], renew: Callable[[], None]) -> None:
-        self.paused = ''  # why the servo takes no commands; empty when it does
-        self._stop_jogging = stop  # brings jogging to rest, for a reason
-        self._renew = renew  # takes what comes from now on for a new jog
-        self._kind: CommandType | None = None
-        node.create_service(ServoCommandType, '~/switch_command_type', self._switch)
-        node.create_service(SetBool, '~/pause_servo', self._pause)
-        for name, act in (
-            ('~/start_servo', self._resume),
-            ('~/unpause_servo', self._resume),
-            ('~/stop_servo', self._hold),
-        ):
-            node.create_service(Trigger, name, partial(self._answer, act))
-        node.create_service(Empty, '~/reset_servo_status', self._reset)
-
-    def admit(self, kind: CommandType) -> None:
-        """Check whether a command is taken.
-
-        Raises:
-            CommandError: The servo is paused, or another type was chosen.
-        """
-        if self.paused:
-            raise CommandError(self.paused)
-        if self._kind not in {None, kind}:
-            chosen = self._kind.name if self._kind is not None else ''
-            raise CommandError(
-                f'a {kind.name} command, but {chosen} was chosen; call ~/switch_command_type with'
-                f' command_type {int(kind)}'
-            )
-
-    def _switch(
-        self, request: ServoCommandType.Request, response: ServoCommandType.Response
-    ) -> ServoCommandType.Response:
-        try:
-            self._kind = CommandType(request.command_type)
-        except ValueError:
-            return response  # success is false
-        self._renew()
-        response.success = True
-        return response
-
-    def _pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        return self._answer(self._hold if request.data else self._resume, request, response)
-
-    def _answer(self, act: Callable[[], str], _: object, response: Any) -> Any:  # noqa: ANN401
-        response.success, response.message = True, act()
-        return response
-
-    def _reset(self, _: Empty.Request, response: Empty.Response) -> Empty.Response:
-        self._kind = None
-        return response
-
-    def _hold(self) -> str:
-        self.paused = 'the servo is paused; call ~/pause_servo with data: false'
-        self._stop_jogging('the servo was paused')
-        return 'paused; jogging comes to rest, trajectories go on'
-
-    def _resume(self) -> str:
-        self.paused = ''
-        self._renew()
-        return 'takes commands'
-
-
-class Servo:
-    """``~/delta_twist_cmds``, ``~/delta_joint_cmds``, ``~/pose_target_cmds``, and services."""
 
     def __init__(
         self,
         node: Node,
         gateway: CommandGateway,
         parameters: ServoParameters,
-        prepare: Callable[[], object],
     ) -> None:
-        self._node, self._gateway, self._prepare = node, gateway, prepare
-        self._parameters = parameters
-        self._modes = ServoModes(node, self._stop, lambda: gateway.renew(Source.JOG))
+        self._node, self._gateway, self._parameters = node, gateway, parameters
+        self._paused = ''  # why the servo takes no commands; empty when it does
+        self._kind: CommandType | None = None  # the chosen type of commands
         model = gateway.model
         frames = TfListener(
             node,
@@ -192,15 +125,53 @@ class Servo:
             (CommandType.POSE, PoseStamped, parameters.pose_topic, self.converter.pose),
         ):
             node.create_subscription(message, topic, partial(self._take, kind, convert), 10)
+        node.create_service(ServoCommandType, '~/switch_command_type', self._switch)
+        node.create_service(SetBool, '~/pause_servo', self._pause)
+        for name, act in (
+            ('~/start_servo', self._resume),
+            ('~/unpause_servo', self._resume),
+            ('~/stop_servo', self._hold),
+        ):
+            node.create_service(Trigger, name, partial(self._answer, act))
+        node.create_service(Empty, '~/reset_servo_status', self._reset)
         node.add_on_set_parameters_callback(self._check_scales)
         node.add_post_set_parameters_callback(self._rescale)
         node.create_timer(1.0 / parameters.status_rate, self._publish_status)
 
+    def _switch(
+        self, request: ServoCommandType.Request, response: ServoCommandType.Response
+    ) -> ServoCommandType.Response:
+        with suppress(ValueError):
+            self._kind = CommandType(request.command_type)
+            self._gateway.renew(Source.JOG)
+            response.success = True
+        return response
+
+    def _pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        return self._answer(self._hold if request.data else self._resume, request, response)
+
+    def _answer(self, act: Callable[[], str], _: object, response: Any) -> Any:  # noqa: ANN401
+        response.success, response.message = True, act()
+        return response
+
+    def _reset(self, _: Empty.Request, response: Empty.Response) -> Empty.Response:
+        self._kind = None
+        return response
+
+    def _hold(self) -> str:
+        self._paused = 'the servo is paused; call ~/pause_servo with data: false'
+        self._gateway.command(StopRequest('the servo was paused', JOGGING))
+        return 'paused; jogging comes to rest, trajectories go on'
+
+    def _resume(self) -> str:
+        self._paused = ''
+        self._gateway.renew(Source.JOG)
+        return 'takes commands'
+
     def _take(self, kind: CommandType, convert: Convert, message: Any) -> None:  # noqa: ANN401  # messages have no type
         begin = time.monotonic()
         try:
-            age = self._checked_age(message)
-            self._modes.admit(kind)
+            age = self._admitted(kind, message)
             request = convert(message, begin - age)
             self._send(request, (kind, message.header.frame_id))
         except ArmError as error:
@@ -214,22 +185,28 @@ class Servo:
     def _send(
         self, request: JogRequest | DisplacementRequest, client: tuple[CommandType, str]
     ) -> None:
-        """Command a motion, which gets back drives that others have."""
+        """Command a motion."""
         # the events executor hands out no publisher, so topic and frame stand for the client
         note = partial(self._note, time.monotonic())
-        get_ready = (lambda: None) if request.is_zero else self._prepare
         if isinstance(request, JogRequest):
             request = replace(request, client=client)
-            self._gateway.command(request, get_ready).add_done_callback(note)
+            self._gateway.command(request).add_done_callback(note)
             return
         # a stream of displacements is held like a jog
         self._gateway.stream(Source.JOG, client, is_zero=request.is_zero)
-        command = self._gateway.request(request, get_ready, stream=client)
+        command = self._gateway.request(request, stream=client)
         command.future.add_done_callback(note)
         command.ended.add_done_callback(self._note_end)
 
-    def _checked_age(self, message: Any) -> float:  # noqa: ANN401
+    def _admitted(self, kind: CommandType, message: Any) -> float:  # noqa: ANN401
         """Return how long ago a message was sent in [s]."""
+        if self._paused:
+            raise CommandError(self._paused)
+        if self._kind is not None and self._kind is not kind:
+            raise CommandError(
+                f'a {kind.name} command, but {self._kind.name} was chosen; call'
+                f' ~/switch_command_type with command_type {int(kind)}'
+            )
         stamp = seconds(message.header.stamp)
         if not stamp:  # as good as now
             return 0.0
@@ -261,9 +238,6 @@ class Servo:
     def _refuse(self, reason: str) -> None:
         self._refusals.note(reason, time.monotonic())
 
-    def _stop(self, reason: str) -> None:
-        self._gateway.command(StopRequest(reason, JOGGING))
-
     def _check_scales(self, parameters: list[Parameter]) -> SetParametersResult:
         for parameter in parameters:
             known = sorted(unit.value for unit in Units)
@@ -281,7 +255,7 @@ class Servo:
         code, words = status_of(
             snapshot,
             self._refusals.fresh(now),
-            self._modes.paused,
+            self._paused,
             self.converter.capped,
             now - snapshot.time,
         )

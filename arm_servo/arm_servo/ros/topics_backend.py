@@ -110,12 +110,12 @@ def build_motion(make_node: MakeNode, offers: Offers) -> Sequence[MotionThread]:
 
     drives: list[TopicDrives] = []
 
-    def make_drives(node: Node, model: RobotModel, settings: CoreSettings) -> TopicDrives:
+    def make_gateway(node: Node, model: RobotModel, settings: CoreSettings) -> CommandGateway:
         topic = ARRAY_TOPIC if model is main else f'{model.group}_{ARRAY_TOPIC}'
         drives.append(TopicDrives(node, model, settings, output=(topic, ARRAY)))
-        return drives[-1]
+        return drives[-1].gateway
 
-    groups = build_groups(models, name, make_node, offers, make_drives)
+    groups = build_groups(models, name, make_node, offers, make_gateway)
     checked, unchecked = by_check(groups)
     SceneListener(manager, checked, unchecked, joint_topic=drives[0].joint_topic)
     entries = [entry for group in groups for entry in group.entries(drives[0].period)]
@@ -134,12 +134,12 @@ def _beside_a_controller(servo: Node) -> MotionThread:
 
     drives: list[TopicDrives] = []
 
-    def make_drives(node: Node, model: RobotModel, settings: CoreSettings) -> TopicDrives:
+    def make_gateway(node: Node, model: RobotModel, settings: CoreSettings) -> CommandGateway:
         output = (topic, TRAJECTORY)
         drives.append(TopicDrives(node, model, settings, prefix=PREFIX, output=output))
-        return drives[-1]
+        return drives[-1].gateway
 
-    build_arm(model, None, servo, make_drives)
+    build_arm(model, None, servo, make_gateway)
     SceneListener(servo, [drives[0].gateway], joint_topic=drives[0].joint_topic)
     watch_other_programs([servo], [drives[0].topic])
     return drives[0].thread
@@ -173,10 +173,6 @@ class TopicDrives:
         watch = FollowingWatch(model.limits, loop.following, loop.period)
         cycle = MotionCycle(self.gateway, feedback, publish, watch)
         self.thread = MotionThread(cycle, loop.period, begin)  # steps the core; not started yet
-
-    def prepare(self) -> bool:
-        """Return that nothing was got back: the drives stay with their client."""
-        return False
 
 
 TRAJECTORY = 'trajectory_msgs/JointTrajectory'

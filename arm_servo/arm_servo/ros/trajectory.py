@@ -27,7 +27,7 @@ from trajectory_msgs.msg import JointTrajectory
 
 from arm_model import ArmError
 from arm_model.ros import seconds
-from arm_trajectory import GoalCode, TrajectoryGoal
+from arm_trajectory import GoalCode
 from node_runner import LATCHED
 from node_runner.action_goals import Ending
 
@@ -182,14 +182,10 @@ class TrajectoryController:
         node: Node,
         gateway: CommandGateway,
         parameters: TrajectoryParameters,
-        prepare: Callable[[], bool],
+        sources: tuple[Source, ...] = (Source.TRAJECTORY,),  # what ends when it is deactivated
     ) -> None:
         self.active = True
-        self._node = node
-        self._gateway = gateway
-        self._parameters = parameters
-        self._prepare = prepare
-        self._execution: Execution | None = None
+        self._node, self._gateway, self._sources = node, gateway, sources
         self._news: deque[str] = deque()
         self._logged = LoggedReasons()
         self._state = node.create_publisher(
@@ -220,30 +216,16 @@ class TrajectoryController:
         if active:
             self._gateway.renew(Source.TRAJECTORY)
         else:
-            self._stop('the controller was deactivated')
+            self._gateway.command(StopRequest('the controller was deactivated', self._sources))
 
     @property
     def _now(self) -> float:
         return float(self._node.get_clock().now().nanoseconds) * 1e-9
 
     def _follow(self, request: Any, number: int) -> MotionCommand:  # noqa: ANN401  # goals have no type
-        goal = goal_of_action(request, self._now, self._parameters)
-        return self._request(goal, self._prepare, number)
-
-    def _request(
-        self,
-        goal: TrajectoryGoal,
-        get_ready: Callable[[], object],
-        number: int | None = None,
-        stream: str | None = None,
-    ) -> MotionCommand:
+        goal = goal_of_action(request, self._now)
         self.check_active()
-        command = self._gateway.request(goal, get_ready, number, stream)
-        command.future.add_done_callback(self._remember)
-        return command
-
-    def _stop(self, reason: str) -> None:
-        self._gateway.command(StopRequest(reason, (Source.TRAJECTORY,)))
+        return self._gateway.request(goal, number)
 
     def check_active(self) -> None:
         """Make sure that it is active.
@@ -255,22 +237,16 @@ class TrajectoryController:
             name = self._node.get_name()
             raise NotReadyError(f'{name} is inactive; activate it with switch_controller')
 
-    def _remember(self, future: Future[Execution | None]) -> None:
-        if not future.cancelled() and future.exception() is None:
-            self._execution = future.result()
-
     def _take(self, message: JointTrajectory) -> None:
         if not message.joint_names and not message.points:
-            self._stop('an empty trajectory came')
+            self._gateway.command(StopRequest('an empty trajectory came', (Source.TRAJECTORY,)))
             self._gateway.renew(Source.TRAJECTORY)
             return
         try:
             self._gateway.stream(Source.TRAJECTORY, TOPIC)
-            goal = goal_of_trajectory(message, self._now, self._parameters)
-            get_ready = partial(
-                self._gateway.get_ready_for, Source.TRAJECTORY, TOPIC, self._prepare
-            )
-            command = self._request(goal, get_ready, stream=TOPIC)
+            goal = goal_of_trajectory(message, self._now)
+            self.check_active()
+            command = self._gateway.request(goal, stream=TOPIC)
         except ArmError as error:
             self._news.append(f'trajectory refused: {error}')
             return
@@ -292,15 +268,15 @@ class TrajectoryController:
     def _query(
         self, request: QueryTrajectoryState.Request, response: QueryTrajectoryState.Response
     ) -> QueryTrajectoryState.Response:
-        snapshot, execution = self._gateway.snapshot, self._execution
+        snapshot = self._gateway.snapshot
         state = snapshot.reference
         response.message = snapshot.stale(time.monotonic() - snapshot.time)
         if state is None or response.message:
             response.message = response.message or snapshot.blocked
             return response
         ahead = seconds(request.time) - self._now if seconds(request.time) else 0.0
-        if snapshot.source is Source.TRAJECTORY and execution is not None:
-            state = execution.foreseen(ahead)
+        if snapshot.source is Source.TRAJECTORY and snapshot.execution is not None:
+            state = snapshot.execution.foreseen(ahead)
         response.success = True
         response.message = 'paused; ~/resume goes on' if snapshot.paused else ''
         response.name = list(self._gateway.model.joints)

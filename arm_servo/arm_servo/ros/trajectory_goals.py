@@ -7,8 +7,8 @@ Trajectories, tolerances and states are converted between ROS messages and the c
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rclpy.node import Node
@@ -17,7 +17,6 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 from arm_model import JointLimits, ModelError, RobotState
 from arm_model.ros import duration_fields, seconds
 from arm_trajectory import (
-    check_tolerances,
     GoalCode,
     GoalError,
     GoalPoint,
@@ -46,8 +45,6 @@ class TrajectoryParameters:
     """How the trajectory controller behaves."""
 
     execution: ExecutionSettings  # how trajectories are accepted and followed
-    path: Mapping[str, JointTolerance]  # tolerances on the way by joint; 0 is none
-    goal: Mapping[str, JointTolerance]  # tolerances at the end by joint; 0 is none
     monitor_rate: float  # rate of the action's feedback in [Hz]
     state_rate: float  # rate of ~/controller_state in [Hz]
     speed: float  # speed scaling at the start, 0 to 1
@@ -100,9 +97,7 @@ def declare_trajectory(
         'time to come within the tolerances of the goal [s]; 0 waits without end',
     )
     return TrajectoryParameters(
-        ExecutionSettings(rules=rules, goal=JointTolerance(0.0, stopped), goal_time=goal_time),
-        path,
-        goal,
+        ExecutionSettings(rules, path, goal, goal_time),
         read.number('action_monitor_rate', 20.0, RATE_RANGE, "rate of the action's feedback [Hz]"),
         read.number('state_publish_rate', 50.0, RATE_RANGE, 'rate of ~/controller_state [Hz]'),
         read.number(
@@ -150,7 +145,6 @@ def _declare_interfaces(read: ParameterReader) -> None:
 def goal_of_trajectory(
     message: Any,  # noqa: ANN401  # message classes have no type
     now: float,  # ROS time in [s]
-    parameters: TrajectoryParameters,
 ) -> TrajectoryGoal:
     """Return the goal that a JointTrajectory is.
 
@@ -172,33 +166,31 @@ def goal_of_trajectory(
             for point in message.points
         ],
         age=now - stamp if stamp else 0.0,
-        path_tolerance=parameters.path,
-        goal_tolerance=parameters.goal,
     )
 
 
 def goal_of_action(
     request: Any,  # noqa: ANN401
     now: float,  # ROS time in [s]
-    parameters: TrajectoryParameters,
 ) -> TrajectoryGoal:
     """Return the goal that a goal of FollowJointTrajectory is.
 
     Raises:
-        GoalError: It has parts that nothing would follow, or tolerances of unknown joints.
+        GoalError: It has parts that nothing would follow.
     """
     if request.multi_dof_trajectory.points or request.multi_dof_trajectory.joint_names:
         raise GoalError(GoalCode.INVALID_JOINTS, 'multi_dof_trajectory: the arm has none')
     if request.component_path_tolerance or request.component_goal_tolerance:
         raise GoalError(GoalCode.INVALID_GOAL, 'component tolerances are for multi-DOF joints')
-    goal = goal_of_trajectory(request.trajectory, now, parameters)
-    return TrajectoryGoal(
-        goal.joints,
-        goal.points,
-        goal.age,
-        _overridden(parameters.path, request.path_tolerance, 'path_tolerance'),
-        _overridden(parameters.goal, request.goal_tolerance, 'goal_tolerance'),
-        seconds(request.goal_time_tolerance),
+    path, end = (
+        {each.name: JointTolerance(each.position, each.velocity) for each in tolerances}
+        for tolerances in (request.path_tolerance, request.goal_tolerance)
+    )
+    return replace(
+        goal_of_trajectory(request.trajectory, now),
+        path_tolerance=path,
+        goal_tolerance=end,
+        goal_time=seconds(request.goal_time_tolerance),
     )
 
 
@@ -221,17 +213,3 @@ def difference(limits: JointLimits, wanted: RobotState, actual: RobotState) -> R
         wanted.velocity - actual.velocity,
         0.0 * wanted.acceleration,
     )
-
-
-def _overridden(
-    defaults: Mapping[str, JointTolerance], asked: Sequence[Any], what: str
-) -> Mapping[str, JointTolerance]:
-    """Return tolerances of the parameters, overridden by those of a goal."""
-    merged = dict(defaults)
-    for tolerance in asked:
-        before = merged.get(tolerance.name, JointTolerance())
-        merged[tolerance.name] = JointTolerance(
-            tolerance.position or before.position, tolerance.velocity or before.velocity
-        )
-    check_tolerances(list(defaults), merged, what)
-    return merged
