@@ -19,7 +19,7 @@ import numpy as np
 from arm_model import Array, frozen, JointLimits, RobotState
 from arm_trajectory import GoalCode, hard_brake
 from realtime_loop import CycleTimer
-from robot_primitives import JointSample, JointStateStore
+from robot_primitives import JointSample, JointStateStore, setting
 
 from .controllers.controller import MotionReport, SetPoint, Source
 from .core.gateway import CommandGateway
@@ -40,8 +40,14 @@ ARRIVAL_TOLERANCE = 0.02
 class FollowingLimits:
     """When an arm counts as not following."""
 
-    error: float = 0.2  # how far a joint may be from where it was sent in [rad]; 0 is any distance
-    delay: float = 0.2  # how late it may be there in [s]
+    following_error_limit: float = setting(
+        0.2,
+        0.0,
+        10.0,
+        'distance of a joint from where it was sent at which the arm comes to rest [rad];'
+        ' 0 is any',
+    )
+    following_delay: float = setting(0.2, 0.0, 1.0, 'how late it may be where it was sent [s]')
 
 
 class FollowingWatch:
@@ -54,9 +60,9 @@ class FollowingWatch:
     def __init__(self, joints: JointLimits, limits: FollowingLimits, period: float) -> None:
         self._joints = joints
         self._limits = limits
-        self._commands = np.zeros((math.ceil(limits.delay / period) + 1, len(joints)))
+        self._commands = np.zeros((math.ceil(limits.following_delay / period) + 1, len(joints)))
         self._turn = 0
-        self._quiet = math.ceil(limits.delay / period)
+        self._quiet = math.ceil(limits.following_delay / period)
         self._still = 0
         self._rest = self._mean = self._last = self._commands[0]
         self._noise = np.zeros(len(joints))
@@ -114,7 +120,7 @@ class FollowingWatch:
         """Describe the joint that does not follow; empty when all do."""
         errors = self.errors(measured)
         worst = int(np.argmax(errors))
-        if not 0.0 < self._limits.error < errors[worst]:
+        if not 0.0 < self._limits.following_error_limit < errors[worst]:
             return ''
         joint = self._joints.names[worst]
         return (

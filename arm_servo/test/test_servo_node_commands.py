@@ -58,7 +58,9 @@ class Frames:
 
 def converter(scales: Scales, *, about_tip: bool = True) -> CommandConverter:
     """Return what makes commands."""
-    parameters = ServoParameters(0.1, about_tip, '', '', '', '', '', 25.0, 0.005, ServoSettings())
+    parameters = ServoParameters(
+        0.005, ServoSettings(), apply_twist_commands_about_ee_frame=about_tip
+    )
     frames: Any = Frames()
     return CommandConverter(robot('gp110'), frames, parameters, scales)
 

@@ -176,7 +176,9 @@ def test_jogging_an_arm_that_stands_still_runs_no_further_than_the_limit() -> No
     refusals = jog_elsewhere(arm, 400)
     ahead = arm.path()[:, 0] - begin[0]
     limits, speed = FollowingLimits(), 0.5
-    assert ahead.max() < limits.error + speed * limits.delay + 0.06  # the stop
+    assert (
+        ahead.max() < limits.following_error_limit + speed * limits.following_delay + 0.06
+    )  # the stop
     assert 'joint_1_s does not follow' in refusals[0]
     speeds = np.diff(arm.path(), axis=0) / PERIOD
     jumps = np.abs(np.diff(speeds, axis=0)) / PERIOD

@@ -232,9 +232,13 @@ class SafetyFilter:
 
     def _remember(self, stop: Plan) -> None:
         """Allow as much beyond the limits as the present stop needs, and no more."""
+        if self._lower is self._limits.lower and self._upper is self._limits.upper:
+            return
         lower, upper = stop.extremes
         self._lower = np.minimum(self._limits.lower, np.maximum(self._lower, lower))
         self._upper = np.maximum(self._limits.upper, np.minimum(self._upper, upper))
+        if (self._lower == self._limits.lower).all() and (self._upper == self._limits.upper).all():
+            self._lower, self._upper = self._limits.lower, self._limits.upper  # for good
 
     def _announce(self, stop: Plan, begin: float) -> None:
         """Publish to other arms how this one would come to rest now."""

@@ -21,8 +21,8 @@ from sensor_msgs.msg import JointState
 
 from arm_model import Array, CommandError, RobotState
 from arm_trajectory import GoalCode
-from node_runner import ParameterReader
 from node_runner.action_goals import Ending
+from robot_primitives import setting, switch
 
 from ..controllers.controller import CONTINUED, Outcome, refused, Source
 from ..core.gateway import CommandGateway, MotionCommand
@@ -112,29 +112,12 @@ PARALLEL = GripperInterface(
 class GripperParameters:
     """How the gripper controller behaves."""
 
-    goal_tolerance: float  # how far a joint may be off at the goal in [rad] or [m]
-    stall_velocity: float  # speed below which a joint does not move in [rad/s] or [m/s]
-    # time without motion in front of the goal after which it is stalled in [s]
-    stall_timeout: float
-    allow_stalling: bool  # whether a goal that ends stalled succeeds: something is held
-
-
-def declare_gripper(node: Node) -> GripperParameters:
-    """Declare the parameters of the gripper controller."""
-    read = ParameterReader(node)
-    return GripperParameters(
-        read.number(
-            'goal_tolerance', 0.002, (0.0, 10.0), 'how far a joint may be off [rad] or [m]'
-        ),
-        read.number(
-            'stall_velocity_threshold',
-            0.001,
-            (0.0, 10.0),
-            'speed below which a joint does not move [rad/s] or [m/s]',
-        ),
-        read.number('stall_timeout', 1.0, (0.05, 60.0), 'time without motion that is a stall [s]'),
-        read.flag('allow_stalling', 'a goal that ends stalled succeeds', default=False),
+    goal_tolerance: float = setting(0.002, 0.0, 10.0, 'how far a joint may be off [rad] or [m]')
+    stall_velocity_threshold: float = setting(
+        0.001, 0.0, 10.0, 'speed below which a joint does not move [rad/s] or [m/s]'
     )
+    stall_timeout: float = setting(1.0, 0.05, 60.0, 'time without motion that is a stall [s]')
+    allow_stalling: bool = switch(False, 'a goal that ends stalled succeeds')
 
 
 WATCH_RATE = 20.0  # rate of feedback in [Hz]
@@ -251,7 +234,7 @@ class GripperController:
         if command is not self._newest or point.source is Source.TRAJECTORY:  # another does
             self._abandoned = None
             return
-        moves = (np.abs(measured.velocity) > self._parameters.stall_velocity).any()
+        moves = (np.abs(measured.velocity) > self._parameters.stall_velocity_threshold).any()
         if point.source is not Source.NONE or point.state.moving or moves:
             return
         self._abandoned = None
@@ -267,9 +250,9 @@ class GripperController:
     def _look(self, goal: _Goal, measured: RobotState) -> GripperState:
         """Return where the gripper is, and whether it stalls or is there."""
         now, command, parameters = time.monotonic(), goal.command, self._parameters
-        moves = bool((np.abs(measured.velocity) > parameters.stall_velocity).any())
+        moves = bool((np.abs(measured.velocity) > parameters.stall_velocity_threshold).any())
         if goal.last_place is not None:  # joint states may have no velocities
-            way = parameters.stall_velocity * parameters.stall_timeout
+            way = parameters.stall_velocity_threshold * parameters.stall_timeout
             moves |= bool((np.abs(measured.position - goal.last_place) > way).any())
         if moves or goal.last_place is None or not self._is_pushed(command):
             goal.last_motion, goal.last_place = now, measured.position
@@ -288,7 +271,9 @@ class GripperController:
         point = self._gateway.snapshot.set_point
         return command.ended.done() or (
             point is not None
-            and bool((np.abs(point.state.velocity) > self._parameters.stall_velocity).any())
+            and bool(
+                (np.abs(point.state.velocity) > self._parameters.stall_velocity_threshold).any()
+            )
         )
 
     def _there(self, command: MotionCommand, measured: RobotState) -> bool:

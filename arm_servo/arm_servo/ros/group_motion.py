@@ -21,7 +21,7 @@ from ..controllers.controller import Source
 from ..core.gateway import CommandGateway
 from ..core.preparation import CoreSettings
 from .controller_manager import Controller
-from .gripper import declare_gripper, GripperController
+from .gripper import GripperController, GripperParameters
 from .servo import Servo
 from .servo_commands import declare_servo, PREFIX
 from .trajectory import TrajectoryController
@@ -111,7 +111,7 @@ def build_tool(model: RobotModel, node: Node, make_gateway: MakeGateway) -> Move
         ModelError: The core cannot move it.
     """
     trajectory = declare_trajectory(node, model.joints, checks=False)
-    gripper = declare_gripper(node)
+    gripper = ParameterReader(node).settings(GripperParameters)
     settings = CoreSettings(
         execution=trajectory.execution, clearance=None, check_self_collision=trajectory.check
     )

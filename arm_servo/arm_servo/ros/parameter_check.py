@@ -54,7 +54,7 @@ def _nodes(models: GroupModels, document: Mapping[str, Any]) -> dict[str, Declar
     from node_runner import ParameterReader
 
     from .controller_manager import declare_broadcaster, declare_manager
-    from .gripper import declare_gripper
+    from .gripper import GripperParameters
     from .servo_commands import declare_servo, PREFIX
     from .topics_backend import ARRAY, declare_loop, declare_output, TRAJECTORY
     from .trajectory_goals import declare_check, declare_trajectory
@@ -72,7 +72,7 @@ def _nodes(models: GroupModels, document: Mapping[str, Any]) -> dict[str, Declar
 
     def tool(model: RobotModel, node: Node) -> None:
         controller(model, node, checks=False)
-        declare_gripper(node)
+        ParameterReader(node).settings(GripperParameters)
 
     def servo(model: RobotModel, node: Node) -> None:
         same_robot(node, model)

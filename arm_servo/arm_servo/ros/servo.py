@@ -120,9 +120,19 @@ class Servo:
         self._refusals = Refusals()
         self._status = node.create_publisher(ServoStatus, parameters.status_topic, 10)
         for kind, message, topic, convert in (
-            (CommandType.TWIST, TwistStamped, parameters.twist_topic, self.converter.twist),
-            (CommandType.JOINT_JOG, JointJog, parameters.joint_topic, self.converter.jog),
-            (CommandType.POSE, PoseStamped, parameters.pose_topic, self.converter.pose),
+            (
+                CommandType.TWIST,
+                TwistStamped,
+                parameters.cartesian_command_in_topic,
+                self.converter.twist,
+            ),
+            (
+                CommandType.JOINT_JOG,
+                JointJog,
+                parameters.joint_command_in_topic,
+                self.converter.jog,
+            ),
+            (CommandType.POSE, PoseStamped, parameters.pose_command_in_topic, self.converter.pose),
         ):
             node.create_subscription(message, topic, partial(self._take, kind, convert), 10)
         node.create_service(ServoCommandType, '~/switch_command_type', self._switch)
@@ -211,12 +221,12 @@ class Servo:
         if not stamp:  # as good as now
             return 0.0
         age = float(self._node.get_clock().now().nanoseconds) * 1e-9 - stamp
-        if age > self._parameters.timeout:
+        timeout = self._parameters.incoming_command_timeout
+        if age > timeout:
             raise NotReadyError(
-                f'stale: {age:.2f} s old when it was read, and a command counts for '
-                f'{self._parameters.timeout:g} s (incoming_command_timeout): sender or this '
-                'computer is too busy, or clocks of two computers differ; a stamp of 0 counts as '
-                'now'
+                f'stale: {age:.2f} s old when it was read, and a command counts for {timeout:g} s'
+                ' (incoming_command_timeout): sender or this computer is too busy, or clocks of'
+                ' two computers differ; a stamp of 0 counts as now'
             )
         if age < -MAX_STAMP_AHEAD:
             raise NotReadyError(f'stamped {-age:.2f} s in the future: are the clocks in step?')

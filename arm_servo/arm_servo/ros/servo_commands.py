@@ -24,6 +24,7 @@ from arm_model import (
 )
 from arm_model.ros import TfListener, xyz, xyzw
 from node_runner import ParameterReader
+from robot_primitives import setting, switch
 
 from ..controllers.jog import JointCommand, PoseCommand, ServoSettings, TwistCommand
 from ..controllers.velocity_ik import IkSettings, VelocityBoundsSettings
@@ -51,28 +52,39 @@ class Scales:
     """How numbers of commands become speeds; may be changed while the servo runs."""
 
     units: Units  # what the numbers are
-    linear: float  # factor, or cap with speed units, of the tool's speed in [m/s]; 0 is no cap
-    rotational: float  # the same of its angular speed in [rad/s]
-    joint: float  # factor of joint speeds in [rad/s]
-    override: float  # factor of all commands, 0 to 1
+    # 0 is no cap
+    linear: float = setting(
+        DEFAULT_LINEAR_SPEED, 0.0, 10.0, 'speed of the tool at 1, cap in speed units [m/s]'
+    )
+    rotational: float = setting(
+        DEFAULT_ANGULAR_SPEED, 0.0, 20.0, 'angular speed at 1, cap in speed units [rad/s]'
+    )
+    joint: float = setting(0.5, 0.0, 20.0, 'speed of a joint at 1 [rad/s]')
+    override: float = 1.0  # factor of all commands, 0 to 1
 
 
 @dataclass(frozen=True, slots=True)
 class ServoParameters:
     """How the servo behaves."""
 
-    timeout: float  # age at which a command counts no more in [s]
-    about_tip: bool  # twists of other frames turn about the tip; else about the frame's origin
-    default_frame: str  # frame of commands without one; empty is the base
-    twist_topic: str  # topic of twists
-    joint_topic: str  # topic of joint jogs
-    pose_topic: str  # topic of poses
-    status_topic: str  # topic of the status
-    status_rate: float  # its rate in [Hz]
     # least distance between links that a jog may bring about in [m]; None is any
     clearance: float | None
     settings: ServoSettings  # how the core jogs
-    frame_prefix: str = ''  # before the names of the robot's links in TF
+    incoming_command_timeout: float = setting(
+        0.1, 0.01, 10.0, 'age of a command at which the arm comes to rest [s]'
+    )
+    apply_twist_commands_about_ee_frame: bool = switch(
+        True, "twists turn about the tip; else about the origin of the command's frame"
+    )
+    robot_link_command_frame: str = switch(
+        '', 'frame of commands without one; empty is the base link'
+    )
+    cartesian_command_in_topic: str = switch('~/delta_twist_cmds', 'topic of twists')
+    joint_command_in_topic: str = switch('~/delta_joint_cmds', 'topic of joint jogs')
+    pose_command_in_topic: str = switch('~/pose_target_cmds', 'topic of poses')
+    status_topic: str = switch('~/status', 'topic of the status')
+    status_rate: float = setting(25.0, 1.0, 500.0, 'rate of the status [Hz]')
+    frame_prefix: str = switch('', 'what robot_state_publisher puts before frames in TF')
 
 
 def declare_servo(node: Node, model: RobotModel) -> ServoParameters:
@@ -102,29 +114,10 @@ def declare_servo(node: Node, model: RobotModel) -> ServoParameters:
         pairs=brakes.pairs if checks else 0,
         joint_margins=_joint_margins(read, model.limits),
     )
-    return ServoParameters(
-        read.number(
-            'incoming_command_timeout',
-            0.1,
-            (0.01, 10.0),
-            'age of a command at which the arm comes to rest [s]',
-        ),
-        read.flag(
-            'apply_twist_commands_about_ee_frame',
-            "twists turn about the tip; else about the origin of the command's frame",
-            default=True,
-        ),
-        read.text(
-            'robot_link_command_frame', '', 'frame of commands without one; empty is the base link'
-        ),
-        read.text('cartesian_command_in_topic', '~/delta_twist_cmds', 'topic of twists'),
-        read.text('joint_command_in_topic', '~/delta_joint_cmds', 'topic of joint jogs'),
-        read.text('pose_command_in_topic', '~/pose_target_cmds', 'topic of poses'),
-        read.text('status_topic', '~/status', 'topic of the status'),
-        read.number('status_rate', 25.0, (1.0, 500.0), 'rate of the status [Hz]'),
-        CLEARANCE_FACTOR * threshold if checks else None,
-        ServoSettings(ik=IkSettings(brakes=brakes)),
-        read.text('frame_prefix', '', 'what robot_state_publisher puts before frames in TF'),
+    return read.settings(
+        ServoParameters,
+        clearance=CLEARANCE_FACTOR * threshold if checks else None,
+        settings=ServoSettings(ik=IkSettings(brakes=brakes)),
     )
 
 
@@ -168,19 +161,7 @@ def read_scales(node: Node) -> Scales:
 def _declare_scales(node: Node) -> None:
     live = ParameterReader(node, PREFIX, fixed=False)
     live.text('command_in_type', Units.UNITLESS.value, 'unitless (-1 to 1) or speed_units')
-    live.number(
-        'scale.linear',
-        DEFAULT_LINEAR_SPEED,
-        (0.0, 10.0),
-        'speed of the tool at 1, cap in speed units [m/s]',
-    )
-    live.number(
-        'scale.rotational',
-        DEFAULT_ANGULAR_SPEED,
-        (0.0, 20.0),
-        'angular speed at 1, cap in speed units [rad/s]',
-    )
-    live.number('scale.joint', 0.5, (0.0, 20.0), 'speed of a joint at 1 [rad/s]')
+    live.settings(Scales, 'scale.', units=Units.UNITLESS)
     live.number('override_velocity_scaling_factor', 0.0, (0.0, 1.0), 'factor; 0 is none')
 
 
@@ -210,10 +191,10 @@ class CommandConverter:
         """
         twist = np.concatenate((xyz(message.twist.linear), xyz(message.twist.angular)))
         twist = self._scaled(checked(twist, 6, 'twist'))
-        expires = sent + self._parameters.timeout
-        frame = message.header.frame_id or self._parameters.default_frame
+        expires = sent + self._parameters.incoming_command_timeout
+        frame = message.header.frame_id or self._parameters.robot_link_command_frame
         link, axes, about = None, None, None
-        if frame and not self._parameters.about_tip:
+        if frame and not self._parameters.apply_twist_commands_about_ee_frame:
             about = self._place(frame)
         elif frame and (named := self._frames.link(frame)):
             link = None if named == self._model.base else named
@@ -251,7 +232,9 @@ class CommandConverter:
             speeds = {name: min(max(speed, -1.0), 1.0) for name, speed in speeds.items()}
         speeds = {name: factor * speed for name, speed in speeds.items()}
         command = JointCommand(*by_joint(self._model, speeds, 'velocities'))
-        return JogRequest(command, sent + (message.duration or self._parameters.timeout))
+        return JogRequest(
+            command, sent + (message.duration or self._parameters.incoming_command_timeout)
+        )
 
     def pose(self, message: Any, sent: float) -> JogRequest:  # noqa: ANN401
         """Return the request of a PoseStamped.
@@ -261,7 +244,7 @@ class CommandConverter:
         """
         position = checked(xyz(message.pose.position), 3, 'position')
         goal = Pose(rotation_of(xyzw(message.pose.orientation)), position)
-        frame = message.header.frame_id or self._parameters.default_frame
+        frame = message.header.frame_id or self._parameters.robot_link_command_frame
         self.capped = ''
         scales = self.scales
         command = PoseCommand(
@@ -269,7 +252,7 @@ class CommandConverter:
             scales.override * (scales.linear or DEFAULT_LINEAR_SPEED),
             scales.override * (scales.rotational or DEFAULT_ANGULAR_SPEED),
         )
-        expires = sent + self._parameters.timeout
+        expires = sent + self._parameters.incoming_command_timeout
         return JogRequest(command, expires, self._place(frame) if frame else None)
 
     def _place(self, frame: str) -> str | Pose:

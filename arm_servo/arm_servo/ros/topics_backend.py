@@ -30,6 +30,7 @@ from node_runner import (
     settle_process_memory,
     spin,
 )
+from robot_primitives import setting, switch
 
 from ..controllers.controller import SetPoint
 from ..core.gateway import CommandGateway, start_worker
@@ -159,20 +160,25 @@ class TopicDrives:
     ) -> None:
         loop, wanted = declare_loop(node, prefix), declare_output(node, prefix, *output)
         self.gateway = CommandGateway(MotionCore(model, settings), start_worker())
-        self.period, self.topic, self.joint_topic = loop.period, wanted.topic, loop.joint_topic
-        feedback = JointFeedback(model.joints, loop.joint_timeout)
+        self.period, self.topic, self.joint_topic = (
+            loop.publish_period,
+            wanted.topic,
+            loop.joint_topic,
+        )
+        feedback = JointFeedback(model.joints, loop.joint_state_timeout)
 
         def receive(message: JointState) -> None:
             feedback.receive(message.name, message.position, message.velocity, time.monotonic())
 
         def begin() -> None:
-            raise_thread_priority(node, loop.priority, 'the motion loop')
+            raise_thread_priority(node, loop.thread_priority, 'the motion loop')
 
         node.create_subscription(JointState, loop.joint_topic, receive, 10)
-        publish = TopicOutput(node, wanted, list(model.joints), loop.period)
-        watch = FollowingWatch(model.limits, loop.following, loop.period)
+        publish = TopicOutput(node, wanted, list(model.joints), loop.publish_period)
+        watch = FollowingWatch(model.limits, loop.following, loop.publish_period)
         cycle = MotionCycle(self.gateway, feedback, publish, watch)
-        self.thread = MotionThread(cycle, loop.period, begin)  # steps the core; not started yet
+        # steps the core; not started yet
+        self.thread = MotionThread(cycle, loop.publish_period, begin)
 
 
 TRAJECTORY = 'trajectory_msgs/JointTrajectory'
@@ -224,38 +230,22 @@ def declare_output(node: Node, prefix: str, topic: str, kind: str) -> OutputPara
 class LoopParameters:
     """How the loop runs."""
 
-    period: float  # its period in [s]
-    joint_topic: str  # topic of the joint states
-    joint_timeout: float  # age at which a joint state counts no more in [s]
-    priority: int  # SCHED_FIFO priority of its thread; 0 is none
+    thread_priority: int  # SCHED_FIFO priority of its thread; 0 is none
     following: FollowingLimits  # when the arm counts as not following
+    publish_period: float = setting(0.01, 0.001, 0.1, 'period of the loop [s]')
+    joint_topic: str = switch('joint_states', 'topic of the joint states')
+    joint_state_timeout: float = setting(
+        0.5, 0.02, 10.0, 'silence of a joint at which the arm comes to rest [s]'
+    )
 
 
 def declare_loop(node: Node, prefix: str) -> LoopParameters:
     """Declare how the loop runs."""
     read = ParameterReader(node, prefix)
-    return LoopParameters(
-        read.number('publish_period', 0.01, (0.001, 0.1), 'period of the loop [s]'),
-        read.text('joint_topic', 'joint_states', 'topic of the joint states'),
-        read.number(
-            'joint_state_timeout',
-            0.5,
-            (0.02, 10.0),
-            'silence of a joint at which the arm comes to rest [s]',
-        ),
-        declare_thread_priority(read, THREAD_PRIORITY),
-        FollowingLimits(
-            read.number(
-                'following_error_limit',
-                0.2,
-                (0.0, 10.0),
-                'distance of a joint from where it was sent at which the arm comes to rest [rad];'
-                ' 0 is any',
-            ),
-            read.number(
-                'following_delay', 0.2, (0.0, 1.0), 'how late it may be where it was sent [s]'
-            ),
-        ),
+    return read.settings(
+        LoopParameters,
+        thread_priority=declare_thread_priority(read, THREAD_PRIORITY),
+        following=read.settings(FollowingLimits),
     )
 
 
