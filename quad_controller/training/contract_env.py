@@ -16,7 +16,8 @@ import gymnasium
 from gymnasium import spaces
 import numpy as np
 
-from quad_controller import PolicyOptions, Velocity
+from quad_controller import GaitParameters, PolicyOptions, Velocity
+from quad_controller.gait.velocity import REST
 from quad_controller.policy.contract.document import ContractDocument, document_of
 from quad_controller.policy.contract.mjlab import read_metadata
 from quad_controller.policy.contract.model import PolicyContract, Source
@@ -32,6 +33,7 @@ from quad_sim import ServoModel, Terrain
 from quad_sim.env import Randomization, WalkingEnv
 
 PERIOD = 0.02  # [s]
+LIMITS = GaitParameters().velocity_limits  # that the controller keeps for every policy
 V1_SHARE = 0.5  # of the episodes that go through the bytes of protocol v1; the others are v2's
 TIMESTEP = 0.004  # [s] of the physics
 ROUGH = Terrain(roughness=0.02, seed=2)  # the highest bumps that are practised on
@@ -115,6 +117,7 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
         start = tuple(self.simulation.robot.joint_targets.tolist())
         self._runner.reset(start)
         self._limiter.start(start)
+        self._velocity = REST
         self._bytes.reset()
         self._attitude_rate = AttitudeRate(EstimatorSettings().rate_cutoff)
         self._by_v1 = self.simulation.np_random.random() < V1_SHARE
@@ -127,7 +130,7 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
         wanted = self._runner.act(np.asarray(action, np.float32), PERIOD)
         sent = self._limiter.step(wanted, PERIOD)
         targets = np.array(self._bytes.rounded(sent) if self._by_v1 else sent, np.float32)
-        _, reward, fallen, over, info = self.simulation.step(targets - self.simulation.stand)
+        reward, fallen, over, info = self.simulation.advance(targets - self.simulation.stand)
         self._runner.advance(PERIOD)
         self._sense()
         return self._observe(), float(reward), fallen, over, info
@@ -143,7 +146,9 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
         else:
             turning = self._attitude_rate.update(state.time, imu.orientation)
             imu = ImuSample(imu.orientation, turning, imu.acceleration)
-        self.inputs = Situation(joints, imu, velocity=Velocity(*self.simulation.command))
+        wanted = LIMITS.clamp(Velocity(*self.simulation.command))
+        self._velocity = LIMITS.approach(self._velocity, wanted, PERIOD)
+        self.inputs = Situation(joints, imu, velocity=self._velocity)
 
     def _observe(self) -> Floats:
         seen: Floats = self._runner.observe(self.inputs)[0].copy()

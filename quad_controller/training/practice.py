@@ -8,11 +8,13 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from functools import partial
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 from contract_env import contract_of, PERIOD, PLANT, walking_env
 from networks import Actor, explore, Judge, layers_of, learned_in, Normaliser
 import numpy as np
+import numpy.typing as npt
 from policy_export import export
 from progress import Progress
 import skrl
@@ -32,6 +34,20 @@ FIRST_SHARE, FULL_AT = 0.3, 0.5  # of the randomization; of the time at which it
 SHARE_STEP = 0.1  # the randomization grows by
 RATE = 2e-4
 STEPS_UNKNOWN = 1_000_000_000  # skrl wants to know how many; here the clock ends it
+
+
+class Rollouts(RandomMemory):  # type: ignore[misc]
+    """Takes samples by NumPy: JAX's indexing costs as much as the learning."""
+
+    def sample_by_index(
+        self, names: list[str], *, indexes: npt.NDArray[np.intp], mini_batches: int = 1
+    ) -> list[list[Any]]:
+        """Return rows of what is remembered by these names, in so many parts."""
+        there = self.get_tensor_names()
+        whole = [np.asarray(self.get_tensor_by_name(n)) if n in there else None for n in names]
+        rows = [None if each is None else each.reshape(-1, each.shape[-1]) for each in whole]
+        parts = np.array_split(indexes, mini_batches)
+        return [[None if each is None else each[part] for each in rows] for part in parts]
 
 
 class Practice:
@@ -56,14 +72,14 @@ class Practice:
         judge.init_state_dict(role='value')
         self._agent = PPO(
             models={'policy': actor, 'value': judge},
-            memory=RandomMemory(memory_size=ROLLOUT, num_envs=envs.num_envs),
+            memory=Rollouts(memory_size=ROLLOUT, num_envs=envs.num_envs),
             observation_space=observations,
             action_space=actions,
             cfg=_settings(normaliser, curves),
         )
         self._agent.init()
         self._agent.enable_training_mode(True)
-        self._updates, self._step, self._share = 0, 0, -1.0
+        self._updates, self._step, self._share, self._begun = 0, 0, -1.0, monotonic()
         self._envs.reset(seed=seed)
         self._observed, _ = self._wrapped.reset()
 
@@ -129,9 +145,10 @@ class Practice:
             worth = float(np.mean([terms[name] for terms in ended]))
             track(f'Reward of an episode / {name}', worth)
         steps = self._step * self._envs.num_envs
+        rate = steps / (monotonic() - self._begun)
         return (
             f'reward {per_second:5.2f}/s  falls {per_minute:5.2f}/min  '
-            f'{steps / 1e6:.2f} M steps  randomized {self._share:.0%}'
+            f'{steps / 1e6:.2f} M steps, {rate:.0f}/s  randomized {self._share:.0%}'
         )
 
 

@@ -309,6 +309,10 @@ class JointBytes:
     def __init__(self, urdf: str, model: Model = Model.LITE) -> None:
         self._servos = [servo_of(joint) for joint in movable_joints(urdf)]
         self._spans = [ANGLE_SPANS[model][servo.motor] for servo in self._servos]
+        self._positions = [  # [rad] of each byte, for each joint
+            [servo.position(span.decode(byte)) for byte in range(256)]
+            for servo, span in zip(self._servos, self._spans, strict=True)
+        ]
         self.reset()
 
     def reset(self) -> None:
@@ -318,8 +322,10 @@ class JointBytes:
     def rounded(self, positions: Sequence[float]) -> tuple[float, ...]:
         """Return positions in the order of the URDF [rad] after a byte each."""
         return tuple(
-            servo.position(span.decode(span.encode(servo.angle(position))))
-            for servo, span, position in zip(self._servos, self._spans, positions, strict=True)
+            positions_of[span.encode(servo.angle(position))]
+            for servo, span, positions_of, position in zip(
+                self._servos, self._spans, self._positions, positions, strict=True
+            )
         )
 
     def read(self, positions: Sequence[float], time: float) -> JointSample:

@@ -169,7 +169,10 @@ class TargetRamp:
         Raises:
             TargetError: A name is unknown, a value is not finite, or there are too many or few.
         """
-        indices, values = self._checked(targets)
+        self.begin(*self.checked(targets), duration)
+
+    def begin(self, indices: NDArray[np.intp], values: Array, duration: float) -> None:
+        """Do what :meth:`approach` does with what :meth:`checked` returned."""
         goal = np.minimum(np.maximum(values, self._lower[indices]), self._upper[indices])
         steps = max(round(duration / self._timestep), 1)
         self._goal[indices] = goal
@@ -179,14 +182,6 @@ class TargetRamp:
             self._next_arrival = self._last_arrival = self._step + steps
         else:
             self._plan()
-
-    def check(self, targets: Targets) -> None:
-        """Refuse what :meth:`approach` would refuse, and change nothing.
-
-        Raises:
-            TargetError: A name is unknown, a value is not finite, or there are too many or few.
-        """
-        self._checked(targets)
 
     def advance(self) -> None:
         """Go one time step on."""
@@ -205,7 +200,12 @@ class TargetRamp:
         self._next_arrival = int(coming.min()) if len(coming) else self._step
         self._last_arrival = int(coming.max()) if len(coming) else self._step
 
-    def _checked(self, targets: Targets) -> tuple[NDArray[np.intp], Array]:
+    def checked(self, targets: Targets) -> tuple[NDArray[np.intp], Array]:
+        """Return indices and values of targets, and change nothing.
+
+        Raises:
+            TargetError: A name is unknown, a value is not finite, or there are too many or few.
+        """
         if isinstance(targets, Mapping):
             unknown = sorted(targets.keys() - self._index.keys())
             if unknown:
@@ -298,7 +298,7 @@ class KinematicRobot:
         Raises:
             TargetError: As :meth:`quad_sim.physics.Robot.set_targets`.
         """
-        self._ramp.check(targets)
+        self._ramp.checked(targets)
         if not isinstance(targets, Mapping):
             targets = dict(zip(self.joint_names, targets, strict=True))
         held = {name: value for name, value in targets.items() if self._on[name]}

@@ -7,7 +7,7 @@ Frames are as in REP 103, quaternions are (x, y, z, w).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 import math
 
 import numpy as np
@@ -79,11 +79,6 @@ class Noise:
     velocity: float = 0.0  # of a joint's speed [rad/s]
     encoder_step: float = 0.0  # least difference of two positions [rad]; 0 for none
 
-    @property
-    def silent(self) -> bool:
-        """Whether measurements are the truth."""
-        return not any(getattr(self, name) for name in self.__slots__)
-
 
 NONE = Noise()
 """Sensors without noise."""
@@ -101,7 +96,7 @@ BOARD = Noise(
 
 def disturb(truth: Measurement, noise: Noise, random: np.random.Generator) -> Measurement:
     """Return what noisy sensors measure of a true state."""
-    if noise.silent:
+    if noise == NONE:
         return truth
     count = len(truth.positions)
     # one draw for everything: the generator costs more than the numbers
@@ -109,14 +104,14 @@ def disturb(truth: Measurement, noise: Noise, random: np.random.Generator) -> Me
     positions: Array = truth.positions + noise.position * drawn[:count]
     velocities: Array = truth.velocities + noise.velocity * drawn[count : 2 * count]
     if noise.encoder_step:
-        positions = np.round(positions / noise.encoder_step) * noise.encoder_step
+        positions = np.rint(positions / noise.encoder_step) * noise.encoder_step
     vectors = drawn[2 * count :].tolist()
     imu = Imu(
         _scatter(truth.imu.specific_force, noise.specific_force, vectors[:3]),
         _scatter(truth.imu.angular_velocity, noise.angular_velocity, vectors[3:6]),
         _scatter(truth.imu.roll_pitch_yaw, noise.attitude, vectors[6:]),
     )
-    return replace(truth, imu=imu, positions=positions, velocities=velocities)
+    return Measurement(imu, positions, velocities, truth.torques)
 
 
 def _scatter(vector: Vector, deviation: float, drawn: list[float]) -> Vector:

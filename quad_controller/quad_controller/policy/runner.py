@@ -138,7 +138,10 @@ class PolicyRunner:
         builder.positions[own] = np.array(joints.positions)[there]
         if joints.velocities is not None:
             builder.velocities[own] = np.array(joints.velocities)[there]
-        return builder.build(replace(inputs, velocity=self._command(inputs.velocity)), imu)
+        velocity = self._command(inputs.velocity)
+        if velocity != inputs.velocity:
+            inputs = replace(inputs, velocity=velocity)
+        return builder.build(inputs, imu)
 
     def step(self, inputs: Situation, dt: float) -> PolicyStep:
         """Advance by some [s]; a slower policy is asked in one of several steps."""

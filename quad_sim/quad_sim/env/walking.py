@@ -332,6 +332,11 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
             TargetError: A number is not finite, or there are too many or few.
             SimulationError: The physics blew up.
         """
+        outcome = self.advance(action)
+        return self._observation(), *outcome
+
+    def advance(self, action: Floats) -> tuple[float, bool, bool, dict[str, Any]]:
+        """Do what :meth:`step` does, for those who observe :attr:`state` themselves."""
         speed = self._move(np.asarray(action, np.float32))
         fallen = self.robot.base_pose.tilt > MAX_TILT
         terms = self._weights.terms(self.robot, speed, self.command, self.period, fallen=fallen)
@@ -343,7 +348,7 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         if not self._is_command_lasting and self._steps % self._command_steps == 0:
             # what is seen now is judged next
             self.command = self._commands.draw(self.np_random)
-        return self._observation(), sum(terms.values()), fallen, is_over and not fallen, info
+        return sum(terms.values()), fallen, is_over and not fallen, info
 
     def vary(self, randomization: Randomization) -> None:
         """Change the ranges from the next episode on; noise stays as it was made."""
@@ -370,7 +375,7 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
             raise TargetError(
                 f'action {wanted}: give a finite number for each of {len(self.stand)} joints'
             )
-        wanted = np.clip(wanted, self._lowest, self._highest)
+        wanted = np.minimum(np.maximum(wanted, self._lowest), self._highest)
         robot, ranges, random = self.robot, self._randomization, self.np_random
         if ranges.kick_interval and random.random() < self.period / ranges.kick_interval:
             robot.kick((*random.uniform(*ranges.kick, 2).tolist(), 0.0))

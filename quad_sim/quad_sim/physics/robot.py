@@ -11,6 +11,7 @@ from typing import Final
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_description import FEET, movable_joints, Pose, pose_positions
 from quad_description.rotations import IDENTITY, multiply, normalized, Quaternion, Vector
@@ -95,6 +96,13 @@ def _follow_mimics(model: mujoco.MjModel, data: mujoco.MjData) -> None:
             data.qpos[follower] = offset + multiplier * data.qpos[leader]
 
 
+def _places(addresses: list[int]) -> slice | list[int]:
+    """Return addresses as a slice, which copies nothing, if they follow each other."""
+    first, count = addresses[0], len(addresses)
+    follows = addresses == list(range(first, first + count))
+    return slice(first, first + count) if follows else addresses
+
+
 TIMESTEP: Final = 0.002  # [s]
 STRONGEST: Final = 200.0  # [N] of a push; the robot weighs 7 N
 MAX_KICK: Final = 10.0  # [m/s] of a kick
@@ -148,16 +156,14 @@ class Robot:
         # the movable joints in the order of the URDF; all arrays have this order
         self.joint_names: Final = tuple(joint.name for joint in joints)
         self.feet: Final = FEET  # links of the feet, in the order of foot_forces
-        self._qpos = [int(self._model.joint(name).qposadr[0]) for name in self.joint_names]
-        self._qvel = [int(self._model.joint(name).dofadr[0]) for name in self.joint_names]
-        self._touch = [int(self._model.sensor(foot).adr[0]) for foot in FEET]
+        named = [self._model.joint(name) for name in self.joint_names]
+        self._qpos = _places([int(joint.qposadr[0]) for joint in named])
+        self._qvel = _places([int(joint.dofadr[0]) for joint in named])
+        self._touch = _places([int(self._model.sensor(foot).adr[0]) for foot in FEET])
         self._inertial = InertialUnit(self._model, self._data)
         self._varied = VariedModel(self._model)
         self._ramp = TargetRamp(joints, timestep, np.zeros(len(joints)))
-        self._hinges = [
-            int(self._model.joint(name).type[0]) == mujoco.mjtJoint.mjJNT_HINGE
-            for name in self.joint_names
-        ]
+        self._hinges = [int(joint.type[0]) == mujoco.mjtJoint.mjJNT_HINGE for joint in named]
         self._random = np.random.default_rng(seed)
         self.reset(pose=pose, seed=seed)
 
@@ -193,13 +199,14 @@ class Robot:
         # what the error of a joint has to exceed before its servo pulls; a jaw has no play
         free = servo.free_width + 0.5 * variation.backlash
         self._free, self._has_play = np.where(self._hinges, free, 0.0), free > 0.0
+        self._unfree = -self._free
         self._gains = self._model.actuator_gainprm.copy(), self._model.actuator_biasprm.copy()
         mujoco.mj_resetData(self._model, self._data)
         self._random = np.random.default_rng(seed)
         self._steps, self._remainder = 0, 0.0
         self._push_until: int | None = None
         # targets that servos do not have yet: with which step they come
-        self._coming: deque[tuple[int, Targets, float]] = deque()
+        self._coming: deque[tuple[int, NDArray[np.intp], Array, float]] = deque()
         start = start_positions(self.joint_names, pose or {})
         self._data.qpos[self._qpos] = start
         self._ramp.jump(start)
@@ -222,11 +229,11 @@ class Robot:
         """
         duration = self._servo.interpolation if duration is None else duration
         due = -(-(self._steps + self._delay) // self._refresh) * self._refresh
+        checked = self._ramp.checked(targets)
         if due == self._steps:
-            self._ramp.approach(targets, duration)
-            return
-        self._ramp.check(targets)
-        self._coming.append((due, targets, duration))
+            self._ramp.begin(*checked, duration)
+        else:
+            self._coming.append((due, *checked, duration))
 
     def set_torque(
         self, on: bool, joints: Iterable[str] | None = None, *, hold: bool = True
@@ -257,7 +264,7 @@ class Robot:
             ):
                 array[index] = original[index] if on else 0.0
             if switched_on:
-                place = self._data.qpos[self._qpos[index]] if hold else self._ramp.goal[index]
+                place = self._data.qpos[self._qpos][index] if hold else self._ramp.goal[index]
                 self._ramp.approach({name: float(place)}, 0.0)
 
     def torque_on(self, joint: str) -> bool:
@@ -308,9 +315,10 @@ class Robot:
         self._remainder -= count
         model, data, ramp, inertial = self._model, self._data, self._ramp, self._inertial
         for _ in range(count):
-            self._take_targets(self._steps)
+            if self._coming:
+                self._take_targets(self._steps)
             ramp.advance()
-            data.ctrl[:] = self._set_points()
+            self._set_controls(data.ctrl)
             if self._push_until is not None and self._steps >= self._push_until:
                 data.xfrc_applied[self._base] = 0.0
                 self._push_until = None
@@ -412,17 +420,19 @@ class Robot:
     def _take_targets(self, until: int) -> None:
         """Begin to approach the targets that come up to a step."""
         while self._coming and self._coming[0][0] <= until:
-            _, targets, duration = self._coming.popleft()
-            self._ramp.approach(targets, duration)
+            self._ramp.begin(*self._coming.popleft()[1:])
 
-    def _set_points(self) -> Array:
-        """Return what the servos pull to: nowhere within their free width."""
+    def _set_controls(self, controls: Array) -> None:
+        """Set what the servos pull to: nowhere within their free width."""
         values = self._ramp.values
         if not self._has_play:
-            return values
-        error = values - self._data.qpos[self._qpos]
-        pulled: Array = values - np.minimum(np.maximum(error, -self._free), self._free)
-        return pulled
+            controls[:] = values
+            return
+        # in place: this is done with every step of the physics
+        np.subtract(values, self._data.qpos[self._qpos], out=controls)
+        np.maximum(controls, self._unfree, out=controls)
+        np.minimum(controls, self._free, out=controls)
+        np.subtract(values, controls, out=controls)
 
     @property
     def _base(self) -> int:
