@@ -49,9 +49,26 @@ def test_a_varied_robot_is_the_one_that_was_made_so() -> None:
     assert settled(varied) == settled(made)
 
 
-def test_the_trunk_gets_heavier() -> None:
+FIXED = """<link name="base_link"/><joint name="floating_base" type="fixed">
+<parent link="base_link"/><child link="trunk"/></joint></robot>"""
+A1 = robot_urdf().replace('"base_link"', '"trunk"').replace('</robot>', FIXED)
+"""A trunk that is fixed to a link without shape, as that of Unitree's A1."""
+
+
+def test_a_fixed_trunk_is_the_body() -> None:
+    """The legs touch it where they touch any trunk."""
+    robots = Robot(robot_urdf(), FIRM), Robot(A1, FIRM)
+    for robot in robots:
+        robot.set_targets([-0.5, -1.5, -1.5] * 4)
+        robot.step(0.6)
+    plain, fixed = (robot.joint_positions for robot in robots)
+    assert fixed == pytest.approx(plain, abs=1e-6)
+
+
+@pytest.mark.parametrize('urdf', [robot_urdf(), A1])
+def test_the_trunk_gets_heavier(urdf: str) -> None:
     """By its own mass only; the legs carry it, and it turns more slowly."""
-    plain, heavy = Robot(robot_urdf()), Robot(robot_urdf())
+    plain, heavy = Robot(urdf), Robot(urdf)
     heavy.reset(variation=Variation(trunk_mass=2.0))
     assert plain.mass < heavy.mass < 2.0 * plain.mass
     for robot in (plain, heavy):

@@ -177,12 +177,16 @@ def _add_base(spec: mujoco.MjSpec) -> None:
 
 
 def _let_legs_collide(spec: mujoco.MjSpec) -> None:
-    for geom in _body(spec, BASE).geoms:
+    ways = [[_body(spec, foot)] for foot in FEET]
+    for way in ways:
+        while way[-1].name != BASE:
+            way.append(way[-1].parent)
+    # of some robots, the trunk is fixed to a base_link that has no shape
+    trunk = set.intersection(*({body.name for body in way} for way in ways))
+    for geom in (geom for body in ways[0] if body.name in trunk for geom in body.geoms):
         geom.conaffinity |= _LEGS
-    for foot in FEET:
-        leg = [_body(spec, foot)]
-        while leg[-1].parent.name != BASE:
-            leg.append(leg[-1].parent)
+    for way in ways:
+        leg = [body for body in way if body.name not in trunk]
         for geom in (geom for body in leg for geom in body.geoms):
             geom.contype, geom.conaffinity = _LEGS, geom.conaffinity | _LEGS
         for one, other in combinations(leg, 2):
@@ -394,13 +398,14 @@ class VariedModel:
     def __init__(self, model: mujoco.MjModel) -> None:
         """Keep what may change."""
         self._model = model
-        self._base = int(model.body(BASE).id)
+        welded = model.body_weldid == model.body_weldid[model.body(BASE).id]
+        self._trunk = np.flatnonzero(welded)
         self._ground = [
             geom for geom in range(model.ngeom) if model.geom(geom).name in {FLOOR, BUMPS}
         ]
         self._friction = float(model.geom_friction[self._ground[0], 0])
-        self._mass = float(model.body_mass[self._base])
-        self._inertia = model.body_inertia[self._base].copy()
+        self._mass = model.body_mass[self._trunk]
+        self._inertia = model.body_inertia[self._trunk]
         self._damping = model.dof_damping.copy()
         self._bumps = model.hfield_size[:, 2].copy()
         self._gains = model.actuator_gainprm.copy()
@@ -419,8 +424,8 @@ class VariedModel:
         self._present = variation
         friction = self._friction if variation.friction is None else variation.friction
         model.geom_friction[self._ground, 0] = friction
-        model.body_mass[self._base] = self._mass * variation.trunk_mass
-        model.body_inertia[self._base] = self._inertia * variation.trunk_mass
+        model.body_mass[self._trunk] = self._mass * variation.trunk_mass
+        model.body_inertia[self._trunk] = self._inertia * variation.trunk_mass
         model.dof_damping[:] = self._damping * variation.damping
         model.hfield_size[:, 2] = np.maximum(self._bumps * variation.bumps, FLATTEST)
         mujoco.mj_setConst(model, data)
