@@ -25,6 +25,7 @@ T = TypeVar('T')
 
 WINDOW = 2000  # cycles that the percentiles look back
 REPORTED_LATENESS = 0.1  # [s] lateness of a cycle that is worth a word
+IDLE_SHARE = 0.5  # of a period, in which a bus that was silent until its end is not read again
 
 OWNER = 'the CANopen master'  # of the thread, for messages
 
@@ -148,12 +149,13 @@ class NetworkThread(BusThread):
 
     def step(self) -> None:
         """Receive until something is due, and do that; SYNC comes before all else."""
-        now = self.now()
+        now, idle = self.now(), False
         if now < self._timer.deadline:
             # TPDOs that answer SYNC act together, when the last has come
             self._bus.batch = self.network.pending_pdos or 1
-            self._take(self.receive(max(0.0, self.next_due - now)))
-            now = self.now()
+            frames = self.receive(max(0.0, self.next_due - now))
+            self._take(frames)
+            now, idle = self.now(), not frames
             if now < self._timer.deadline:
                 self._log_defects(partial(self.network.advance, now))
                 self._update_when_due(now)
@@ -161,21 +163,21 @@ class NetworkThread(BusThread):
         cycle = self._timer.begin(now)
         self._log_defects(self.network.sync)
         self._statistics.record(cycle.late + self.now() - now, cycle.skipped)
-        self._begin_cycle(cycle, now)
+        idle = idle and cycle.late < IDLE_SHARE * self.period
+        self._begin_cycle(cycle, now, [] if idle else self.receive(0.0))
 
     def _serve(self) -> None:
         self.begin()
         while not self.stopping:
             self.step()
 
-    def _begin_cycle(self, cycle: Cycle, now: float) -> None:
+    def _begin_cycle(self, cycle: Cycle, now: float, frames: list[Frame]) -> None:
         """Do what follows SYNC, with what has come before it taken first.
 
         After a pause of this process, that is older than the time-outs that it would otherwise
         seem to have missed.
         """
         self._cycle_time = cycle.time
-        frames = self.receive(0.0)
         self._take([frame for frame in frames if frame.timestamp < now])
         if cycle.late > REPORTED_LATENESS:
             self._log_defects(partial(self.network.note_pause, cycle.late, now))

@@ -23,6 +23,7 @@ enum { SLOTS = 64, DATAGRAM_MAX = 384, ANCILLARY_MAX = 128, PAYLOAD_MAX = 8, STA
 enum { FIRST_PDO = 0x181, LAST_PDO = 0x57F }; /* what comes between these may wait for others */
 #define READ_AHEAD 1e-3 /* frames may arrive while a batch is read [s] */
 #define GATHERING 15e-6 /* time in which frames that are missing gather, for each of them [s] */
+#define SECONDS(time) (struct timespec){(time_t)(time), fmod(time, 1.0) * 1e9}
 #define NANO 1000000000LL
 #define SO_TIMESTAMPNS_OLD_KIND 35 /* asm-generic/socket.h */
 #define SO_RXQ_OVFL_KIND 40
@@ -177,7 +178,8 @@ static int drain(Reader *reader, int fd, int count, Record *records, uint8_t *ra
 
 /* Wait at most so long [s] until so many frames of process data are there, or another one, or the
    event of wake_fd; return the number of records, with 0x10000 for the event, or an error below 0.
-   Without a time to wait, it reads what is there. */
+   Without a time to wait, it reads what is there. Where several are expected, it sleeps before it
+   looks: waking up for each frame costs more than reading it. */
 int reader_receive(Reader *reader, int fd, int wake_fd, double timeout, int expected,
                    Record *records, uint8_t *raw) {
   int count = 0, urgent = 0, error = reader->error;
@@ -187,11 +189,18 @@ int reader_receive(Reader *reader, int fd, int wake_fd, double timeout, int expe
   double deadline = (double)clock_ns(CLOCK_MONOTONIC) * 1e-9 + timeout;
   if (expected > SLOTS) expected = SLOTS;
   for (;;) {
-    struct pollfd both[] = {{fd, POLLIN, 0}, {wake_fd, POLLIN, 0}};
     double left = fmax(0.0, deadline - (double)clock_ns(CLOCK_MONOTONIC) * 1e-9);
-    struct timespec limit = {0, 0};
-    if (isfinite(left)) limit = (struct timespec){left, (left - floor(left)) * 1e9};
-    int ready = ppoll(both, 2, isfinite(left) ? &limit : 0, 0);
+    if (expected - count > 1) {
+      double gathering = fmin(left, (expected - count) * GATHERING);
+      clock_nanosleep(CLOCK_MONOTONIC, 0, &SECONDS(gathering), 0);
+      int before = count;
+      count = drain(reader, fd, count, records, raw, &urgent);
+      if (count < 0 || urgent || count >= expected) return count;
+      if (count > before) continue; /* the others are on their way */
+      left = fmax(0.0, left - gathering);
+    }
+    struct pollfd both[] = {{fd, POLLIN, 0}, {wake_fd, POLLIN, 0}};
+    int ready = ppoll(both, 2, isfinite(left) ? &SECONDS(left) : 0, 0);
     if (ready < 0) return errno == EINTR ? count : -errno;
     if (both[1].revents) {
       eventfd_t value;
@@ -201,8 +210,5 @@ int reader_receive(Reader *reader, int fd, int wake_fd, double timeout, int expe
     if (!ready) return count;
     count = drain(reader, fd, count, records, raw, &urgent);
     if (count < 0 || urgent || count >= expected) return count;
-    /* waking up for each frame costs more than reading it */
-    left = fmin(deadline - (double)clock_ns(CLOCK_MONOTONIC) * 1e-9, (expected - count) * GATHERING);
-    if (left > 0.0) clock_nanosleep(CLOCK_MONOTONIC, 0, &(struct timespec){0, left * 1e9}, 0);
   }
 }
