@@ -45,13 +45,12 @@ class VirtualArm:
         ]
         self.net = VirtualNetwork(bus_config(*nodes))  # the network
         self.gateway = CommandGateway(core, worker, lambda: self.net.now)  # commands to the arm
-        self.gateway.get_ready = self.attach
-        self._source = DriveSource(self.gateway)
+        DriveSource(self.gateway, self._attach)
         self.net.boot()
         for name in self.joints:
             self.net.do(name, 'init')
             self.net.select(name, mode)
-        self.attach()
+        self.gateway.get_ready()
         self.net.run(0.1)
 
     @property
@@ -59,13 +58,6 @@ class VirtualArm:
         """How far the motors are from where they began in [rad]."""
         drives = [self.net.devices[name].drive for name in self.joints]
         return np.array([drive.position / SCALE for drive in drives if drive is not None])
-
-    def attach(self) -> bool:
-        """Attach the core where it is not; return whether it was not."""
-        is_detached = self._source.detached
-        if is_detached:
-            self._source.attach(self._attach)
-        return is_detached
 
     def _attach(self, source: MotionSource) -> Future[None]:
         self.net.master.attach(source)

@@ -152,7 +152,14 @@ class DriveSource:
     set-points are: at once when no drive was taken away, else when it is attached again.
     """
 
-    def __init__(self, gateway: CommandGateway) -> None:
+    def __init__(
+        self,
+        gateway: CommandGateway,
+        # attaches a source to the bus before the next cycle, and waits for nothing
+        attach: Callable[[MotionSource], Future[None]],
+    ) -> None:
+        self._attach = attach
+        gateway.get_ready = self.get_ready
         self._gateway = gateway  # it is stepped here only
         self._axes = list(gateway.model.joints)
         self._released: dict[str, Refusal | str] = dict.fromkeys(self._axes, NOT_ATTACHED)
@@ -164,25 +171,25 @@ class DriveSource:
         """Names of the drives, which are those of the joints."""
         return self._axes
 
-    @property
-    def detached(self) -> bool:
-        """Whether a drive was taken away, so that it has to be attached again; any thread."""
-        return bool(self._released)
-
-    def attach(self, attach: Callable[[MotionSource], Future[None]]) -> None:
+    def get_ready(self) -> bool:
         """Get back the drives that were taken away; any thread, and it waits for nothing.
 
-        ``attach`` attaches a source to the bus before the next cycle. When that fails, the drives
-        are away as before, and the next command tries again.
+        When that fails, the drives are away as before, and the next command tries again.
+
+        Returns:
+            Whether there were any.
         """
         before = self._released
+        if not before:
+            return False
         self._released = {}  # before, so that a drive which is taken away right after is known
 
         def finish(future: Future[None]) -> None:
             if future.cancelled() or future.exception() is not None:
                 self._released = {**before, **self._released}
 
-        attach(self).add_done_callback(finish)
+        self._attach(self).add_done_callback(finish)
+        return True
 
     def released(self, axis: str, refusal: Refusal) -> None:
         """Come to rest, and leave the drives alone until attached again.

@@ -49,7 +49,8 @@ class Drives:
         core = MotionCore(model or robot(name), settings)
         # commands to the core that moves them
         self.gateway = CommandGateway(core, worker or InlineWorker(), lambda: self.now)
-        self.source = DriveSource(self.gateway)  # the source under test
+        self.source = DriveSource(self.gateway, self._attached)  # the source under test
+        self.gateway.get_ready = lambda: False  # a test says when
         self.axes = [
             AxisFeedback(joint, True, DriveState.OPERATION_ENABLED, 8, at, 0.0, at, True)
             for joint, at in zip(
@@ -68,14 +69,7 @@ class Drives:
 
     def attach(self) -> None:
         """Give the source its drives."""
-        self.source.attach(self._attached)
-
-    def get_ready(self) -> bool:
-        """Give the source its drives if they are away; return whether they were."""
-        is_detached = self.source.detached
-        if is_detached:
-            self.attach()
-        return is_detached
+        self.source.get_ready()
 
     def following(self, cycles: int = 2) -> Drives:
         """Give the source its drives, and run some cycles."""

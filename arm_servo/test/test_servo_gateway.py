@@ -346,7 +346,7 @@ def test_a_long_goal_that_is_refused_at_rest_does_not_end_a_jog(
 def test_a_goal_that_is_refused_takes_no_drive_from_anyone(is_wrong: bool) -> None:
     """Others move the arm: it is tried from where the arm stands before they are thrown out."""
     drives = Drives().following()
-    drives.gateway.get_ready = drives.get_ready
+    drives.gateway.get_ready = drives.source.get_ready
     goal = wave(drives, 20)
     if is_wrong:
         beyond = replace(goal.points[-1], positions=[9.0] * 7)
@@ -370,7 +370,7 @@ def test_a_motion_that_a_stop_made_void_takes_no_drive_from_anyone() -> None:
     """The stop came while it was tried from where the arm stands."""
     worker = SteppedWorker()
     drives = Drives(worker=worker).following()
-    drives.gateway.get_ready = drives.get_ready
+    drives.gateway.get_ready = drives.source.get_ready
     drives.source.released(JOINT, Refusal(RefusalCause.SINGLE_TARGET))
     drives.run(3)
     before = len(drives.attachments)
@@ -385,7 +385,7 @@ def test_a_motion_that_a_stop_made_void_takes_no_drive_from_anyone() -> None:
 def test_a_motion_is_tried_from_where_the_arm_is_when_its_turn_comes() -> None:
     """The one before has got the drives back, and leads to where there is room for this one."""
     drives = Drives().following()
-    drives.gateway.get_ready = drives.get_ready
+    drives.gateway.get_ready = drives.source.get_ready
     begin = drives.path[-1][0]
     drives.source.released(JOINT, Refusal(RefusalCause.SINGLE_TARGET))
     drives.run(3)

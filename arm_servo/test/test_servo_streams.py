@@ -86,7 +86,7 @@ class Arm:
         return self.drives.axes[0].setpoint
 
     def _get_ready(self) -> bool:
-        is_detached = self.drives.get_ready()
+        is_detached = self.drives.source.get_ready()
         self.taken_back += is_detached
         return is_detached
 
@@ -273,7 +273,7 @@ class Stick:
 
     def __init__(self, client: str = 'stick') -> None:
         self.drives = Drives().following()
-        self.drives.gateway.get_ready = self.drives.get_ready
+        self.drives.gateway.get_ready = self.drives.source.get_ready
         self.client = client
         self.refusals: list[str] = []
 

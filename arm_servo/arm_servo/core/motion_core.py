@@ -125,6 +125,7 @@ class MotionCore:
         self._jogged = False  # whether the arm moves because of a jog, or out of one
         self._unchecked: Execution | None = None  # whose path is not checked in the present scene
         self._state: RobotState | None = None
+        self._rested: SetPoint | None = None  # of an arm that rests, until something moves it
         self._still = frozen(np.zeros(len(model)))
         self._sequence = 0
         self._last_change = ''
@@ -180,7 +181,7 @@ class MotionCore:
         where = checked(positions, len(self.model), 'positions')
         self._changed('the arm was moved by something else')
         self._release(reason)
-        self._state = RobotState.at_rest(where)
+        self._state, self._rested = RobotState.at_rest(where), None
         self._filter.reset(self._state)
 
     def keep_apart(self, neighbours: Neighbours) -> None:
@@ -380,6 +381,8 @@ class MotionCore:
             NotReadyError: The position of the arm is not known yet.
         """
         state, active = self.state, self._active
+        if active is None and self._rested is not None:
+            return self._rested
         arm = ArmState(state, measured or state, now, self.speed_scaling, self.paused, self._held)
         wanted = None if active is None else active.update(arm, period)
         report = MotionReport() if active is None else active.report
@@ -398,7 +401,10 @@ class MotionCore:
             self._give_up(limiter, is_at_rest=not (state.moving or after.moving))
         if active is not None and active.conclude(arm, after):
             self._release('')
-        return SetPoint(after, Source.NONE if active is None else active.source, report)
+        point = SetPoint(after, Source.NONE if active is None else active.source, report)
+        rests = active is None and limiter is None and not (state.moving or after.moving)
+        self._rested = point if rests and self._filter.is_alone else None
+        return point
 
     @property
     def _clearance(self) -> float | None:

@@ -121,6 +121,11 @@ class SafetyFilter:
         self._version = 0
         self.is_near_neighbour = False
 
+    @property
+    def is_alone(self) -> bool:
+        """Whether there are no other arms to heed, also at rest."""
+        return self._neighbours is None
+
     def keep_apart(self, neighbours: Neighbours) -> None:
         """Heed from now on how other arms move."""
         self._neighbours, self._lock = neighbours, neighbours.lock

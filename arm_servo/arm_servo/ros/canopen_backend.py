@@ -105,15 +105,7 @@ class CanopenMotion:
                 f' joints, and there are: {", ".join(bus.joints) or "none"}'
             )
         gateway = CommandGateway(MotionCore(model, settings), start_worker())
-        source = DriveSource(gateway)
-
-        def get_ready() -> bool:
-            is_detached = source.detached
-            if is_detached:
-                source.attach(self._master.attach)
-            return is_detached
-
-        gateway.get_ready = get_ready
+        DriveSource(gateway, self._master.attach)
         return gateway
 
     def _attach_first(self) -> None:
