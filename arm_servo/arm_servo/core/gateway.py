@@ -546,8 +546,9 @@ class CommandGateway:
             yield Turn.WORKER
             self._core.plan(command.request, basis)
         self._check(command.source, command.number)
-        if command.takes_drives:  # for a stream that begins, too
-            self._gate.ask(command.source, command.stream, self._clock())  # the cycle is quick
+        if command.takes_drives:
+            # a stream that begins asks first: the cycle may be quicker
+            self._gate.ask(command.source, command.stream, self._clock())
             if not self.get_ready():
                 self._gate.ask(command.source, command.stream, -math.inf)
         for _ in range(MAX_ATTEMPTS - 1):
