@@ -15,6 +15,11 @@ z, w; twists linear before angular. ``now`` and all times are on the steady cloc
 
 from __future__ import annotations
 
+import os
+
+# before numpy: a second thread of BLAS only spins at the import, and what is here is small
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+
 from .arrays import (
     Array,
     checked,

@@ -24,11 +24,15 @@ enum { MAX_GJK = 64, LEAF = 4, MAX_STACK = 256 }; /* LEAF: shapes below a node a
 #define CONVERGED 1e-5      /* gap between bounds of a distance that ends GJK [m] */
 #define CONVERGED_NEAR 1e-8 /* the same where shapes nearly touch [m] */
 #define NEAR 3e-3           /* what counts as nearly [m] */
+#ifndef LOOSE
+#define LOOSE 0.5           /* share of a distance by which a bound that will do may be lower */
+#endif
 #undef HUGE
 #define HUGE 1e300          /* more than any length */
+#define NONE -HUGE          /* stands for no distance that is to be kept */
 #define OVERLAP -1.0        /* what stands for the distance of shapes that overlap [m] */
 #define MIN_MARGIN 1e-4     /* motion within a part that is not cut any further [m] */
-#define FAR 0.01            /* with a quarter of what is asked for: a bound that will do [m] */
+#define FAR 0.01            /* a bound that will do, though it proves less of the motion [m] */
 #ifndef COARSE
 #define COARSE 0.125        /* half length of a node that is opened, by the motion in doubt */
 #endif
@@ -264,9 +268,28 @@ static double between_boxes(const double *center, const double *span, const doub
   return sum > 0.0 ? sqrt(sum) : -HUGE;
 }
 
-/* A lower bound of the distance of two shapes: at least `enough`, or exact but for CONVERGED.
+/* A lower bound of the distance of the boxes about two shapes, by the gap along their axes. */
+static double between_turned(const Shape *a, const Shape *b, const double *b_in_a) {
+  double apart[3], back[3], most = -HUGE;
+  turn(b_in_a, b->middle, apart);
+  for (int i = 0; i < 3; i++) apart[i] += b_in_a[9 + i] - a->middle[i];
+  turn_back(b_in_a, apart, back);
+  for (int i = 0; i < 3; i++) {
+    const double *row = b_in_a + 3 * i;
+    double gap = fabs(apart[i]) - a->half[i] - fabs(row[0]) * b->half[0] -
+                 fabs(row[1]) * b->half[1] - fabs(row[2]) * b->half[2];
+    double its = fabs(back[i]) - b->half[i] - fabs(b_in_a[i]) * a->half[0] -
+                 fabs(b_in_a[3 + i]) * a->half[1] - fabs(b_in_a[6 + i]) * a->half[2];
+    most = fmax(most, fmax(gap, its));
+  }
+  return most;
+}
+
+/* A lower bound of the distance of two shapes: at least `enough`, below `keep` where the distance
+   is, else exact but for LOOSE of it, or for CONVERGED where keep is NONE.
    direction: the last one that parted them, in the frame of the first. */
-static double between(World *w, const Shape *a, const Shape *b, double *direction, double enough) {
+static double between(World *w, const Shape *a, const Shape *b, double *direction, double enough,
+                      double keep) {
   double swept = a->swept + b->swept, least = -HUGE, b_in_a[12], apart[3], v[3];
   double simplex[4][3];
   int count = 0;
@@ -295,6 +318,8 @@ static double between(World *w, const Shape *a, const Shape *b, double *directio
   }
   minus(b->world + 9, a->world + 9, apart);
   turn_back(a->world, apart, b_in_a + 9);
+  least = fmax(least, between_turned(a, b, b_in_a) - swept);
+  if (least >= enough) return least;
   memcpy(v, direction, sizeof v);
   if (dot(v, v) == 0.0) turn_back(a->world, apart, v);
   if (dot(v, v) == 0.0) v[0] = 1.0;
@@ -309,7 +334,10 @@ static double between(World *w, const Shape *a, const Shape *b, double *directio
       memcpy(direction, d, sizeof d);
       if (least >= enough) return least;
     }
-    if (count && most - least <= (least < NEAR ? CONVERGED_NEAR : CONVERGED)) return least;
+    if (count && (most < keep ||
+                  most - least <= (keep > NONE && least >= keep && least >= NEAR ? LOOSE * most
+                                   : least < NEAR ? CONVERGED_NEAR : CONVERGED)))
+      return least;
     for (int i = 0; i < count; i++) {
       double again[3];
       minus(simplex[i], simplex[count], again);
@@ -566,13 +594,13 @@ static int pair_of(const World *w, Item item) {
 }
 
 /* A lower bound of the distance of a pair, by the item that has its shapes. */
-static double distance(World *w, Item item, int pair, double enough) {
+static double distance(World *w, Item item, int pair, double enough, double keep) {
   Pair *p = w->pair + pair;
   const Shape *a = w->shape + p->first, *b = w->shape + p->second;
   double none[3] = {0.0, 0.0, 0.0};
   if (item.mover >= 0)
     a = w->shape + w->moving[item.mover], b = w->shape + w->still[item.which - w->nodes];
-  return between(w, a, b, b - w->shape < w->owners ? p->direction : none, enough);
+  return between(w, a, b, b - w->shape < w->owners ? p->direction : none, enough, keep);
 }
 
 /* A lower bound of the distance of a moving shape from what is below a node. */
@@ -617,7 +645,7 @@ static int look(World *w, const double *q, double within, double *out) {
         continue;
       }
       if (pair < 0) continue;
-      apart = distance(w, item, pair, within);
+      apart = distance(w, item, pair, within, out ? NONE : within);
       if (out) out[pair] = item.mover < 0 ? apart : fmin(out[pair], apart);
       else if (apart < within) return pair;
     }
@@ -668,8 +696,8 @@ static int doubtful(World *w, const Part *part, const double *required, double m
       moved = moved_by(is_node ? w->fastest + item.mover * n : w->rates + (size_t)pair * n,
                        turned, n);
       need = fmax(share * moved, keep);
-      will_do = fmin(need, fmax(keep, FAR + 0.25 * need));
-      apart = is_node ? node_distance(w, item) : distance(w, item, pair, will_do);
+      will_do = fmin(need, fmax(keep, FAR));
+      apart = is_node ? node_distance(w, item) : distance(w, item, pair, will_do, keep);
       if (is_node && apart < will_do && (apart < keep || is_coarse(w, item, need))) {
         count += open_node(w, item, stack + count);
         continue;
@@ -710,7 +738,8 @@ int world_edge(World *w, const double *begin, const double *end, const double *r
     w->way[j] = end[j] - begin[j], w->turns[j] = fabs(w->way[j]);
   if (hit >= 0) { /* what was in the way last is often again */
     place(w, end);
-    if (distance(w, w->hit, hit, required[hit]) < required[hit]) return *where = 1.0, 0;
+    double keep = required[hit];
+    if (distance(w, w->hit, hit, keep, keep) < keep) return *where = 1.0, 0;
   }
   if (!push(w, &queued, (Part){0.5, 0.5, -1, w->roots})) return -1;
   for (int next = 0; next < queued; next++) {
