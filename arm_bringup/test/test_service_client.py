@@ -62,17 +62,28 @@ def drives(monkeypatch: pytest.MonkeyPatch) -> Iterator[Drives]:
         rclpy.shutdown()
 
 
-def test_drives_are_enabled_when_they_have_booted(drives: Drives) -> None:
-    """No service is called that would be refused, and said to be, at a healthy start."""
+@pytest.mark.parametrize('by_heartbeat', [True, False])
+def test_drives_are_enabled_when_they_have_booted(
+    drives: Drives, by_heartbeat: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No service is called that would be refused, and said to be, at a healthy start.
+
+    The master knows that before a heartbeat shows it.
+    """
+    monkeypatch.setattr('arm_bringup.bringup.BOOT_TIMEOUT', 600.0)
     states = drives.create_publisher(String, 'arm/nmt_state', LATCHED)
     states.publish(String(data='PREOP'))
     for name in ('init', 'mode'):
         drives.create_service(Trigger, f'arm/{name}', partial(drives._answer, name))
     said: list[str] = []
-    with enabling(['arm'], 'mode', said.append):
+    booted = threading.Event()
+    with enabling(['arm'], 'mode', said.append, booted=booted):
         time.sleep(3.0)
         assert drives.calls == []
-        states.publish(String(data='START'))
+        if by_heartbeat:
+            states.publish(String(data='START'))
+        else:
+            booted.set()
         deadline = time.monotonic() + 60.0
         while not said and time.monotonic() < deadline:
             time.sleep(0.05)
