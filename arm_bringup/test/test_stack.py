@@ -24,7 +24,7 @@ from arm_bringup.session import (
     Stack,
 )
 from node_runner import init_ros
-from process_supervisor import EVERY_NODE, Executable, ProcessSpec, RosOptions, StartError
+from process_supervisor import EVERY_NODE, ProcessSpec, RosOptions, StartError
 
 ROBOT = Robot('panda', Path('/robots/panda/bus.yml'), Path('/robots/panda/panda.urdf.xacro'))
 PARAMETERS = Path('/tmp/parameters.yaml')
@@ -69,10 +69,16 @@ def processes(folder: Path, stack: Stack, *packages: str) -> dict[str, ProcessSp
 def test_the_master_of_motion_publishes_the_joints(tmp_path: Path) -> None:
     """It gets the files of the robot, later ones counting more, and needs no other publisher."""
     files = (Path('/r/motion.yaml'), Path('/r/controllers.yaml'))
-    stack = Stack(ROBOT, 'can0', simulate=True, master=MOTION_NODE, master_files=files)
+    own = {'diagnostics_period': '0.2'}
+    stack = Stack(
+        ROBOT, 'can0', simulate=True, master=MOTION_NODE, master_parameters=own, master_files=files
+    )
     found = processes(tmp_path, stack, 'arm_servo')
     assert set(found) == {'slaves', 'master'}
     argv = found['master'].argv
+    assert argv[0].endswith('arm_servo/motion_node')
+    assert {'bus_config:=/robots/panda/bus.yml', 'diagnostics_period:=0.2'} < {*argv}
+    assert 'bus_config:=/robots/panda/bus.yml' in found['slaves'].argv
     named = [Path(argv[n + 1]) for n, word in enumerate(argv) if word == '--params-file']
     assert named == [PARAMETERS, *files]
 
@@ -137,15 +143,6 @@ def test_master_without_arm_servo(tmp_path: Path) -> None:
     assert 'other_groups' not in values  # rcl has no type for an empty list
 
 
-def test_hardware_has_no_slaves_and_simulation_has(tmp_path: Path) -> None:
-    """Everything else is the same."""
-    real = processes(tmp_path, Stack(ROBOT, 'can0', simulate=False))
-    simulated = processes(tmp_path, Stack(ROBOT, 'can0', simulate=True))
-    assert set(real) == {'master'}
-    assert set(simulated) == {'slaves', 'master'}
-    assert simulated['master'] == real['master']
-
-
 def test_the_page_is_there_when_it_is_asked_for_and_built(tmp_path: Path) -> None:
     """Everything else is the same."""
     without = processes(tmp_path, Stack(ROBOT, 'can0', simulate=True), 'robot_viewer')
@@ -155,31 +152,6 @@ def test_the_page_is_there_when_it_is_asked_for_and_built(tmp_path: Path) -> Non
     assert viewer.stop_order > seen['master'].stop_order  # STOP is there until then
     unbuilt = processes(tmp_path, Stack(ROBOT, 'can0', simulate=True, view=True))
     assert 'viewer' not in unbuilt
-
-
-def test_bus_and_description_reach_the_processes(tmp_path: Path) -> None:
-    """The bus as parameters, the description as a parameter file."""
-    found = processes(tmp_path, Stack(ROBOT, 'udp_multicast:239.1.2.3:5000', simulate=True))
-    for name in ('slaves', 'master'):
-        argv = found[name].argv
-        assert 'bus_config:=/robots/panda/bus.yml' in argv
-        assert 'can_interface_name:=udp_multicast:239.1.2.3:5000' in argv
-    argv = found['master'].argv
-    assert argv[argv.index('--params-file') + 1] == str(PARAMETERS)
-
-
-def test_another_master_gets_its_parameters(tmp_path: Path) -> None:
-    """That of arm_servo, for one."""
-    stack = Stack(
-        ROBOT,
-        'can0',
-        simulate=True,
-        master=Executable('arm_servo', 'motion_node'),
-        master_parameters={'diagnostics_period': '0.2'},
-    )
-    argv = processes(tmp_path, stack, 'arm_servo')['master'].argv
-    assert argv[0].endswith('arm_servo/motion_node')
-    assert 'diagnostics_period:=0.2' in argv
 
 
 def test_the_master_stops_before_the_slaves(tmp_path: Path) -> None:
@@ -205,15 +177,6 @@ def test_the_public_robot_state_publisher_runs_where_it_is_installed(
     assert not found['robot_state'].required
     assert found['robot_state'].notifies_ready == (taken == 'robot_viewer')
     assert found['robot_state'].argv[0].endswith(f'{taken}/robot_state_publisher')
-
-
-def test_a_workspace_that_is_not_built_says_so(tmp_path: Path) -> None:
-    """A missing package and a missing executable are distinguished."""
-    stack = Stack(ROBOT, 'can0', simulate=True)
-    with pytest.raises(StartError, match=r'canopen_sim is not in .*; source env.sh.*make build'):
-        arm_processes(stack, PARAMETERS, lambda package, name: None)
-    with pytest.raises(StartError, match=r'fake_slaves does not exist.*make build'):
-        arm_processes(stack, PARAMETERS, lambda package, name: tmp_path / name)
 
 
 def test_move_group_has_what_the_master_has(tmp_path: Path) -> None:

@@ -28,14 +28,6 @@ from process_supervisor.spec import no_answer
 NODE = Executable('some_package', 'some_node')
 
 
-def test_parameters_reach_the_command_line(tmp_path: Path) -> None:
-    """The file first, so that single values win over it."""
-    file = tmp_path / 'some_node'
-    file.touch(mode=0o755)
-    argv = node_argv(NODE, lambda package, name: tmp_path / name, {'a': '1'}, [Path('p.yaml')])
-    assert argv == (str(file), '--ros-args', '--params-file', 'p.yaml', '-p', 'a:=1')
-
-
 def test_a_workspace_that_is_not_built_is_reported(tmp_path: Path) -> None:
     """A missing package and a missing executable are distinguished."""
     with pytest.raises(StartError, match=r'some_package is not in .*; source env.sh.*make build'):

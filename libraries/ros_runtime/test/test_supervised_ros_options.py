@@ -83,8 +83,10 @@ def test_every_node_gets_them(tmp_path: Path) -> None:
     node = Executable('package', 'node')
     (tmp_path / 'node').touch(mode=0o755)
     ros = RosOptions('left', ('-p', 'rate:=2'))
-    argv = node_argv(node, lambda package, name: tmp_path / name, {'rate': '1'}, ros=ros)
-    assert argv[1:] == ('--ros-args', '-p', 'rate:=1', '-r', '__ns:=/left', '-p', 'rate:=2')
+    files = [Path('p.yaml')]
+    argv = node_argv(node, lambda package, name: tmp_path / name, {'rate': '1'}, files, ros)
+    own = ('--params-file', 'p.yaml', '-p', 'rate:=1')
+    assert argv[1:] == ('--ros-args', *own, '-r', '__ns:=/left', '-p', 'rate:=2')
     assert ros.resolve('servo_node/status') == '/left/servo_node/status'
     assert ros.frame_prefix == 'left/'
     assert RosOptions().resolve('joint_states') == '/joint_states'

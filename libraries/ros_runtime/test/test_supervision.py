@@ -78,11 +78,6 @@ def test_all_start_at_once_and_running_means_all_are_ready() -> None:
     assert bench.supervision.next_deadline() is None
 
 
-def test_a_process_that_reports_nothing_is_ready_at_once() -> None:
-    """Started is ready."""
-    assert Bench(spec('viewer', notifies_ready=False)).supervision.phase is Phase.RUNNING
-
-
 def test_not_ready_in_time_stops_all_and_names_the_process_and_its_last_lines() -> None:
     """The outcome says who was late, by when, and what it wrote last."""
     bench = Bench(MASTER, SLAVES)
@@ -137,19 +132,6 @@ def test_the_end_of_an_optional_process_is_a_warning() -> None:
     bench.supervision.exited('viewer', 1, 1.0)
     assert bench.supervision.phase is Phase.RUNNING
     assert bench.notices[0].severity is Severity.WARNING
-
-
-def test_interrupt_stops_in_order_and_exits_0() -> None:
-    """The master first; the slaves only when it is gone."""
-    bench = Bench(SLAVES, MASTER)
-    bench.supervision.interrupt(5.0)
-    assert bench.sent == [('master', Signals.SIGTERM)]
-    bench.supervision.exited('master', 0, 6.0)
-    assert bench.sent == [('master', Signals.SIGTERM), ('slaves', Signals.SIGTERM)]
-    bench.supervision.exited('slaves', -2, 6.5)
-    assert bench.supervision.phase is Phase.STOPPED
-    assert bench.outcome == Outcome(0, 'stopped by the user')
-    assert all(notice.severity is Severity.INFO for notice in bench.notices)
 
 
 def test_a_second_interrupt_kills_everybody_and_is_no_success() -> None:
@@ -229,13 +211,6 @@ def test_the_first_reason_stays() -> None:
     bench.supervision.stop(Outcome(0, 'done'), 1.1)
     bench.supervision.exited('master', -9, 2.0)
     assert bench.outcome.reason == 'slaves ended with exit code 7 before it was ready'
-
-
-def test_what_cannot_be_started_stops_what_was() -> None:
-    """A missing executable is reported; those started before it are stopped."""
-    bench = Bench(SLAVES, MASTER, missing='master')
-    assert bench.sent == [('slaves', Signals.SIGTERM)]
-    assert bench.outcome.reason == 'master cannot be started: no such file'
 
 
 def test_two_processes_of_one_name_are_refused() -> None:
