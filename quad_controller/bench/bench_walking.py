@@ -33,6 +33,8 @@ GROUNDS = {
 }
 STIFFNESSES = (1.1, 1.7, 2.45, 4.0, 8.0, 10.0)  # [N m/rad]
 DELAYS = (0.02, 0.04, 0.06)  # [s]
+HELD_OUT = [(kp, delay) for kp in (1.7, 4.0, 8.0) for delay in (0.025, 0.05)]
+"""Servos by which a policy is judged: stiffness [N m/rad] and delay [s]."""
 SERVO_COMMANDS = (Velocity(0.2), Velocity(-0.15), Velocity(0.0, -0.1), Velocity(0.0, 0.0, -1.0))
 HEADINGS = (
     *('', 'ground', 'forward [m/s]', 'lateral [m/s]', 'turn [rad/s]'),
@@ -89,6 +91,23 @@ def servos(walkers: dict[str, Candidate], duration: float) -> None:
     print(table_text(table, numbers=True))
 
 
+def held_out(walkers: dict[str, Candidate], duration: float) -> None:
+    """Print speed errors and falls on the servos that judge a policy, on each ground."""
+    table: Table = [('', *GROUNDS)]
+    for name, who in walkers.items():
+        robots = [replace(who, robot=RobotChoice(servo=servo(*each))) for each in HELD_OUT]
+        cells = []
+        for ground in GROUNDS.values():
+            found = run_trials([Trial(each, SERVO_COMMANDS, duration, ground) for each in robots])
+            whole = CourseFigures(tuple(one for each in found for one in each.passages))
+            largest = max(each.error for each in whole.passages)
+            falls = f'{whole.falls_per_minute:.1f}/min'
+            cells.append(f'{whole.mean("error"):.3f} {largest:.3f} m/s {falls}')
+        table.append((name, *cells))
+    print('\nservos of 1.7, 4 and 8 N m/rad, 25 and 50 ms late: mean and largest error, falls')
+    print(table_text(table, numbers=True))
+
+
 def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -108,6 +127,7 @@ def main() -> None:
     print(f'off by, falls, commands without one; {len(commands)} commands of {options.duration} s')
     print(table_text(table, numbers=True))
     servos({'gait': Candidate()} | shipped_walkers(), options.duration)
+    held_out(walkers, options.duration)
 
 
 if __name__ == '__main__':
