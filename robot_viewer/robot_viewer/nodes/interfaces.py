@@ -14,7 +14,7 @@ from functools import partial
 import sys
 import threading
 import traceback
-from typing import Any, TYPE_CHECKING
+from typing import Any, Protocol, TYPE_CHECKING
 
 from rclpy.client import Client
 from rclpy.node import Node
@@ -54,8 +54,13 @@ def stops_robot(node: str, services: Mapping[str, Collection[str]]) -> bool:
     )
 
 
-Report = Callable[..., None]
-"""Takes what was requested, what became of it, and whether it has `failed`."""
+class Report(Protocol):
+    """Reports what became of a request."""
+
+    def __call__(self, what: str, text: str, *, failed: bool) -> None:
+        """Report it."""
+
+
 TRIGGER = 'std_srvs/srv/Trigger'
 
 
@@ -84,23 +89,34 @@ class TriggerCalls:
             self._clients[service] = self._node.create_client(Trigger, service)
         return self._clients[service]
 
-    def call(self, service: str, take: Callable[[bool, str], None]) -> None:
-        """Call a service; ``take`` gets whether that has succeeded, and the answer in words."""
+    def call(self, service: str) -> Future | None:
+        """Call a service; return its answer to come, None where it is not there."""
         client = self.client(service)
         if not client.service_is_ready():
-            take(False, 'its service is not there')
-            return
-        future = client.call_async(client.srv_type.Request())
-        future.add_done_callback(lambda done: take(succeeded(done), text_of(done)))
+            self._report(service, 'is not there', failed=True)
+            return None
+        future: Future = client.call_async(client.srv_type.Request())
+
+        def answered(done: Future) -> None:
+            self._report(service, text_of(done), failed=not succeeded(done))
+
+        future.add_done_callback(answered)
+        return future
 
     def call_all(
-        self, what: str, services: Sequence[str], done: Callable[[bool], None] = lambda _: None
+        self, what: str, services: Sequence[str], done: Callable[[bool], None] | None = None
     ) -> None:
         """Call services at the same time; report all answers at once, the failures first."""
+        if not services:
+            self._report(what, 'is not offered', failed=True)
+            if done is not None:
+                done(False)
+            return
         answers: dict[str, tuple[bool, str]] = {}
 
-        def take(service: str, ok: bool, text: str) -> None:
-            answers[service] = ok, text
+        def take(service: str, call: Future | None) -> None:
+            text = 'its service is not there' if call is None else text_of(call)
+            answers[service] = call is not None and succeeded(call), text
             if len(answers) < len(services):
                 return
             self._running.pop(what, None)
@@ -108,15 +124,17 @@ class TriggerCalls:
             texts = bad or list(dict.fromkeys(said for _, said in answers.values() if said))
             count = f'{len(services) - len(bad)} of {len(services)} done'
             self._report(what, '; '.join((count, *texts)), failed=bool(bad))
-            done(not bad)
+            if done is not None:
+                done(not bad)
 
-        if not services:
-            self._report(what, 'is not offered', failed=True)
-            done(False)
-            return
         self._running[what] = services
         for service in services:
-            self.call(service, partial(take, service))
+            client = self.client(service)
+            if client.service_is_ready():
+                call = client.call_async(client.srv_type.Request())
+                call.add_done_callback(partial(take, service))
+            else:
+                take(service, None)
 
 
 def succeeded(call: Future) -> bool:
