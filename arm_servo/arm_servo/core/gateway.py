@@ -131,8 +131,8 @@ class Turn(Enum):
     WORKER = 'in the thread that plans and checks'
 
 
-Course = Generator[Turn, Cycle, None]
-"""The way of a motion to its begin, which says where it goes on; it gets the cycle there."""
+MotionSequence = Generator[Turn, Cycle, None]
+"""The steps of a motion to its begin. It yields where it goes on, and gets the cycle there."""
 
 
 @dataclass(slots=True, eq=False)
@@ -520,25 +520,27 @@ class CommandGateway:
             if self._preparing is not None or not self._waiting:
                 return
             command = self._preparing = self._waiting.popleft()
-        self._go_on(command, self._course(command))
+        self._go_on(command, self._sequence(command))
 
-    def _go_on(self, command: MotionCommand, course: Course, cycle: Cycle | None = None) -> None:
+    def _go_on(
+        self, command: MotionCommand, sequence: MotionSequence, cycle: Cycle | None = None
+    ) -> None:
         """Go on with a motion, up to where another thread has its turn."""
         try:
             if command.is_canceled:
                 raise CancelledError  # noqa: TRY301
-            turn = next(course) if cycle is None else course.send(cycle)
+            turn = next(sequence) if cycle is None else sequence.send(cycle)
         except StopIteration:
             self._end(command)
         except (Exception, CancelledError) as error:  # noqa: BLE001  # its future carries it
             self._refuse(command, error)
         else:
             if turn is Turn.WORKER:
-                self._worker.submit(self._go_on, command, course)
+                self._worker.submit(self._go_on, command, sequence)
             else:
-                self._orders.append(lambda cycle: self._go_on(command, course, cycle))
+                self._orders.append(lambda cycle: self._go_on(command, sequence, cycle))
 
-    def _course(self, command: MotionCommand) -> Course:
+    def _sequence(self, command: MotionCommand) -> MotionSequence:
         """Prepare a motion, and begin it; again where the arm or the scene has changed."""
         rest = self._rest()
         if rest is not None:  # one that is refused from where the arm stands takes no drives
@@ -556,7 +558,7 @@ class CommandGateway:
                 return (yield from self._attempt(command))
         yield from self._attempt(command, is_last=True)
 
-    def _attempt(self, command: MotionCommand, *, is_last: bool = False) -> Course:
+    def _attempt(self, command: MotionCommand, *, is_last: bool = False) -> MotionSequence:
         """Plan and check a motion from the state of a cycle, and begin it in a later one."""
         ordered = self._clock()
         cycle = yield Turn.CYCLE
