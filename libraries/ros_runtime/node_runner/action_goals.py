@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import Enum
@@ -20,7 +20,6 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
-from rclpy.task import Future
 
 RESULT_TIMEOUT = 10.0
 """Time in [s] that an ended goal is kept for late requests, as by rcl; rclpy keeps it for 900."""
@@ -69,15 +68,18 @@ class _Server(ActionServer):
         super().__init__(*args, **kwargs)
 
     async def _execute_goal_request(self, request: Any) -> None:  # noqa: ANN401  # rclpy has no types
-        header, goal = request
-        uuid = bytes(goal.goal_id.uuid)
+        uuid = bytes(request[1].goal_id.uuid)
         is_new = uuid not in self._came_at
         if is_new:
             self._came_at[uuid] = time.monotonic()
         self._receive(uuid)
-        await self._delay(ANSWER_DELAY)
-        if is_new:
-            self._node.executor.create_task(self._accept_again, header, uuid)
+        self._later(ANSWER_DELAY, self._answer_goal, request, again=is_new)
+
+    async def _answer_goal(self, request: Any, *, again: bool) -> None:  # noqa: ANN401
+        header, goal = request
+        uuid = bytes(goal.goal_id.uuid)
+        if again:
+            self._later(REPEATS[0], self._accept_again, header, uuid, *REPEATS[1:])
         await super()._execute_goal_request(request)
         self._forget(uuid)
 
@@ -91,37 +93,53 @@ class _Server(ActionServer):
         now = time.monotonic()
         came = self._came_at.pop(bytes(request[1].goal_id.uuid), now)
         paced = RESULT_RATIO * (now - came - ANSWER_DELAY)
-        await self._delay(min(max(ANSWER_DELAY, paced), LONGEST_DELAY))
-        await super()._execute_get_result_request(request)
+        delay = min(max(ANSWER_DELAY, paced), LONGEST_DELAY)
+        self._later(delay, super()._execute_get_result_request, request)
 
     async def _execute_expire_goals(self, expired_goals: Any) -> None:  # noqa: ANN401
         for goal in expired_goals:
             self._came_at.pop(bytes(goal.goal_id.uuid), None)
         await super()._execute_expire_goals(expired_goals)
 
-    async def _accept_again(self, header: Any, uuid: bytes) -> None:  # noqa: ANN401
-        for pause in REPEATS:
-            await self._delay(pause)
-            goal = self._goal_handles.get(uuid)
-            if goal is None or uuid not in self._came_at:
-                return
-            response = self.action_type.Impl.SendGoalService.Response(accepted=True)
-            response.stamp = goal._goal_info.stamp  # noqa: SLF001  # rclpy shows no other
-            with suppress(rclpy_implementation.RCLError):  # the client has gone
-                self._handle.send_goal_response(header, response)
+    async def _accept_again(self, header: Any, uuid: bytes, *pauses: float) -> None:  # noqa: ANN401
+        goal = self._goal_handles.get(uuid)
+        if goal is None or uuid not in self._came_at:
+            return
+        response = self.action_type.Impl.SendGoalService.Response(accepted=True)
+        response.stamp = goal._goal_info.stamp  # noqa: SLF001  # rclpy shows no other
+        with suppress(rclpy_implementation.RCLError):  # the client has gone
+            self._handle.send_goal_response(header, response)
+        if pauses:
+            self._later(pauses[0], self._accept_again, header, uuid, *pauses[1:])
 
-    async def _delay(self, duration: float) -> None:
-        """Return later. A timer is not destroyed in its callback, which may be queued twice."""
-        elapsed = Future()
-        steady = Clock(clock_type=ClockType.STEADY_TIME)  # simulated time may stand still
+    def _later(
+        self,
+        delay: float,
+        work: Callable[..., Coroutine[Any, Any, None]],
+        *args: Any,  # noqa: ANN401
+        **options: Any,  # noqa: ANN401
+    ) -> None:
+        """Run a coroutine after a time in [s].
+
+        It must not wait itself: executors of rclpy resume one that waits as often as they can, and
+        burn a core. A timer is not destroyed in its callback, which may be queued twice.
+        """
+
+        async def begin() -> None:
+            self._node.destroy_timer(timer)
+            await work(*args, **options)
+
+        def due() -> None:
+            if not timer.is_canceled():
+                timer.cancel()
+                self._node.executor.create_task(begin)
+
         timer = self._node.create_timer(
-            duration,
-            lambda: elapsed.set_result(None),
+            delay,
+            due,
             callback_group=self.callback_group,
-            clock=steady,
+            clock=Clock(clock_type=ClockType.STEADY_TIME),  # simulated time may stand still
         )
-        await elapsed
-        self._node.destroy_timer(timer)
 
 
 class GoalClient(ActionClient):

@@ -101,6 +101,32 @@ def test_a_goal_goes_on_after_its_callback_and_is_forgotten_after_its_end(
 
 
 @pytest.mark.slow
+def test_a_goal_whose_answers_are_delayed_keeps_its_executor_asleep(isolation: Isolation) -> None:
+    """A coroutine that waited for them was resumed 170,000 times a second: a core a goal."""
+    begun: list[ServedGoal] = []
+    with RosClient(isolation.domain_id) as client:
+        server = serve(client.node, begun.append)
+        caller = client.action(LookupTransform, 'look_up')
+        assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
+        passes = 0
+
+        def passed(done: Callable[[], bool]) -> bool:
+            nonlocal passes
+            passes += 1
+            return done()
+
+        sent = caller.send_goal_async(LookupTransform.Goal())  # type: ignore[no-untyped-call]
+        client.spin_until(lambda: passed(lambda: bool(begun)), TIMEOUT, 'the start')
+        end = time.monotonic() + 0.5  # its acceptance is about to be repeated
+        client.spin_until(lambda: passed(lambda: time.monotonic() > end), TIMEOUT, 'some time')
+        result = sent.result().get_result_async()
+        server.end(begun[0])
+        client.spin_until(lambda: passed(result.done), TIMEOUT, 'a result')
+        assert passes < 1000
+        server.destroy()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('ending', 'is_canceled', 'status'),
     [
