@@ -121,8 +121,8 @@ class _Server(ActionServer):
     ) -> None:
         """Run a coroutine after a time in [s].
 
-        It must not wait itself: executors of rclpy resume one that waits as often as they can, and
-        burn a core. A timer is not destroyed in its callback, which may be queued twice.
+        It must not wait itself: rclpy's EventsExecutor resumes one that waits as often as it can,
+        which takes a core. A timer is not destroyed in its callback, which may be queued twice.
         """
 
         async def begin() -> None:
