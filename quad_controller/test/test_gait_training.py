@@ -12,7 +12,7 @@ from pathlib import Path
 import subprocess
 import sys
 
-from contract_env import contract_of, PERIOD, PLANT, walking_env
+from contract_env import contract_of, PERIOD, PLANT, UNSEEN, walking_env
 import numpy as np
 import pytest
 
@@ -76,6 +76,8 @@ def test_walking_as_commanded_is_worth_more() -> None:
         return total
 
     right = worth((0.2, 0.0, 0.0), Velocity(0.2))
+    # also where the commanded velocity is far away
+    assert worth((0.3, 0.0, 0.0), Velocity(0.1)) > worth((0.3, 0.0, 0.0), Velocity()) + 0.2
     assert right > worth((0.2, 0.0, 0.0), Velocity()) + 2.0
     assert right > worth((0.2, 0.0, 0.0), Velocity(-0.2)) + 2.0
     assert worth((0.0, 0.0, 0.0), Velocity()) > worth((0.0, 0.0, 0.0), Velocity(0.2)) + 2.0
@@ -88,22 +90,30 @@ def test_what_is_trained_is_what_runs() -> None:
     runner = PolicyRunner(
         FakeNetwork({}), env.contract, MODEL, options=PolicyOptions(), period=PERIOD
     )
+    width = env.contract.width
     phase = math.atan2(seen[9], seen[10]) % math.tau / math.tau
     runner.reset(tuple(env.simulation.stand.tolist()))
     runner.advance(phase * 0.28)
     random = np.random.default_rng(2)
     for _ in range(20):
         action = random.normal(0.0, 0.3, 12).astype(np.float32)
-        assert seen == pytest.approx(runner.observe(env.inputs)[0], abs=1e-5)
+        assert seen[:width] == pytest.approx(runner.observe(env.inputs)[0], abs=1e-5)
         targets = runner.act(action, PERIOD)
         before = env.simulation.robot.joint_targets
+        asked, error = env.inputs.velocity.x, env.simulation.error[0]
         seen, *_ = env.step(action)
+        # it is judged by the velocity that it saw, which changes as the controller lets it
+        off = env.simulation.robot.base_velocity.linear[0] - asked
+        assert env.simulation.error[0] == pytest.approx(error + PERIOD / 0.4 * (off - error))
         slow = np.abs(np.array(targets) - before) < 0.19  # others the limiter of speeds cuts
         sent = env.simulation.robot.joint_targets
         assert slow.any()
         # to half a step of the widest byte of protocol v1
         assert sent[slow] == pytest.approx(np.array(targets)[slow], abs=math.radians(0.32))
         runner.advance(PERIOD)
+    # the judge sees more: how the plant is, and how far the velocity is from the commanded one
+    assert len(seen) == width + UNSEEN
+    assert seen[-3:] == pytest.approx(np.array(env.simulation.error) / (0.1, 0.1, 0.4), abs=1e-5)
 
 
 @pytest.mark.skipif(

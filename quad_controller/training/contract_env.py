@@ -9,6 +9,7 @@ limiter of speeds.
 from __future__ import annotations
 
 from dataclasses import replace
+import math
 from pathlib import Path
 from typing import Any
 
@@ -30,10 +31,12 @@ from quad_hardware.backend import JointBytes
 from quad_hardware.estimation import EstimatorSettings
 from quad_hardware.filters import AttitudeRate
 from quad_sim import ServoModel, Terrain
-from quad_sim.env import Randomization, WalkingEnv
+from quad_sim.env import CommandRanges, Randomization, WalkingEnv
 
 PERIOD = 0.02  # [s]
 LIMITS = GaitParameters().velocity_limits  # that the controller keeps for every policy
+COMMANDS = CommandRanges(x=(-LIMITS.x, LIMITS.x), time=3.0, straight=0.7)
+UNSEEN = 6  # numbers at the end of an observation, which the judge sees and the policy does not
 V1_SHARE = 0.5  # of the episodes that go through the bytes of protocol v1; the others are v2's
 TIMESTEP = 0.004  # [s] of the physics
 ROUGH = Terrain(roughness=0.02, seed=2)  # the highest bumps that are practised on
@@ -107,7 +110,8 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
         self._bytes = JointBytes(robot_urdf())
         count = len(robot.names)
         self.action_space = spaces.Box(-np.inf, np.inf, (count,), np.float32)
-        self.observation_space = spaces.Box(-np.inf, np.inf, (self.contract.width,), np.float32)
+        width = self.contract.width + UNSEEN
+        self.observation_space = spaces.Box(-np.inf, np.inf, (width,), np.float32)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -130,7 +134,9 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
         wanted = self._runner.act(np.asarray(action, np.float32), PERIOD)
         sent = self._limiter.step(wanted, PERIOD)
         targets = np.array(self._bytes.rounded(sent) if self._by_v1 else sent, np.float32)
-        reward, fallen, over, info = self.simulation.advance(targets - self.simulation.stand)
+        reward, fallen, over, info = self.simulation.advance(
+            targets - self.simulation.stand, self._velocity
+        )
         self._runner.advance(PERIOD)
         self._sense()
         return self._observe(), float(reward), fallen, over, info
@@ -151,8 +157,10 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
         self.inputs = Situation(joints, imu, velocity=self._velocity)
 
     def _observe(self) -> Floats:
-        seen: Floats = self._runner.observe(self.inputs)[0].copy()
-        return seen
+        seen: Floats = self._runner.observe(self.inputs)[0]
+        (x, y, yaw), robot = self.simulation.error, self.simulation.variation
+        plant = math.log(robot.stiffness), robot.delay / 0.03 - 1.0, robot.friction
+        return np.concatenate([seen, np.array([*plant, x / 0.1, y / 0.1, yaw / 0.4], np.float32)])
 
 
 def walking_env(contract: PolicyContract, randomization: Randomization) -> ContractEnv:
@@ -160,6 +168,7 @@ def walking_env(contract: PolicyContract, randomization: Randomization) -> Contr
     env = WalkingEnv(
         servo=SERVO,
         randomization=randomization,
+        commands=COMMANDS,
         period=PERIOD,
         terrain=ROUGH,
         timestep=TIMESTEP,

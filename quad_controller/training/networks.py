@@ -8,6 +8,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from contract_env import UNSEEN
 from flax import linen
 import gymnasium
 import jax
@@ -41,7 +42,8 @@ class Actor(GaussianMixin, Model):  # type: ignore[misc]
     @linen.compact  # type: ignore[untyped-decorator]
     def __call__(self, inputs: dict[str, Any], role: str) -> tuple[jax.Array, dict[str, Any]]:
         """Return the mean actions, and the logarithm of the deviation."""
-        mean = _layers(inputs['observations'], self.num_actions, last=0.1)
+        seen = inputs['observations'][:, :-UNSEEN]
+        mean = _layers(seen, self.num_actions, last=0.1)
         deviation = self.param('log_std', linen.initializers.zeros, (self.num_actions,))
         return mean, {'log_std': deviation}
 
@@ -117,7 +119,10 @@ def learned_in(path: Path, actor: Actor) -> Normaliser:
             )
         layers[f'Dense_{place}'] = {'kernel': jnp.array(kernel), 'bias': jnp.array(bias)}
     actor.state_dict = actor.state_dict.replace(params={**params, 'params': layers})
-    return Normaliser(found['mean'], found['deviation'])
+    return Normaliser(
+        np.append(found['mean'], np.zeros(UNSEEN, np.float32)),
+        np.append(found['deviation'], np.ones(UNSEEN, np.float32)),
+    )
 
 
 def layers_of(actor: Actor, normaliser: Normaliser) -> Layers:
@@ -125,8 +130,8 @@ def layers_of(actor: Actor, normaliser: Normaliser) -> Layers:
     params = jax.device_get(actor.state_dict.params)['params']
     dense = [params[f'Dense_{place}'] for place in range(len(HIDDEN) + 1)]
     return Layers(
-        normaliser.mean,
-        normaliser.deviation,
+        normaliser.mean[:-UNSEEN],
+        normaliser.deviation[:-UNSEEN],
         [np.asarray(each['kernel'], np.float32) for each in dense],
         [np.asarray(each['bias'], np.float32) for each in dense],
     )

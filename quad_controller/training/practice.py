@@ -30,7 +30,7 @@ from quad_sim.env import ProcessVectorEnv, Randomization
 
 ROLLOUT = 32  # steps of each environment between two updates
 JUDGE_ALONE = 20  # updates at the beginning that change the judge only
-FIRST_SHARE, FULL_AT = 0.3, 0.5  # of the randomization; of the time at which it is whole
+FULL_AT = 0.5  # of the time: then the randomization is whole
 SHARE_STEP = 0.1  # the randomization grows by
 RATE = 2e-4
 STEPS_UNKNOWN = 1_000_000_000  # skrl wants to know how many; here the clock ends it
@@ -63,8 +63,15 @@ class Practice:
         period: float,
         curves: Path,
         seed: int,
+        share: float,
     ) -> None:
-        """Prepare it; `curves` is the folder for the files that TensorBoard reads."""
+        """Prepare it.
+
+        Args:
+            curves: Folder for the files that TensorBoard reads.
+            share: Of the randomization at the beginning.
+        """
+        self._first = share
         self._envs, self._wrapped = envs, wrap_env(envs, wrapper='gymnasium', verbose=False)
         self._randomization, self._period, self._actor = randomization, period, actor
         observations, actions = envs.single_observation_space, envs.single_action_space
@@ -102,7 +109,7 @@ class Practice:
         self._agent.writer.close()
 
     def _vary(self, passed: float) -> None:
-        share = min(FIRST_SHARE + (1.0 - FIRST_SHARE) * passed / FULL_AT, 1.0)
+        share = min(self._first + (1.0 - self._first) * passed / FULL_AT, 1.0)
         share = min(round(share / SHARE_STEP) * SHARE_STEP, 1.0)
         if share != self._share:
             self._share = share
@@ -194,7 +201,9 @@ def _settings(normaliser: Normaliser, curves: Path) -> PPO_CFG:
 DEVIATION = 0.18  # of the actions that are tried when practice begins: 0.05 rad
 
 
-def train(start: Path, target: Path, progress: Progress, *, seed: int, environments: int) -> None:
+def train(
+    start: Path, target: Path, progress: Progress, *, seed: int, environments: int, share: float
+) -> None:
     """Train the policy of an ONNX file, and write another, until the time of `progress` is over.
 
     Raises:
@@ -218,6 +227,7 @@ def train(start: Path, target: Path, progress: Progress, *, seed: int, environme
             period=PERIOD,
             curves=target.parent / 'curves',
             seed=seed,
+            share=share,
         )
         for practised in practice.until(lambda: progress.share):
             progress.figures(practised)

@@ -46,7 +46,8 @@ def run(arguments: Sequence[str]) -> int:
     path = folder / 'walk.onnx'
     try:
         start = find_policy(options.start)
-        train(start, path, progress, seed=options.seed, environments=options.environments)
+        settings = {name: getattr(options, name) for name in ('seed', 'environments', 'share')}
+        train(start, path, progress, **settings)
     except PolicyError as error:
         progress.say(str(error))
         return 1
@@ -88,6 +89,12 @@ def _parser() -> argparse.ArgumentParser:
         default='trot_ppo',
         metavar='POLICY',
         help='ONNX file of this training, or a name that is shipped; default: %(default)s',
+    )
+    parser.add_argument(
+        '--share',
+        type=number('share', 0.0, 1.0),
+        default=0.3,
+        help='of what differs, at the beginning; 1 to go on with a policy of this training',
     )
     # check_policy would refuse another one after the training
     duration = number('time in [s]', MIN_DURATION, MAX_DURATION)

@@ -43,12 +43,14 @@ class RewardWeights:
 
     tracking: float = 2.0  # exp(-(error / tracking_width)^2) of the linear velocity
     turning: float = 1.0  # exp(-(error / turning_width)^2) of the turning
+    astray: float = -6.0  # error of the linear velocity in [m/s]: a slope where tracking has none
+    heading: float = -0.5  # error of the turning in [rad/s]
     vertical: float = -2.0  # square of the velocity up and down in [m2/s2]
     rolling: float = -0.05  # square of the turning about x and y in [rad2/s2]
     level: float = -2.0  # square of the sine of the tilt
     power: float = -0.02  # of the servos' torques, before the damping of their motors, in [W]
     action_rate: float = -0.002  # square of the speed of the targets in [rad2/s2]
-    fall: float = -5.0  # of a fall
+    fall: float = -15.0  # of a fall
     tracking_width: float = 0.1  # [m/s]
     turning_width: float = 0.4  # [rad/s]
 
@@ -60,22 +62,23 @@ class RewardWeights:
                 raise SetupError(f'{field.name} {value}: give a finite number, a width above 0')
 
     def terms(
-        self, robot: Robot, target_speed: Array, commanded: Vector, period: float, *, fallen: bool
+        self, robot: Robot, target_speed: Array, error: Vector, period: float, *, fallen: bool
     ) -> dict[str, float]:
         """Return what each term is worth in one step.
 
         Args:
             target_speed: That of the targets since the step before in [rad/s].
-            commanded: x and y in [m/s], yaw in [rad/s].
+            error: As of :class:`WalkingEnv`.
         """
         velocity, down = robot.base_velocity, down_in_body(robot.base_pose.orientation)
-        (x, y, up), (roll, pitch, yaw) = velocity.linear, velocity.angular
-        wanted_x, wanted_y, wanted_yaw = commanded
-        off = math.hypot(x - wanted_x, y - wanted_y)
+        (_, _, up), (roll, pitch, _) = velocity.linear, velocity.angular
+        off, turning = math.hypot(error[0], error[1]), abs(error[2])
         power = float(abs(robot.joint_torques * robot.joint_velocities).sum())
         rates = {
             'tracking': self.tracking * _nearness(off, self.tracking_width),
-            'turning': self.turning * _nearness(yaw - wanted_yaw, self.turning_width),
+            'turning': self.turning * _nearness(turning, self.turning_width),
+            'astray': self.astray * off,
+            'heading': self.heading * turning,
             'vertical': self.vertical * up * up,
             'rolling': self.rolling * (roll * roll + pitch * pitch),
             'level': self.level * (down[0] ** 2 + down[1] ** 2),
@@ -191,6 +194,7 @@ NO_RANDOMIZATION = Randomization(
 
 
 PERIOD = 0.02  # [s]
+ERROR_TIME = 0.4  # [s] over which the error of the velocity is smoothed: a step is 0.28 s
 MAX_TILT = math.radians(70.0)  # as in the vendor's training (luwu_mjlab)
 Floats = NDArray[np.float32]
 
@@ -254,6 +258,8 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         command: Velocity that is commanded: ahead and to the left in [m/s], turning in [rad/s].
         stand: Joint positions of a robot that stands in [rad].
         state: What its sensors measured last.
+        error: How far its velocity was from the commanded one in the last 0.4 s, a step counts
+            less the older it is: ahead and to the left in [m/s], turning in [rad/s].
         variation: How the robot and its ground differ in this episode.
     """
 
@@ -301,6 +307,7 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         self._weights, self._most = weights or RewardWeights(), round(duration / period)
         self._commands = commands or CommandRanges()
         self.command: Vector = (0.0, 0.0, 0.0)
+        self.error: Vector = (0.0, 0.0, 0.0)
         self._steps = self._command_steps = 0
         self._sums: dict[str, float] = {}
         self._begin(None)
@@ -335,11 +342,18 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         outcome = self.advance(action)
         return self._observation(), *outcome
 
-    def advance(self, action: Floats) -> tuple[float, bool, bool, dict[str, Any]]:
-        """Do what :meth:`step` does, for those who observe :attr:`state` themselves."""
+    def advance(
+        self, action: Floats, wanted: Vector | None = None
+    ) -> tuple[float, bool, bool, dict[str, Any]]:
+        """Do what :meth:`step` does, for those who observe :attr:`state` themselves.
+
+        Args:
+            wanted: Velocity that is judged, where it is not the command at once.
+        """
         speed = self._move(np.asarray(action, np.float32))
+        self._judge(wanted or self.command)
         fallen = self.robot.base_pose.tilt > MAX_TILT
-        terms = self._weights.terms(self.robot, speed, self.command, self.period, fallen=fallen)
+        terms = self._weights.terms(self.robot, speed, self.error, self.period, fallen=fallen)
         self._steps += 1
         for name, value in terms.items():
             self._sums[name] += value
@@ -349,6 +363,15 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
             # what is seen now is judged next
             self.command = self._commands.draw(self.np_random)
         return sum(terms.values()), fallen, is_over and not fallen, info
+
+    def _judge(self, wanted: Vector) -> None:
+        velocity, share = self.robot.base_velocity, min(self.period / ERROR_TIME, 1.0)
+        went = *velocity.linear[:2], velocity.angular[2]
+        x, y, yaw = (
+            old + share * (now - asked - old)
+            for old, now, asked in zip(self.error, went, wanted, strict=True)
+        )
+        self.error = x, y, yaw
 
     def vary(self, randomization: Randomization) -> None:
         """Change the ranges from the next episode on; noise stays as it was made."""
@@ -364,6 +387,7 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         # of the step before; what the set-points are at the start of an episode
         self._action: Floats = self.robot.joint_targets.astype(np.float32) - self.stand
         self.state = self._sense()
+        self.error = (0.0, 0.0, 0.0)
         self._is_command_lasting = command is not None
         self.command = command or self._commands.draw(random)
         self._command_steps = max(round(self._commands.time / self.period), 1)
