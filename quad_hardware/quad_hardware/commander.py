@@ -97,63 +97,19 @@ class JointCommander:
         """Whether the last command is no longer ago than a pause."""
         return now - self._last_at < self.timeout
 
-    def commanded(self, targets: Sequence[float], now: float) -> None:
-        """Note targets that were sent [rad]; a command ends the way down."""
-        if not self.is_commanded(now) and not (self.goes_down or self.hazard):
-            self._began_at = now  # a pause with a foot in the air is part of a stream
-        self._place, self._unseen_at = None, math.inf
-        self._last_at, self._last = now, targets[: len(self._legs)]
-
-    def forget(self) -> None:
-        """Forget the stream: the robot was lost or let go, and is not moved unasked."""
-        self._place, self._unseen_at = None, math.inf
-        self._began_at = self._last_at = -math.inf
-        self._last = ()
-
     @property
-    def hazard(self) -> str:
+    def _hazard(self) -> str:
         """How the last stream ended, if that is nothing to be left so; else nothing."""
         if not self._last or self._last_at - self._began_at < MIN_STREAM:
             return ''
         raised = self._raised(self._last)
         return f'with {" or ".join(raised)} in the air' if raised else ''
 
-    def begin(self, place: Mapping[str, float], tilt: float | None, now: float) -> str:
-        """Go down from now on, or return why not. The stream is forgotten.
-
-        Args:
-            place: Where the joints are [rad]; empty when that is unknown.
-            tilt: Of the body [rad]; None when it is unknown.
-
-        Returns:
-            Why the robot holds; empty when it goes down.
-        """
-        began_at = self._began_at
-        self.forget()
-        if reason := self._refusal(place, tilt):
-            return reason
-        travel = max(abs(self._lying[name] - place[name]) for name in self._legs)
-        # a cosine is pi / 2 times as fast in its middle as on average
-        self._duration = max(MIN_DURATION, travel * math.pi / 2 / SPEED)
-        self._place, self._elapsed = dict(place), 0.0
-        self._stepped_at, self._began_at = now, began_at
-        return ''
-
-    def step(self, now: float) -> list[float] | None:
-        """Return positions of the legs [rad]; None when there is nothing to do any more.
-
-        They are on a path with a soft start and end, which waits while it is not stepped: what is
-        sent keeps up with it, to its end.
-        """
-        start = self._place
-        if start is None:
-            return None
-        self._elapsed += min(max(now - self._stepped_at, 0.0), MAX_PERIOD)
-        self._stepped_at = now
-        share = 0.5 * (1.0 - math.cos(math.pi * min(self._elapsed / self._duration, 1.0)))
-        if self._elapsed >= self._duration:
-            self.forget()
-        return [start[name] + share * (self._lying[name] - start[name]) for name in self._legs]
+    def _forget(self) -> None:
+        """Forget the stream: the robot was lost or let go, and is not moved unasked."""
+        self._place, self._unseen_at = None, math.inf
+        self._began_at = self._last_at = -math.inf
+        self._last = ()
 
     def _refusal(self, place: Mapping[str, float], tilt: float | None) -> str:
         if self._reaction is LossReaction.HOLD:
@@ -182,7 +138,7 @@ class JointCommander:
         the stream is no new request; a stalled process makes one, too.
         """
         self.lose()
-        self.forget()
+        self._forget()
         self._moved_by, self.counters.loss = 'the servos were let go', ''
 
     def refuse(self, error: CommandError) -> None:
@@ -201,9 +157,11 @@ class JointCommander:
         """
         command = self._send(positions, place, now, descent=False)
         if command is not None:
-            self._moved_by = ''
-            self.commanded(command.targets, now)
-            self.counters.loss = ''
+            if not self.is_commanded(now) and not (self.goes_down or self._hazard):
+                self._began_at = now  # a pause with a foot in the air is part of a stream
+            self._place, self._unseen_at = None, math.inf  # it ends the way down
+            self._last_at, self._last = now, command.targets[: len(self._legs)]
+            self._moved_by = self.counters.loss = ''
         return command
 
     def miss(self, place: Mapping[str, float], tilt: float | None, now: float) -> str | None:
@@ -216,13 +174,21 @@ class JointCommander:
         Returns:
             What the robot does; empty without a hazard; None while a report is awaited.
         """
-        hazard = self.hazard
+        hazard = self._hazard
         if not hazard:
             return ''
         if self._awaits_report(place, now):
             return None
-        reason = self.begin(place, tilt, now)
-        if not reason:  # commands that only did not arrive raise no robot that lies, either
+        began_at = self._began_at
+        self._forget()
+        reason = self._refusal(place, tilt)
+        if not reason:
+            travel = max(abs(self._lying[name] - place[name]) for name in self._legs)
+            # a cosine is pi / 2 times as fast in its middle as on average
+            self._duration = max(MIN_DURATION, travel * math.pi / 2 / SPEED)
+            self._place, self._elapsed = dict(place), 0.0
+            self._stepped_at, self._began_at = now, began_at
+            # commands that only did not arrive raise no robot that lies, either
             self._limiter.reset()
             self._moved_by = 'joint commands broke off and the robot was laid down'
         does = f'holds as it is, for {reason}' if reason else 'lies down'
@@ -232,15 +198,25 @@ class JointCommander:
         return self.counters.loss
 
     def go_down(self, place: Mapping[str, float], now: float) -> Command | None:
-        """Send the next targets on the way down; None for nothing, while it waits too."""
-        if self.goes_down and self._awaits_report(place, now):
+        """Send the next targets on the way down; None for nothing, while it waits too.
+
+        They are on a path with a soft start and end, which waits while it is not stepped: what is
+        sent keeps up with it, to its end.
+        """
+        start = self._place
+        if start is None or self._awaits_report(place, now):
             return None
-        positions = self.step(now)
-        if positions is None:
-            return None
+        self._elapsed += min(max(now - self._stepped_at, 0.0), MAX_PERIOD)
+        self._stepped_at = now
+        share = 0.5 * (1.0 - math.cos(math.pi * min(self._elapsed / self._duration, 1.0)))
+        if self._elapsed >= self._duration:
+            self._forget()
+        positions = [
+            start[name] + share * (self._lying[name] - start[name]) for name in self._legs
+        ]
         command = self._send(positions, place, now, descent=True)
         if command is None:
-            self.forget()
+            self._forget()
         return command
 
     def _awaits_report(self, place: Mapping[str, float], now: float) -> bool:
@@ -295,7 +271,7 @@ class JointCommander:
     def _drop(self, *, forget: bool = True) -> None:
         self.lose()
         if forget:
-            self.forget()
+            self._forget()
         self._trouble(f'joint command not sent: {self._obstacle()}')
 
     def _count(self, command: Command) -> None:

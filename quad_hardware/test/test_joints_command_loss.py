@@ -42,13 +42,6 @@ def raised(targets: Sequence[float]) -> Sequence[str]:
     return raised_feet(ROBOT.feet(targets))
 
 
-def command_loss(
-    reaction: LossReaction = LossReaction.LIE, joints: JointMap = JOINTS
-) -> JointCommander:
-    """What is watched."""
-    return Line(reaction, joints).commander
-
-
 def trot(tick: int, lift: float) -> list[float]:
     """Targets of a robot of which a diagonal pair of legs is lifted by an angle [rad]."""
     pair = ('fl', 'br') if tick // 7 % 2 else ('fr', 'bl')
@@ -57,94 +50,127 @@ def trot(tick: int, lift: float) -> list[float]:
     ]
 
 
-def stream(loss: JointCommander, duration: float, lift: float, start: float = 0.0) -> float:
-    """Command a trot on the spot for a time; return its end [s]."""
-    count = round(duration / PERIOD)
-    for tick in range(count):
-        loss.commanded(trot(tick, lift), start + tick * PERIOD)
-    return start + count * PERIOD
+class Line:
+    """What a commander sends its angles to; it may be cut."""
+
+    def __init__(
+        self, reaction: LossReaction = LossReaction.LIE, joints: JointMap = JOINTS
+    ) -> None:
+        self.sent: list[Mapping[int, float]] = []
+        self.warned: list[str] = []
+        self.obstacle = ''
+        self.place: dict[str, float] = dict(STAND)  # where the legs are seen
+        self.commander = JointCommander(
+            joints, LimiterSettings(command_loss=reaction),
+            raised=raised, send=self._send, waits=lambda: False,
+            obstacle=lambda: self.obstacle, warn=self.warned.append,
+        )  # fmt: skip
+
+    def _send(self, angles: Mapping[int, float]) -> bool:
+        if not self.obstacle:
+            self.sent.append(angles)
+        return not self.obstacle
+
+    def walk(self, duration: float, lift: float = 0.3, start: float = 0.0) -> float:
+        """Command a trot on the spot for a time; return its end [s]."""
+        for tick in range(round(duration / PERIOD)):
+            self.stand(trot(tick, lift), start + tick * PERIOD)
+        return start + duration
+
+    def stand(self, targets: Sequence[float], now: float) -> None:
+        """Command targets."""
+        assert self.commander.take(targets, self.place, now) is not None
+
+    def miss(self, tilt: float | None, now: float) -> str:
+        """Return what the robot does as no command has come, a report or none."""
+        commander, place = self.commander, self.place
+        loss = commander.miss(place, tilt, now)
+        if loss is None:
+            loss = commander.miss(place, tilt, now + REPORT_TIMEOUT)
+        assert loss is not None
+        return loss
+
+    def descend(self, now: float) -> list[Sequence[float]]:
+        """Step until the robot is down, ten seconds at most; return its targets [rad]."""
+        way: list[Sequence[float]] = []
+        while self.commander.goes_down and len(way) < 500:
+            now += PERIOD
+            if command := self.commander.go_down(self.place, now):
+                way.append(command.targets)
+        assert not self.commander.goes_down
+        return way
 
 
-def descend(loss: JointCommander, now: float) -> list[list[float]]:
-    """Step until the robot is down, ten seconds at most."""
-    found = []
-    for tick in range(500):
-        positions = loss.step(now + tick * PERIOD)
-        if positions is None:
-            break
-        found.append(positions)
-    assert not loss.goes_down
-    return found
-
-
+@pytest.mark.parametrize('tilt', [0.1, None], ids=['tilted', 'dead IMU'])
 @pytest.mark.parametrize('lift', [0.15, 0.3])
-def test_a_stream_that_breaks_off_in_a_trot_brings_the_robot_down(lift: float) -> None:
+def test_a_stream_that_breaks_off_in_a_trot_brings_the_robot_down(
+    lift: float, tilt: float | None
+) -> None:
     """From where the joints are, softly, to the lying pose, and then nothing is sent."""
-    loss = command_loss()
-    now = stream(loss, 2.0, lift)
-    assert 'in the air' in loss.hazard
-    assert loss.begin(STAND, 0.1, now) == ''
-    way = descend(loss, now)
-    assert way[0] == pytest.approx(STANDING)
+    line = Line()
+    now = line.walk(2.0, lift)
+    loss = line.miss(tilt, now)
+    assert 'in the air' in loss
+    assert 'lies down' in loss
+    way = line.descend(now)
+    assert way[0] == pytest.approx(STANDING, abs=SPEED * PERIOD)
     assert way[-1] == pytest.approx(LYING)
     steps = [abs(b - a) for one, two in itertools.pairwise(way)
              for a, b in zip(one, two, strict=True)]  # fmt: skip
     assert max(steps) <= SPEED * PERIOD * 1.01
-    assert not loss.hazard
+    assert line.miss(tilt, now + 20.0) == ''
 
 
 @pytest.mark.parametrize(('duration', 'lift'), [(2.0, 0.0), (2.0, 0.02), (0.3, 0.3)])
 def test_commands_that_end_on_all_feet_leave_a_posture(duration: float, lift: float) -> None:
     """Standing, levelling, a person who tries a servo for a moment: nothing moves by itself."""
-    loss = command_loss()
-    stream(loss, duration, lift)
-    assert not loss.hazard
+    line = Line()
+    assert line.miss(0.0, line.walk(duration, lift) + 1.0) == ''
 
 
 def test_the_posture_at_the_end_counts() -> None:
     """A robot that walked, and had put down its feet when its commands ended, stands."""
-    loss = command_loss()
-    stream(loss, PERIOD, 0.0, start=stream(loss, 2.0, 0.3))
-    assert not loss.hazard
+    line = Line()
+    assert line.miss(0.0, line.walk(0.2, 0.0, start=line.walk(2.0)) + 1.0) == ''
 
 
 def test_a_robot_that_was_just_laid_down_lies() -> None:
     """The demo and Ctrl-C end the controller as soon as it says so: nothing has broken off."""
-    loss = command_loss()
+    line = Line()
     for tick in range(50):
         share = 0.5 * (1.0 - math.cos(math.pi * tick / 49))
-        loss.commanded(
+        line.stand(
             [stand + share * (lie - stand) for stand, lie in zip(STANDING, LYING, strict=True)],
             tick * PERIOD,
         )
-    assert not loss.hazard
+    assert line.miss(0.0, 2.0) == ''
 
 
 @pytest.mark.parametrize('legs', [('fl',), ('br',), ('fr', 'bl')])
 def test_a_leg_that_is_held_in_the_air_is_no_rest(legs: tuple[str, ...]) -> None:
     """A controller that holds in the middle of a trot, for a fault, and then ends."""
-    loss = command_loss()
-    held = {**STAND, **{f'{leg}_thigh_joint': STAND[f'{leg}_thigh_joint'] + 0.3 for leg in legs}}
-    for tick in range(100):
-        loss.commanded([held[name] for name in NAMES], tick * PERIOD)
-    assert all(f'{leg}_foot' in loss.hazard for leg in legs)
-    assert loss.begin(held, 0.1, 2.5) == ''
-    assert descend(loss, 2.5)[-1] == pytest.approx(LYING)
+    line = Line()
+    line.place.update({f'{leg}_thigh_joint': STAND[f'{leg}_thigh_joint'] + 0.3 for leg in legs})
+    for tick in range(50):
+        line.stand([line.place[name] for name in NAMES], tick * PERIOD)
+    loss = line.miss(0.1, 2.5)
+    assert all(f'{leg}_foot' in loss for leg in legs)
+    assert line.descend(2.5)[-1] == pytest.approx(LYING)
 
 
 @given(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.floats(-0.1, 0.1))
 def test_a_body_that_leans_or_sways_stands(roll: float, height: float, pitch: float) -> None:
     """On a slope, or swaying over its feet until the end: all of them stand in a plane."""
-    loss = command_loss()
-    for tick in range(100):
-        place, share = dict(STAND), tick / 99
+    line = Line()
+    for tick in range(50):
+        place, share = dict(STAND), tick / 49
         for leg in ('fl', 'fr', 'bl', 'br'):
             way = share * (height + (pitch if leg[0] == 'f' else -pitch))
             place[f'{leg}_hip_joint'] += share * roll
             place[f'{leg}_thigh_joint'] += way
             place[f'{leg}_calf_joint'] -= 2.0 * way
-        loss.commanded([place[name] for name in NAMES], tick * PERIOD)
-    assert not loss.hazard
+        line.stand([place[name] for name in NAMES], tick * PERIOD)
+    assert line.miss(0.0, 2.0) == ''
 
 
 @pytest.mark.parametrize(
@@ -159,64 +185,20 @@ def test_it_says_why_it_may_not(
     place: dict[str, float], tilt: float, reaction: LossReaction, named: str
 ) -> None:
     """Nobody knows where the legs are, the robot lies on its side, or it is not wanted."""
-    loss = command_loss(reaction)
-    now = stream(loss, 2.0, 0.3)
-    assert named in loss.begin(place, tilt, now)
-    assert loss.step(now) is None
+    line = Line(reaction)
+    now = line.walk(2.0)
+    line.place = place
+    assert named in line.miss(tilt, now)
+    assert not line.commander.goes_down
 
 
 def test_a_robot_of_others_holds() -> None:
     """Where joints have other names, no lying pose is known."""
     first, *rest = JOINTS.servos
-    loss = command_loss(joints=JointMap([replace(first, joint='left_front_hip'), *rest]))
-    now = stream(loss, 2.0, 0.3)
-    assert 'left_front_hip' in loss.begin({**STAND, 'left_front_hip': 0.0}, None, now)
-
-
-def test_without_an_attitude_it_comes_down_all_the_same() -> None:
-    """A dead IMU is no reason to stay on two legs."""
-    loss = command_loss()
-    assert loss.begin(STAND, None, stream(loss, 2.0, 0.3)) == ''
-
-
-@given(st.floats(0.0, 3.0))
-def test_whoever_commands_ends_the_way_down(after: float) -> None:
-    """At any moment of it, and its own stream begins anew."""
-    loss = command_loss()
-    now = stream(loss, 2.0, 0.3) + 1.0
-    loss.begin(STAND, 0.0, now)
-    while loss.goes_down and loss.step(now) and now < after:
-        now += PERIOD
-    loss.commanded(STANDING, now)
-    assert loss.step(now + PERIOD) is None
-    assert not loss.hazard
-
-
-class Line:
-    """What a commander sends its angles to; it may be cut."""
-
-    def __init__(
-        self, reaction: LossReaction = LossReaction.LIE, joints: JointMap = JOINTS
-    ) -> None:
-        self.sent: list[Mapping[int, float]] = []
-        self.warned: list[str] = []
-        self.obstacle = ''
-        self.commander = JointCommander(
-            joints, LimiterSettings(command_loss=reaction),
-            raised=raised, send=self._send, waits=lambda: False,
-            obstacle=lambda: self.obstacle, warn=self.warned.append,
-        )  # fmt: skip
-
-    def _send(self, angles: Mapping[int, float]) -> bool:
-        if not self.obstacle:
-            self.sent.append(angles)
-        return not self.obstacle
-
-    def walk(self, duration: float) -> float:
-        """Command a trot on the spot for a time from zero on; return its end [s]."""
-        for tick in range(round(duration / PERIOD)):
-            assert self.commander.take(trot(tick, 0.3), STAND, tick * PERIOD) is not None
-        return duration
+    line = Line(joints=JointMap([replace(first, joint='left_front_hip'), *rest]))
+    line.place['left_front_hip'] = 0.0
+    assert 'left_front_hip' in line.miss(None, line.walk(2.0))
+    assert not line.commander.goes_down
 
 
 def test_what_breaks_off_is_sent_down_through_the_same_limits() -> None:
@@ -245,7 +227,6 @@ def test_timers_that_are_late_behind_a_command_change_nothing() -> None:
     last = now - PERIOD
     assert line.commander.is_commanded(last + 0.9 * line.commander.timeout)
     assert line.commander.go_down(STAND, now) is None
-    assert line.commander.hazard
     now = last + line.commander.timeout
     assert not line.commander.is_commanded(now)
     assert 'lies down' in (line.commander.miss(STAND, 0.0, now) or '')
@@ -297,16 +278,16 @@ def test_a_pause_on_the_way_down_makes_it_later_and_not_quicker(share: float) ->
     assert line.sent[-1] == pytest.approx(JOINTS.angles(LYING))
 
 
-def test_a_pause_with_a_foot_in_the_air_does_not_begin_a_new_stream() -> None:
+@pytest.mark.parametrize('noticed', [False, True])
+def test_a_pause_with_a_foot_in_the_air_does_not_begin_a_new_stream(*, noticed: bool) -> None:
     """A controller stutters, goes on for a moment and is gone: the robot comes down."""
-    for noticed in (False, True):
-        loss = command_loss()
-        now = stream(loss, 2.0, 0.3) + 0.5
-        if noticed:
-            assert loss.begin(STAND, 0.0, now) == ''
-            loss.step(now + PERIOD)
-        stream(loss, 0.2, 0.3, start=now + 2 * PERIOD)
-        assert loss.hazard
+    line = Line()
+    now = line.walk(2.0) + 0.5
+    if noticed:
+        assert 'lies down' in line.miss(0.0, now)
+        assert line.commander.go_down(STAND, now + PERIOD) is not None
+    now = line.walk(0.2, 0.25, start=now + 2 * PERIOD)
+    assert 'in the air' in line.miss(0.0, now + 0.5)
 
 
 @pytest.mark.parametrize('cut', ['before', 'on the way', 'for long'])
@@ -350,6 +331,7 @@ def test_a_controller_that_wakes_begins_softly_where_the_legs_are(descended: flo
     place, now = laid_down(line, line.walk(2.0) + line.commander.timeout, descended)
     assert line.commander.take([place[name] for name in NAMES], place, now) is not None
     assert not line.commander.goes_down
+    assert line.commander.go_down(place, now) is None
     for tick in range(1, 10):
         before = place
         command = line.commander.take([0.5, 0.2, 0.9] * 4, before, now + tick * PERIOD)

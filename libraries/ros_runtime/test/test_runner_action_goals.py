@@ -69,6 +69,13 @@ def serve(
     return server
 
 
+def send(client: RosClient) -> Any:
+    """Send a goal once its server is there; return the future of its acceptance."""
+    caller = client.action(LookupTransform, 'look_up')
+    assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
+    return caller.send_goal_async(LookupTransform.Goal())  # type: ignore[no-untyped-call]
+
+
 @pytest.mark.slow
 def test_a_goal_goes_on_after_its_callback_and_is_forgotten_after_its_end(
     isolation: Isolation, monkeypatch: pytest.MonkeyPatch
@@ -79,15 +86,13 @@ def test_a_goal_goes_on_after_its_callback_and_is_forgotten_after_its_end(
 
     with RosClient(isolation.domain_id) as client:
         server = serve(client.node, begun.append)
-        caller = client.action(LookupTransform, 'look_up')
-        assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
 
         def result_of(goal: Any) -> Any:
             result = goal.get_result_async()
             client.spin_until(result.done, TIMEOUT, 'a result')
             return result.result()
 
-        sent = caller.send_goal_async(LookupTransform.Goal())  # type: ignore[no-untyped-call]
+        sent = send(client)
         client.spin_until(sent.done, TIMEOUT, 'acceptance')
         goal = sent.result()
         client.spin_until(lambda: bool(begun), TIMEOUT, 'the start')
@@ -106,8 +111,6 @@ def test_a_goal_whose_answers_are_delayed_keeps_its_executor_asleep(isolation: I
     begun: list[ServedGoal] = []
     with RosClient(isolation.domain_id) as client:
         server = serve(client.node, begun.append)
-        caller = client.action(LookupTransform, 'look_up')
-        assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
         passes = 0
 
         def passed(done: Callable[[], bool]) -> bool:
@@ -115,7 +118,7 @@ def test_a_goal_whose_answers_are_delayed_keeps_its_executor_asleep(isolation: I
             passes += 1
             return done()
 
-        sent = caller.send_goal_async(LookupTransform.Goal())  # type: ignore[no-untyped-call]
+        sent = send(client)
         client.spin_until(lambda: passed(lambda: bool(begun)), TIMEOUT, 'the start')
         end = time.monotonic() + 0.5  # its acceptance is about to be repeated
         client.spin_until(lambda: passed(lambda: time.monotonic() > end), TIMEOUT, 'some time')
@@ -143,9 +146,7 @@ def test_a_goal_ends_once_with_the_status_of_its_server(
     begun: list[ServedGoal] = []
     with RosClient(isolation.domain_id) as client:
         server = serve(client.node, begun.append, ending)
-        caller = client.action(LookupTransform, 'look_up')
-        assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
-        sent = caller.send_goal_async(LookupTransform.Goal())  # type: ignore[no-untyped-call]
+        sent = send(client)
         client.spin_until(lambda: sent.done() and bool(begun), TIMEOUT, 'acceptance')
         assert server.running == begun
         if is_canceled:
@@ -200,9 +201,7 @@ def test_a_cancel_of_all_goals_counts_for_one_that_is_not_accepted_yet(
 
     with RosClient(isolation.domain_id) as client:
         server = serve(client.node, lambda _: None, Ending.CANCELED, accept)
-        caller = client.action(LookupTransform, 'look_up')
-        assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
-        sent = caller.send_goal_async(LookupTransform.Goal())  # type: ignore[no-untyped-call]
+        sent = send(client)
         client.spin_until(lambda: bool(received), TIMEOUT, 'the request')
         cancel = client.call_async(CancelGoal, 'look_up/_action/cancel_goal', CancelGoal.Request())
         client.spin_until(cancel.done, TIMEOUT, 'the answer to the cancel')
@@ -241,9 +240,7 @@ def test_a_goal_that_fails_is_aborted_with_the_reason(
 
     with RosClient(isolation.domain_id) as client:
         server = serve(client.node, start, None)
-        caller = client.action(LookupTransform, 'look_up')
-        assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
-        sent = caller.send_goal_async(LookupTransform.Goal())  # type: ignore[no-untyped-call]
+        sent = send(client)
         client.spin_until(lambda: sent.done() and bool(begun), TIMEOUT, 'acceptance')
         if wrong is None:
             cancel = sent.result().cancel_goal_async()
@@ -268,9 +265,7 @@ def test_a_goal_is_answered_by_an_executor_that_heeds_groups(isolation: Isolatio
         executor = SingleThreadedExecutor(context=context)
         executor.add_node(node)
         server = serve(node, lambda _: None)
-        caller = client.action(LookupTransform, 'look_up')
-        assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
-        sent = caller.send_goal_async(LookupTransform.Goal())  # type: ignore[no-untyped-call]
+        sent = send(client)
 
         def answered() -> bool:
             executor.spin_once(0.01)

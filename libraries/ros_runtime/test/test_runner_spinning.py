@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 import threading
 
 from isolation import Isolation
 import pytest
 import rclpy
 from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.node import Node
 from rclpy.utilities import try_shutdown
 
 from node_runner import log_defects, make_executor, spin, spin_beside
@@ -16,30 +17,34 @@ from node_runner import log_defects, make_executor, spin, spin_beside
 TIMEOUT = 20.0  # [s]
 
 
-@pytest.mark.parametrize('make', [make_executor, SingleThreadedExecutor])
-@pytest.mark.parametrize('end', ['event', 'shutdown'])
-def test_spin_serves_until_the_end(
-    isolation: Isolation, make: Callable[[], Executor], end: str
-) -> None:
-    """Callbacks run until the event is set, or the context is shut down from elsewhere."""
+@pytest.fixture
+def node(isolation: Isolation) -> Iterator[Node]:
+    """Return a node of its own context."""
     rclpy.init(args=[], domain_id=isolation.domain_id)
     try:
         node = rclpy.create_node('spinner')
-        called, stop = threading.Event(), threading.Event()
-        node.create_timer(0.005, called.set)
-
-        def finish() -> None:
-            called.wait(TIMEOUT)
-            stop.set() if end == 'event' else rclpy.shutdown()
-
-        finisher = threading.Thread(target=finish)
-        finisher.start()
-        spin([node], stop, make())
-        finisher.join()
-        assert called.is_set()
+        yield node
         node.destroy_node()
     finally:
         try_shutdown()
+
+
+@pytest.mark.parametrize('make', [make_executor, SingleThreadedExecutor])
+@pytest.mark.parametrize('end', ['event', 'shutdown'])
+def test_spin_serves_until_the_end(node: Node, make: Callable[[], Executor], end: str) -> None:
+    """Callbacks run until the event is set, or the context is shut down from elsewhere."""
+    called, stop = threading.Event(), threading.Event()
+    node.create_timer(0.005, called.set)
+
+    def finish() -> None:
+        called.wait(TIMEOUT)
+        stop.set() if end == 'event' else rclpy.shutdown()
+
+    finisher = threading.Thread(target=finish)
+    finisher.start()
+    spin([node], stop, make())
+    finisher.join()
+    assert called.is_set()
 
 
 @pytest.mark.parametrize('simulated', [False, True])
@@ -65,77 +70,59 @@ def test_simulated_time_is_said_once(
 
 @pytest.mark.parametrize('make', [make_executor, SingleThreadedExecutor])
 def test_what_a_callback_raises_ends_nothing_where_it_is_reported(
-    isolation: Isolation, make: Callable[[], Executor], capfd: pytest.CaptureFixture[str]
+    node: Node, make: Callable[[], Executor], capfd: pytest.CaptureFixture[str]
 ) -> None:
     """The same callback, and the others, are called again; without a report it is raised."""
-    rclpy.init(args=[], domain_id=isolation.domain_id)
-    try:
-        node = rclpy.create_node('spinner')
-        stop, reported, others = threading.Event(), list[str](), list[int]()
+    stop, reported, others = threading.Event(), list[str](), list[int]()
 
-        def fail() -> None:
-            raise ValueError('no such thing')
+    def fail() -> None:
+        raise ValueError('no such thing')
 
-        def report(error: Exception) -> None:
-            reported.append(str(error))
-            if len(reported) > 2 and others:
-                stop.set()
+    def report(error: Exception) -> None:
+        reported.append(str(error))
+        if len(reported) > 2 and others:
+            stop.set()
 
-        node.create_timer(0.005, fail)
-        node.create_timer(0.005, lambda: others.append(1))
-        spin([node], stop, make(), survive=report)
-        assert set(reported) == {'no such thing'}
-        reported.clear()
-        spin([node], stop, make(), linger=0.1, survive=report)
-        assert set(reported) == {'no such thing'}, 'while it lingers, too'
-        stop.clear()
-        node.create_timer(0.3, stop.set)
-        spin([node], stop, make(), survive=log_defects(node))
-        assert capfd.readouterr().err.count('a callback failed') == 1
-        with pytest.raises(ValueError, match='no such thing'):
-            spin([node], threading.Event(), make())
-        node.destroy_node()
-    finally:
-        try_shutdown()
+    node.create_timer(0.005, fail)
+    node.create_timer(0.005, lambda: others.append(1))
+    spin([node], stop, make(), survive=report)
+    assert set(reported) == {'no such thing'}
+    reported.clear()
+    spin([node], stop, make(), linger=0.1, survive=report)
+    assert set(reported) == {'no such thing'}, 'while it lingers, too'
+    stop.clear()
+    node.create_timer(0.3, stop.set)
+    spin([node], stop, make(), survive=log_defects(node))
+    assert capfd.readouterr().err.count('a callback failed') == 1
+    with pytest.raises(ValueError, match='no such thing'):
+        spin([node], threading.Event(), make())
 
 
-def test_spin_lingers(isolation: Isolation) -> None:
+def test_spin_lingers(node: Node) -> None:
     """What is due soon after the event is done, as the result of a goal that has just ended."""
-    rclpy.init(args=[], domain_id=isolation.domain_id)
-    try:
-        node = rclpy.create_node('spinner')
-        called, stop = threading.Event(), threading.Event()
-        stop.set()
-        node.create_timer(0.01, called.set)
-        spin([node], stop)
-        assert not called.is_set()
-        spin([node], stop, linger=TIMEOUT / 20)
-        assert called.is_set()
-        node.destroy_node()
-    finally:
-        try_shutdown()
+    called, stop = threading.Event(), threading.Event()
+    stop.set()
+    node.create_timer(0.01, called.set)
+    spin([node], stop)
+    assert not called.is_set()
+    spin([node], stop, linger=TIMEOUT / 20)
+    assert called.is_set()
 
 
 @pytest.mark.parametrize('fails', [False, True])
-def test_nodes_are_served_while_a_thread_works(isolation: Isolation, fails: bool) -> None:
+def test_nodes_are_served_while_a_thread_works(node: Node, fails: bool) -> None:
     """Its end ends both, and what it raises is raised where the nodes were served."""
-    rclpy.init(args=[], domain_id=isolation.domain_id)
-    try:
-        node = rclpy.create_node('spinner')
-        called, stop = threading.Event(), threading.Event()
-        node.create_timer(0.005, called.set)
+    called, stop = threading.Event(), threading.Event()
+    node.create_timer(0.005, called.set)
 
-        def work() -> None:
-            assert called.wait(TIMEOUT)
-            if fails:
-                raise OSError('no disk')
-
+    def work() -> None:
+        assert called.wait(TIMEOUT)
         if fails:
-            with pytest.raises(OSError, match='no disk'):
-                spin_beside(work, [node], stop, 'work')
-        else:
+            raise OSError('no disk')
+
+    if fails:
+        with pytest.raises(OSError, match='no disk'):
             spin_beside(work, [node], stop, 'work')
-        assert stop.is_set()
-        node.destroy_node()
-    finally:
-        try_shutdown()
+    else:
+        spin_beside(work, [node], stop, 'work')
+    assert stop.is_set()
