@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from html import unescape
 import math
-from pathlib import Path
 import re
 import sys
 from types import SimpleNamespace
@@ -43,9 +42,8 @@ from robot_viewer.nodes.first_motion import (
 )
 from robot_viewer.page.first_motion import (
     Axis,
-    BusPlace,
     correction_lines,
-    correction_of,
+    corrections,
     GuardedTargets,
     LEAD_TIME,
     MAX_STEP_TIME,
@@ -64,9 +62,8 @@ AXIS = Axis(
     JointKind.TURNS,
     AxisScales(False, 1e4, 1e-4, 1e4, 1e-4, 1.0, 1.0, 0.0),
     DriveFacts(1e4),
-    BusPlace(Path('none'), 0, 0, 'shoulder', None),
+    'bus.yml, shoulder',
 )
-BUS = 'nodes:\n  shoulder:\n    node_id: 2  # mine\n    scale_pos_to_dev: 1000.0\n'
 
 
 @given(beats=st.lists(st.booleans(), min_size=1, max_size=300), sign=st.sampled_from((1, -1)))
@@ -192,32 +189,21 @@ def test_what_was_seen_is_compared_with_the_picture(
     assert judge(JointKind.TURNS, commanded, reported, seen, facts).verdict is verdict
 
 
-def test_a_correction_is_shown_and_written_once(tmp_path: Path) -> None:
-    """Into the very file that the robot was started with; an own copy of it is left alone."""
-    path, copy = tmp_path / 'bus.yml', tmp_path / 'copy.yml'
-    for each in (path, copy):
-        each.write_text(BUS)
-    stat = path.stat()
-    place = BusPlace(path, stat.st_ino, stat.st_mtime_ns, 'shoulder', None)
+def test_each_likely_cause_has_its_correction() -> None:
+    """As lines of bus.yml, with the reason; what is right needs none."""
     says = DriveFacts(1000.0, gear=50.0)
-    axis = Axis(JointKind.TURNS, SCALES, says, place)
+    axis = Axis(JointKind.TURNS, SCALES, says, 'bus.yml, shoulder')
     judgement = judge(JointKind.TURNS, 0.1, 0.1, Saw.OTHER_WAY.seen(0.1, 0.002), says)
-    assert len(judgement.causes) == 2, 'a gear of 50, or degrees'
-    assert correction_of(axis, judgement, None) is None, 'a person chooses'
-    correction = correction_of(axis, judgement, judgement.causes[0])
-    assert correction is not None
-    lines = correction_lines(place, correction)
-    assert yaml.safe_load(lines) == correction.values
+    first, second = corrections(axis, judgement)  # a gear of 50, or degrees
+    lines = correction_lines(axis.where, first)
+    assert yaml.safe_load(lines) == first.values != second.values
+    assert lines.startswith('# bus.yml, shoulder\n')
     assert 'the gear of 50 (0x6091) is missing' in lines
-    assert not BusPlace(copy, stat.st_ino, stat.st_mtime_ns, 'shoulder', None).is_here
-    assert place.is_here
-    assert place.write(correction) == path
-    written = yaml.safe_load(path.read_text())['nodes']['shoulder']
-    assert written == {'node_id': 2, **correction.values}
-    assert '# mine' in path.read_text()
-    assert not place.is_here
-    with pytest.raises(ValueError, match='changed since the robot was started'):
-        place.write(correction)
+    assert 'per degree' in correction_lines(axis.where, second)
+    odd = judge(JointKind.TURNS, 0.1, 0.1, Saw.OTHER_WAY.seen(0.1, 1.3), says)
+    assert [each.reason.count('by eye') for each in corrections(axis, odd)] == [1]
+    right = judge(JointKind.TURNS, 0.1, 0.1, Saw.LIKE_PICTURE.seen(0.1, 0.1), says)
+    assert not list(corrections(axis, right))
 
 
 @pytest.mark.parametrize(

@@ -2,11 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The first motion of a joint: guarded while it moves, then judged by what a person has seen.
 
-`guard` decides, `judgement` concludes, `correction` and `bus_edit` correct: without a
-clock or bus.
+`guard` decides, `judgement` concludes and corrects: without a clock or bus.
 """
 
-from .bus_edit import BusEditError, edited, replace_file, yaml_text
 from .guard import FOLLOWING, MotionGuard, MotionPlan, Order, Outcome, Sample
 from .judgement import (
     AxisScales,
@@ -26,6 +24,7 @@ from .judgement import (
     too_fast,
     too_few_increments,
     Verdict,
+    yaml_text,
 )
 
 __all__ = [
@@ -34,7 +33,6 @@ __all__ = [
     'FOLLOWING',
     'FURTHEST',
     'AxisScales',
-    'BusEditError',
     'Cause',
     'Correction',
     'DriveFacts',
@@ -48,10 +46,8 @@ __all__ = [
     'Seen',
     'Verdict',
     'corrected',
-    'edited',
     'judge',
     'propose',
-    'replace_file',
     'too_far',
     'too_fast',
     'too_few_increments',

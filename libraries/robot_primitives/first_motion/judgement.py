@@ -345,3 +345,11 @@ def propose(scales: AxisScales, judgement: Judgement, cause: Cause | None) -> Co
         f'first motion: {why}; scale_pos_to_dev was {scales.scale_pos_to_dev!r}',
         (*((VELOCITIES,) if odd_velocity else ()), *accelerations, LIMITS),
     )
+
+
+def yaml_text(value: float | bool) -> str:
+    """Write a value as YAML 1.1 reads it; 2e-05 were a text there, 2.0e-05 is a number."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    mantissa, exponent, power = repr(value).partition('e')
+    return f'{mantissa}{"" if "." in mantissa or not exponent else ".0"}{exponent}{power}'

@@ -4,30 +4,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 import math
-from pathlib import Path
 
 from hypothesis import assume, given
 from hypothesis import strategies as st
 import pytest
-import yaml
 
 from first_motion import (
     AxisScales,
-    BusEditError,
     CAUSES,
     corrected,
     DriveFacts,
-    edited,
     JointKind,
     judge,
     MotionGuard,
     MotionPlan,
     Order,
     Outcome,
-    replace_file,
     Sample,
     Seen,
     too_far,
@@ -200,16 +194,6 @@ def test_a_first_motion_is_short_and_slow() -> None:
         assert 'a first motion is slow' in too_fast(kind, speed)
 
 
-def test_the_file_behind_a_link_is_changed(tmp_path: Path) -> None:
-    """The link stays: the next build would make it anew, and the change were lost."""
-    source, link = tmp_path / 'source.yml', tmp_path / 'installed.yml'
-    source.write_text('old')
-    link.symlink_to(source)
-    replace_file(link, lambda text: f'{text}, new')
-    assert link.is_symlink()
-    assert source.read_text() == 'old, new'
-
-
 def test_nobody_there_and_enough() -> None:
     """It does not wait without end; Enter ends it before the target."""
     guard = MotionGuard(PLAN, 0.0)
@@ -317,67 +301,3 @@ def test_corrected_scales() -> None:
     assert 'scale_eff_to_dev' not in corrected(scales(1000.0, 1000.0), 1, 2.0)
     odd = scales(-1000.0, 1000.0)
     assert 'scale_eff_to_dev' not in corrected(odd, -1, 1.0)
-
-
-KEYS = st.sampled_from(('scale_pos_to_dev', 'scale_vel_to_dev', 'offset_pos_from_dev', 'period'))
-TEXTS = st.sampled_from(('1', "'two'", '[1, 2]', '{a: 1}', '"x: y"', '0x10'))
-
-
-@given(
-    own=st.dictionaries(KEYS, TEXTS, max_size=4),
-    values=st.dictionaries(KEYS, st.floats(1e-12, 9e9) | st.booleans(), min_size=1, max_size=3),
-    flow=st.booleans(),
-    comments=st.lists(st.sampled_from(('', '  # one', '  # {two}: 3')), min_size=5, max_size=5),
-)
-def test_any_device_is_edited_as_yaml_means_it(
-    own: dict[str, str], values: dict[str, float | bool], *, flow: bool, comments: list[str]
-) -> None:
-    """The document is the same but for these keys, in block and in flow style."""
-    keys = {'node_id': '2', **own}
-    if flow:
-        body = ' {' + ', '.join(f'{key}: {text}' for key, text in keys.items()) + '}'
-    else:
-        pairs = zip(keys.items(), comments, strict=False)
-        body = ''.join(f'\n    {key}: {text}{comment}' for (key, text), comment in pairs)
-    text = f'nodes:\n  first:{body}\n  second: {{node_id: 3}}\n'
-    document = yaml.safe_load(text)
-    document['nodes']['first'] |= values
-    assert yaml.safe_load(edited(text, 'first', values, 'why', None)) == document
-
-
-def test_a_comment_of_the_old_value_says_so() -> None:
-    """Once: what was read from the drive is not what is written now."""
-    text = 'nodes:\n  b:\n    node_id: 2  # the left one\n    by_group: true  # read; 5 a turn\n'
-    changed = edited(text, 'b', {'by_group': False}, 'why', None)
-    assert changed == (
-        'nodes:\n  b:\n    node_id: 2  # the left one\n'
-        '    # why\n    by_group: false  # before: read; 5 a turn\n'
-    )
-    again = edited(changed, 'b', {'by_group': True}, 'because', None)
-    assert again.count('# before: read; 5 a turn\n') == again.count('before') == 1
-
-
-@pytest.mark.parametrize(
-    ('text', 'channel', 'words'),
-    [
-        ('nodes: {a: &x {node_id: 2}, b: *x}', None, 'alias'),
-        ('nodes: {b: {node_id: 2, scale_pos_to_dev: *s}}', None, 'alias'),
-        ('nodes: {b: {node_id: 2}}', 1, 'no channels'),
-        ('nodes: {c: {node_id: 2}}', None, 'no keys of b'),
-    ],
-)
-def test_forms_that_are_left_to_the_person(text: str, channel: int | None, words: str) -> None:
-    """With what to write by hand."""
-    anchor = 'defaults: {scale_pos_to_dev: &s 2.0}\n' if '*s' in text else ''
-    with pytest.raises(BusEditError, match=rf'{words}.*scale_pos_to_dev: 5\.0|alias'):
-        edited(anchor + text, 'b', {'scale_pos_to_dev': 5.0}, 'why', channel)
-
-
-def test_channels_and_devices_beside_the_sections() -> None:
-    """As ros2_canopen has them, too."""
-    values: Mapping[str, float | bool] = {'scale_pos_to_dev': 5.0}
-    text = 'b:\n  node_id: 2\n  channels:\n    - {}\n    - {scale_pos_to_dev: 1.0}\n'
-    changed = yaml.safe_load(edited(text, 'b', values, 'why', 1))
-    assert changed['b']['channels'][1] == values
-    text = 'b:\n  node_id: 2\n'
-    assert yaml.safe_load(edited(text, 'b', values, 'why', None))['b'] == {'node_id': 2, **values}

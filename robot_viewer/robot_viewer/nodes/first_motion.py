@@ -4,12 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 import math
-from pathlib import Path
 import time
 from typing import Any
 
@@ -23,14 +22,11 @@ from urdf_reader import KinematicTree
 
 from first_motion import (
     AxisScales,
-    Cause,
-    Correction,
     DriveFacts,
     FASTEST,
     FURTHEST,
     JointKind,
     judge,
-    Judgement,
     Order,
     Outcome,
     Sample,
@@ -43,9 +39,8 @@ from first_motion import (
 from ..page.first_motion import (
     announcement,
     Axis,
-    BusPlace,
     correction_lines,
-    correction_of,
+    corrections,
     GuardedTargets,
     motion_plan,
     MotionRequest,
@@ -54,7 +49,7 @@ from ..page.first_motion import (
 )
 from ..page.live import Hold
 from ..page.robot_page import RobotPage
-from ..page.style import BAD, CAUTION, GOOD, line, NEUTRAL, PLAIN, WANTED
+from ..page.style import BAD, GOOD, line, NEUTRAL, PLAIN, WANTED
 from ..robot_state import DRIVE, Status
 
 READ_UNITS = 'read_units'
@@ -71,7 +66,10 @@ SPEEDS = {JointKind.TURNS: 0.5, JointKind.SLIDES: 1.0}
 """In the same unit per second: slow enough to let go in time, whatever the scale is by ten."""
 HOLD = 'Hold to move'
 PRESS_ANEW = 'let go of the button, and press it anew'
-CHOOSE = 'choose'
+
+
+class _FailedError(Exception):
+    """Why no motion can be made, in words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,25 +103,21 @@ class FirstMotion:
         self._offered = False
         self._hold: int | None = None  # number of the button, while a motion is prepared
         self._kind = JointKind.TURNS  # of the joint that is chosen
-        self._causes: Mapping[str, Cause] = {}
         self._publishers: dict[str, Publisher] = {}
-        self._attempt = 0  # what is answered for an earlier one counts no more
         self._request = MotionRequest('', 0.0, 0.0)
         self._axis: Axis | None = None
-        self._step: Callable[[float], None] | None = None  # what goes on at a steady time
+        self._run: Iterator[None] | None = None  # what goes on at each look
         self._disabling: Disabling | None = None
         self._unconfirmed: Disabling | None = None  # what the page shows of one that was late
         self._seen_at = -math.inf  # when a position of the joint came
         self._targets: GuardedTargets | None = None
         self._commanded = 0.0
         self._reported: float | None = None
-        self._judgement: Judgement | None = None
-        self._correction: Correction | None = None
 
     @property
     def busy(self) -> bool:
         """Whether positions matter, also for a page that was closed."""
-        return self._step is not None
+        return self._run is not None
 
     # -- what the robot offers
 
@@ -167,16 +161,12 @@ class FirstMotion:
             self._far = gui.add_number('How far', DISTANCE, step=0.01)
             self._conclude = gui.add_button('Conclude', color=NEUTRAL)
             self._verdict = gui.add_html('')
-            self._cause = gui.add_dropdown('Cause', (CHOOSE,))
             self._lines = gui.add_markdown('')
-            self._write = gui.add_button('Write it into bus.yml', color=CAUTION)
             self._note = gui.add_html('')
         self._joint.on_update(lambda _: self._select())
         self._prepare.on_click(lambda _: order(partial(self.prepare, self._asked())))
         self._enough.on_click(lambda _: order(self.finish))
         self._conclude.on_click(lambda _: self._have_seen())
-        self._cause.on_update(lambda _: self._choose())
-        self._write.on_click(lambda _: order(self.write))
         self._offered = True
         self._use_units()
         self._begin('')
@@ -195,11 +185,6 @@ class FirstMotion:
     def _have_seen(self) -> None:
         saw, far = Saw(self._saw.value), abs(self._far.value) * self._kind.size
         self._order(partial(self.conclude, saw, far))
-
-    def _choose(self) -> None:
-        cause = self._causes.get(self._cause.value)
-        if cause is not None:
-            self._order(partial(self.propose, cause))
 
     def _use_units(self) -> None:
         kind = self._kind = self._kinds[self._joint.value]
@@ -244,8 +229,7 @@ class FirstMotion:
         self._enough.visible = moves
         for question in (self._saw, self._far, self._conclude):
             question.visible = asks
-        self._verdict.visible = concluded
-        self._cause.visible = self._lines.visible = self._write.visible = False
+        self._verdict.visible = self._lines.visible = concluded
         self._note.content = ''
 
     def _drop_hold(self) -> None:
@@ -280,9 +264,7 @@ class FirstMotion:
 
     def _end(self) -> None:
         """Forget what was prepared and measured."""
-        self._attempt += 1
-        self._step = self._targets = self._reported = None
-        self._judgement = self._correction = self._unconfirmed = None
+        self._run = self._targets = self._reported = self._unconfirmed = None
 
     def forget(self) -> None:
         """Another joint was chosen: what was prepared counts no more."""
@@ -300,38 +282,76 @@ class FirstMotion:
             return
         self._end()
         self._request, self._seen_at = request, -math.inf
+        self._run = self._motion(request)
+        self.advance()
+
+    def _motion(self, request: MotionRequest) -> Iterator[None]:
+        """Prepare and make a motion, one step at each look."""
         kind = self._kinds[request.joint]
         if large := too_far(kind, request.distance) or too_fast(kind, request.speed):
-            self._fail(large)
-            return
+            raise _FailedError(large)
         try:
             service = import_module('arm_msgs.srv').ReadUnits
         except ModuleNotFoundError as error:
-            self._fail(f'{error.name} is not installed here; build the workspace with arm_msgs')
-            return
+            text = f'{error.name} is not installed here; build the workspace with arm_msgs'
+            raise _FailedError(text) from error
         self._begin('asking the drive ...', waits=True)
-        self._ask_drive(service, READ_UNITS, self._take_units)
+        units = yield from self._ask_drive(service, READ_UNITS)
+        scales = AxisScales.of(units)
+        says = DriveFacts(scales.scale_pos_to_dev, units.gear or None, units.factor_scale or None)
+        where = f'{units.bus_config}, {units.device}'
+        if units.channel >= 0:
+            where += f', channel {units.channel}'
+        self._axis = axis = Axis(kind, scales, says, where)
+        if few := too_few_increments(kind, request.distance, scales.scale_pos_to_dev):
+            raise _FailedError(few)
+        yield from self._ask_drive(Trigger, 'enable')
+        yield from self._await_status()
+        start = self._positions[request.joint]
+        others = {
+            name: self._positions[name]
+            for name in self._drives
+            if name != request.joint and name in self._positions
+        }
+        try:
+            plan = motion_plan(request, axis, start, others)
+        except ValueError as error:
+            raise _FailedError(str(error)) from error
+        self._targets = targets = GuardedTargets(plan, time.monotonic())
+        self._prepare.disabled = False
+        self._state.content = ''.join(map(line, announcement(request, axis, plan.start)))
+        self._show(moves=True)
+        yield from self._move(targets)
+        if targets.guard.outcome.is_judged:
+            until = time.monotonic() + SETTLE_TIME
+            while time.monotonic() < until:
+                yield
+            self._ask_person(targets)
+        elif targets.guard.outcome is Outcome.IDLE:
+            self._end()
+            self._begin('the button was not held: prepare it anew')
+        else:
+            self._disable(targets.guard.detail)
 
-    def _ask_drive(
-        self,
-        kind: Any,  # noqa: ANN401
-        name: str,
-        take: Callable[[Any], None],
-    ) -> None:
-        """Call a service of the drive; an answer to an attempt that is over is dropped."""
-        attempt = self._attempt
-        self._step = partial(self._await_answer, name, time.monotonic() + ANSWER_TIMEOUT)
+    def _ask_drive(self, kind: Any, name: str) -> Generator[None, None, Any]:  # noqa: ANN401
+        """Call a service of the drive, and wait for its answer."""
+        answers: list[tuple[Any, str]] = []
+        until = time.monotonic() + ANSWER_TIMEOUT
 
         def answered(response: Any, refusal: str) -> None:  # noqa: ANN401
-            if attempt != self._attempt:
-                return
-            self._step = None
-            if refusal:
-                self._fail(f'{name}: {refusal}')
-            else:
-                take(response)
+            answers.append((response, refusal))
+            self.advance()
 
         self._call(kind, name, answered)
+        while not answers:
+            if time.monotonic() > until:
+                why = f'no answer within {ANSWER_TIMEOUT:g} s; does its master run?'
+                raise _FailedError(f'{name}: {why}')
+            yield
+        response, refusal = answers[0]
+        if refusal:
+            raise _FailedError(f'{name}: {refusal}')
+        return response
 
     def _call(self, kind: Any, name: str, answered: Callable[[Any, str], None]) -> None:  # noqa: ANN401
         """Call a service of the drive."""
@@ -347,29 +367,6 @@ class FirstMotion:
 
         client.call_async(kind.Request()).add_done_callback(done)
 
-    def _take_units(self, response: Any) -> None:  # noqa: ANN401
-        kind = self._kinds[self._request.joint]
-        scales = AxisScales.of(response)
-        says = DriveFacts(
-            scales.scale_pos_to_dev, response.gear or None, response.factor_scale or None
-        )
-        place = BusPlace(
-            Path(response.bus_config),
-            response.bus_config_inode,
-            response.bus_config_changed,
-            response.device,
-            None if response.channel < 0 else response.channel,
-        )
-        self._axis = Axis(kind, scales, says, place)
-        if few := too_few_increments(kind, self._request.distance, scales.scale_pos_to_dev):
-            self._fail(few)
-            return
-        self._ask_drive(Trigger, 'enable', self._enabled_now)
-
-    def _enabled_now(self, _response: Trigger.Response) -> None:
-        """The drive is enabled; what is known of it is older."""
-        self._step = partial(self._await_status, time.monotonic(), self._status())
-
     def _status(self) -> Status | None:
         return self._statuses.get(f'{self._request.joint}{DRIVE}')
 
@@ -378,39 +375,17 @@ class FirstMotion:
         values = {} if status is None else status.values
         return problem_of(values, time.monotonic() - self._seen_at)
 
-    def _await_answer(self, name: str, until: float, now: float) -> None:
-        if now > until:
-            self._fail(f'{name}: no answer within {ANSWER_TIMEOUT:g} s; does its master run?')
-
-    def _await_status(self, since: float, before: Status | None, now: float) -> None:
-        """Offer the motion once /diagnostics shows a drive that takes targets."""
-        silent = self._status() is before
-        problem = 'nothing came on /diagnostics' if silent else self._problem()
-        if not problem:
-            self._step = None
-            self._ready()
-        elif now - since > (SILENCE_TIMEOUT if silent else STATUS_TIMEOUT):
-            self._fail(problem)
-
-    def _ready(self) -> None:
-        axis, request, positions = self._axis, self._request, self._positions
-        if axis is None:
-            return
-        others = {
-            name: positions[name]
-            for name in self._drives
-            if name != request.joint and name in positions
-        }
-        try:
-            plan = motion_plan(request, axis, positions[request.joint], others)
-        except ValueError as error:
-            self._fail(str(error))
-            return
-        self._targets = targets = GuardedTargets(plan, time.monotonic())
-        self._step = partial(self._move, targets)
-        self._prepare.disabled = False
-        self._state.content = ''.join(map(line, announcement(request, axis, plan.start)))
-        self._show(moves=True)
+    def _await_status(self) -> Iterator[None]:
+        """Wait until /diagnostics shows a drive that takes targets: what is known of it is old."""
+        since, before = time.monotonic(), self._status()
+        while True:
+            silent = self._status() is before
+            problem = 'nothing came on /diagnostics' if silent else self._problem()
+            if not problem:
+                return
+            if time.monotonic() - since > (SILENCE_TIMEOUT if silent else STATUS_TIMEOUT):
+                raise _FailedError(problem)
+            yield
 
     # -- the motion
 
@@ -431,30 +406,30 @@ class FirstMotion:
 
     def advance(self) -> None:
         """Go on; called 30 times a second."""
-        now = time.monotonic()
-        if self._disabling is not None and now > self._disabling.deadline:
+        if self._disabling is not None and time.monotonic() > self._disabling.deadline:
             refusal = f'no answer within {DISABLE_TIMEOUT:g} s'
             self._report_disabling(self._disabling, refusal)
-        if self._step is not None:
-            self._step(now)
+        run = self._run
+        if run is None:
+            return
+        try:
+            next(run)
+        except _FailedError as error:
+            self._fail(str(error))
+        except StopIteration:
+            self._run = None
 
-    def _move(self, targets: GuardedTargets, now: float) -> None:
+    def _move(self, targets: GuardedTargets) -> Iterator[None]:
         guard = targets.guard
-        others = {name: self._positions[name] for name in guard.plan.others}
-        position = self._positions[self._request.joint]
-        target = targets.step(now, Sample(position, problem=self._problem(), others=others))
-        if target is not None:
-            self._publisher().publish(Float64(data=target))
-        if not guard.detail:
-            return
-        if guard.outcome.is_judged:
-            self._step = partial(self._await_rest, targets, now + SETTLE_TIME)
-            return
-        if guard.outcome is Outcome.IDLE:
-            self._end()
-            self._begin('the button was not held: prepare it anew')
-            return
-        self._disable(guard.detail)
+        while not guard.detail:
+            others = {name: self._positions[name] for name in guard.plan.others}
+            position = self._positions[self._request.joint]
+            sample = Sample(position, problem=self._problem(), others=others)
+            target = targets.step(time.monotonic(), sample)
+            if target is not None:
+                self._publisher().publish(Float64(data=target))
+            if not guard.detail:
+                yield
 
     def _disable(self, why: str) -> None:
         """Disable a joint that moves without a command, as at the terminal."""
@@ -492,13 +467,11 @@ class FirstMotion:
 
     # -- after the motion
 
-    def _await_rest(self, targets: GuardedTargets, until: float, now: float) -> None:
-        if now < until:
-            return
+    def _ask_person(self, targets: GuardedTargets) -> None:
         guard, kind = targets.guard, self._kinds[self._request.joint]
         self._commanded = targets.commanded
         self._reported = self._positions[self._request.joint] - guard.plan.start
-        self._step = self._targets = None
+        self._targets = None
         ended = f'{guard.detail}; the drive reported {kind.shown(self._reported)}'
         self._state.content = line(ended) + line('What did the real joint do?')
         self._far.value = round(abs(self._reported) / kind.size, 3)  # type: ignore[misc]
@@ -511,7 +484,6 @@ class FirstMotion:
             return
         seen = saw.seen(reported, distance)
         judgement = judge(axis.kind, self._commanded, reported, seen, axis.says)
-        self._judgement, self._correction = judgement, None
         text = f'first motion of {self._request.joint}: {judgement.verdict.value}'
         self._node.get_logger().info(text)
         causes = [f'{each.text} (factor {each.factor:.4g})' for each in judgement.causes]
@@ -520,35 +492,9 @@ class FirstMotion:
         self._verdict.content = line(judgement.verdict.value, GOOD if right else BAD) + ''.join(
             map(line, texts)
         )
-        self._causes = dict(zip(causes, judgement.causes, strict=True))
-        self._cause.options = (CHOOSE, *causes)
-        self._cause.value = CHOOSE  # type: ignore[misc]
+        found = list(corrections(axis, judgement))
+        self._lines.content = '\n'.join(
+            f'```yaml\n{correction_lines(axis.where, each)}\n```' for each in found
+        )
         self._show(asks=True, concluded=True)
-        self._cause.visible = len(causes) > 1
-        self.propose(judgement.causes[0] if len(causes) == 1 else None)
-
-    def propose(self, cause: Cause | None) -> None:
-        """Propose what corrects a cause; None where it is not chosen yet."""
-        axis, judgement = self._axis, self._judgement
-        if axis is None or judgement is None:
-            return
-        self._correction = correction_of(axis, judgement, cause)
-        if self._correction is not None:
-            self._lines.content = f'```yaml\n{correction_lines(axis.place, self._correction)}\n```'
-            self._lines.visible = True
-            self._write.visible = axis.place.is_here
-            self._note.content = ''.join(map(line, self._correction.notes))
-
-    def write(self) -> None:
-        """Change bus.yml."""
-        if self._axis is None or self._correction is None:
-            return
-        try:
-            path = self._axis.place.write(self._correction)
-        except (OSError, ValueError) as error:
-            text, mark = str(error), BAD
-        else:
-            text, mark = f'{path} is written; restart the robot, which has the old scales', GOOD
-            self._node.get_logger().info(text)
-        self._write.visible = False
-        self._note.content = line(text, mark)
+        self._note.content = ''.join(line(note) for each in found[:1] for note in each.notes)

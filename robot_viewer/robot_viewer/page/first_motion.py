@@ -12,16 +12,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import partial
 import math
-from pathlib import Path
 
 from first_motion import (
     AxisScales,
-    Cause,
     Correction,
     DriveFacts,
-    edited,
     FOLLOWING,
     JointKind,
     Judgement,
@@ -29,7 +25,6 @@ from first_motion import (
     MotionPlan,
     Order,
     propose,
-    replace_file,
     Sample,
     Seen,
     yaml_text,
@@ -76,57 +71,13 @@ class MotionRequest:
 
 
 @dataclass(frozen=True, slots=True)
-class BusPlace:
-    """Where the scales of an axis are written."""
-
-    path: Path  # the bus.yml, on the computer of the robot
-    inode: int  # its inode when the robot was started
-    changed: int  # when it was changed last then, in [ns]
-    device: str  # section of the device
-    channel: int | None  # place of the axis in its channels; None for a device with one axis
-
-    @property
-    def is_here(self) -> bool:
-        """Whether this process sees the very file that the robot was started with."""
-        try:
-            stat = self.path.stat()
-        except OSError:
-            return False
-        return (stat.st_ino, stat.st_mtime_ns) == (self.inode, self.changed)
-
-    @property
-    def file(self) -> Path:
-        """The file itself, where the path is a link that is seen from here."""
-        return self.path.resolve() if self.is_here else self.path
-
-    def write(self, correction: Correction) -> Path:
-        """Change the keys in the file, and return which one that is.
-
-        The new text is read back as YAML; the page knows no more of bus.yml, so unlike the
-        terminal it does not read it as the master does.
-
-        Raises:
-            OSError: It cannot be written.
-            BusEditError: It has a form in which nothing is changed.
-            ValueError: It is not the file that the robot was started with.
-        """
-        if not self.is_here:
-            raise ValueError(f'{self.path} was changed since the robot was started: restart it')
-        values, why = correction.values, correction.reason
-        edit = partial(edited, device=self.device, values=values, reason=why, channel=self.channel)
-        file = self.file
-        replace_file(file, edit)
-        return file
-
-
-@dataclass(frozen=True, slots=True)
 class Axis:
     """How a joint counts."""
 
     kind: JointKind  # what it does
     scales: AxisScales
     says: DriveFacts  # what the drive says about its increments
-    place: BusPlace  # where they are written
+    where: str  # they are written: the bus.yml, the section, the channel
 
 
 def motion_plan(
@@ -213,7 +164,7 @@ def problem_of(drive: Mapping[str, str], age: float) -> str:
         return NO_POSITION
     state, mode = drive.get('state', ''), drive.get('mode', '')
     if state != ENABLED:
-        return f'it is not enabled ({state or "no diagnostics"}): see Drives and Status'
+        return f'it is not enabled ({state or "no diagnostics"}): see Diagnose'
     if mode not in MODES:
         return (
             f'it is in {mode or "no mode"}, in which a position is not followed, or goes on when '
@@ -239,16 +190,15 @@ def announcement(request: MotionRequest, axis: Axis, position: float) -> Iterato
     )
 
 
-def correction_of(axis: Axis, judgement: Judgement, cause: Cause | None) -> Correction | None:
-    """Return what corrects a sign or scale; None where a person has to choose a cause first."""
-    if not judgement.verdict.wants_change or (judgement.causes and cause is None):
-        return None
-    return propose(axis.scales, judgement, cause)
+def corrections(axis: Axis, judgement: Judgement) -> Iterator[Correction]:
+    """Yield what corrects a sign or scale, one for each likely cause."""
+    if judgement.verdict.wants_change:
+        for cause in judgement.causes or (None,):
+            yield propose(axis.scales, judgement, cause)
 
 
-def correction_lines(place: BusPlace, correction: Correction) -> str:
+def correction_lines(where: str, correction: Correction) -> str:
     """Return the lines of the file, to be copied."""
-    where = place.device if place.channel is None else f'{place.device}, channel {place.channel}'
-    lines = [f'# {place.file}, {where}', f'# {correction.reason}']
+    lines = [f'# {where}', f'# {correction.reason}']
     lines += [f'{key}: {yaml_text(value)}' for key, value in correction.values.items()]
     return '\n'.join(lines)
