@@ -577,7 +577,8 @@ def test_a_robot_that_stops_late(seen: Seen) -> None:
                 continue
             stage = 'stopped' if stands.is_set() else 'braking' if answers else ''
             state = RobotState('READY', Level.WELL, '')
-            served.show_state(state, {}, stop=stage, simulated=True, program='', listens='')
+            more = {'stop': stage, 'simulated': True, 'program': '', 'listens': ''}
+            served.show_state(state, {}, more)
 
     over, silent = threading.Event(), threading.Event()
     with (

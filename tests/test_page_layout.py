@@ -109,10 +109,12 @@ class Shown:
             self.page.show_state(
                 self.state,
                 {f'panda_joint{number}': 0.1 * number for number in range(1, 8)},
-                stop='stopped' if self.state.word == 'STOPPED' else '',
-                simulated=True,
-                program='',
-                listens='',
+                {
+                    'stop': 'stopped' if self.state.word == 'STOPPED' else '',
+                    'simulated': True,
+                    'program': '',
+                    'listens': '',
+                },
             )
             self.page.list_log()
 

@@ -72,13 +72,13 @@ def test_a_topic_that_is_offered_anew_is_subscribed_to_anew() -> None:
         for number in (1, 2):
             string = {'schemaName': 'std_msgs/msg/String', 'schema': 'string data'}
             form = {'encoding': 'cdr', 'schemaEncoding': 'ros2msg', **string}
-            server.offer('/a', {'id': number, 'topic': '/a', **form})
+            server.post(server.offer, '/a', {'id': number, 'topic': '/a', **form})
             client.subscribe('/a')
             assert taken.get(timeout=60.0) == '/a'
             for text in ('first', 'second'):
-                server.send('/a', 0, serialize_message(String(data=text)))
+                server.post(server.send, '/a', 0, serialize_message(String(data=text)))
             assert [client.next_message('/a').data for _ in range(2)] == ['first', 'second']
-            server.withdraw('/a')
+            server.post(server.withdraw, '/a')
             client.until(lambda: '/a' not in client.channels, 'its end')
             assert not server.wanted
     finally:

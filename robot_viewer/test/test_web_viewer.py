@@ -205,7 +205,7 @@ def test_stop_is_answered_by_the_robot_alone(robot: Robot, said: list[str]) -> N
     robot.spin_until(lambda: not client.service_is_ready(), 'its end')
     answer = robot.viewer.actions.stop()
     robot.called_until_enable()
-    assert robot.answer_to(answer) == Stop(stands=False, text='/stop is not there')
+    assert robot.answer_to(answer) == Stop(stands=False, text='/stop: its service is not there')
 
 
 def test_stop_calls_one_service_that_stops_all(
@@ -507,7 +507,7 @@ def test_a_gripper_is_opened_closed_and_stopped(robot: Robot, said: list[str]) -
     assert not robot.viewer._grippers.busy
     panel = robot.viewer.page._jog
     assert panel is not None
-    panel._grip('Open gripper', '/hand', 2.0)
+    panel._grip('Open gripper', '/hand', lambda: 2.0)
     assert said[-1] == f'Open gripper: stopped; press {ALLOW} first'
     assert len(goals) == 4
     robot.viewer.actions.grip('/hand', 2.0)

@@ -35,7 +35,7 @@ SILENCE = 1.2
 """Time in [s] without a trajectory before an empty one says that what follows is a new request: a
 controller that was stopped in a stream wants a second."""
 
-Report = Callable[[str, bool], None]  # takes what became of a motion, and whether it failed
+Report = Callable[..., None]  # takes what became of a motion, and whether it has `failed`
 
 
 @dataclass(slots=True)
@@ -199,7 +199,7 @@ class Controllers:
 
     def _conclude(self, controller: Controller, text: str, *, failed: bool) -> None:
         controller.targets = {}
-        self._report(text, failed)
+        self._report(text, failed=failed)
 
 
 def _trajectory(controller: Controller, duration: float) -> Any:  # noqa: ANN401
@@ -259,7 +259,9 @@ class Grippers:
             call = self._calls.get(name)
             if gripper.service not in services and call is not None and not call.ended:
                 self._lost.append(self._calls.pop(name))
-                self._report(f'{name}: its action is gone; what it moved may go on: STOP', True)
+                self._report(
+                    f'{name}: its action is gone; what it moved may go on: STOP', failed=True
+                )
         for service, kinds in services.items():
             action = service.removesuffix(SEND_GOAL)
             name = action.rpartition('/')[0]
@@ -282,7 +284,7 @@ class Grippers:
         words = {ends[0]: 'close', ends[1]: 'open'}
         what = f'{name}: {words.get(position, f"to {position:.4f}")}'
         if gripper is None or not gripper.client.server_is_ready():
-            self._report(f'{what}: its action is not there', True)
+            self._report(f'{what}: its action is not there', failed=True)
             return
         goal = import_module('control_msgs.action').GripperCommand.Goal()
         goal.command.position = position
@@ -297,8 +299,10 @@ class Grippers:
 
     def _done(self, what: str, _call: ActionCall, result: Any, why: str) -> None:  # noqa: ANN401
         if why:
-            self._report(f'{what}: {why}', True)
+            self._report(f'{what}: {why}', failed=True)
             return
         arrived = bool(result.reached_goal)
         how = 'done' if arrived else 'stalled: it holds something' if result.stalled else 'ended'
-        self._report(f'{what}: {how}, at {result.position:.4f}', not (arrived or result.stalled))
+        self._report(
+            f'{what}: {how}, at {result.position:.4f}', failed=not (arrived or result.stalled)
+        )

@@ -49,7 +49,7 @@ from ..page.first_motion import (
 )
 from ..page.live import Hold
 from ..page.robot_page import RobotPage
-from ..page.style import BAD, GOOD, line, NEUTRAL, PLAIN, WANTED
+from ..page.style import add_button, add_choice, BAD, GOOD, line, PLAIN, WANTED
 from ..robot_state import DRIVE, Status
 
 READ_UNITS = 'read_units'
@@ -150,23 +150,24 @@ class FirstMotion:
                 'First motion', order=page.before_log, expand_by_default=False
             )
         with self._folder:
-            self._joint = gui.add_dropdown('Joint', tuple(self._drives))
+            self._joint = add_choice(gui, 'Joint', self._drives, lambda _: self._select())
             self._distance = gui.add_number('Distance', DISTANCE, step=0.1)
             self._speed = gui.add_number('Speed', DISTANCE, step=0.1)
-            self._prepare = gui.add_button('Enable and prepare', color=WANTED)
+            self._prepare = add_button(
+                gui,
+                'Enable and prepare',
+                lambda: order(partial(self.prepare, self._asked())),
+                WANTED,
+            )
             self._state = gui.add_html('')
             self._place_of_hold = gui.add_html('')
-            self._enough = gui.add_button('That is enough', color=NEUTRAL)
+            self._enough = add_button(gui, 'That is enough', lambda: order(self.finish))
             self._saw = gui.add_dropdown('What you saw', tuple(each.value for each in Saw))
             self._far = gui.add_number('How far', DISTANCE, step=0.01)
-            self._conclude = gui.add_button('Conclude', color=NEUTRAL)
+            self._conclude = add_button(gui, 'Conclude', self._have_seen)
             self._verdict = gui.add_html('')
             self._lines = gui.add_markdown('')
             self._note = gui.add_html('')
-        self._joint.on_update(lambda _: self._select())
-        self._prepare.on_click(lambda _: order(partial(self.prepare, self._asked())))
-        self._enough.on_click(lambda _: order(self.finish))
-        self._conclude.on_click(lambda _: self._have_seen())
         self._offered = True
         self._use_units()
         self._begin('')

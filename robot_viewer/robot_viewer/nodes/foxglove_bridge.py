@@ -155,23 +155,9 @@ class Server:
         clients = tuple(self._clients.values())
         return frozenset(topic for topics in clients for topic in tuple(topics.values()))
 
-    def offer(self, topic: str, offer: dict[str, object]) -> None:
-        """Offer a topic to all clients, also to those that come later."""
-        self._loop.call_soon_threadsafe(self._offer, topic, offer)
-
-    def withdraw(self, topic: str) -> None:
-        """Offer a topic no more."""
-        self._loop.call_soon_threadsafe(self._withdraw, topic)
-
-    def send(self, topic: str, stamp: int, data: bytes) -> None:
-        """Send a message that came at a time in [ns]."""
-        self._loop.call_soon_threadsafe(self._send, topic, stamp, data)
-
-    def warn(self, text: str) -> None:
-        """Show a text to all clients."""
-        self._loop.call_soon_threadsafe(
-            self._publish, 'status', {'level': WARNING, 'message': text}
-        )
+    def post(self, act: Callable[..., None], *values: object) -> None:
+        """Have something done in the thread of the server."""
+        self._loop.call_soon_threadsafe(act, *values)
 
     def close(self) -> None:
         """Close the port and every connection."""
@@ -191,20 +177,23 @@ class Server:
         refusal = self._admission.refusal(request.path, request.headers.get_all('Origin'))
         return connection.respond(HTTPStatus.FORBIDDEN, f'{refusal}\n') if refusal else None
 
-    def _publish(self, operation: str, values: dict[str, object]) -> None:
-        text = json.dumps({'op': operation, **values})
-        broadcast(self._clients, text)
+    def publish(self, operation: str, values: dict[str, object]) -> None:
+        """Send an operation of the protocol to all clients."""
+        broadcast(self._clients, json.dumps({'op': operation, **values}))
 
-    def _offer(self, topic: str, offer: dict[str, object]) -> None:
+    def offer(self, topic: str, offer: dict[str, object]) -> None:
+        """Offer a topic to all clients, also to those that come later."""
         self._offers[topic] = offer
-        self._publish('advertise', {'channels': [offer]})
+        self.publish('advertise', {'channels': [offer]})
 
-    def _withdraw(self, topic: str) -> None:
+    def withdraw(self, topic: str) -> None:
+        """Offer a topic no more."""
         for client, topics in self._clients.items():
             self._clients[client] = {n: each for n, each in topics.items() if each != topic}
-        self._publish('unadvertise', {'channelIds': [self._offers.pop(topic)['id']]})
+        self.publish('unadvertise', {'channelIds': [self._offers.pop(topic)['id']]})
 
-    def _send(self, topic: str, stamp: int, data: bytes) -> None:
+    def send(self, topic: str, stamp: int, data: bytes) -> None:
+        """Send a message that came at a time in [ns]."""
         for client, topics in self._clients.items():
             if client.transport.get_write_buffer_size() > WAITING:
                 continue
@@ -338,7 +327,7 @@ class FoxgloveBridge(Node):
         for name, channel in list(self._channels.items()):
             if there.get(name) != channel.type:
                 self._unsubscribe(self._channels.pop(name))
-                self._server.withdraw(name)
+                self._server.post(self._server.withdraw, name)
         for name, type_ in there.items():
             if name not in self._channels and (name, type_) not in self._refused:
                 self._offer(name, type_)
@@ -351,7 +340,8 @@ class FoxgloveBridge(Node):
             self._refused.add((name, type_))
             text = f'{name} is not shown: {error}'
             self.get_logger().warning(text)
-            self._server.warn(text)
+            status = {'level': WARNING, 'message': text}
+            self._server.post(self._server.publish, 'status', status)
             return
         offer: dict[str, object] = {
             'id': next(self._numbers),
@@ -362,7 +352,7 @@ class FoxgloveBridge(Node):
             'schemaEncoding': 'ros2msg',
         }
         self._channels[name] = _Channel(type_, kind, offer)
-        self._server.offer(name, offer)
+        self._server.post(self._server.offer, name, offer)
 
     def _match(self) -> None:
         """Subscribe to what clients want; to what is latched anew for one that is new."""
@@ -389,7 +379,8 @@ class FoxgloveBridge(Node):
             channel.subscription = channel.qos = None
 
     def _pass(self, topic: str, data: bytes) -> None:
-        self._server.send(topic, self.get_clock().now().nanoseconds, data)
+        stamp = self.get_clock().now().nanoseconds
+        self._server.post(self._server.send, topic, stamp, data)
 
     def _qos(self, name: str) -> QoSProfile:
         """Return what connects to all publishers, and gets what they keep where all keep it."""

@@ -14,7 +14,7 @@ from functools import partial
 import sys
 import threading
 import traceback
-from typing import Any, Protocol, TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from rclpy.client import Client
 from rclpy.node import Node
@@ -54,13 +54,8 @@ def stops_robot(node: str, services: Mapping[str, Collection[str]]) -> bool:
     )
 
 
-class Report(Protocol):
-    """Reports what became of a request."""
-
-    def __call__(self, what: str, text: str, *, failed: bool) -> None:
-        """Report it."""
-
-
+Report = Callable[..., None]
+"""Takes what was requested, what became of it, and whether it has `failed`."""
 TRIGGER = 'std_srvs/srv/Trigger'
 
 
@@ -89,34 +84,23 @@ class TriggerCalls:
             self._clients[service] = self._node.create_client(Trigger, service)
         return self._clients[service]
 
-    def call(self, service: str) -> Future | None:
-        """Call a service; return its answer to come, None where it is not there."""
+    def call(self, service: str, take: Callable[[bool, str], None]) -> None:
+        """Call a service; ``take`` gets whether that has succeeded, and the answer in words."""
         client = self.client(service)
         if not client.service_is_ready():
-            self._report(service, 'is not there', failed=True)
-            return None
-        future: Future = client.call_async(client.srv_type.Request())
-
-        def answered(done: Future) -> None:
-            self._report(service, text_of(done), failed=not succeeded(done))
-
-        future.add_done_callback(answered)
-        return future
+            take(False, 'its service is not there')
+            return
+        future = client.call_async(client.srv_type.Request())
+        future.add_done_callback(lambda done: take(succeeded(done), text_of(done)))
 
     def call_all(
-        self, what: str, services: Sequence[str], done: Callable[[bool], None] | None = None
+        self, what: str, services: Sequence[str], done: Callable[[bool], None] = lambda _: None
     ) -> None:
         """Call services at the same time; report all answers at once, the failures first."""
-        if not services:
-            self._report(what, 'is not offered', failed=True)
-            if done is not None:
-                done(False)
-            return
         answers: dict[str, tuple[bool, str]] = {}
 
-        def take(service: str, call: Future | None) -> None:
-            text = 'its service is not there' if call is None else text_of(call)
-            answers[service] = call is not None and succeeded(call), text
+        def take(service: str, ok: bool, text: str) -> None:
+            answers[service] = ok, text
             if len(answers) < len(services):
                 return
             self._running.pop(what, None)
@@ -124,17 +108,15 @@ class TriggerCalls:
             texts = bad or list(dict.fromkeys(said for _, said in answers.values() if said))
             count = f'{len(services) - len(bad)} of {len(services)} done'
             self._report(what, '; '.join((count, *texts)), failed=bool(bad))
-            if done is not None:
-                done(not bad)
+            done(not bad)
 
+        if not services:
+            self._report(what, 'is not offered', failed=True)
+            done(False)
+            return
         self._running[what] = services
         for service in services:
-            client = self.client(service)
-            if client.service_is_ready():
-                call = client.call_async(client.srv_type.Request())
-                call.add_done_callback(partial(take, service))
-            else:
-                take(service, None)
+            self.call(service, partial(take, service))
 
 
 def succeeded(call: Future) -> bool:

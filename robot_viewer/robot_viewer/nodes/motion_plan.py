@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What can be planned for, what was planned, and what is in the way, in MoveIt's messages.
+"""What can be planned for, and what was planned, in MoveIt's messages.
 
 The package needs moveit_msgs only where something is planned.
 """
@@ -105,19 +105,13 @@ def tip_line(
 
 
 PLANNING_TIME = 5.0  # that is allowed in [s]
-JOINT_TOLERANCE, PLACE_TOLERANCE, TURN_TOLERANCE = 1e-3, 1e-3, 1e-2
-"""Of goals in [rad] or [m], in [m] and in [rad]."""
-SHAPES = ('primitives', 'primitive_poses', 'meshes', 'mesh_poses')
-"""Fields of a moveit_msgs/CollisionObject that are shown."""
+JOINT_TOLERANCE = 1e-3  # of goals in [rad] or [m]
 
 
-def plan_goal(
-    group: PlanGroup, goal: Mapping[str, float] | Transform, frame: str, share: float
-) -> Message:
+def plan_goal(group: PlanGroup, goal: Mapping[str, float], share: float) -> Message:
     """Return a moveit_msgs/MoveGroup goal that is planned, and not executed.
 
-    A pose is that of the tip in ``frame``, the root link; ``share`` is that of the greatest
-    velocity and acceleration, above 0 to 1.
+    ``share`` is that of the greatest velocity and acceleration, above 0 to 1.
     """
     moveit = import_module('moveit_msgs.msg')
     message = import_module('moveit_msgs.action').MoveGroup.Goal()
@@ -127,38 +121,17 @@ def plan_goal(
     request.max_velocity_scaling_factor = request.max_acceleration_scaling_factor = share
     request.start_state.is_diff = options.planning_scene_diff.is_diff = True
     options.planning_scene_diff.robot_state.is_diff = options.plan_only = True
-    wanted = moveit.Constraints()
-    if isinstance(goal, Transform):
-        ball = import_module('shape_msgs.msg').SolidPrimitive(dimensions=[PLACE_TOLERANCE])
-        ball.type = ball.SPHERE
-        place = moveit.PositionConstraint(
-            header=Header(frame_id=frame), link_name=group.tip, weight=1.0
-        )
-        place.constraint_region.primitives.append(ball)
-        place.constraint_region.primitive_poses.append(pose_message(Transform(goal.translation)))
-        wanted.position_constraints.append(place)
-        turn = moveit.OrientationConstraint(
-            header=Header(frame_id=frame),
-            orientation=pose_message(goal).orientation,
-            link_name=group.tip,
-            absolute_x_axis_tolerance=TURN_TOLERANCE,
-            absolute_y_axis_tolerance=TURN_TOLERANCE,
-            absolute_z_axis_tolerance=TURN_TOLERANCE,
+    wanted = [
+        moveit.JointConstraint(
+            joint_name=name,
+            position=position,
+            tolerance_above=JOINT_TOLERANCE,
+            tolerance_below=JOINT_TOLERANCE,
             weight=1.0,
         )
-        wanted.orientation_constraints.append(turn)
-    else:
-        wanted.joint_constraints.extend(
-            moveit.JointConstraint(
-                joint_name=name,
-                position=position,
-                tolerance_above=JOINT_TOLERANCE,
-                tolerance_below=JOINT_TOLERANCE,
-                weight=1.0,
-            )
-            for name, position in goal.items()
-        )
-    request.goal_constraints.append(wanted)
+        for name, position in goal.items()
+    ]
+    request.goal_constraints.append(moveit.Constraints(joint_constraints=wanted))
     return message
 
 
@@ -219,54 +192,6 @@ def scene_change(operation: str, name: str, header: Header, **values: object) ->
     scene.robot_state.is_diff = True
     scene.world.collision_objects.append(thing)
     return scene
-
-
-@dataclass(frozen=True, slots=True)
-class SceneObject:
-    """Something that a robot may not touch, or holds."""
-
-    message: Message  # as a moveit_msgs/CollisionObject
-    attached: bool = False  # the robot holds it
-
-    @property
-    def pose(self) -> Transform:
-        """Where it is in its frame."""
-        return transform_of(self.message.pose)
-
-    @property
-    def frame(self) -> str:
-        """The frame in which it is."""
-        return str(self.message.header.frame_id)
-
-
-def changed(objects: Mapping[str, SceneObject], scene: Message) -> dict[str, SceneObject]:
-    """Return the objects after a moveit_msgs/PlanningScene, which is whole or a change."""
-    kept = dict(objects) if scene.is_diff else {}
-    for message in scene.world.collision_objects:
-        _apply(kept, message, attached=False)
-    if not scene.robot_state.is_diff:
-        kept = {name: each for name, each in kept.items() if not each.attached}
-    for body in scene.robot_state.attached_collision_objects:
-        _apply(kept, body.object, attached=True)
-    return kept
-
-
-def _apply(objects: dict[str, SceneObject], message: Message, *, attached: bool) -> None:
-    kind = type(message)
-    known = objects.get(message.id)
-    if message.operation == kind.REMOVE:
-        if not message.id:
-            objects.clear()
-        objects.pop(message.id, None)
-        return
-    if message.operation == kind.MOVE and known is not None:
-        for shapes in SHAPES:
-            setattr(message, shapes, getattr(known.message, shapes))
-    elif message.operation == kind.APPEND and known is not None:
-        message.pose = known.message.pose
-        for shapes in SHAPES:
-            setattr(message, shapes, [*getattr(known.message, shapes), *getattr(message, shapes)])
-    objects[message.id] = SceneObject(message, attached)
 
 
 def transform_of(pose: Pose) -> Transform:

@@ -16,14 +16,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import String
 from urdf_reader import DescriptionError, link_poses, Transform
-from viser import (
-    GuiButtonHandle,
-    GuiDropdownHandle,
-    GuiEvent,
-    LineSegmentsHandle,
-    TransformControlsEvent,
-    TransformControlsHandle,
-)
+from viser import LineSegmentsHandle, TransformControlsEvent, TransformControlsHandle
 
 from node_runner import LATCHED
 from node_runner.action_goals import GoalClient
@@ -31,7 +24,7 @@ from node_runner.action_goals import GoalClient
 from ..page.live import Hold, RELEASED_AFTER
 from ..page.robot_page import RobotPage
 from ..page.robot_scene import links_beyond, moved, pose_of, put, RobotScene, Tint
-from ..page.style import BAD, Color, GOOD, line, NEUTRAL, PLAIN, WANTED
+from ..page.style import add_button, add_choice, BAD, GOOD, line, PLAIN, WANTED
 from .interfaces import ActionCall
 from .motion_plan import (
     ik_request,
@@ -87,7 +80,7 @@ class MotionPlanning:
         self._groups: Mapping[str, PlanGroup] = {}
         self._group = PlanGroup('', (), '', {})
         self._goal = NO_GOAL
-        self._pose: Transform | None = None  # where the tip is dragged to
+        self._pose: Transform | None = None  # where the tip is dragged to, until it is solved
         self._joints: dict[str, float] = {}  # of the goal; none where none is known
         self._asked: float | None = None  # when inverse kinematics were asked for
         self._planning: ActionCall | None = None
@@ -102,7 +95,7 @@ class MotionPlanning:
         self._links: frozenset[str] = frozenset()  # that the group moves
         self._line: LineSegmentsHandle | None = None
         self._gizmo: TransformControlsHandle | None = None
-        self.scene = PlanningScene(node, page, self.order, self.say)
+        self.scene = PlanningScene(node, page, self.ordered, self.say)
 
     # -- what there is
 
@@ -119,6 +112,7 @@ class MotionPlanning:
             self._execution = None
             self._page.live.end(self.hold)
             self.say('move_group is gone; what it executed may go on: STOP', failed=True)
+        self.scene.look()
         if not self.offered and self._semantic and self._page.robot is not None:
             self._offer(self._page.robot)
 
@@ -146,13 +140,13 @@ class MotionPlanning:
             self._node.get_logger().error(f'robot_description_semantic: {error}')
             self._semantic = ''
             return
-        self._robot = robot
+        self._robot, do = robot, self.ordered
         with page.place('Plan', self):
-            self._group_box = self._dropdown('Group', tuple(self._groups), self.choose_group)
-            self.goal = self._dropdown('Goal', (NO_GOAL, DRAGGED), self.choose_goal)
-            self._button('Plan motion', self.plan, WANTED)
+            self._group_box = add_choice(gui, 'Group', self._groups, do(self.choose_group))
+            self.goal = add_choice(gui, 'Goal', (NO_GOAL, DRAGGED), do(self.choose_goal))
+            add_button(gui, 'Plan motion', do(self.plan), WANTED)
             self.outcome = gui.add_html('')
-            self._again = self._button('Show motion again', self.show_again)
+            self._again = add_button(gui, 'Show motion again', do(self.show_again))
             self.hold, html = page.live.button(
                 Hold(
                     HOLD_EXECUTE,
@@ -167,25 +161,6 @@ class MotionPlanning:
         page.cancel = partial(self.order, self._drop)
         self._allow(execute=False)
         self.choose_group(next(iter(self._groups)))
-
-    def _dropdown(
-        self, label: str, options: Sequence[str], action: Callable[[str], None]
-    ) -> GuiDropdownHandle[str]:
-        dropdown = self._page.server.gui.add_dropdown(label, options)
-
-        def chosen(event: GuiEvent[GuiDropdownHandle[str]]) -> None:
-            if event.client_id is not None:  # or it was set here
-                self.order(partial(action, event.target.value))
-
-        dropdown.on_update(chosen)
-        return dropdown
-
-    def _button(
-        self, label: str, press: Callable[[], None], color: Color = NEUTRAL
-    ) -> GuiButtonHandle:
-        button = self._page.server.gui.add_button(label, color=color)
-        button.on_click(lambda _: self.order(press))
-        return button
 
     def remove(self) -> None:
         """Remove it from the page: another robot comes."""
@@ -208,6 +183,10 @@ class MotionPlanning:
                 action()
 
         self._order(act)
+
+    def ordered(self, action: Callable[..., object]) -> Callable[..., None]:
+        """Return what has an action carried out in the thread of the node."""
+        return lambda *values: self.order(partial(action, *values))
 
     def show_again(self) -> None:
         """Show once more what was planned."""
@@ -331,14 +310,16 @@ class MotionPlanning:
         if asked != self._pose:
             self._solve()
         else:
-            self._pose = self._pose if reason else None  # the joints are the goal
+            self._pose = self._pose if reason else None  # else the joints are the goal
             self.say(reason, failed=True)
 
     def plan(self) -> None:
         """Plan, at the speed of the page."""
-        goal, reason = self._pose or self._joints, ''
-        if not goal:
+        reason = ''
+        if not self._joints:
             reason = 'choose a goal first: a state, or one that is dragged'
+        elif self._pose is not None:
+            reason = 'no joints are known that bring the tip to where it was dragged'
         elif self.busy:
             reason = 'it is still executing; STOP ends it'
         elif not self._move.server_is_ready():
@@ -348,7 +329,7 @@ class MotionPlanning:
             return
         self._drop()
         self.say('planning ...')
-        message = plan_goal(self._group, goal, self._robot.tree.root, self._page.speed())
+        message = plan_goal(self._group, self._joints, self._page.speed())
         self._planning = ActionCall(self._move, message, self._planned)
 
     def _planned(self, call: ActionCall, result: Message, why: str) -> None:

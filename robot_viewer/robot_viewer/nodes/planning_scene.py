@@ -5,9 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from typing import Any, Protocol
+import math
+import time
+from typing import Any
 
 import numpy as np
 from rclpy.client import Client
@@ -18,7 +21,6 @@ from viser import (
     FrameHandle,
     GuiButtonHandle,
     GuiDropdownHandle,
-    GuiEvent,
     SceneApi,
     SceneNodeHandle,
     TransformControlsEvent,
@@ -29,19 +31,12 @@ from node_runner import LATCHED
 
 from ..page.robot_page import RobotPage
 from ..page.robot_scene import pose_of, put, RobotScene
-from ..page.style import NEUTRAL
-from .motion_plan import (
-    box_message,
-    changed,
-    Message,
-    pose_message,
-    scene_change,
-    SceneObject,
-    transform_of,
-)
+from ..page.style import add_button, add_choice
+from .motion_plan import box_message, Message, pose_message, scene_change, transform_of
 
 WORLD_AND_ATTACHED = 16 | 4  # of moveit_msgs/PlanningSceneComponents
 AHEAD = 0.6  # how far before the root link a new box comes, in [m]
+ANSWER_TIME = 2.0  # time in [s] after which an answer counts as lost
 NO_OBJECT = 'none'
 COLOR, ATTACHED_COLOR = (73, 80, 87), (12, 133, 153)
 OPACITY = 0.6
@@ -49,22 +44,35 @@ GIZMO_SIZE = 0.2  # of the arrows by which an object is dragged in [m]
 BOX_SIZE = (0.2, 0.2, 0.2)  # of a new box in [m]
 
 
-Order = Callable[[Callable[[], object]], None]
-"""Has something done in the thread of the node, as long as this robot is shown."""
+Ordered = Callable[[Callable[..., object]], Callable[..., None]]
+"""Returns what has something done in the thread of the node, as long as this robot is shown."""
 
 
-class Say(Protocol):
-    """Shows what became of a request."""
+@dataclass(frozen=True, slots=True)
+class SceneObject:
+    """Something that a robot may not touch, or holds."""
 
-    def __call__(self, text: str, *, failed: bool | None = None) -> None:
-        """Show it."""
+    message: Message  # as a moveit_msgs/CollisionObject
+    attached: bool = False  # the robot holds it
+
+    @property
+    def pose(self) -> Transform:
+        """Where it is in its frame."""
+        return transform_of(self.message.pose)
+
+    @property
+    def frame(self) -> str:
+        """The frame in which it is."""
+        return str(self.message.header.frame_id)
 
 
 class PlanningScene:
     """What move_group has in its scene; everything in the thread of the node."""
 
-    def __init__(self, node: Node, page: RobotPage, order: Order, say: Say) -> None:
-        self._node, self._page, self._order, self._say = node, page, order, say
+    def __init__(
+        self, node: Node, page: RobotPage, ordered: Ordered, say: Callable[..., None]
+    ) -> None:
+        self._node, self._page, self._ordered, self._say = node, page, ordered, say
         self._apply: Client | None = None
         self._whole: Client | None = None
         self._robot: RobotScene | None = None  # on which it is shown
@@ -73,7 +81,8 @@ class PlanningScene:
         self._count = 0
         self._name = NO_OBJECT
         self._grips = False  # the object is being dragged
-        self._changed_since = False  # the whole scene was asked for
+        self._asked = -math.inf  # when the whole scene was requested, as long as it is awaited
+        self._stale = False  # it was not shown since it has changed
         self._seen = True
         self.gizmo: TransformControlsHandle | None = None
 
@@ -89,25 +98,19 @@ class PlanningScene:
     def offer(self, robot: RobotScene) -> None:
         """Show the scene beside a robot, and offer to change it."""
         self._robot, self._seen = robot, True
-        gui, order = self._page.server.gui, self._order
-        self.chosen: GuiDropdownHandle[str] = gui.add_dropdown('Object', (NO_OBJECT,))
-        self._remove: GuiButtonHandle = gui.add_button('Remove object', color=NEUTRAL)
+        gui, do = self._page.server.gui, self._ordered
+        self.chosen: GuiDropdownHandle[str] = add_choice(
+            gui, 'Object', (NO_OBJECT,), do(self.choose)
+        )
+        self._remove: GuiButtonHandle = add_button(gui, 'Remove object', do(self.remove_chosen))
         size = gui.add_vector3(
             'Size [m]', BOX_SIZE, min=(0.01, 0.01, 0.01), max=(3.0, 3.0, 3.0), step=0.01
         )
-
-        def choose(event: GuiEvent[GuiDropdownHandle[str]]) -> None:
-            if event.client_id is not None:  # or it was set here
-                order(partial(self.choose, event.target.value))
-
-        self.chosen.on_update(choose)
-        self._remove.on_click(lambda _: order(self.remove_chosen))
-        gui.add_button('Add box', color=NEUTRAL).on_click(
-            lambda _: order(partial(self.add_box, size.value))
-        )
-        self._page.offer_to_see('objects', lambda seen: order(partial(self.show_objects, seen)))
+        add_button(gui, 'Add box', lambda: do(self.add_box)(size.value))
+        self._page.offer_to_see('objects', do(self.show_objects))
         self._show()
-        self._ask()
+        self._stale = True
+        self.look()
 
     def show_objects(self, seen: bool) -> None:
         """Show or hide all objects."""
@@ -128,28 +131,34 @@ class PlanningScene:
         self._name, self._grips = name, False
         self._show()
 
-    def _ask(self) -> None:
-        """Request the whole scene: MoveIt's topic may have carried a change only."""
-        if self._whole is not None and self._whole.service_is_ready():
-            self._changed_since = False
+    def _take(self, message: Message) -> None:
+        """Request the whole scene when objects change: the topic may carry the change only."""
+        held = message.robot_state.attached_collision_objects
+        whole = not (message.is_diff and message.robot_state.is_diff)
+        if whole or held or message.world.collision_objects:
+            self._stale = True
+            self.look()
+
+    def look(self) -> None:
+        """Request the whole scene where it has changed; one request at a time."""
+        now = time.monotonic()
+        if not self._stale or self._whole is None or now - self._asked < ANSWER_TIME:
+            return
+        if self._whole.service_is_ready():
+            self._stale, self._asked = False, now
             request = import_module('moveit_msgs.srv').GetPlanningScene.Request()
             request.components.components = WORLD_AND_ATTACHED
             self._whole.call_async(request).add_done_callback(self._answered)
 
     def _answered(self, future: Future) -> None:
-        if future.exception() is not None:
-            return
-        if self._changed_since:  # the answer may be from before that
-            self._ask()
-            return
-        answer: Any = future.result()
-        answer.scene.is_diff = answer.scene.robot_state.is_diff = False
-        self._take(answer.scene)
-
-    def _take(self, message: Message) -> None:
-        self._objects = changed(self._objects, message)
-        self._changed_since = True
-        self._show()
+        self._asked = -math.inf
+        if future.exception() is None:
+            scene: Message = future.result().scene  # type: ignore[attr-defined, unused-ignore]
+            held = [each.object for each in scene.robot_state.attached_collision_objects]
+            self._objects = {each.id: SceneObject(each) for each in scene.world.collision_objects}
+            self._objects |= {each.id: SceneObject(each, attached=True) for each in held}
+            self._show()
+        self.look()
 
     # -- what is shown
 
@@ -202,7 +211,7 @@ class PlanningScene:
         # coroutines keep their order
         if event.phase != 'start':
             pose, is_last = pose_of(event.target), event.phase == 'end'
-            self._order(partial(self.drag, pose, is_last=is_last))
+            self._ordered(partial(self.drag, is_last=is_last))(pose)
 
     # -- what people do
 

@@ -61,13 +61,14 @@ class Watch:
     Attributes:
         statuses: The last of each name.
         answer: The status that a page publishes of this robot; None before one.
+        joints_at: When the last joint states came; None before them.
     """
 
     def __init__(self) -> None:
         self.statuses: dict[str, Status] = {}
         self.answer: Status | None = None
         self._times: dict[str, float] = {}
-        self._joints_at: float | None = None
+        self.joints_at: float | None = None
         self._since: float | None = None  # when it began to listen to joint states
         self._moved_at = -math.inf
 
@@ -76,20 +77,15 @@ class Watch:
         self.statuses.clear()
         self._times.clear()
 
-    @property
-    def joints_age(self) -> float | None:
-        """Time in [s] since the last joint states; None before them."""
-        return None if self._joints_at is None else time.monotonic() - self._joints_at
-
     def listen(self, *, begins: bool) -> None:
         """Record that joint states are listened to from now on, or no more."""
-        self._since, self._joints_at = time.monotonic() if begins else None, None
+        self._since, self.joints_at = time.monotonic() if begins else None, None
 
     def take_joints(self, message: JointState) -> None:
         """Record a message of the robot."""
-        self._joints_at = time.monotonic()
+        self.joints_at = time.monotonic()
         if any(abs(velocity) > MOVES for velocity in message.velocity):
-            self._moved_at = self._joints_at
+            self._moved_at = self.joints_at
 
     def take_statuses(self, message: DiagnosticArray) -> None:
         """Record a message of any node of the robot."""
@@ -122,7 +118,7 @@ class Watch:
     def silence(self, now: float, *, publishes: bool) -> float:
         """Return the time in [s] since the last message of the robot; 0 where it sends none."""
         if publishes and self._since is not None:
-            return now - (self._joints_at or self._since)
+            return now - (self.joints_at or self._since)
         last = max(self._times.values(), default=now)
         return now - last if now - last > STATUS_SILENCE else 0.0
 
@@ -231,14 +227,13 @@ class Judge:
         drawn = shown, tuple(known.values()), self._page.last
         if self._page.watched and (drawn != self._pushed or now - self._pushed_at > PUSH_PERIOD):
             self._pushed, self._pushed_at = drawn, now
-            self._page.show_state(
-                state,
-                known,
-                stop='' if self._stop is None else STAGES[self._stop.stands],
-                simulated=self._simulated,
-                program=program,
-                listens=f'It listens in ROS domain {os.environ.get("ROS_DOMAIN_ID") or 0}.',
-            )
+            more = {
+                'stop': '' if self._stop is None else STAGES[self._stop.stands],
+                'simulated': self._simulated,
+                'program': program,
+                'listens': f'It listens in ROS domain {os.environ.get("ROS_DOMAIN_ID") or 0}.',
+            }
+            self._page.show_state(state, known, more)
 
     def _publish(self, state: RobotState) -> None:
         message = DiagnosticArray()
@@ -341,7 +336,7 @@ class StateNode(Node):
 
     def known(self, elapsed: float) -> bool:
         """Whether nothing more is waited for, after a time in [s]."""
-        seen = bool(self._robot and self._watch.statuses and self._watch.joints_age is not None)
+        seen = bool(self._robot and self._watch.statuses and self._watch.joints_at is not None)
         return self._watch.answer is not None or (seen and elapsed > ANSWER_TIME)
 
 

@@ -272,10 +272,10 @@ class WebViewer(Node):
         self._body.draw()
         drawn = self._drawn.get
         moved = {n: p for n, p in self._positions.items() if abs(p - drawn(n, math.inf)) > SEEN}
-        if moved:
+        if moved and self.page.robot is not None:
             self._moved_at = time.monotonic()
             self._drawn.update(moved)
-            self.page.show_joints(moved)
+            self.page.robot.place(moved)
         if self._base != self._shown_base:
             self._moved_at = time.monotonic()
             self._shown_base = self._base
@@ -463,30 +463,43 @@ class WebViewer(Node):
     def _stop(self, answer: concurrent.futures.Future[Stop]) -> None:
         self.page.say('STOP: no answer from the robot yet', failed=None)
         self._judge.stop(answer, self._order)
-        calls = {service: self._triggers.call(service) for service in sorted(self._stops)}
-        called = {service for service, call in calls.items() if call is not None}
+        answers: dict[str, tuple[bool, str]] = {}
+        counted: set[str] = set()
+
+        def take(service: str, ok: bool, text: str) -> None:
+            self._report(service, text, failed=not ok)
+            answers[service] = ok, text
+            _conclude(answer, answers, counted)
+
+        for service in sorted(self._stops):
+            self._triggers.call(service, partial(take, service))
         for part in (self._controllers, self._grippers, self._first_motion, self._planning):
             with self.border.around('STOP'):
                 part.stop()
+        called = self._stops - answers.keys()  # the others are not there
         try:
             doubtful = self._doubtful_stops(called)
         except Exception as error:  # noqa: BLE001  # whatever it is, the drives are halted
             self.get_logger().error(f'STOP: {type(error).__name__}: {error}')
             doubtful = {service: [] for service in called}
-        for drive in self._drives:
-            if _stop_beside(drive) not in called - doubtful.keys():
-                calls[f'{drive}/halt'] = self._triggers.call(f'{drive}/halt')
+        halts = {
+            f'{drive}/halt'
+            for drive in self._drives
+            if _stop_beside(drive) not in called - doubtful.keys()
+        }
+        for service in sorted(halts):
+            self._triggers.call(service, partial(take, service))
         for service, others in doubtful.items():
             who = ', '.join(others) or 'a node that the graph does not show'
             text = f'offered by {who}, which leads neither drives nor legs: each drive is halted'
             self._report(service, f'{text}, too. Give that service another name', failed=True)
-        counted = {name: call for name, call in calls.items() if name not in doubtful}
-        if not counted:
-            text = 'nothing here offers to be stopped'
-            self.page.say(f'STOP: {text}', failed=True)
-            answer.set_result(Stop(stands=False, text=text))
+        counted |= (self._stops | halts) - doubtful.keys()
+        if counted:
+            _conclude(answer, answers, counted)
             return
-        _await_all(counted, answer)
+        text = 'nothing here offers to be stopped'
+        self.page.say(f'STOP: {text}', failed=True)
+        answer.set_result(Stop(stands=False, text=text))
 
     def _doubtful_stops(self, services: Collection[str]) -> dict[str, list[str]]:
         """Return those that are not a robot's own alone, with the other nodes that offer them.
@@ -521,7 +534,7 @@ class WebViewer(Node):
     def _answered(self, what: str, future: Future) -> None:
         self._report(what, text_of(future), failed=not succeeded(future))
 
-    def _say(self, text: str, failed: bool) -> None:
+    def _say(self, text: str, *, failed: bool) -> None:
         self.page.say(text, failed=failed)
 
     def _report(self, what: str, text: str, *, failed: bool) -> None:
@@ -533,29 +546,17 @@ class WebViewer(Node):
             self.get_logger().info(f'{what}: {text}')
 
 
-def _await_all(
-    calls: Mapping[str, Future | None], answer: concurrent.futures.Future[Stop]
+def _conclude(
+    answer: concurrent.futures.Future[Stop],
+    answers: Mapping[str, tuple[bool, str]],
+    counted: Collection[str],
 ) -> None:
-    """Answer a STOP when each of its calls has succeeded, or with the first that has failed."""
-    texts: list[str] = []
-
-    def take(service: str, call: Future | None) -> None:
-        text = 'is not there' if call is None else text_of(call)
-        stands = call is not None and succeeded(call)
-        texts.append(text)
-        if answer.done():  # also when the page waits no more
-            return
-        if not stands:
-            what = f'{service} {text}' if call is None else f'{service}: {text}'
-            answer.set_result(Stop(stands=False, text=what))
-        elif len(texts) == len(calls):
-            answer.set_result(Stop(stands=True, text='. '.join(texts)))
-
-    for service, call in calls.items():
-        if call is None:
-            take(service, call)
-        else:
-            call.add_done_callback(partial(take, service))
+    """Answer a STOP when each service that counts has succeeded, or with one that has not."""
+    known = {name: answers[name] for name in answers if name in counted}
+    failed = [f'{name}: {text}' for name, (ok, text) in known.items() if not ok]
+    if not answer.done() and (failed or len(known) == len(counted) > 0):  # or none waits any more
+        text = failed[0] if failed else '. '.join(text for _, text in known.values())
+        answer.set_result(Stop(stands=not failed, text=text))
 
 
 def _stop_beside(node: str) -> str:

@@ -33,7 +33,7 @@ from viser import (
 from ..robot_state import Stop
 from .live import Hold, Live
 from .robot_scene import links_beyond, RobotScene, Tint, travel
-from .style import NEUTRAL, pad, sentence, Share, THREE_COLUMNS, value_of
+from .style import add_button, pad, sentence, Share, THREE_COLUMNS, value_of
 
 Velocity: TypeAlias = tuple[float, float, float]
 Twist: TypeAlias = tuple[float, float, float, float, float, float]
@@ -231,19 +231,16 @@ class JogPanel:
                 f'Width [{unit}]', size * low, size * high, size * (high - low) / 100.0, size * low
             )
 
-            def move(label: str, position: Callable[[], float]) -> Callable[[object], None]:
-                return lambda _: self._grip(label, gripper, position())
-
             for label, position in (
                 ('Open gripper', lambda: high),
                 ('Close gripper', lambda: low),
                 ('Move to width', lambda: value_of(width) / size),
             ):
-                self._gui.add_button(label, color=NEUTRAL).on_click(move(label, position))
+                add_button(self._gui, label, partial(self._grip, label, gripper, position))
 
-    def _grip(self, label: str, gripper: str, position: float) -> None:
+    def _grip(self, label: str, gripper: str, position: Callable[[], float]) -> None:
         if not self._live.refuses(label):
-            self._actions.grip(gripper, position)
+            self._actions.grip(gripper, position())
 
     def _jog(self, axes: GuiDropdownHandle[str], twist: Twist) -> None:
         x, y, z, a, b, c = (self._speed() * part for part in twist)
@@ -321,9 +318,7 @@ class TargetPanel:
             slider = gui.add_slider(joint.name, low, high, (high - low) / 1000.0, low)
             slider.on_update(partial(self._moved, joint.name))
             self._sliders[joint.name] = slider
-        gui.add_button('Put the target where the robot is', color=NEUTRAL).on_click(
-            lambda _: self._targets.clear()
-        )
+        add_button(gui, 'Put the target where the robot is', self._targets.clear)
 
     def follow(self, positions: Mapping[str, float]) -> None:
         """Show the target; without one the sliders follow the joints."""

@@ -32,6 +32,8 @@ from .jog_panel import Actions, History, JogPanel, joint_texts, Offered, PlotPan
 from .live import Hold, Live, RELEASED_AFTER
 from .robot_scene import feet_of, Ground, RobotScene
 from .style import (
+    add_button,
+    add_choice,
     add_speed,
     BAD,
     CAUTION,
@@ -262,11 +264,6 @@ class RobotPage:
         client.camera.position = (x, y, z + height if view != 'Top' else z)
         client.camera.look_at = (0.0, 0.0, height)
 
-    def show_joints(self, positions: Mapping[str, float]) -> None:
-        """Show where the joints are in [rad] and [m]."""
-        if self.robot is not None:
-            self.robot.place(positions)
-
     def show_base(self, pose: Transform) -> None:
         """Show how the root link is in the world, and that it moves there."""
         if self.robot is not None:
@@ -283,19 +280,13 @@ class RobotPage:
             self.live.end(self._jog.target.hold)
 
     def show_state(
-        self,
-        state: RobotState,
-        positions: Mapping[str, float],
-        *,
-        stop: str,
-        simulated: bool,
-        program: str,
-        listens: str,
+        self, state: RobotState, positions: Mapping[str, float], more: Mapping[str, object]
     ) -> None:
         """Show how the robot is, and enable what may be done then.
 
-        ``stop`` is the stage of the STOP that counts: braking, stopped, failed, or empty;
-        ``program`` the name of one that moves it; ``listens`` where robots are looked for.
+        ``more`` is shown by the overlay alone: ``stop`` (the stage of the STOP that counts:
+        braking, stopped, failed, or empty), ``simulated``, ``program`` (the name of one that moves
+        it) and ``listens`` (where robots are looked for).
         """
         self.live.movable = state.movable
         if self.robot is not None:
@@ -315,14 +306,11 @@ class RobotPage:
                 'sentence': state.sentence,
                 'action': state.action,
                 'movable': state.movable,
-                'stop': stop,
-                'simulated': simulated,
-                'program': program,
                 'robot': '' if tree is None else tree.name,
                 'said': self.last,
-                'listens': listens,
                 'speed': speed,
                 'joints': {} if tree is None else joint_texts(tree, positions),
+                **more,
             }
         )
 
@@ -385,9 +373,8 @@ class RobotPage:
                     gui.add_html(THREE_COLUMNS)
                     for label, verb in group.items():
                         if verb in verbs:
-                            color = BUTTON_COLORS.get(verb, NEUTRAL)
-                            button = gui.add_button(label, color=color)
-                            button.on_click(partial(self._call, drive, label, verb))
+                            press = partial(self._call, drive, label, verb)
+                            add_button(gui, label, press, BUTTON_COLORS.get(verb, NEUTRAL))
                     if title and DISABLE in verbs:
                         self._add_disable(drive)
 
@@ -452,12 +439,10 @@ class RobotPage:
             with gui.add_folder('Posture'):
                 gui.add_html(THREE_COLUMNS)
                 for label, mode in MODES.items():
-                    button = gui.add_button(label, color=BUTTON_COLORS.get(mode, NEUTRAL))
-                    button.on_click(partial(self._request, mode))
-                    self._modes[mode] = button
+                    color = BUTTON_COLORS.get(mode, NEUTRAL)
+                    self._modes[mode] = add_button(gui, label, partial(self._request, mode), color)
                 self._modes['policy'].visible = policy
-                gait = gui.add_dropdown('Gait', GAITS)
-                gait.on_update(lambda _: self._request(f'gait:{gait.value}'))
+                add_choice(gui, 'Gait', GAITS, lambda gait: self._request(f'gait:{gait}'))
             with gui.add_folder('Hold to walk'):
                 gui.add_html(pad(holds[:WALK_BUTTONS]) + pad(holds[WALK_BUTTONS:], 'rv-keyed'))
 
@@ -483,9 +468,7 @@ class RobotPage:
         x, y, turn = (self.speed() * part for part in velocity)
         self._actions.walk((x, y, turn))
 
-    def _call(
-        self, drive: GuiDropdownHandle[str], label: str, verb: str, _: object = None
-    ) -> None:
+    def _call(self, drive: GuiDropdownHandle[str], label: str, verb: str) -> None:
         if drive.value == NO_DRIVE:
             self.say(f'{label}: choose a drive first', failed=True)
         elif verb not in MOTIONS or not self.live.refuses(label):
@@ -493,7 +476,7 @@ class RobotPage:
             services = [f'{name}/{verb}' for name in chosen if verb in self._drives[name]]
             self._actions.call(f'{label} {drive.value.rpartition("/")[2]}', services)
 
-    def _request(self, mode: str, _: object = None) -> None:
+    def _request(self, mode: str) -> None:
         if not self.live.refuses(f'mode {mode}'):
             self._actions.set_mode(mode)
 

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
@@ -57,15 +56,6 @@ class Ground:
         return Transform((0.0, 0.0, z), pose.rotation)
 
 
-@dataclass(frozen=True, slots=True)
-class Look:
-    """How a robot is shown."""
-
-    path: str = ROOT  # of its base in the scene
-    links: frozenset[str] | None = None  # those that are seen; None for all
-    tint: Tint | None = None  # color of all of it; None for those of the description
-
-
 class RobotScene:
     """The links of a robot below one another in a scene, so that a joint moves one frame."""
 
@@ -73,20 +63,24 @@ class RobotScene:
         self,
         scene: SceneApi,
         tree: KinematicTree,
-        look: Look | None = None,
+        name: str = ROOT,
+        seen: tuple[frozenset[str], Tint] | None = None,
         meshes: Meshes | None = None,
     ) -> None:
-        """Show the robot, each joint at zero or the limit next to it."""
-        look = look or Look()
+        """Show the robot, each joint at zero or the limit next to it.
+
+        ``seen`` are the links that are shown alone, and the color of all of them.
+        """
         self.notes: list[str] = []  # what cannot be shown, in words
         self._scene, self.tree = scene, tree
-        self._links, self._tint = look.links or frozenset(tree.links), look.tint
+        self._tint: Tint | None
+        self._links, self._tint = seen or (frozenset(tree.links), None)
         self._meshes = meshes or Meshes()
         self._movable = {joint.name: joint for joint in tree.movable()}
-        self._base = scene.add_frame(look.path, show_axes=False)
+        self._base = scene.add_frame(name, show_axes=False)
         self._frames: dict[str, FrameHandle] = {}
         # below the link that each hangs on; parents come first
-        self._paths = {tree.root: f'{look.path}/{tree.root}'}
+        self._paths = {tree.root: f'{name}/{tree.root}'}
         for joint in parents_first(tree):
             self._paths[joint.child] = f'{self._paths[joint.parent]}/{joint.child}'
         scene.add_frame(self._paths[tree.root], show_axes=False)
@@ -111,8 +105,7 @@ class RobotScene:
 
     def ghost(self, name: str, links: frozenset[str], tint: Tint) -> RobotScene:
         """Return the robot once more, on the same base, with joints of its own."""
-        look = Look(f'{ROOT}/{name}', links, tint)
-        return RobotScene(self._scene, self.tree, look, self._meshes)
+        return RobotScene(self._scene, self.tree, f'{ROOT}/{name}', (links, tint), self._meshes)
 
     def show(self, *, seen: bool) -> None:
         """Show or hide it."""

@@ -14,7 +14,7 @@ from html import escape
 import time
 from typing import TypeAlias
 
-from viser import GuiApi, GuiSliderHandle
+from viser import GuiApi, GuiButtonHandle, GuiDropdownHandle, GuiSliderHandle
 
 Color: TypeAlias = tuple[int, int, int]
 Share = Callable[[], float]
@@ -63,6 +63,24 @@ def pad(buttons: Iterable[str], kind: str = 'rv-pad') -> str:
 def sentence(text: str) -> str:
     """Return a sentence of a panel."""
     return f'<div style="margin:0.3em 12px">{escape(text)}</div>'
+
+
+def add_button(
+    gui: GuiApi, label: str, press: Callable[[], None], color: Color = NEUTRAL
+) -> GuiButtonHandle:
+    """Add a button that acts when it is pressed."""
+    button = gui.add_button(label, color=color)
+    button.on_click(lambda _: press())
+    return button
+
+
+def add_choice(
+    gui: GuiApi, label: str, options: Iterable[str], chosen: Callable[[str], None]
+) -> GuiDropdownHandle[str]:
+    """Add a list; reported is what is chosen on a page, and not what is set here."""
+    box = gui.add_dropdown(label, tuple(options))
+    box.on_update(lambda e: None if e.client_id is None else chosen(e.target.value))
+    return box
 
 
 def value_of(slider: GuiSliderHandle[float]) -> float:
