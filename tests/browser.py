@@ -63,6 +63,13 @@ for (const kind of [WebGLRenderingContext, WebGL2RenderingContext])
 """Pixels of the scene are drawn where a test looks at them: one picture costs a core a second."""
 TWO_PICTURES = """() => new Promise(
   (done) => requestAnimationFrame(() => requestAnimationFrame(done)))"""
+IN_SIGHT = """(element) => {
+  element.scrollIntoViewIfNeeded();
+  const box = element.getBoundingClientRect();
+  return element.contains(
+    document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2));
+}"""
+"""A folder that is still folded out hides what has its place already."""
 PICTURES = Path(__file__).parents[1] / 'build' / 'screenshots'
 """Where pictures of the tests are kept, to be looked at."""
 PANEL = 410  # [px] width of the controls at the right
@@ -272,16 +279,19 @@ def show(page: Page, *tabs: str) -> None:
 
 
 def press(found: Locator) -> None:
-    """Press a button once it stands."""
-    _wait_until_it_stands(found)
+    """Press a button once it stands in sight."""
+    _wait_until_it_stands(found, IN_SIGHT)
     found.click(force=True)
 
 
-def _wait_until_it_stands(found: Locator) -> None:
-    """Wait while what is folded out, or comes above it, moves it."""
+def _wait_until_it_stands(found: Locator, condition: str = '() => true') -> None:
+    """Wait while what is folded out, or comes above it, moves it, and for a condition of it."""
     found.wait_for()
     deadline, before = time.monotonic() + PAGE_TIMEOUT / 1000.0, None
-    while (place := found.bounding_box()) is None or place != before:
+    while True:
+        holds, place = found.evaluate(condition), found.bounding_box()
+        if holds and place is not None and place == before:
+            return
         assert time.monotonic() < deadline, f'{found} never stands'
         before = place
         found.page.wait_for_timeout(STANDS)
