@@ -22,15 +22,29 @@ from urdf_reader import (
     Transform,
 )
 
+HIGHEST_FREQUENCY = 1000.0  # greatest publish_frequency in [Hz] (robot_state_publisher 3.3.3)
+
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How transforms are published; names and defaults are robot_state_publisher's."""
+    """How transforms are published; names and defaults are robot_state_publisher's.
+
+    Raises:
+        ValueError: publish_frequency is out of its range.
+    """
 
     publish_frequency: float = 20.0
     """Greatest rate of a joint's transform, 0 to 1000 [Hz]; 0 for every message."""
     frame_prefix: str = ''  # put in front of each frame name as it is
     ignore_timestamp: bool = False  # publish at each message, whatever its stamp is
+
+    def __post_init__(self) -> None:
+        """Refuse a frequency that is none."""
+        if not 0.0 <= self.publish_frequency <= HIGHEST_FREQUENCY:
+            raise ValueError(
+                f'publish_frequency is {self.publish_frequency:g} Hz; give 0 to'
+                f' {HIGHEST_FREQUENCY:g} Hz, 0 for every message'
+            )
 
     @property
     def interval(self) -> int:

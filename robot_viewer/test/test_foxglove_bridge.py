@@ -238,6 +238,19 @@ def test_clients_from_before_the_sdk_are_served(rig: Rig) -> None:
 
 @pytest.mark.scenario
 @pytest.mark.xdist_group('foxglove-bridge')
+def test_what_is_not_of_the_protocol_is_refused(client: FoxgloveClient) -> None:
+    """With the text, and why; the client keeps its connection."""
+    client.send('subscribe')
+    client.until(lambda: bool(client.statuses), 'refusal')
+    client.send('fetchAsset', uri='package://cube_description/meshes/cube.stl')
+    client.until(lambda: len(client.statuses) > 1, 'another refusal')
+    for name, text in zip(('subscriptions', 'requestId'), client.statuses, strict=True):
+        assert text.startswith('not understood: \'{"op": ')
+        assert f"KeyError: '{name}'" in text
+
+
+@pytest.mark.scenario
+@pytest.mark.xdist_group('foxglove-bridge')
 def test_a_number_that_no_message_carries_is_refused(rig: Rig, client: FoxgloveClient) -> None:
     """Its client keeps its connection, and the others get their messages."""
     robot, topic, other = rig.robot, '/joint_states', FoxgloveClient(rig.url)

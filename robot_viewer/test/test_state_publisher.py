@@ -316,6 +316,13 @@ def test_every_message_is_published_where_that_is_wanted(options: dict[str, obje
     assert all(send(core, START).transforms for _ in range(3))
 
 
+@pytest.mark.parametrize('frequency', [-1.0, 1000.1, math.nan])
+def test_a_frequency_that_is_none_is_refused(frequency: float) -> None:
+    """Also of the library, which has no parameters of a node."""
+    with pytest.raises(ValueError, match='give 0 to 1000 Hz'):
+        Settings(publish_frequency=frequency)
+
+
 def test_a_clock_that_jumps_back_begins_anew() -> None:
     """A bag that is played in a loop."""
     core = publisher()

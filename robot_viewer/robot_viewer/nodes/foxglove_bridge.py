@@ -10,7 +10,6 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 import hmac
@@ -71,6 +70,7 @@ UNKNOWN_DEPTH, MAX_DEPTH = 10, 25
 """Depth for a publisher whose depth is unknown, since DDS does not report it, and the greatest of
 a subscription."""
 WARNING, ERROR = 1, 2  # levels of a status of the protocol
+QUOTED = 80  # length of a text that is not understood in its refusal, at most
 ID_END = 2**32  # numbers that clients give are below; messages carry them as uint32
 CLOSE_TIMEOUT = 1.0  # time for a client to answer that the connection ends, in [s]
 
@@ -214,8 +214,11 @@ class Server:
         broadcast([connection], json.dumps({'op': 'advertise', 'channels': channels}))
         try:
             async for text in connection:
-                with suppress(KeyError, TypeError, ValueError):  # it is none of the protocol
+                try:
                     await self._take(connection, json.loads(text))
+                except (KeyError, TypeError, ValueError) as error:
+                    why = f'{type(error).__name__}: {error}'
+                    _refuse(connection, f'not understood: {text[:QUOTED]!r} ({why})')
         except ConnectionClosed:
             pass
         finally:
@@ -245,10 +248,12 @@ def _accepts(client: ServerConnection, what: str, number: object) -> bool:
     """Return whether messages can carry a number; refuse one that they cannot."""
     fits = type(number) is int and 0 <= number < ID_END
     if not fits:
-        text = f'{what} {number!r}: give it a whole number from 0 to {ID_END - 1}'
-        status = {'op': 'status', 'level': ERROR, 'message': text}
-        broadcast([client], json.dumps(status))
+        _refuse(client, f'{what} {number!r}: give it a whole number from 0 to {ID_END - 1}')
     return fits
+
+
+def _refuse(client: ServerConnection, text: str) -> None:
+    broadcast([client], json.dumps({'op': 'status', 'level': ERROR, 'message': text}))
 
 
 def _asset(request: int, uri: str) -> bytes:

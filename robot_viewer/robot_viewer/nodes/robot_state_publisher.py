@@ -34,6 +34,7 @@ from node_runner import (
 
 from ..state_publisher import (
     FrameTransform,
+    HIGHEST_FREQUENCY,
     MessageProblem,
     Settings,
     StatePublisher,
@@ -42,7 +43,6 @@ from ..state_publisher import (
 NAME = 'robot_state_publisher'
 DESCRIPTION = 'robot_description'
 DEFAULTS = Settings()
-HIGHEST_FREQUENCY = 1000.0  # greatest publish_frequency in [Hz] (robot_state_publisher 3.3.3)
 TF_DEPTH = 100
 """Queue of /tf, as tf2_ros has it."""
 

@@ -344,7 +344,7 @@ class TargetPanel:
         if self._ghost is not None:
             self._ghost.remove()
 
-    def _moved(self, joint: str, event: GuiEvent[GuiSliderHandle[float]]) -> None:
+    async def _moved(self, joint: str, event: GuiEvent[GuiSliderHandle[float]]) -> None:
         if event.client_id is not None:  # or it follows its joint
             self._targets[joint] = value_of(event.target)
 
