@@ -134,6 +134,14 @@ def test_motors_without_torque_let_go(tmp_path: Path) -> None:
         wait(lambda: servos.torque_on(31), 'leg 3 loaded')
 
 
+def test_a_write_of_the_vendors_older_library_counts() -> None:
+    """XGO-PythonLib 1.1.8 writes with TYPE 0x01."""
+    robot = VirtualRobot('--physics', 'none', protocol=V1)
+    robot.line.receive(bytes.fromhex('55 00 09 01 30 FF C6 00 AA'), robot.now)
+    robot.run(0.02)
+    assert robot.simulation.board.walker.command[0] > 0.0
+
+
 def test_the_vendors_zero_is_no_creeping(tmp_path: Path) -> None:
     """A library that encodes zero as 127 commands no motion at all."""
     with robot(tmp_path, '--physics', 'none') as (client, served):

@@ -223,6 +223,7 @@ class Protocol:
     kinds: frozenset[Kind]  # kinds of frame that there are
     functions: Mapping[int, Function]  # the table, by address
     max_length: int = 255  # longest frame [B]
+    other_write: int | None = None  # a TYPE that some hosts send for a write, too
 
     @property
     def overhead(self) -> int:
@@ -321,6 +322,8 @@ class StreamParser:
         """Begin with an empty buffer; the other side sends ``ROBOT_KINDS`` or ``HOST_KINDS``."""
         self._protocol = protocol
         self._kinds = {int(kind): kind for kind in kinds & protocol.kinds}
+        if Kind.WRITE in kinds and protocol.other_write is not None:
+            self._kinds[protocol.other_write] = Kind.WRITE
         self._buffer = bytearray()
         self.counters = ParserCounters()
 

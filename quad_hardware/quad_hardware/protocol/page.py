@@ -45,7 +45,9 @@ def _section(protocol: Protocol) -> Iterator[str]:
     )
     yield ''
     kinds = (f'{kind:02X} {kind.name.lower()}' for kind in Kind if kind in protocol.kinds)
-    yield f'TYPE: {", ".join(kinds)}.'
+    other = protocol.other_write
+    also = '' if other is None else f'; {other:02X} of some hosts is a write, too'
+    yield f'TYPE: {", ".join(kinds)}{also}.'
     yield ''
     yield '| address | name | access | bytes | payload | range | meaning |'
     yield '|---|---|---|---|---|---|---|'

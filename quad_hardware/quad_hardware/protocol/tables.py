@@ -355,6 +355,7 @@ V1 = Protocol(
     baud=115200,
     address_size=1,
     kinds=frozenset({Kind.WRITE, Kind.READ, Kind.REPLY}),
+    other_write=0x01,  # XGO-PythonLib 1.1.8
     functions=table(
         *sorted(
             (*_system_rows(), *_motion_rows(), *_servo_rows(), *_sensor_rows(), *_arm_rows()),
