@@ -168,9 +168,10 @@ def _after_stop(points: Points, limits: JointLimits, state: RobotState) -> GoalP
 
     For a first point to which no way leads from the motion within the limits of position.
     """
-    stop = stop_path(state, limits)
-    if stop is None:
+    plan = OnlineTrajectoryGenerator(limits).brake(state)
+    if plan is None:
         raise refuse('the arm cannot come to rest in front of the trajectory; stop it first')
+    stop = _phases(plan)
     saved = stop.duration if points.times[0] > 2.0 * stop.duration else 0.0
     rest = RobotState.at_rest(stop.end.position)
     answer = _tried(points.delayed(-saved), limits, rest)
@@ -363,12 +364,6 @@ def approach_path(
         return None
     path = _phases(plan)
     return path if farthest_beyond(path, lower, upper) is None else None
-
-
-def stop_path(state: RobotState, limits: JointLimits) -> Path | None:
-    """Return the shortest path from a motion to rest; None where ruckig has no answer."""
-    stop = OnlineTrajectoryGenerator(limits).brake(state)
-    return None if stop is None else _phases(stop)
 
 
 def _phases(plan: Plan) -> Path:

@@ -206,7 +206,8 @@ class Stepper:
                 self._swing(foot, leg_phase, velocity, (hip_x, hip_y), dt)
                 continue
             stood = self._land(foot, leg_phase, hip_x, hip_y) if foot.swings else dt
-            self._stand(foot, leg_phase)
+            push = math.sin(math.pi * leg_phase / self.schedule.duty)
+            foot.z = -self._depth * self._engaged * push
             # how the ground moves under the foot itself, which is not just below the hip
             turn_x, turn_y = -velocity.yaw * foot.y, velocity.yaw * foot.x
             foot.x -= (hip_x + turn_x) * min(stood, dt)
@@ -218,10 +219,6 @@ class Stepper:
         half = 0.5 * self.schedule.stance_duration
         foot.x, foot.y = half * hip_x, half * hip_y
         return phase * self.schedule.period
-
-    def _stand(self, foot: _Foot, phase: float) -> None:
-        schedule = self.schedule
-        foot.z = -self._depth * self._engaged * math.sin(math.pi * phase / schedule.duty)
 
     def _swing(
         self, foot: _Foot, phase: float, velocity: Velocity, hip: tuple[float, float], dt: float
