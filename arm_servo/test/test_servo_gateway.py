@@ -128,18 +128,6 @@ def test_no_thread_is_started_in_a_cycle(monkeypatch: pytest.MonkeyPatch) -> Non
     assert started == []
 
 
-def test_a_displacement_into_contact_is_refused_and_nothing_moves() -> None:
-    """The wrist of Panda, turned and folded until its hand would be in the forearm."""
-    drives = Drives().following()
-    before = drives.path[-1]
-    command = move_by(drives.gateway, {'panda_joint6': -1.4})
-    begun(drives, command)
-    drives.run(20)
-    with pytest.raises(CommandError, match='panda_link5 and panda_hand would collide'):
-        command.future.result(0.0)
-    assert drives.path[-1].tolist() == before.tolist()
-
-
 def test_a_flood_is_refused() -> None:
     """What cannot be carried out in time is not kept for later."""
     drives = Drives().following()

@@ -64,6 +64,14 @@ def load(path: Path) -> LoadedPolicy:
     return load_policy(path, ROBOT, STAND, OPTIONS, PERIOD)
 
 
+def controlled(tool: Tool, folder: Path, *settings: str) -> Controller:
+    """Return a controller with a tool's policy, whose contract is attached."""
+    write_network(tool, folder / 'policy.onnx')
+    assert run([*attached(tool, folder), *settings]) == 0
+    policy = load(folder / 'policy.onnx').runner
+    return Controller(ROBOT, GaitParameters(), StateParameters(), policy=policy)
+
+
 @pytest.mark.parametrize('name', TOOLS)
 @pytest.mark.parametrize('external', [False, True], ids=['one_file', 'side_file'])
 def test_policies_answer_as_in_their_tool(name: str, external: bool, tmp_path: Path) -> None:
@@ -425,11 +433,7 @@ def test_commands_stay_within_the_training(tmp_path: Path) -> None:
 
 def test_a_policy_needs_a_velocity_that_somebody_estimates(tmp_path: Path) -> None:
     """The mode is refused while there is none, and while it is old."""
-    tool = TOOLS['playground']()
-    write_network(tool, tmp_path / 'policy.onnx')
-    assert run(attached(tool, tmp_path)) == 0
-    policy = load(tmp_path / 'policy.onnx').runner
-    controller = Controller(ROBOT, GaitParameters(), StateParameters(), policy=policy)
+    controller = controlled(TOOLS['playground'](), tmp_path)
     state = RobotState(JointSample(STAND, (0.0,) * 12), UPRIGHT, 0.9)
     controller.step(state, PERIOD)
     assert 'linear velocity' in controller.set_mode('policy').message
@@ -455,11 +459,7 @@ def test_joint_velocities_are_as_exact_as_in_the_training(
     tmp_path: Path, setting: str, error: float, accepted: bool, warned: bool
 ) -> None:
     """What is less exact is refused; of a training that says nothing, one warning shows."""
-    tool = TOOLS['playground']()
-    write_network(tool, tmp_path / 'policy.onnx')
-    assert run([*attached(tool, tmp_path), '--set', setting]) == 0
-    policy = load(tmp_path / 'policy.onnx').runner
-    controller = Controller(ROBOT, GaitParameters(), StateParameters(), policy=policy)
+    controller = controlled(TOOLS['playground'](), tmp_path, '--set', setting)
     joints = JointSample(STAND, (0.0,) * 12, velocity_error=error)
     state = RobotState(joints, UPRIGHT, 0.9, linear_velocity=(0.0, 0.0, 0.0))
     controller.step(state, PERIOD)
@@ -489,10 +489,7 @@ def test_contacts_of_feet_are_observed_in_the_order_of_the_training(tmp_path: Pa
         settings={**tool.settings, 'observation.terms.foot_contact.feet': order},
         width=tool.width + 4,
     )
-    write_network(tool, tmp_path / 'policy.onnx')
-    assert run(attached(tool, tmp_path)) == 0
-    policy = load(tmp_path / 'policy.onnx').runner
-    controller = Controller(ROBOT, GaitParameters(), StateParameters(), policy=policy)
+    controller = controlled(tool, tmp_path)
     state = RobotState(JointSample(STAND, (0.0,) * 12), UPRIGHT, 0.9)
     controller.step(state, PERIOD)
     assert '/foot_contacts' in controller.set_mode('policy').message
