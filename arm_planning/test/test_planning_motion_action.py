@@ -224,13 +224,13 @@ def test_a_stop_between_the_request_of_a_goal_and_its_acceptance_counts(
     bench: Bench, kind: Any, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The acceptance is delayed for the client."""
-    delay = action_goals._Server._delay
+    answer = action_goals._Server._answer_goal
 
-    async def stop_meanwhile(server: Any, duration: float) -> None:
-        bench.execution.stops += duration == action_goals.ANSWER_DELAY
-        await delay(server, duration)
+    async def stop_before(server: Any, request: Any, *, again: bool) -> None:
+        bench.execution.stops += 1
+        await answer(server, request, again=again)
 
-    monkeypatch.setattr(action_goals._Server, '_delay', stop_meanwhile)
+    monkeypatch.setattr(action_goals._Server, '_answer_goal', stop_before)
     status, result = bench.result(bench.send(kind, name, kind.Goal()))
     code = getattr(result, 'response', result).error_code
     assert (status, code.val) == (GoalStatus.STATUS_ABORTED, PlanningCode.PREEMPTED)
