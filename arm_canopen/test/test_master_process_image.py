@@ -10,7 +10,6 @@ import struct
 from drive_samples import drive_config, pdo, sdo_write
 from hypothesis import given
 from hypothesis import strategies as st
-import pytest
 
 from arm_canopen.config import PdoConfig
 from arm_canopen.master.process_image import ProcessImage, ReceivedTpdo, SyncRound
@@ -38,63 +37,6 @@ def image(
     return ProcessImage(tpdos, rpdos, SyncRound(lambda: None), send_last=is_controlword)
 
 
-@given(st.integers(0, 0xFFFF), st.integers(-128, 127), INT32, INT32)
-def test_values_stand_where_the_mapping_says(
-    word: int, mode: int, position: int, velocity: int
-) -> None:
-    """Each object is found in the frame of its TPDO, signed as its type is."""
-    entries = image()
-    for entry in entries.tpdos:
-        data = (
-            struct.pack('<Hb', word, mode)
-            if entry.config.number == 1
-            else struct.pack('<ii', position, velocity)
-        )
-        entry.receive(Frame(entry.config.cob_id, data, timestamp=3.0))
-        assert entry.timestamp == 3.0
-    readers = [entries.reader(index) for index in (0x6041, 0x6061, 0x6064, 0x606C)]
-    assert [reader and reader.value for reader in readers] == [word, mode, position, velocity]
-
-
-@given(st.integers(0, 0xFFFF), INT32, INT32, INT32)
-def test_what_is_written_leaves_with_the_next_frame(
-    word: int, target: int, velocity: int, data: int
-) -> None:
-    """Each object is written to its place in its RPDO and to no other."""
-    entries = image()
-    for index, subindex, value in (
-        (CONTROLWORD, 0, word),
-        (TARGET, 0, target),
-        (VELOCITY, 0, velocity),
-        (0x60C1, 1, data),
-    ):
-        writer = entries.writer(index, subindex)
-        assert writer is not None
-        writer.write(value)
-    frames = {output.frame().can_id: output.frame().data for output in entries.rpdos}
-    assert frames == {
-        0x202: struct.pack('<Hb', word, 0),
-        0x302: struct.pack('<ii', target, velocity),
-        0x402: struct.pack('<i', data),
-    }
-
-
-def test_an_object_in_several_rpdos_is_written_to_all_of_them() -> None:
-    """An EDS often maps the controlword four times; a zero in one would disable the drive."""
-    also = pdo(3, 0x402, (CONTROLWORD, 0), (TARGET, 0))
-    entries = image(rpdos=(*RPDOS[:2], also))
-    for index, value in ((CONTROLWORD, 0x0F), (TARGET, -5)):
-        writer = entries.writer(index)
-        assert writer is not None
-        writer.write(value)
-    frames = {output.frame().can_id: output.frame().data for output in entries.rpdos}
-    assert frames == {
-        0x202: struct.pack('<Hb', 0x0F, 0),
-        0x302: struct.pack('<ii', -5, 0),
-        0x402: struct.pack('<Hi', 0x0F, -5),
-    }
-
-
 def test_the_controlword_leaves_last() -> None:
     """A command never overtakes its data; the others keep their order."""
     assert [output.config.cob_id for output in image().rpdos] == [0x302, 0x402, 0x202]
@@ -110,29 +52,6 @@ def test_what_no_pdo_carries_has_no_place() -> None:
     assert entries.writer(0x6041) is None
     assert entries.writer(0x60C1, 2) is None
     assert entries.commanded(0x6071) is None
-
-
-def test_values_are_unknown_until_they_come_and_after_a_restart() -> None:
-    """Nothing is invented: no value before the first PDO, and none after it was forgotten."""
-    entries = image()
-    reader = entries.reader(0x6041)
-    assert reader is not None
-    assert reader.value is None
-    entries.tpdos[0].receive(Frame(0x182, bytes(3)))
-    assert reader.value == 0
-    entries.clear()
-    assert reader.value is None
-
-
-@pytest.mark.parametrize(('length', 'taken'), [(0, False), (2, False), (3, True), (8, True)])
-def test_short_pdos_are_counted_and_long_ones_read(length: int, taken: bool) -> None:
-    """A PDO of the wrong length does not change values by half (CiA 301, 7.2.2.5)."""
-    entry = image().tpdos[0]
-    entry.receive(Frame(0x182, b'\x37\x06\x01' + bytes(5)))
-    entry.receive(Frame(0x182, (b'\x40\x02\x08' + bytes(5))[:length]))
-    assert entry.values == ((0x240, 8) if taken else (0x637, 1))
-    assert entry.count == 1 + taken
-    assert entry.length_errors == 1 - taken
 
 
 def answered(entry: ReceivedTpdo) -> None:

@@ -278,28 +278,6 @@ def test_torques() -> None:
 # --- profile position (1) ---
 
 
-def test_handshake() -> None:
-    """New set-point, acknowledge, bit taken back, acknowledge gone: one move."""
-    rig = enabled(1)
-    rig.run(0.05)
-    assert rig.statusword & (ACKNOWLEDGE | REACHED) == REACHED
-    rig.put(0x607A, 500)
-    rig.run(0.05)
-    assert rig.statusword & ACKNOWLEDGE == 0
-    rig.command(NEW)
-    assert rig.statusword & (ACKNOWLEDGE | REACHED) == ACKNOWLEDGE
-    rig.run(0.05)
-    assert rig.statusword & ACKNOWLEDGE
-    rig.command(ENABLE)
-    assert rig.statusword & (ACKNOWLEDGE | REACHED) == 0
-    arrival(rig)
-    assert rig.get(0x6064) == pytest.approx(500, abs=10)
-    rig.run(0.1)
-    assert (rig.get(0x6064), rig.get(0x606C)) == (500, 0)
-    assert offer(rig, 500) & ACKNOWLEDGE  # where it stands already
-    arrival(rig)
-
-
 @pytest.mark.parametrize(
     ('words', 'arrives'),
     [

@@ -86,18 +86,6 @@ def test_what_is_no_command_is_ignored(frame: Frame) -> None:
     assert rig.take() == []
 
 
-def test_first_frame_is_boot_up() -> None:
-    """A device says that it is there when its start is over, and not before."""
-    rig = Rig(boot_time=0.5, power=False)
-    rig.device.advance(rig.now)
-    rig.run(0.499)
-    assert rig.nmt_state is NmtState.BOOT_UP
-    assert rig.take() == []
-    rig.run(0.002)
-    assert rig.nmt_state is PRE
-    assert rig.take(0x700 + NODE_ID) == BOOT_UP
-
-
 def test_commands_during_initialisation() -> None:
     """Start is not obeyed, a reset prolongs it; there is one boot-up frame."""
     rig = Rig(boot_time=0.5)
@@ -225,19 +213,6 @@ def test_heartbeats_of_devices_are_spread() -> None:
     firsts = sorted(rig.times(0x700 + rig.node_id)[-1] for rig in rigs)
     gaps = [later - earlier for earlier, later in pairwise(firsts)]
     assert min(gaps) > 0.05
-
-
-def test_heartbeat_carries_the_nmt_state(rig: Rig) -> None:
-    """Each heartbeat has the state at its time, in every state."""
-    rig.put(0x1017, 100)
-    for command, state in (
-        (NmtCommand.START, NmtState.OPERATIONAL),
-        (NmtCommand.STOP, NmtState.STOPPED),
-        (NmtCommand.ENTER_PRE_OPERATIONAL, NmtState.PRE_OPERATIONAL),
-    ):
-        rig.nmt(command)
-        rig.run(0.1)
-        assert rig.take(OWN)[-1] == bytes((state,))
 
 
 def test_no_burst_after_a_standstill(rig: Rig) -> None:

@@ -146,23 +146,6 @@ def test_inhibit_time(rig: Rig) -> None:
     assert rig.take(can_id) == [b'\x50\x02', b'\x33\x02']
 
 
-def test_moving_axis_is_an_event(rig: Rig) -> None:
-    """A position in an event-driven PDO is sent while it changes, and comes to rest with it."""
-    can_id = configure(rig, 1, [0x60640020], transmission=255)
-    rig.nmt(NmtCommand.START)
-    rig.put(0x607A, 200)
-    rig.enable(1)
-    rig.take()
-    rig.command(0x1F)
-    rig.run(2.0)
-    positions = [int.from_bytes(data, 'little', signed=True) for data in rig.take(can_id)]
-    assert len(positions) > 20
-    assert positions == sorted(positions)
-    assert positions[-1] == 200
-    rig.run(5.0)
-    assert rig.take(can_id) == []
-
-
 def test_sync_start_value(rig: Rig) -> None:
     """With a SYNC counter, a PDO begins at its start value and goes on from there."""
     rig.put(0x1019, 10)

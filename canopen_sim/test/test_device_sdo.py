@@ -254,14 +254,6 @@ def test_strings_come_back(text: str) -> None:
     assert rig.read(STRING) == text.encode('latin-1')
 
 
-@given(value=st.integers(0, 2**64 - 1))
-def test_long_numbers_come_back(value: int) -> None:
-    """64 bits survive a segmented write and read."""
-    rig = Rig(dictionary())
-    rig.write(BIG, 0, value.to_bytes(8, 'little'))
-    assert rig.read(BIG) == value.to_bytes(8, 'little')
-
-
 FILE = 0x2100
 FILE_NAME = struct.pack('<HB', FILE, 0)
 RESPONSE = 0x580 + NODE_ID

@@ -96,14 +96,6 @@ def test_every_state_and_controlword(state: State) -> None:
         assert drive_state(rig.statusword) is rig.drive.state
 
 
-def test_starts_by_itself() -> None:
-    """Transitions 0 and 1: after the start of the device the drive can be switched on."""
-    rig = Rig(boot_time=0.5)
-    assert rig.drive.state is NOT_READY
-    rig.run(1.0)
-    assert rig.drive.state is SOD
-
-
 @pytest.mark.parametrize('state', [SOD, READY, ON, OE, QS])
 def test_fault_from_every_state(state: State) -> None:
     """Transitions 13 and 14: a fault leads to Fault from everywhere, and is reported."""
@@ -127,23 +119,6 @@ def test_fault_reset_is_an_edge() -> None:
     assert rig.state is FAULT
     rig.command(0x00, FAULT_RESET)
     assert rig.state is SOD
-
-
-@pytest.mark.parametrize(
-    ('word', 'low_bits'),
-    [(None, 0x250), (SHUTDOWN, 0x231), (SWITCH_ON, 0x233), (ENABLE, 0x237), (QUICK_STOP, 0x217)],
-)
-def test_statusword(word: int | None, low_bits: int) -> None:
-    """Beside the state the word shows voltage and remote (CiA 402-2, tables 30 and 31)."""
-    rig = Rig()
-    rig.put(0x605A, 6)
-    for command in (SHUTDOWN, SWITCH_ON, ENABLE, QUICK_STOP):
-        if word is None:
-            break
-        rig.command(command)
-        if command == word:
-            break
-    assert rig.statusword & ~0x400 == low_bits
 
 
 @pytest.mark.parametrize('state', [SOD, READY, ON, OE, QS])

@@ -307,11 +307,6 @@ def test_an_entry_that_is_not_used(word: int) -> None:
     assert not ConsumerHeartbeatTime.parse(word).used
 
 
-def test_bit_23_belongs_to_the_node_id() -> None:
-    """An entry for id 129, which there is not, is not that of node 1."""
-    assert ConsumerHeartbeatTime.parse(0x0081_0064).node_id != 1
-
-
 NAME = '0x1008:00 Name'
 # '>' goes to the device, '<' comes from it
 CONVERSATIONS = {
