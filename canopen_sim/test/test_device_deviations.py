@@ -236,20 +236,6 @@ def test_heartbeat_stops_and_returns(rig: Rig) -> None:
     assert min(rig.times(HEARTBEAT)) >= start + 1.0
 
 
-def test_cut_off_device_goes_on_by_itself(rig: Rig) -> None:
-    """Nothing passes in or out, but the motion goes on; then it is there again, as it was."""
-    rig.enable(3)
-    rig.put(0x60FF, 1000)
-    rig.take()
-    rig.inject(Fault.DISCONNECT, duration=1.0)
-    assert not answers(rig)
-    rig.send(0, b'\x81\x00')
-    rig.run(1.1)
-    assert rig.take() == []
-    assert rig.get(0x6064) > 800
-    assert rig.state is DriveState.OPERATION_ENABLED
-
-
 def test_other_devices_of_the_process_are_not_touched() -> None:
     """A fault belongs to one device; frames that it loses do not reach its neighbours either."""
     sent: list[Frame] = []
@@ -382,24 +368,6 @@ def test_safe_torque_off_is_no_fault(rig: Rig) -> None:
     assert rig.get(0x6041) & 0x6F == 0x21
     rig.cure(Fault.STO)
     assert rig.get(0x6041) & 0x6F == 0x27
-
-
-@pytest.mark.parametrize('mode', [1, 3, 8, 9])
-def test_stop_in_the_way_makes_a_following_error(mode: int) -> None:
-    """An axis that a stop holds does not pass it, and faults with 0x8611."""
-    rig = Rig()
-    rig.drive.block(500.0, rig.now)
-    rig.enable(mode)
-    rig.put(0x607A, 3000)
-    rig.put(0x60FF, 1000)
-    rig.command(ENABLE | 0x10)
-    highest = 0.0
-    for _ in range(300):
-        rig.run(0.01)
-        highest = max(highest, rig.position)
-    assert highest == pytest.approx(500.0)
-    assert (rig.state, rig.get(0x603F)) == (DriveState.FAULT, 0x8611)
-    assert rig.statusword & 0x2000
 
 
 def test_stop_holds_a_torque() -> None:
