@@ -27,7 +27,6 @@ RPDOS = (
     pdo(2, 0x302, (TARGET, 0), (VELOCITY, 0)),
     pdo(3, 0x402, (0x60C1, 1)),
 )
-INT32 = st.integers(-(2**31), 2**31 - 1)
 
 
 def image(

@@ -22,7 +22,7 @@ from canopen_core.standard import drive_state, ObjectDictionary
 
 pytestmark = pytest.mark.slow
 
-NOT_READY, SOD, READY, ON, OE, QS, REACTION, FAULT = tuple(State)[1:]
+SOD, READY, ON, OE, QS, REACTION, FAULT = tuple(State)[2:]
 
 TO_STATE = {
     SOD: [],
