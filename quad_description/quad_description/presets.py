@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
 import math
+import os
 from pathlib import Path
 import re
 import signal
@@ -203,12 +204,24 @@ INTERRUPTED = 130  # exit code of a program that Ctrl-C ended
 
 def run_command(run: Callable[[Sequence[str]], int]) -> NoReturn:
     """Run a program with the arguments of its command line, and end with its exit code."""
+    interrupted = False
+
+    def interrupt(_number: int, _frame: object) -> None:
+        nonlocal interrupted
+        interrupted = True
+        raise KeyboardInterrupt
+
     # a script's shell starts background jobs with SIGINT ignored
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGINT, interrupt)
     try:
         sys.exit(run(sys.argv[1:]))
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)
+    except Exception:
+        if not interrupted:
+            raise
+        # MuJoCo made an error of its own of it, and Python would end by the signal
+        os._exit(INTERRUPTED)
 
 
 def run(argv: Sequence[str] | None = None) -> int:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import math
 from pathlib import Path
 import subprocess
+import sys
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -277,3 +278,24 @@ def test_ctrl_c_ends_a_program_without_a_traceback() -> None:
     with pytest.raises(SystemExit) as ended:
         run_command(interrupted)
     assert ended.value.code == 130
+
+
+CONVERTED = """
+import os, signal
+from quad_description import run_command
+
+def run(arguments):
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+    except KeyboardInterrupt as error:
+        raise RuntimeError('what a library in C++ makes of it') from error
+
+run_command(run)
+"""
+
+
+def test_ctrl_c_ends_a_program_whatever_a_library_makes_of_it() -> None:
+    """MuJoCo raises an error of its own when it is interrupted while it starts."""
+    command = [sys.executable, '-c', CONVERTED]
+    done = subprocess.run(command, check=False, capture_output=True, timeout=60)
+    assert (done.returncode, done.stderr) == (130, b'')
