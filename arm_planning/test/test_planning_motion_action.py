@@ -226,9 +226,9 @@ def test_a_stop_between_the_request_of_a_goal_and_its_acceptance_counts(
     """The acceptance is delayed for the client."""
     answer = action_goals._Server._answer_goal
 
-    async def stop_before(server: Any, request: Any, *, again: bool) -> None:
+    async def stop_before(server: Any, request: Any) -> None:
         bench.execution.stops += 1
-        await answer(server, request, again=again)
+        await answer(server, request)
 
     monkeypatch.setattr(action_goals._Server, '_answer_goal', stop_before)
     status, result = bench.result(bench.send(kind, name, kind.Goal()))

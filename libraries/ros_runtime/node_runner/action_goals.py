@@ -68,20 +68,18 @@ class _Server(ActionServer):
         super().__init__(*args, **kwargs)
 
     async def _execute_goal_request(self, request: Any) -> None:  # noqa: ANN401  # rclpy has no types
-        uuid = bytes(request[1].goal_id.uuid)
-        is_new = uuid not in self._came_at
-        if is_new:
-            self._came_at[uuid] = time.monotonic()
-        self._receive(uuid)
-        self._later(ANSWER_DELAY, self._answer_goal, request, again=is_new)
-
-    async def _answer_goal(self, request: Any, *, again: bool) -> None:  # noqa: ANN401
         header, goal = request
         uuid = bytes(goal.goal_id.uuid)
-        if again:
-            self._later(REPEATS[0], self._accept_again, header, uuid, *REPEATS[1:])
+        if uuid not in self._came_at:
+            self._came_at[uuid] = time.monotonic()
+            first, *others = REPEATS
+            self._later(ANSWER_DELAY + first, self._accept_again, header, uuid, *others)
+        self._receive(uuid)
+        self._later(ANSWER_DELAY, self._answer_goal, request)
+
+    async def _answer_goal(self, request: Any) -> None:  # noqa: ANN401
         await super()._execute_goal_request(request)
-        self._forget(uuid)
+        self._forget(bytes(request[1].goal_id.uuid))
 
     async def _execute_cancel_request(self, request: Any) -> None:  # noqa: ANN401
         asked = request[1].goal_info
@@ -117,7 +115,6 @@ class _Server(ActionServer):
         delay: float,
         work: Callable[..., Coroutine[Any, Any, None]],
         *args: Any,  # noqa: ANN401
-        **options: Any,  # noqa: ANN401
     ) -> None:
         """Run a coroutine after a time in [s].
 
@@ -127,7 +124,7 @@ class _Server(ActionServer):
 
         async def begin() -> None:
             self._node.destroy_timer(timer)
-            await work(*args, **options)
+            await work(*args)
 
         def due() -> None:
             if not timer.is_canceled():

@@ -140,9 +140,13 @@ class RobotStatePublisher(Node):
             self._tf.publish(_message(update.transforms, Time(nanoseconds=update.stamp)))
 
     def _warn(self, problem: MessageProblem, names: Sequence[str]) -> None:
-        about = f'message about {", ".join(names[:3]) or "no joint"}: '
-        text = problem.value if problem is MessageProblem.BACKWARDS else about + problem.value
-        self.get_logger().warning(text, throttle_duration_sec=5.0)
+        text = f'message about {", ".join(names[:3]) or "no joint"}: {problem.value}'
+        if problem is MessageProblem.LENGTHS:
+            self.get_logger().error(text, throttle_duration_sec=5.0)
+        elif problem is MessageProblem.BACKWARDS:
+            self.get_logger().warning(problem.value)
+        else:
+            self.get_logger().warning(f'{text} (logged once)', once=True)
 
 
 def _message(transforms: Iterable[FrameTransform], stamp: Time) -> TFMessage:
