@@ -253,8 +253,9 @@ def test_commands_of_the_old_protocol_fit_into_50_hz() -> None:
     for _ in range(50):
         rig.dialect.command(LEGS)
         rig.run(0.02)
-    writes = [frame for _, frame in rig.sent if frame.kind is Kind.WRITE]
+    first, *writes = [frame for _, frame in rig.sent if frame.kind is Kind.WRITE]
     span = ANGLE_SPANS[Model.LITE][11]
+    assert (first.address, first.payload) == (0x5C, b'\xff')
     assert len(writes) == 50
     assert {len(frame.payload) for frame in writes} == {12}
     assert writes[0].payload[0] == span.encode(10.0)
@@ -308,14 +309,18 @@ def test_a_servo_that_is_not_reported_goes_slowly_until_it_must_be_there() -> No
     rig.dialect.command({**LEGS, 54: 100.0})
     rig.run(0.05)
     yaw = ANGLE_SPANS[Model.LITE][54].encode(100.0)
-    assert writes_to(rig, 0x5C, 0x70) == [(0x5C, 1), (0x70, yaw)]
+    legs = (0x50, ANGLE_SPANS[Model.LITE][11].encode(10.0))
+    slowly = [(0x5C, 1), (0x70, yaw), (0x5C, 255)]
+    sent = [call for call in writes_to(rig, 0x50, 0x5C, 0x70) if call != (0x50, 15)]
+    assert sent == [*slowly, legs]
     rig.sent.clear()
     rig.dialect.command({**LEGS, 52: 20.0, 54: 100.0})
     rig.run(0.05)
     elbow = ANGLE_SPANS[Model.LITE][52].encode(20.0)
-    assert writes_to(rig, 0x5C, 0x5D) == [(0x5C, 255), (0x5D, elbow)]
+    assert writes_to(rig, 0x5C, 0x5D) == [(0x5D, elbow)]
     rig.sent.clear()
     rig.run(135.0)  # from the other end of its range, 275 degrees at 2.07 deg/s
+    slower = ANGLE_SPANS[Model.LITE][54].encode(90.0)
     rig.dialect.command({**LEGS, 54: 90.0})
     rig.run(0.05)
     assert (0x5C, 1) not in writes_to(rig, 0x5C)
@@ -323,7 +328,7 @@ def test_a_servo_that_is_not_reported_goes_slowly_until_it_must_be_there() -> No
     rig.sent.clear()
     rig.dialect.command({**LEGS, 54: 90.0})
     rig.run(0.05)
-    assert writes_to(rig, 0x5C) == [(0x5C, 1)]
+    assert writes_to(rig, 0x5C, 0x70) == [(0x5C, 1), (0x70, slower), (0x5C, 255)]
 
 
 @given(
@@ -376,12 +381,13 @@ def test_a_lost_answer_costs_little_on_a_quick_board() -> None:
 def test_half_a_report_is_no_report() -> None:
     """An IMU answer without the angles of its period gives nothing."""
     dialect = V1Dialect(0.0)
-    motors = dialect.step(0.0)
+    dialect.step(0.0)  # the speed of the servos
+    motors = dialect.step(0.01)
     (request,) = StreamParser(V1, HOST_KINDS).feed(motors.send)
-    assert dialect.handle_frame(Frame(Kind.REPLY, Register.IMU, bytes(24)), 0.001) is None
+    assert dialect.handle_frame(Frame(Kind.REPLY, Register.IMU, bytes(24)), 0.011) is None
     assert dialect.counters.unusable == 1
-    assert dialect.handle_frame(answer(request), 0.002) is None
-    assert dialect.handle_frame(answer(request), 0.002) is None  # asked once, answered twice
+    assert dialect.handle_frame(answer(request), 0.012) is None
+    assert dialect.handle_frame(answer(request), 0.012) is None  # asked once, answered twice
     assert dialect.counters.unusable == 2
 
 

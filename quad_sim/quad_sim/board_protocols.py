@@ -313,11 +313,12 @@ class Registers:
 
     def _move(self, angles: dict[int, float]) -> None:
         self._board.take_servos()
-        if len(angles) == 1:
-            for motor, angle in angles.items():
-                self._board.servos.command_one(motor, angle)
-        else:
-            self._board.servos.command(angles)
+        servos = self._board.servos
+        if servos.at_full_speed:
+            servos.command(angles)
+            return
+        for motor, angle in angles.items():
+            servos.command_one(motor, angle)
 
     def _set_speed(self, data: bytes) -> None:
         servos = self._board.servos

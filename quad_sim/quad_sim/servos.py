@@ -127,6 +127,11 @@ class Servos:
         """Set how fast single commands are carried out, 1 to 255."""
         self._speed |= dict.fromkeys(motors, max(speed, 1))
 
+    @property
+    def at_full_speed(self) -> bool:
+        """Whether no servo was made slower."""
+        return min(self._speed.values()) >= MAX_SPEED
+
     def set_torque(self, motors: Iterable[int], on: bool, *, hold: bool = True) -> None:
         """Switch servos on or off; those that the robot lacks or that have failed are left out.
 

@@ -12,10 +12,10 @@ import time
 
 import numpy as np
 import pytest
-from sim_serial import serve, Served, TEST_TIMEOUT, V1Client, VirtualRobot
+from sim_serial import Line, serve, Served, TEST_TIMEOUT, V1Client, VirtualRobot
 
 from quad_description import movable_joints, robot_urdf
-from quad_hardware.protocol import Frame, Kind, Register, V1
+from quad_hardware.protocol import Frame, Kind, LEG_MOTORS, Register, V1
 
 pytestmark = pytest.mark.slow
 
@@ -116,6 +116,18 @@ def test_servos_go_where_single_frames_send_them(tmp_path: Path) -> None:
         first = degrees(client.motors())[2]
         assert first > 0.0
         wait(lambda: abs(degrees(client.motors())[2] + 20.0) < 0.5, 'servo 13 arrives slowly')
+
+
+def test_servos_that_another_program_left_slow_are_as_fast_as_ever() -> None:
+    """Legs and arm are commanded at full speed from the first command, whatever was set before."""
+    line = Line('--protocol', 'v1', '--physics', 'none', '--arm', protocol=V1)
+    line.robot.send(Frame(Kind.WRITE, Register.MOTOR_SPEED, b'\x01'))
+    line.robot.run(0.01)
+    targets = {**dict.fromkeys(LEG_MOTORS, 10.0), 52: 30.0}
+    line.command(targets)
+    line.wait_until(line.now() + 0.3)
+    found = line.reports()[-1].positions
+    assert [found[motor] for motor in targets] == pytest.approx([*targets.values()], abs=1.0)
 
 
 def test_motors_without_torque_let_go(tmp_path: Path) -> None:

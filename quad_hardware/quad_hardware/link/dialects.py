@@ -46,7 +46,6 @@ MIN_LATENCY = 0.006  # [s] what is waited for the answer of a quick board
 LATENCY_DECAY = 0.98  # by which a slow answer is forgotten with each quick one
 BATTERY_PERIOD = 2.0  # [s]
 ARM_REPEAT_PERIOD = 0.5  # [s] after which an arm joint is sent again, for a frame may be lost
-_BOARDS_OWN, _FORGOTTEN = -1, -2  # speeds that were not set, or that a restart may have undone
 _IMU = V1.functions[Register.IMU]
 
 
@@ -138,7 +137,7 @@ class V1Dialect(Dialect):
         self._arm: dict[int, bytes] = {}
         self._arm_sent: dict[int, tuple[bytes, float]] = {}  # and until when that counts [s]
         self._unseen: dict[int, UnseenServo] = {}
-        self._speed = _BOARDS_OWN  # of single servos
+        self._speed = 0  # of servos, 0 for unknown; no page says if it counts for bulk writes
         self._angles: bytes | None = None
         self._angles_at = now  # [s] when they were measured
         self._charges: deque[int] = deque(maxlen=3)
@@ -246,14 +245,17 @@ class V1Dialect(Dialect):
         self._queue = deque((_READ_MOTORS, _READ_IMU))
         if now >= self._battery_at:
             self._battery_at = now + BATTERY_PERIOD
+            self._speed = 0  # its frame may be lost, and another program or a restart undo it
             self._queue.append(_READ_BATTERY)
 
     def _next(self, now: float) -> bytes:
-        if self._legs:
+        if self._legs and self._speed == FULL_SPEED:
             payload, self._legs = self._legs, b''
             return Frame(Kind.WRITE, Register.MOTORS, payload).encode(V1)
         if arm := self._next_of_arm(now):
             return arm
+        if self._speed != FULL_SPEED:
+            return self._set_speed(FULL_SPEED)
         if self._torque:
             payload, self._torque = self._torque, b''
             return Frame(Kind.WRITE, Register.TORQUE, payload).encode(V1)
@@ -270,14 +272,18 @@ class V1Dialect(Dialect):
             if sent == payload and now < until:
                 continue
             speed = self._speed_of(motor, now)
-            if speed != self._speed:  # it counts for every single servo that follows
-                self._speed, self._arm[motor] = speed, payload
-                return Frame(Kind.WRITE, Register.MOTOR_SPEED, bytes((speed,))).encode(V1)
+            if speed != self._speed:  # it counts for every servo that follows
+                self._arm[motor] = payload
+                return self._set_speed(speed)
             self._arm_sent[motor] = payload, now + ARM_REPEAT_PERIOD
             if motor in self._unseen:
                 self._unseen[motor].send(self.spans[motor].decode(payload[0]), now)
             return Frame(Kind.WRITE, REGISTER_OF_MOTOR[motor], payload).encode(V1)
         return b''
+
+    def _set_speed(self, speed: int) -> bytes:
+        self._speed = speed
+        return Frame(Kind.WRITE, Register.MOTOR_SPEED, bytes((speed,))).encode(V1)
 
     def _speed_of(self, motor: int, now: float) -> int:
         if motor not in BULK_READ_ORDER:
@@ -285,14 +291,12 @@ class V1Dialect(Dialect):
                 self._unseen[motor] = UnseenServo(self.spans[motor], now)
             if not self._unseen[motor].arrived(now):
                 return MIN_SPEED
-        return _BOARDS_OWN if self._speed == _BOARDS_OWN else FULL_SPEED
+        return FULL_SPEED
 
     def _forget_arm(self) -> None:
         """Send the arm anew, for it may have been moved."""
         self._arm_sent.clear()
         self._unseen.clear()
-        if self._speed != _BOARDS_OWN:
-            self._speed = _FORGOTTEN
 
     def _report(self, imu: bytes, now: float) -> Report:
         angles, self._angles = self._angles or b'', None
