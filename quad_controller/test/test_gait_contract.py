@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 import math
 from pathlib import Path
@@ -28,7 +29,7 @@ from quad_controller.policy.contract.document import document_of, read_yaml
 from quad_controller.policy.contract.mjlab import read_metadata
 from quad_controller.policy.contract.model import RecurrentState
 from quad_controller.policy.load import LoadedPolicy, read_contract_file
-from quad_controller.policy.network import OnnxNetwork
+from quad_controller.policy.network import Floats, OnnxNetwork
 from quad_controller.policy.observation import Situation
 from quad_controller.policy.options import GravitySource
 from quad_description import ImuSample, JointSample, RobotState
@@ -241,6 +242,80 @@ def test_an_input_that_cannot_be_fed_is_named(tmp_path: Path, half: bool) -> Non
     words = rf'{port.name} tensor\(float16\)' if half else rf"{port.name} .*'width'"
     with pytest.raises(PolicyError, match=words):
         load(path)
+
+
+def write_lstm(
+    path: Path, fed: Sequence[str], kept: Sequence[str], sizes: Sequence[int | str]
+) -> dict[str, Floats]:
+    """Write an LSTM of 8 cells with states of some names and sizes; return its weights."""
+    random, helper, kind = np.random.default_rng(7), onnx.helper, onnx.TensorProto.FLOAT
+    shapes = {'w': (1, 32, 48), 'r': (1, 32, 8), 'out': (8, 12)}
+    weights = {
+        name: (0.3 * random.standard_normal(shape)).astype(np.float32)
+        for name, shape in shapes.items()
+    }
+    nodes = [
+        helper.make_node('Unsqueeze', ['obs', 'axis'], ['x']),
+        helper.make_node('LSTM', ['x', 'w', 'r', '', '', *fed], ['y', *kept], hidden_size=8),
+        helper.make_node('Squeeze', ['y', 'axes'], ['row']),
+        helper.make_node('MatMul', ['row', 'out'], ['actions']),
+    ]
+    axes = {'axis': np.zeros(1, np.int64), 'axes': np.arange(2)}
+    inputs, outputs = (
+        [helper.make_tensor_value_info(name, kind, ['batch', size])]
+        + [helper.make_tensor_value_info(state, kind, sizes) for state in states]
+        for name, size, states in (('obs', 48, fed), ('actions', 12, kept))
+    )
+    made = [
+        onnx.numpy_helper.from_array(array, name)
+        for arrays in (weights, axes)
+        for name, array in arrays.items()
+    ]
+    opset = [helper.make_opsetid('', 17)]
+    graph = helper.make_graph(nodes, 'lstm', inputs, outputs, made)
+    onnx.save_model(helper.make_model(graph, opset_imports=opset, ir_version=8), path)
+    return weights
+
+
+@pytest.mark.parametrize(
+    ('fed', 'kept', 'sizes'),
+    [
+        (('h0', 'c0'), ('hn', 'cn'), (1, 1, 8)),
+        (('hidden_in', 'cell_in'), ('hidden_out', 'cell_out'), (1, 'batch', 8)),
+        (('h_in', 'c_in'), ('h_out', 'c_out'), ('layers', 'batch', 8)),
+        (('h_in', 'c_in'), ('h_out', 'c_out'), ('layers', 'batch', 'cells')),
+    ],
+)
+def test_the_states_of_an_lstm_may_have_any_names(
+    fed: tuple[str, str], kept: tuple[str, str], sizes: tuple[int | str, ...], tmp_path: Path
+) -> None:
+    """Without a recurrence they are named, and a number of cells that is open is, too."""
+    tool, path = TOOLS['playground'](), tmp_path / 'policy.onnx'
+    weights = write_lstm(path, fed, kept, sizes)
+    recurrence = dict(zip(fed, kept, strict=True))
+    tool = replace(tool, settings={**tool.settings, 'recurrence': recurrence})
+    assert run(attached(tool, tmp_path, left_out='recurrence')) == 0
+    with pytest.raises(PolicyError, match=rf'{fed[0]} tensor.*{fed[1]} tensor'):
+        load(path)
+    assert run(attached(tool, tmp_path)) == 0
+    if sizes[-1] != 8:
+        with pytest.raises(PolicyError, match=r'initial_h must have shape \{1,1,8\}'):
+            load(path)
+        return
+    runner = load(path).runner
+    runner.reset(STAND)
+    random, last, memory = np.random.default_rng(3), np.zeros(12, np.float32), list[Floats]()
+    h = c = np.zeros(8, np.float32)
+    for _ in range(20):
+        inputs, step = recorded(random)
+        targets = runner.step(inputs, PERIOD).targets
+        row = tool.observe(step, last, memory)
+        gate_in, gate_out, forget, cell = np.split(weights['w'][0] @ row + weights['r'][0] @ h, 4)
+        c = c / (1 + np.exp(-forget)) + np.tanh(cell) / (1 + np.exp(-gate_in))
+        h = np.tanh(c) / (1 + np.exp(-gate_out))
+        last = h @ weights['out']
+        assert targets is not None
+        assert [targets[place] for place in ORDER] == pytest.approx(tool.target(last), abs=1e-4)
 
 
 @pytest.mark.parametrize('order', [1, -1], ids=['base.yaml last', 'base.yaml first'])
