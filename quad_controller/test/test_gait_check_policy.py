@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 import re
@@ -16,7 +17,7 @@ from quad_controller import find_policy
 from quad_controller.attach_contract import run as attach
 from quad_controller.policy.contract.build import build_contract
 from quad_controller.policy.contract.mjlab import read_metadata
-from quad_controller.policy.contract.model import PolicyContract
+from quad_controller.policy.contract.model import PolicyContract, Source
 from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy_check.main import ExitCode, run
 from quad_gait_rig import joined, metadata, ROBOT, write_policy
@@ -44,6 +45,37 @@ def test_the_shipped_policy_passes_and_walks(capsys: pytest.CaptureFixture[str])
     assert 'sha256' in output
     went = output.rpartition('went ')[2]
     assert float(went.split()[0]) == pytest.approx(0.2, abs=0.03)
+
+
+@pytest.mark.slow
+def test_the_gait_beside_a_policy_is_the_one_of_its_two_stances_that_goes_better(
+    tmp_path: Path,
+) -> None:
+    """With an arm on the vendor's soft servos it is the low and wide one."""
+    path, report = write_policy(tmp_path / 'still.onnx', metadata()), tmp_path / 'report.csv'
+    soft = ['--arm', '--servo', 'vendor_rl', '--duration', '2']
+    assert run([str(path), *soft, '--report', str(report)]) == 1
+    rows = list(csv.DictReader(report.read_text(encoding='utf-8').splitlines()))
+    ahead = [row for row in rows if (row['walker'], row['axis']) == ('gait', 'forward')]
+    pairs = [(float(row['went x [m/s]']), float(row['commanded x [m/s]'])) for row in ahead]
+    assert len(pairs) == 4
+    assert max(abs(went - commanded) for went, commanded in pairs) < 0.06
+
+
+def test_a_policy_that_bytes_do_not_suffice_for_is_found_over_v1(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Joint velocities are differentiated there, and it was trained with better ones."""
+    (term,) = (
+        term.name for term in load_contract().terms if term.source is Source.JOINT_VELOCITIES
+    )
+    path, setting = tmp_path / 'policy.onnx', f'observation.terms.{term}.noise=0.03'
+    assert attach([SHIPPED, '--set', setting, '--output', str(path)]) == 0
+    walk = [str(path), '--walk', '0.2', '0', '0', '--duration', '1', '--servo', 'firm']
+    assert run(walk) == 0
+    capsys.readouterr()
+    assert run([*walk, '--v1']) == 1
+    assert 'set noise' in capsys.readouterr().out
 
 
 def test_a_policy_that_only_stands_walks_nowhere(

@@ -20,7 +20,7 @@ from robot_primitives import settings_of
 
 from ..exceptions import CheckError, PolicyError, QuadControllerError
 from ..gait.generator import GaitGenerator
-from ..gait.parameters import GaitParameters
+from ..gait.parameters import AS_TUNED, GaitParameters, LOW_AND_WIDE
 from ..gait.velocity import Velocity
 from ..policy.load import find_policy, load_policy, LoadedPolicy
 from ..policy.network import OnnxNetwork
@@ -132,24 +132,29 @@ def _try_out(options: argparse.Namespace, loaded: LoadedPolicy, found: Findings)
         raise CheckError(f'a walk needs quad_sim and MuJoCo: {error}') from error
     choice = RobotChoice(options.preset, options.arm, options.servo)
     policy = Candidate(find_policy(options.policy), _policy_options(options), choice)
-    both = policy, Candidate(robot=choice)
     conditions = Conditions(v1=options.v1)
     if options.walk is not None:
         _walk(options, loaded, PhysicsArena(choice, conditions), found)
+    if not (compare or options.chain):
+        return
     commands = course_for(loaded.contract.commands)
+    stances = [Candidate(robot=choice, gait=gait) for gait in (AS_TUNED, LOW_AND_WIDE)]
+    duration = options.duration or COMPARE_DURATION
+    trials = [Trial(who, commands, duration, conditions) for who in (policy, *stances)]
+    mine, *others = run_trials(trials)
+    pairs = zip(stances, others, strict=True)
+    gait, other = min(pairs, key=lambda pair: (pair[1].falls, pair[1].mean('error')))
     if compare:
-        duration = options.duration or COMPARE_DURATION
-        mine, other = run_trials([Trial(who, commands, duration, conditions) for who in both])
         sensors = 'the bytes of protocol v1' if options.v1 else 'ideal sensors'
         title = f'in physics with {sensors}, in virtual time'
         _add_course(found, Compared(title, mine, other))
     if options.chain:
-        duration = chain_duration(options.minutes, len(both), len(commands))
+        duration = chain_duration(options.minutes, 2, len(commands))
         title = (
             f'behind the serial line in real time, {options.minutes:g} minutes: servos, board, '
             'line, estimator, clocks'
         )
-        mine, other = run_chain(both, commands, duration)
+        mine, other = run_chain((policy, gait), commands, duration)
         _add_course(found, Compared(title, mine, other))
 
 
