@@ -79,12 +79,11 @@ class PhysicsRig:
         states: StateParameters | None = None,
     ) -> None:
         """Stand up, by what the robot's sensors say."""
-        self._sense = sense
+        states = states or StateParameters()
+        self._sense, self._period = sense, states.period
         self.robot, self.model, self._urdf = robot or Robot(urdf), quadruped(urdf), urdf
-        self._backend = PhysicsBackend(self.robot, PERIOD)
-        self.controller = Controller(
-            self.model, gait or GaitParameters(), states or StateParameters(), policy=policy
-        )
+        self._backend = PhysicsBackend(self.robot, self._period)
+        self.controller = Controller(self.model, gait or GaitParameters(), states, policy=policy)
         self.tilt = 0.0
         self.step(REST)
         self.mode('stand')
@@ -99,26 +98,26 @@ class PhysicsRig:
         """Pass one period; return the targets that were sent."""
         self.controller.set_velocity(velocity)
         state = self._sense(self._backend.observe())
-        targets = self.controller.step(state, PERIOD).targets
-        self.hold(PERIOD, targets)
+        targets = self.controller.step(state, self._period).targets
+        self.hold(self._period, targets)
         return targets or ()
 
     def hold(self, duration: float, targets: Targets | None) -> None:
         """Pass some seconds with targets, without the controller."""
-        for _ in range(round(duration / PERIOD)):
+        for _ in range(round(duration / self._period)):
             self._backend.step(targets)
             self.tilt = max(self.tilt, self.robot.base_pose.tilt)
 
     def run(self, duration: float, velocity: Velocity = REST) -> None:
         """Pass some seconds with a velocity."""
-        for _ in range(round(duration / PERIOD)):
+        for _ in range(round(duration / self._period)):
             self.step(velocity)
 
     def travel(self, duration: float, velocity: Velocity) -> Travel:
         """Walk with a velocity and return how the robot went."""
         self.tilt = 0.0
         meter = Meter(self.robot, self._urdf)
-        for _ in range(round(duration / PERIOD)):
+        for _ in range(round(duration / self._period)):
             self.step(velocity)
             meter.sample()
         way = meter.read()

@@ -306,6 +306,7 @@ def test_a_missing_joint_is_a_fault_that_is_cleared_by_its_service(robot: Robot)
         ('gait:=gallop', "gait is 'gallop': it must be trot, crawl or pace"),
         ('nominal_height:=0.5', 'do not reach'),
         ('loop_rate:=fast', "loop_rate is 'fast': it must be a number"),
+        ('loop_rate:=10.0', 'it must be 25.0 to 200.0'),
     ],
 )
 def test_odd_parameters_are_refused_at_the_start(parameter: str, reason: str) -> None:

@@ -38,6 +38,7 @@ from quad_sim import ServoModel as ServoModels
 from quad_sim import Terrain
 from quad_sim.physics import PhysicsBackend, Robot
 from quad_sim.plant import parse_servo
+from robot_primitives import settings_of
 
 pytestmark = pytest.mark.slow
 
@@ -68,6 +69,18 @@ def test_trot_goes_as_commanded(velocity: Velocity) -> None:
     assert travel.y == pytest.approx(velocity.y, abs=0.02)
     assert travel.yaw == pytest.approx(velocity.yaw, abs=max(0.02 * abs(velocity.yaw), 0.01))
     assert travel.tilt < LEVEL
+
+
+def test_the_slowest_loop_that_is_allowed_walks_at_true_speed() -> None:
+    """A loop with fewer set-points in a period of the gait is refused."""
+    slowest = next(span for name, _, span, _ in settings_of(StateParameters) if name == 'period')
+    assert slowest is not None
+    for velocity in (Velocity(0.1), Velocity(0.3), Velocity(-0.2), Velocity(0.0, 0.15)):
+        rig = PhysicsRig(states=StateParameters(period=slowest[1]))
+        rig.mode('walk')
+        rig.run(2.0, velocity)
+        travel = rig.travel(3.0, velocity)
+        assert math.hypot(travel.x - velocity.x, travel.y - velocity.y) < 0.03, velocity
 
 
 def test_short_silences_of_joint_states_do_not_let_a_soft_robot_creep_down() -> None:

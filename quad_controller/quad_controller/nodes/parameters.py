@@ -110,5 +110,5 @@ def _policy_options(read: ParameterReader) -> PolicyOptions:
 
 def _states(read: ParameterReader) -> StateParameters:
     default = StateParameters()
-    rate = read.number('loop_rate', 1.0 / default.period, (10.0, 200.0), 'steps a second [Hz]')
+    rate = read.number('loop_rate', 1.0 / default.period, (25.0, 200.0), 'steps a second [Hz]')
     return read.settings(StateParameters, period=1.0 / rate)
