@@ -44,7 +44,7 @@ from process_supervisor import (
 )
 from process_supervisor.ros_options import add_network, add_timeout, apply_network
 from quad_description import PRESETS, robot_urdf
-from quad_hardware.protocol import V1, V2
+from quad_hardware.protocol import DEVELOPER, V1, V2
 
 
 class BringupError(Exception):
@@ -61,7 +61,7 @@ class ArgumentError(BringupError, ValueError):
 GAITS = ('trot', 'crawl', 'pace')
 """Gaits of quad_controller."""
 AUTO, VENDOR = 'auto', 'vendor'
-PROTOCOLS = (AUTO, V2.name, V1.name, VENDOR)
+PROTOCOLS = (AUTO, V2.name, V1.name, DEVELOPER.name, VENDOR)
 """Serial protocols of quad_hardware, and ways to choose one."""
 PORT_REMEDY = 'another --port'
 """What a second bring-up on a port has to choose."""
@@ -403,7 +403,7 @@ LAUNCH_ARGUMENTS = (
     LaunchArgument('policy', '', 'ONNX policy to load'),
     LaunchArgument('record', '', 'folder for recordings of each step (MCAP)'),
     LaunchArgument('servo', '', 'servo model of a simulated robot'),
-    LaunchArgument('protocol', '', 'auto, v2, v1 or vendor'),
+    LaunchArgument('protocol', '', 'auto, v2, v1, developer or vendor'),
     LaunchArgument('calibration', '', 'parameters of the serial bridge'),
     LaunchArgument('namespace', '', 'namespace of all nodes, and prefix of TF frames'),
     LaunchArgument('no-view', FALSE, 'true: without the page in the browser', flag=True),

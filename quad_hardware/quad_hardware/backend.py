@@ -28,7 +28,7 @@ from .protocol import (
     PROTOCOLS,
     ROBOT_KINDS,
     StreamParser,
-    V1,
+    V2,
 )
 from .recording import Entry, Opened, read_serial_log, StateEntered, Transfer
 from .serial_robot import ObservedRobot, RobotSettings, SerialRobot
@@ -89,9 +89,9 @@ class ReplayedRobot(ObservedRobot):
                 f'the session was recorded in protocol {opened.protocol!r}, and only {known} can '
                 'be replayed; what went through the vendor’s library is known to it alone'
             )
-        if protocol is V1 and opened.model is None:
-            raise RecordingError('the line `open` has no model, whose ranges scale protocol v1')
-        self._dialect = make_dialect(opened.model, self._now)
+        if protocol is not V2 and opened.model is None:
+            raise RecordingError('the line `open` has no model, whose ranges scale the bytes')
+        self._dialect = make_dialect(protocol, opened.model, self._now)
         self._received = StreamParser(protocol, ROBOT_KINDS)
         self._sent = StreamParser(protocol, HOST_KINDS)
         status = self._status

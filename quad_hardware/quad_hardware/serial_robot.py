@@ -18,6 +18,7 @@ from .estimation import Estimator, EstimatorSettings
 from .exceptions import CommandError
 from .joints import JointMap, LimiterSettings, NOMINAL_PERIOD
 from .link import Driver, LinkOptions, LinkState, LinkStatus, Session, STALE_TIME
+from .protocol import DEVELOPER
 from .recording import FaultWatch, LossWatch, Opened, SerialLogFile, SerialMemory, StateEntered
 from .report import check_torque_off, Report, TorqueOffResult
 
@@ -127,6 +128,7 @@ class SerialRobot(ObservedRobot):
             warn=self._warn,
         )
         self.counters = self._commander.counters  # what became of joint commands
+        self._reach = len(self.names)  # how many joints the protocol has servos for
         self._last_note = ''
         self._seen: Report | None = None  # the newest that can be
         self._let_go_at = -math.inf  # [s] when that was last requested
@@ -182,6 +184,9 @@ class SerialRobot(ObservedRobot):
             return False
         self.counters.received += 1
         now = time.monotonic()
+        if len(positions) == len(self.names) > self._reach:
+            positions = positions[: self._reach]
+            self._warn('the developer firmware moves no arm: its joints stay as they are')
         command = self._commander.take(positions, self._place(now), now)
         if command is not None:
             self._estimator.command(now, command.targets)
@@ -266,6 +271,7 @@ class SerialRobot(ObservedRobot):
         port, protocol = session.port, session.dialect.protocol
         now, name, model = time.monotonic(), protocol.name, session.model
         spans = session.dialect.spans
+        self._reach = self._joints.leg_count if protocol is DEVELOPER else len(self.names)
         self._commander.limit_to(self._joints.within(spans) if spans else self._joints)
         opened = Opened(now, port.path, port.baud, name, session.firmware, model)
         for recorder in self._recorders:

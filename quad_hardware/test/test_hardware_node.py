@@ -35,7 +35,7 @@ from quad_node_rig import NodeRig, TIMEOUT
 
 WRONG = {
     'protokoll:=old': "did you mean 'protocol'",
-    'protocol:=v3': "protocol is 'v3': it must be auto, vendor, v1 or v2",
+    'protocol:=v3': "protocol is 'v3': it must be auto, vendor, v1, developer or v2",
     'joints.fl_hip_joint.sign:=0': 'sign 0 is neither 1 nor -1',
     'joints.fl_calf_joint.offset:=6.9': 'correct joints.fl_calf_joint.offset',
     'robot_description:=<robot/>': 'has no <link>',

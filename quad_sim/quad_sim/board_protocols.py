@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The board's side of both protocols: registers of v1, functions and pushed states of v2.
+"""The board's side of the protocols: registers of v1, functions and pushed states of v2.
 
 Every register of v1 is taken; those that move nothing here (teaching, LED, swinging of the body,
 actions other than 1, 2 and 255) are kept as bytes and otherwise mean nothing.
@@ -21,6 +21,7 @@ from quad_hardware.protocol import (
     ANGLE_SPANS,
     BULK_READ_ORDER,
     Code,
+    DEVELOPER,
     Frame,
     Kind,
     MOTOR_OF_REGISTER,
@@ -29,6 +30,7 @@ from quad_hardware.protocol import (
     scatter,
     slot_of,
     STATE,
+    swap_floats,
     Torque,
     V1,
     V2,
@@ -54,6 +56,8 @@ class RefusedError(Exception):
 
 class Functions:
     """Answers frames of protocol v2 and pushes states."""
+
+    protocol = V2
 
     def __init__(self, board: Board) -> None:
         """Begin without feedback."""
@@ -393,6 +397,38 @@ class Registers:
     def _decoded(self, address: int) -> float:
         span = V1.functions[address].spans[self._board.model]
         return span.decode(self._memory[address][0])
+
+
+PUSHED = DEVELOPER.functions[0x00]
+SERVO_PERIOD = 1 / 26  # [s] in which the developer firmware measures the servos anew
+
+
+class DeveloperFirmware(Registers):
+    """Takes angles of the legs and torque as in v1, and pushes states unasked."""
+
+    protocol = DEVELOPER
+    big_endian = False  # its floats, whose order the vendor's page does not say
+
+    def restart(self) -> None:
+        """Begin anew, as after switching on."""
+        super().restart()
+        self.next_push = self._measure_at = 0.0  # [s] when a state is due, and the servos are
+        self._motors = b''
+
+    def handle(self, frame: Frame, now: float) -> list[Frame]:
+        """Carry a frame out; nothing is answered."""
+        return super().handle(frame, now) if frame.address in DEVELOPER.functions else []
+
+    def push(self, now: float) -> Frame:
+        """Return the state that is due, and plan the next one."""
+        self.next_push = max(self.next_push, now) + 1.0 / DEFAULT_RATE
+        if now >= self._measure_at:
+            self._measure_at = max(self._measure_at + SERVO_PERIOD, now)
+            self._motors = self._angles()[: PUSHED.fields[1].size]
+        attitude = self._board.attitude(self._board.measure())
+        battery = (self._board.battery.percent,)
+        state = PUSHED.pack(attitude=attitude, motor=self._motors, battery=battery)
+        return Frame(Kind.WRITE, PUSHED.address, swap_floats(state) if self.big_endian else state)
 
 
 def _clipped(value: float, step: float) -> float:

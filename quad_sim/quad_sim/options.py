@@ -11,7 +11,7 @@ import math
 from pathlib import Path
 
 from quad_description import Pose, pose_positions, PRESETS, robot_urdf
-from quad_hardware.protocol import Model, Protocol, V1, V2
+from quad_hardware.protocol import Model, Protocol, PROTOCOLS, V1, V2
 
 from .board import Board
 from .exceptions import SetupError, SimulationError
@@ -24,7 +24,7 @@ from .state import BOARD, NONE, Terrain
 DEFAULT_LINK = Path('/tmp/xgo')  # noqa: S108  the path that the documentation names
 SETTLE_TIME = 1.0  # [s] until a robot that was put down is at rest
 
-_PROTOCOLS: dict[str, tuple[Protocol, ...]] = {'both': (V2, V1), V2.name: (V2,), V1.name: (V1,)}
+_PROTOCOLS = {'both': (V2, V1), **{each.name: (each,) for each in PROTOCOLS}}
 _NOISE = {'none': NONE, 'board': BOARD}
 
 
@@ -41,12 +41,13 @@ def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:
     """Read the command line; end the process with 2 where it is wrong."""
     parser = argparse.ArgumentParser(
         prog='fake_xgo',
-        description='A simulated XGO on a pseudo-terminal that speaks both serial protocols.',
+        description='A simulated XGO on a pseudo-terminal that speaks its serial protocols.',
         allow_abbrev=False,
     )
     add = parser.add_argument
     add('--link', type=Path, default=DEFAULT_LINK, help='path of the port (%(default)s)')
     add('--protocol', choices=_PROTOCOLS, default='both', help='what the board speaks')
+    add('--big-endian', action='store_true', help='floats of the developer firmware')
     add(
         '--v1-baud',
         type=int,
@@ -72,7 +73,7 @@ def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:
         type=float,
         default=0.0,
         metavar='S',
-        help='the board loses frames of protocol v1 that follow each other faster, e.g. 0.001',
+        help='the board loses frames, but of v2, that follow each other faster, e.g. 0.001',
     )
     add('--fault', action='append', default=[], metavar='KIND,name=value', help=_fault_help())
     add('--seed', type=int, default=0, help='of noise and damage (%(default)s)')
@@ -121,6 +122,7 @@ def build(options: argparse.Namespace) -> Simulation:
         speeds,
         faults=faults,
         command_gap=options.command_gap,
+        big_endian=options.big_endian,
         seed=options.seed,
     )
     return Simulation(plant, board, line)

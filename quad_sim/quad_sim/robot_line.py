@@ -17,7 +17,7 @@ import random
 from quad_hardware.protocol import Code, Frame, HOST_KINDS, Protocol, StreamParser, V1, V2
 
 from .board import Board
-from .board_protocols import Functions, Registers
+from .board_protocols import DeveloperFirmware, Functions, Registers
 from .faults import Fault, FaultKind, FaultPlan
 
 BITS_PER_BYTE = 10  # 8N1: start, eight data bits, stop
@@ -176,14 +176,15 @@ class RobotLine:
         *,
         faults: FaultPlan | None = None,
         command_gap: float = 0.0,
+        big_endian: bool = False,
         seed: int = 0,
     ) -> None:
         """Connect a board.
 
         Args:
-            speeds: What it speaks, by baud rate [bit/s]; both protocols at their own for None.
-            command_gap: Least time between two frames of the host in protocol v1 [s]; a frame that
-                comes sooner is lost, as the vendor warns.
+            speeds: What it speaks, by baud rate [bit/s]; v1 and v2 at their own for None.
+            command_gap: Least time between two frames of the host, but in v2 [s]; one that comes
+                sooner is lost, as the vendor warns.
         """
         self.faults = faults or FaultPlan()  # what goes wrong; may be added to
         self.statistics = LineStatistics()  # what the robot has received
@@ -193,8 +194,12 @@ class RobotLine:
         # the wire to the host
         self.to_host = Wire(self.faults, FaultKind.SILENCE, seed + 1, slow=True)
         self._board = board
-        self._functions, self._registers = Functions(board), Registers(board)
         self._by_baud = dict(speeds or {V2.baud: V2, V1.baud: V1})
+        self._registers = Registers(board)
+        self._pusher: Functions | DeveloperFirmware = Functions(board)
+        if DeveloperFirmware.protocol in self._by_baud.values():
+            self._pusher = DeveloperFirmware(board)
+            self._pusher.big_endian = big_endian
         self._command_gap = command_gap
         self.baud = next(iter(self._by_baud))  # speed of the line [bit/s]
         self._forget_partial_frames()
@@ -247,13 +252,13 @@ class RobotLine:
 
     @property
     def _push_time(self) -> float:
-        return self._functions.next_push
+        return self._pusher.next_push
 
     def _push(self, now: float) -> None:
         self._board.advance(now)
-        frame = self._functions.push(now)
+        frame = self._pusher.push(now)
         if self._board.is_booted:
-            self._send(frame, V2, now)
+            self._send(frame, self._pusher.protocol, now)
 
     def _receive(self, arrived: Arrival) -> None:
         protocol, parser = self._by_baud.get(self.baud), self._parser
@@ -277,13 +282,13 @@ class RobotLine:
         self._frame_end = end
         if not self._board.is_booted:
             return
-        if protocol is V1 and gap < self._command_gap:
+        if protocol is not V2 and gap < self._command_gap:
             self.statistics.hurried += 1
             return
         self.statistics.frames += 1
         if protocol is V2 and frame.address in JOINT_COMMANDS:
             self.command_times.commanded(begin)
-        handler = self._functions if protocol is V2 else self._registers
+        handler = self._pusher if protocol is self._pusher.protocol else self._registers
         for answer in handler.handle(frame, now):
             self._send(answer, protocol, now)
 
@@ -309,7 +314,7 @@ class RobotLine:
             self._powered = not brown_out
             self._board.advance(now)
             self._board.switch_power(self._powered)
-            self._functions.restart()
+            self._pusher.restart()
             self._registers.restart()
         battery = active(FaultKind.BATTERY, now)
         if battery is not None and battery is not self._battery_fault:

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Conversations in protocol v2 and v1.
+"""Conversations in protocol v2, v1 and with the developer firmware.
 
 In v2 the robot pushes its state, and commands go out at once. In v1 it is polled: 50 times a
 second two bulk reads, and a bulk write between. A bulk write of 12 servos, a read of 15 and a read
 of the IMU take 8.1 ms of a 20 ms period at 115200 baud; one frame per servo, as the vendor's
-library sends them, would not fit.
+library sends them, would not fit. The developer firmware pushes, and is written to as in v1.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from ..protocol import (
     ANGLE_SPANS,
     BULK_READ_ORDER,
     Code,
+    DEVELOPER,
     Frame,
     Kind,
     LEG_MOTORS,
@@ -33,10 +34,12 @@ from ..protocol import (
     scatter,
     Span,
     STATE,
+    swap_floats,
     Torque,
     V1,
     V2,
 )
+from ..protocol.tables import PUSHED
 from ..report import Report
 from .dialect import Dialect, Step, vector
 
@@ -176,7 +179,7 @@ class V1Dialect(Dialect):
             self._begin_cycle(now)
         send = self._next(now) if now >= self._free_at else b''
         if send:
-            self._free_at = now + V1.wire_time(len(send)) + HOST_GAP
+            self._free_at = now + self.protocol.wire_time(len(send)) + HOST_GAP
         return Step(send, self._wake())
 
     def handle_frame(self, frame: Frame, now: float) -> Report | None:
@@ -321,6 +324,48 @@ class V1Dialect(Dialect):
 def _on_the_line(payload: bytes) -> float:
     """Return how long the answer with a payload takes [s]."""
     return V1.wire_time(V1.overhead + len(payload))
+
+
+SERVO_PERIOD = 1 / 26  # [s] in which the developer firmware measures the servos anew
+
+
+class DeveloperDialect(V1Dialect):
+    """Listens to the developer firmware, which cannot be asked, and writes to it as in v1."""
+
+    def __init__(self, now: float, model: Model = Model.MINI) -> None:
+        """Begin a conversation."""
+        super().__init__(now, model)
+        self.protocol = DEVELOPER
+        self._cycle_at = math.inf  # it is never polled
+        self._swapped = False  # the byte order of its floats
+        self._motors: tuple[float, ...] = ()  # bytes that were measured last
+
+    def handle_frame(self, frame: Frame, now: float) -> Report | None:
+        """Process a frame of the robot; every push is a report."""
+        if frame.address != PUSHED.address or not PUSHED.accepts(len(frame.payload)):
+            self.counters.unusable += 1
+            return None
+        self.counters.states += 1
+        readings = [PUSHED.unpack(each) for each in (frame.payload, swap_floats(frame.payload))]
+        # floats in the wrong order are no angles [deg]: too small or too large
+        fits = [all(a == 0.0 or 1e-12 < abs(a) <= 360.0 for a in r['attitude']) for r in readings]
+        if fits[0] != fits[1]:
+            self._swapped = fits[1]
+        values = readings[self._swapped]
+        # half of the pushes repeat servos that were measured before
+        if values['motor'] != self._motors or now - self._angles_at > SERVO_PERIOD:
+            self._motors, self._angles_at = values['motor'], now
+        pairs = zip(LEG_MOTORS, self._motors, strict=True)
+        return Report(
+            arrival=now,
+            wire_time=DEVELOPER.wire_time(DEVELOPER.overhead + PUSHED.length),
+            attitude=vector(values['attitude']),
+            acceleration=None,
+            positions={motor: self.spans[motor].decode(int(byte)) for motor, byte in pairs},
+            velocities={},
+            battery=values['battery'][0],
+            joints_age=now - self._angles_at,
+        )
 
 
 REQUEST_PERIOD = 0.3  # [s] of silence after which the robot is asked to push its state

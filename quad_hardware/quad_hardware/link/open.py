@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Opens a robot: its protocol by its firmware version, at 115200 baud, then at 2 Mbaud."""
+"""Opens a robot: asks its firmware version, or listens, in one protocol after the other."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from robot_primitives import setting
 from ..exceptions import LinkError, NoAnswerError
 from ..protocol import (
     Code,
+    DEVELOPER,
     Frame,
     Kind,
     Model,
@@ -28,8 +29,9 @@ from ..protocol import (
     StreamParser,
     V2,
 )
+from ..protocol.tables import DEVELOPER_FIRMWARE, PUSHED
 from .dialect import Dialect
-from .dialects import V1Dialect, V2Dialect
+from .dialects import DeveloperDialect, V1Dialect, V2Dialect
 from .port import SerialPort
 from .vendor import VendorDialect, VendorParser, VendorPort
 
@@ -107,12 +109,14 @@ def open_session(options: LinkOptions) -> Session:
         port.close()
         raise
     parser = StreamParser(protocol, ROBOT_KINDS)
-    return Session(port, firmware, parser, make_dialect(model, now, options.rate), model)
+    return Session(port, firmware, parser, make_dialect(protocol, model, now, options.rate), model)
 
 
-def make_dialect(model: Model | None, now: float, rate: int = 50) -> Dialect:
-    """Return how to talk to a robot: v1 with the ranges of a model, else v2; reports at [Hz]."""
-    return V2Dialect(now, rate) if model is None else V1Dialect(now, model, rate)
+def make_dialect(protocol: Protocol, model: Model | None, now: float, rate: int = 50) -> Dialect:
+    """Return how to talk to a robot, with the ranges of a model but in v2; reports at [Hz]."""
+    if model is None:
+        return V2Dialect(now, rate)
+    return DeveloperDialect(now, model) if protocol is DEVELOPER else V1Dialect(now, model, rate)
 
 
 def _model(firmware: str, protocol: Protocol, options: LinkOptions) -> Model | None:
@@ -202,26 +206,33 @@ def read_value(
     Raises:
         LinkError: The port was lost.
     """
-    request = Frame(Kind.READ, value.register, bytes((value.size,)))
+    request, size = Frame(Kind.READ, value.register, bytes((value.size,))), value.size
     if protocol is V2:
         request = Frame(Kind.READ, value.code)
-    answers = (_ask(port, protocol, request, value.size, timeout) for _ in range(attempts))
-    return next((answer for answer in answers if answer is not None), None)
+    if protocol is DEVELOPER:  # it cannot be asked, and its next push has the charge
+        request, size = Frame(Kind.WRITE, PUSHED.address), PUSHED.length
+    answers = (_ask(port, protocol, request, size, timeout) for _ in range(attempts))
+    answer = next((answer for answer in answers if answer is not None), None)
+    if answer is not None and protocol is DEVELOPER:
+        return DEVELOPER_FIRMWARE.encode() if value is FIRMWARE else answer[-value.size :]
+    return answer
 
 
 def _ask(
     port: SerialPort, protocol: Protocol, request: Frame, size: int, timeout: float
 ) -> bytes | None:
     """Return the payload that answers a request within a time [s]; of another size [B] is none."""
-    parser = StreamParser(protocol, ROBOT_KINDS)
-    port.write(request.encode(protocol))
+    parser, wanted = StreamParser(protocol, ROBOT_KINDS), request.kind
+    if wanted is Kind.READ:  # what is pushed comes unasked
+        wanted = Kind.REPLY
+        port.write(request.encode(protocol))
     deadline = time.monotonic() + timeout
     while (left := deadline - time.monotonic()) > 0:
         readable, _, _ = select.select([port], [], [], left)
         frames = parser.feed(port.read()) if readable else parser.expire()
         for frame in frames:
             if (
-                frame.kind is Kind.REPLY
+                frame.kind is wanted
                 and frame.address == request.address
                 and len(frame.payload) == size
             ):

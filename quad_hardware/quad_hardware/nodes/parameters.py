@@ -95,7 +95,7 @@ def declare_parameters(node: Node) -> NodeSettings:
         path=read.text('port', DEFAULT_PORT, 'serial port of the robot'),
         protocols=protocols,
         model=read.choice(
-            'model', AUTO, MODEL_CHOICES, 'ranges of protocol v1; auto: by firmware'
+            'model', AUTO, MODEL_CHOICES, 'ranges of bytes (not in v2); auto: by firmware'
         ),
         vendor=_vendor(protocols, method),
         vendor_method=method,
@@ -157,7 +157,7 @@ def _vendor(protocols: tuple[Protocol, ...], method: str) -> bool:
     if installed and len(protocols) > 1:
         raise CommandError(
             'protocol auto: xgo_lib2 of the vendor is installed for this Python, and which way to '
-            'the robot is meant is not guessed; set protocol to vendor, v2 or v1'
+            'the robot is meant is not guessed; set protocol to vendor, v2, v1 or developer'
         )
     return wanted
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-r"""Both serial protocols of the XGO: one table each, codecs and a stream parser for both sides.
+r"""The serial protocols of the XGO: one table each, codecs and a stream parser for both sides.
 
 The driver, the simulated robot, ``xgo_lib2`` and the protocol page all read these tables::
 
@@ -33,6 +33,7 @@ from .tables import (
     ARM_MOTORS,
     BULK_READ_ORDER,
     Code,
+    DEVELOPER,
     Fault,
     LEG_MOTORS,
     model_of_firmware,
@@ -45,12 +46,13 @@ from .tables import (
     scatter,
     slot_of,
     STATE,
+    swap_floats,
     Torque,
     V1,
     V2,
 )
 
-PROTOCOLS = (V1, V2)  # in the order of probing: what is documented before what is assumed
+PROTOCOLS = (V1, DEVELOPER, V2)  # in the order of probing: documented before assumed
 
 __all__ = [
     'ACTION_RESET',
@@ -58,6 +60,7 @@ __all__ = [
     'ANGLE_SPANS',
     'ARM_MOTORS',
     'BULK_READ_ORDER',
+    'DEVELOPER',
     'HOST_KINDS',
     'LEG_MOTORS',
     'MOTOR_OF_JOINT',
@@ -89,4 +92,5 @@ __all__ = [
     'model_of_firmware',
     'scatter',
     'slot_of',
+    'swap_floats',
 ]

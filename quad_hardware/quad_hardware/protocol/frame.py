@@ -21,7 +21,7 @@ from ..exceptions import CodecError
 class Kind(IntEnum):
     """What a frame is for: its TYPE byte."""
 
-    WRITE = 0x00  # host to robot, not answered
+    WRITE = 0x00  # host to robot, not answered; what the developer firmware pushes, too
     READ = 0x02  # host to robot
     REPLY = 0x12  # robot to host, answers READ
     NACK = 0x1F  # robot to host, refuses a frame (v2 only)
@@ -321,7 +321,8 @@ class StreamParser:
     def __init__(self, protocol: Protocol, kinds: frozenset[Kind]) -> None:
         """Begin with an empty buffer; the other side sends ``ROBOT_KINDS`` or ``HOST_KINDS``."""
         self._protocol = protocol
-        self._kinds = {int(kind): kind for kind in kinds & protocol.kinds}
+        # the developer firmware has one kind, for both directions
+        self._kinds = {int(kind): kind for kind in kinds & protocol.kinds or protocol.kinds}
         if Kind.WRITE in kinds and protocol.other_write is not None:
             self._kinds[protocol.other_write] = Kind.WRITE
         self._buffer = bytearray()

@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run quad_hardware protocol``: the tables of both protocols as a page of Markdown."""
+"""``ros2 run quad_hardware protocol``: the tables of the protocols as a page of Markdown."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 import sys
 
-from . import V1, V2
+from . import PROTOCOLS
 from .frame import Access, Field, Function, Kind, Protocol
 from .tables import MOTOR_ORDER
 
@@ -15,13 +15,13 @@ _ACCESS = {Access.READ: 'R', Access.WRITE: 'W', Access.PUSH: 'push'}
 
 
 def protocol_page() -> str:
-    """Return PROTOCOL.md: frames, motors, registers and functions of both protocols."""
+    """Return PROTOCOL.md: frames, motors, registers and functions of all protocols."""
     lines = [
         '# Serial protocols of the XGO',
         '',
         'Made from its tables by `ros2 run quad_hardware protocol > PROTOCOL.md`; do not edit.',
         '',
-        'Every frame of both protocols:',
+        'Every frame of all protocols:',
         '',
         '```',
         '55 00 | LEN | TYPE | address | payload | CHK | 00 AA',
@@ -31,7 +31,7 @@ def protocol_page() -> str:
         f'Motors, in the order of the wire: {", ".join(map(str, MOTOR_ORDER))}.',
         '',
     ]
-    for protocol in (V1, V2):
+    for protocol in PROTOCOLS:
         lines += _section(protocol)
     return '\n'.join(lines)
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The servos, and the tables of both protocols.
+"""The servos, and the tables of the protocols.
 
 The id of a servo is ``10 * leg + joint``: legs count 1 left front, 2 right front, 3 right rear,
 4 left rear; joints 1 calf, 2 thigh, 3 hip, which is the reverse of the order in a URDF. 51 is the
@@ -18,11 +18,21 @@ codes, a state frame of 254 bytes about 50 times a second, the valid attitude ``
 20 to 31, 16 joint angles [deg] and 16 joint velocities [deg/s], battery, acceleration of about 9.8
 at rest, no raw gyro and no gravity. Everything else here is chosen so that all of that holds; when
 the vendor's table is known, this file is what changes. Numbers are little-endian.
+
+``developer`` is the firmware for developers of the XGO-Mini, by the vendor's page "Develop mode"
+(https://www.xgorobot.com/XgoWiki-en/wiki/1%20XGO-Mini/For%20XGO%20developer/Develop%20mode/): 1
+Mbaud, nothing can be read, and a frame of 33 bytes comes at 50 Hz: ``55 00 21 00 00``, roll, pitch
+and yaw as float32, the servos of the legs (measured at about 26 Hz) and the charge in a byte each,
+checksum, ``00 AA``: a frame of v1 whose TYPE and address are zero. OUR ASSUMPTIONS, where the page
+is silent: degrees; ranges of the mini, checksum, and writes of angles and torque as in v1 (torque
+is not in the page's list of what is left). The byte order of the floats is recognised. How the PID
+of the servos is set is not documented, so it is not offered.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from enum import IntEnum, IntFlag
 from types import MappingProxyType
 from typing import Any
@@ -363,6 +373,35 @@ V1 = Protocol(
         )
     ),
 )
+
+
+PUSHED = _row(
+    0x00,
+    'state',
+    Access.PUSH,
+    'what is pushed; servos as in v1',
+    Field('attitude', Scalar.F32, 0, 3, unit='deg', meaning='roll, pitch, yaw; in either order'),
+    Field('motor', Scalar.U8, 12, len(LEG_MOTORS), meaning='in the order of motors'),
+    Field('battery', Scalar.U8, 24, unit='%'),
+)
+DEVELOPER = Protocol(
+    name='developer',
+    origin='public: the vendor’s page “Develop mode”; what it leaves open is assumed',
+    baud=1_000_000,
+    address_size=1,
+    kinds=frozenset({Kind.WRITE}),
+    functions=table(
+        PUSHED,
+        V1.functions[Register.TORQUE],
+        *(replace(V1.functions[REGISTER_OF_MOTOR[motor]], access=W) for motor in LEG_MOTORS),
+    ),
+)
+DEVELOPER_FIRMWARE = 'M developer'  # as we call it: it names no version, and is of a mini
+
+
+def swap_floats(pushed: bytes) -> bytes:
+    """Return what the developer firmware pushes with its floats in the other byte order."""
+    return b''.join(pushed[at : at + 4][::-1] for at in (0, 4, 8)) + pushed[12:]
 
 
 def scatter(address: int, payload: bytes) -> Iterator[tuple[int, bytes]]:
