@@ -336,7 +336,7 @@ class DeveloperDialect(V1Dialect):
         """Begin a conversation."""
         super().__init__(now, model)
         self.protocol = DEVELOPER
-        self._cycle_at = math.inf  # it is never polled
+        self._cycle_at, self._speed = math.inf, FULL_SPEED  # it is not polled, nor set a speed
         self._swapped = False  # the byte order of its floats
         self._motors: tuple[float, ...] = ()  # bytes that were measured last
 
