@@ -17,6 +17,7 @@ from std_srvs.srv import Trigger
 from arm_servo import Source, SpeedRequest, StopRequest, TargetRequest
 from arm_servo.controllers.controller import Outcome
 from arm_servo.core.gateway import MotionCommand
+from arm_servo.ros import motion_goals
 from arm_servo.ros import trajectory as controller
 from arm_servo.ros.trajectory import TrajectoryAction, TrajectoryPause
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
@@ -79,6 +80,24 @@ def test_an_unexpected_error_is_the_result_of_a_goal(
     drives.run(300)
     assert drives.gateway.snapshot.source is Source.NONE
     assert (drives.path[-1][0] < there[0] - 0.1) == (when == 'while it is watched')
+
+
+def test_the_answer_to_a_goal_whose_arm_moves_on_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It failed while it was watched, and no cycle comes in which the arm is at rest."""
+    drives = Drives().following()
+    clock = SimpleNamespace(monotonic=lambda: drives.now)
+    monkeypatch.setattr(motion_goals, 'time', clock)
+    node = action(monkeypatch, drives, drives.gateway.request)
+    there = [axis.setpoint + 0.5 for axis in drives.axes]
+    goal = node.send(message(TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(5.0, there)])))
+    drives.run(100)
+    monkeypatch.setattr(goal, 'publish_feedback', lambda _: 1 // 0)
+    node.watch()
+    assert goal.ending == ''
+    drives.now += 11.0
+    node.watch()
+    assert goal.ending == 'aborted'
+    assert 'not seen at rest for 10 s and may still move' in goal.result.error_string
 
 
 def test_an_unexpected_error_of_the_planning_is_its_result(

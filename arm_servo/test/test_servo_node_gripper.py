@@ -16,7 +16,7 @@ from servo_nodes import GoalNode
 
 from arm_model import CommandError
 from arm_servo import NotReadyError, PauseRequest, SpeedRequest, TargetRequest
-from arm_servo.controllers.controller import MOTIONS
+from arm_servo.controllers.controller import MOTIONS, Source
 from arm_servo.ros import gripper as controller
 from arm_servo.ros import motion_goals
 from arm_servo.ros.gripper import GripperController, GripperParameters, PARALLEL, SINGLE
@@ -68,7 +68,14 @@ class Gripper:
         """Cancel a goal."""
         self._node.cancel(handle)
 
-    def run(self, duration: float, *, blocked: bool = False, has_speeds: bool = True) -> None:
+    def run(
+        self,
+        duration: float,
+        *,
+        blocked: bool = False,
+        has_speeds: bool = True,
+        drift: float = 0.0,  # measured velocity whatever is commanded in [rad/s]
+    ) -> None:
         """Advance the time by a duration in [s]."""
         before = list(self.drives.axes)
         for _ in range(round(duration / PERIOD)):
@@ -78,8 +85,8 @@ class Gripper:
                     replace(now, position=was.position, velocity=0.0)
                     for now, was in zip(self.drives.axes, before, strict=True)
                 ]
-            elif not has_speeds:
-                self.drives.axes = [replace(each, velocity=0.0) for each in self.drives.axes]
+            elif drift or not has_speeds:
+                self.drives.axes = [replace(each, velocity=drift) for each in self.drives.axes]
             self._node.watch()
 
 
@@ -156,6 +163,40 @@ def test_the_drive_holds_where_it_is_once_a_goal_has_ended(
     gripper.run(2.0, blocked=True)
     assert gripper.ended == {'goal': end}
     assert gripper.position == pytest.approx(begin, abs=1e-6)
+
+
+@pytest.mark.parametrize('end', ['canceled', 'aborted'])
+def test_a_goal_is_answered_when_rest_was_seen(clock: Any, end: str) -> None:
+    """Of the set-points: neither a cancel nor a stall is an end before that."""
+    gripper, is_stalled = Gripper(clock), end == 'aborted'
+    handle = gripper.send('goal', 1.0)
+    gripper.run(0.9 if is_stalled else 0.5, blocked=is_stalled)
+    if not is_stalled:
+        gripper.cancel(handle)
+    braking = 0
+    while not gripper.ended:
+        gripper.run(PERIOD, blocked=is_stalled)
+        point = gripper.drives.gateway.snapshot.set_point
+        assert point is not None
+        is_braking = point.source is Source.NONE and point.state.moving
+        assert not (is_braking and gripper.ended)
+        braking += is_braking
+    assert gripper.ended == {'goal': end}
+    assert braking
+
+
+def test_jaws_that_move_on_delay_the_answer_and_are_named_in_the_log(clock: Any) -> None:
+    """Ten seconds after the cancel, during which they have not come to rest."""
+    gripper = Gripper(clock)
+    handle = gripper.send('goal', 1.0)
+    gripper.run(0.5, drift=0.1)
+    gripper.cancel(handle)
+    for second in range(12):
+        assert bool(gripper.ended) == (second > 10)
+        for _ in range(round(1.0 / PERIOD)):
+            gripper.run(PERIOD, drift=0.1)
+    assert gripper.ended == {'goal': 'canceled'}
+    assert 'not seen at rest for 10 s' in gripper.warnings[-1]
 
 
 def test_the_drive_pushes_on_where_a_stall_is_a_success(clock: Any) -> None:

@@ -455,14 +455,14 @@ class CommandGateway:
         ages: Array | None,
     ) -> None:
         """Report how motions have ended, and what was done in a cycle."""
-        for command in self._begun.copy():
-            if command.motion is not None and command.motion.outcome is not None:
-                self._begun.remove(command)
-                command.end(command.motion.outcome)
         core, now, blocked = self._core, cycle.now, cycle.blocked
         self.snapshot = Snapshot(
             now, point, measured, blocked, core.paused, core.speed, ages, core.execution
         )
+        for command in self._begun.copy():  # last: who sees the end finds what follows it
+            if command.motion is not None and command.motion.outcome is not None:
+                self._begun.remove(command)
+                command.end(command.motion.outcome)
 
     def _check(self, source: Source, number: int) -> None:
         """Refuse what another command or a stop has made void.

@@ -132,7 +132,7 @@ NO_EFFORT_LIMIT = (
 class _Goal(MotionGoal):
     """A goal from its request to its end."""
 
-    problem: str = ''  # why it cannot go on; empty while it can
+    problem: str = ''  # why it cannot go on, and waits for rest; empty while it can
     last_motion: float = field(default_factory=time.monotonic)
     last_place: Array | None = None  # where the joints were then in [rad]
     state: GripperState | None = None
@@ -174,6 +174,7 @@ class GripperController:
                     canceled='canceled',
                     conclude=partial(self._conclude, interface),
                     fail=partial(self._fail, interface),
+                    rest_speed=parameters.stall_velocity_threshold,
                 ),
             )
             for interface in interfaces
@@ -202,21 +203,21 @@ class GripperController:
             self._newest = command
         if measured is not None:
             goal.state = self._look(goal, measured)
-        goal.problem = self._problem(goal, goals.outcome(goal))
-        state = goal.state
-        if goal.problem or (state is not None and (state.reached or state.stalled)):
-            if goal.command is not None and not self._succeeds(goal):
+        was_ending = bool(goal.problem)
+        goal.problem = goal.problem or self._problem(goal, goals.outcome(goal))
+        if goal.problem:
+            if goal.command is not None and not was_ending:
                 self._gateway.cancel(goal.command, 'stalled')  # nothing moves after it
                 self._abandoned = goal.command
+            if goals.has_stopped(goal):
+                goals.end(goal)
+        elif goal.state is not None and self._succeeds(goal.state):
             goals.end(goal)
-        elif state is not None:
-            goal.handle.publish_feedback(_message(interface.action.Feedback, state))
+        elif goal.state is not None:
+            goal.handle.publish_feedback(_message(interface.action.Feedback, goal.state))
 
-    def _succeeds(self, goal: _Goal) -> bool:
-        """Whether a goal that ends is reached, or ends with something held."""
-        state = goal.state
-        if goal.problem or state is None:
-            return False
+    def _succeeds(self, state: GripperState) -> bool:
+        """Whether a goal that can go on is reached, or ends with something held."""
         return state.reached or (state.stalled and self._parameters.allow_stalling)
 
     def _hold(self) -> None:
@@ -285,26 +286,29 @@ class GripperController:
 
     def _problem(self, goal: _Goal, outcome: Outcome | None) -> str:
         """Return why a goal cannot go on; empty while it can."""
-        if outcome is None:
-            return ''
         if outcome is CONTINUED:
             return 'a newer goal took over'
-        if outcome.code is not GoalCode.SUCCESSFUL or outcome.canceled:
+        if outcome and (outcome.code is not GoalCode.SUCCESSFUL or outcome.canceled):
             return outcome.reason
-        return 'canceled' if goal.handle.is_cancel_requested else ''
+        if outcome and goal.handle.is_cancel_requested:
+            return 'canceled'
+        state = goal.state
+        if state is None or not state.stalled or self._parameters.allow_stalling:
+            return ''
+        return 'stalled in front of the goal (allow_stalling is false)'
 
     def _conclude(self, interface: GripperInterface, goal: _Goal) -> tuple[Ending, Any]:
         result = _message(interface.action.Result, self._state_of(goal))
-        if self._succeeds(goal):
+        if not goal.problem:
             return Ending.SUCCEEDED, result
-        if goal.problem and goal.handle.is_cancel_requested:
-            return Ending.CANCELED, result
-        reason = goal.problem or 'stalled in front of the goal (allow_stalling is false)'
-        self._node.get_logger().warning(f'goal aborted: {reason}')
-        return Ending.ABORTED, result
+        ending = Ending.CANCELED if goal.handle.is_cancel_requested else Ending.ABORTED
+        if goal.unrest or ending is Ending.ABORTED:
+            text = f'goal {ending.value}: {goal.problem}{goal.unrest}'
+            self._node.get_logger().warning(text)
+        return ending, result
 
     def _fail(self, interface: GripperInterface, goal: _Goal, error: Exception) -> Any:  # noqa: ANN401
-        self._node.get_logger().warning(f'goal aborted: {refused(error).reason}')
+        self._node.get_logger().warning(f'goal aborted: {refused(error).reason}{goal.unrest}')
         return _message(interface.action.Result, replace(self._state_of(goal), reached=False))
 
     def _state_of(self, goal: _Goal) -> GripperState:

@@ -18,6 +18,7 @@ import re
 import time
 from typing import Any, TypeVar
 
+import numpy as np
 from rclpy.node import Node
 
 from arm_model import ArmError
@@ -28,7 +29,7 @@ from ..controllers.controller import Outcome, Source
 from ..core.gateway import CommandGateway, MotionCommand
 
 START_TIMEOUT = 5.0  # time in which a goal must be planned and taken by the cycle in [s]
-REST_TIMEOUT = 10.0  # time after which a goal that has failed is answered without rest in [s]
+REST_TIMEOUT = 10.0  # time after which a goal is answered although no rest was seen in [s]
 
 
 @dataclass(slots=True, eq=False)
@@ -39,7 +40,8 @@ class MotionGoal(ServedGoal):
     command: MotionCommand | None = None  # None for a goal that is refused at once
     begin: float = field(default_factory=time.monotonic)
     outcome: Outcome | None = None  # how it ended; None while it goes on
-    rest_by: float = math.inf  # steady time at which a goal that has failed is answered anyway
+    rest_by: float = math.inf  # steady time at which it is answered although the arm moves
+    unrest: str = ''  # says in the answer that no rest was seen; empty where it was
 
 
 GoalT = TypeVar('GoalT', bound=MotionGoal)
@@ -61,8 +63,9 @@ class MotionGoals(GoalServer[GoalT]):
         canceled: str,  # reason of an outcome that a client has asked for
         conclude: Callable[[GoalT], tuple[Ending, Any]],
         fail: Callable[[GoalT, Exception], Any],
+        rest_speed: float = math.inf,  # speed above which a joint moves in [rad/s] or [m/s]
     ) -> None:
-        self._gateway = gateway
+        self._gateway, self._rest_speed = gateway, rest_speed
         self._request, self._canceled = request, canceled
         super().__init__(
             node,
@@ -74,7 +77,7 @@ class MotionGoals(GoalServer[GoalT]):
             conclude=conclude,
             fail=fail,
             refusals=(ArmError,),
-            has_stopped=self._has_come_to_rest,
+            has_stopped=self.has_stopped,
         )
 
     def outcome(self, goal: GoalT, timeout: float = START_TIMEOUT) -> Outcome | None:
@@ -98,13 +101,25 @@ class MotionGoals(GoalServer[GoalT]):
     def _order(self, goal: GoalT) -> None:
         goal.command = self._request(goal)
 
-    def _has_come_to_rest(self, goal: GoalT) -> bool:
-        """Return whether the arm has stopped for a goal that has failed, or others move it."""
-        now, point = time.monotonic(), self._gateway.snapshot.set_point
+    def has_stopped(self, goal: GoalT) -> bool:
+        """Return whether a goal that is ending can be answered.
+
+        The arm has come to rest for it, others move the arm, or ``REST_TIMEOUT`` is over, which
+        the answer says.
+        """
+        has_ended = goal.command is None or goal.command.ended.done()  # first: a cycle may come
+        now, snapshot = time.monotonic(), self._gateway.snapshot
+        point, measured = snapshot.set_point, snapshot.measured
         goal.rest_by = min(goal.rest_by, now + REST_TIMEOUT)
         is_braking = point is not None and point.source is Source.NONE and point.state.moving
-        has_ended = goal.command is None or goal.command.ended.done()
-        return now > goal.rest_by or (has_ended and not is_braking)
+        if point is None or point.source is Source.NONE:
+            speed = 0.0 if measured is None else np.abs(measured.velocity).max()
+            is_braking |= bool(speed > self._rest_speed)
+        if has_ended and not is_braking:
+            return True
+        if now > goal.rest_by:
+            goal.unrest = f'; it was not seen at rest for {REST_TIMEOUT:g} s and may still move'
+        return bool(goal.unrest)
 
     def _end_motion(self, goal: GoalT) -> None:
         if goal.command is not None:
@@ -123,14 +138,15 @@ NUMBER_PATTERN = re.compile(r'(?<![\w.])\d+(\.\d+)?')
 class LoggedReasons:
     """Which reasons of one stream are in the log already."""
 
-    def __init__(self) -> None:
-        self._logged = ('', -math.inf)
+    def __init__(self, period: float = REPEAT_PERIOD) -> None:
+        """Log one again that has not come for a period in [s]."""
+        self._logged, self._period = ('', -math.inf), period
 
     def is_new(self, reason: str, now: float) -> bool:
         """Return whether a reason is to be logged; one that differs in numbers only is not."""
         kind, (logged, seen) = NUMBER_PATTERN.sub('', reason), self._logged
         self._logged = (kind, now)
-        return kind != logged or now - seen >= REPEAT_PERIOD
+        return kind != logged or now - seen >= self._period
 
 
 class Refusals:

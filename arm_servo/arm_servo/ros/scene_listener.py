@@ -35,6 +35,7 @@ from robot_primitives import JointStateStore
 from ..controllers.controller import Source
 from ..core.gateway import CommandGateway
 from ..core.safety_filter import MovingArms
+from .motion_goals import LoggedReasons
 
 SceneChange = Callable[[Scene, Array], Scene]
 """Makes a scene of the one before and the positions of the group's joints in [rad]."""
@@ -185,7 +186,7 @@ class SceneListener:
     """Applies scenes and diffs to all groups, with the joints beside them where they are.
 
     Scenes are built and measured in a thread of their own: neither the executor nor a cycle waits.
-    What is refused is logged.
+    What is refused is logged, once while it comes again and again.
     """
 
     def __init__(
@@ -214,6 +215,8 @@ class SceneListener:
             SceneUpdater(gateway, arms, None if number else moving)
             for number, gateway in enumerate(gateways)
         ]
+        # a whole scene that is refused is requested again, and is one that is in the log
+        self._logged = {each: LoggedReasons(2.0 * ANSWER_TIMEOUT) for each in self._updaters}
         self._gateways = [*gateways, *unchecked]
         self._begin = self._received = clock()
         self._is_complete = False  # whether a whole scene came, and none was refused
@@ -334,10 +337,11 @@ class SceneListener:
             reason = (
                 str(error) if isinstance(error, ArmError) else f'{type(error).__name__}: {error}'
             )
-            self._node.get_logger().error(
-                f'{TOPIC} refused for {updater.gateway.model.group}, the scene before counts:'
-                f' {reason}'
-            )
+            if self._logged[updater].is_new(reason, now):
+                self._node.get_logger().error(
+                    f'{TOPIC} refused for {updater.gateway.model.group}, the scene before counts:'
+                    f' {reason}'
+                )
 
     def _warn_of_whole(self) -> None:
         """Say that objects may be missing."""

@@ -107,7 +107,7 @@ class TrajectoryAction:
     def _fail(self, goal: MotionGoal, error: Exception) -> FollowJointTrajectory.Result:
         if goal.failure is not None:
             outcome = refused(error)
-            return self._result(outcome.code, outcome.reason)
+            return self._result(outcome.code, outcome.reason + goal.unrest)
         reason = f'how it ended is not known: {type(error).__name__}: {error}'
         return self._result(GoalCode.INVALID_GOAL, reason)
 
