@@ -18,6 +18,7 @@ from ros_client import LATCHED
 from sensor_msgs.msg import JointState
 from simulated_arm import SimulatedArm
 from std_msgs.msg import Float64MultiArray, String, UInt8MultiArray
+from std_srvs.srv import Trigger
 
 from arm_msgs.srv import InjectFault, WriteObject
 
@@ -36,13 +37,19 @@ def devices() -> Iterator[SimulatedArm]:
         yield started
 
 
-def _status(devices: SimulatedArm, name: str, level: bytes) -> dict[str, str]:
-    """Wait for a level of a device in /diagnostics; return its values and its message."""
+def _status(devices: SimulatedArm, name: str, level: bytes, **values: str) -> dict[str, str]:
+    """Wait for a level and values of a device in /diagnostics; return all, and its message."""
     arrays = devices.client.listen(DiagnosticArray, '/diagnostics')
 
     def found() -> list[DiagnosticStatus]:
         newest = arrays[-1].status if arrays else []
-        return [each for each in newest if each.name == name and each.level == level]
+        return [
+            each
+            for each in newest
+            if each.name == name
+            and each.level == level
+            and values.items() <= {value.key: value.value for value in each.values}.items()
+        ]
 
     devices.client.spin_until(lambda: bool(found()), TIMEOUT, name)
     (status,) = found()
@@ -116,6 +123,22 @@ def test_a_lost_module_is_in_error_and_its_outputs_are_not_written_again(
     again = _status(devices, 'io: device', DiagnosticStatus.OK)
     assert again['digital_outputs'] == 'not commanded since the boot'
     assert again['digital_inputs'] == '0' * 16
+
+
+def test_inputs_of_a_tpdo_that_does_not_come_are_named_as_unknown(devices: SimulatedArm) -> None:
+    """In /diagnostics and once in the log: the topic is silent, the other one is not."""
+    client = devices.client
+    fault = InjectFault.Request(device='io', fault='tpdo_loss', settings=['pdo=2'])
+    assert client.call(InjectFault, '/fake_slaves/fault', fault).success
+    assert client.call(Trigger, '/io/nmt_reset_node', Trigger.Request()).success
+    devices.master.wait_for('~/analog_inputs is silent: unknown: TPDO 2 not received', TIMEOUT)
+    missing = 'unknown: TPDO 2 not received since the boot'
+    shown = _status(devices, 'io: device', DiagnosticStatus.OK, analog_inputs=missing)
+    assert shown['digital_inputs'] == '0' * 16
+    fault.fault, fault.settings = 'none', []
+    assert client.call(InjectFault, '/fake_slaves/fault', fault).success
+    assert client.call(Trigger, '/io/nmt_reset_node', Trigger.Request()).success
+    _status(devices, 'io: device', DiagnosticStatus.OK, analog_inputs='0 0 0 0')
 
 
 def test_an_encoder_is_a_joint_and_takes_a_preset(devices: SimulatedArm) -> None:

@@ -9,6 +9,7 @@ std_msgs/Float64MultiArray in counts of the device: types that every client has,
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from functools import partial
@@ -68,6 +69,13 @@ class Channels:
         values = [reader.value for reader in self.readers]
         return None if None in values else self._split([value or 0 for value in values])
 
+    @property
+    def missing(self) -> str:
+        """The TPDOs without which the inputs are unknown, in words; empty where they are known."""
+        silent = {r.source.config.number for r in self.readers if r.source.values is None}
+        numbers = ', '.join(map(str, sorted(silent)))
+        return f'unknown: TPDO {numbers} not received since the boot' if silent else ''
+
     def commanded(self) -> list[Number] | None:
         """Return a value for each output; None while nothing was sent since the device booted."""
         outputs = [self._device.image.sent(*entry.address) for entry in self.entries]
@@ -106,6 +114,9 @@ class Channels:
         ]
 
 
+LOOKS = 2  # looks in a row at which inputs that are unknown are logged
+
+
 class IoTopics:
     """``~/digital_inputs``, ``~/analog_inputs`` and, to be written, both kinds of outputs.
 
@@ -116,21 +127,35 @@ class IoTopics:
         self._node = node
         all_channels = (Channels(node.device, group) for group in IO_GROUPS)
         self._channels = [channels for channels in all_channels if channels.entries]
+        self._looks = Counter[str]()  # how often in a row inputs were unknown, by topic
         for channels in self._channels:
             self._offer(channels)
 
     def diagnostics(self) -> dict[str, str]:
-        """Return the inputs, the outputs, and what these do when the master is lost."""
+        """Return the inputs, the outputs, and what these do when the master is lost.
+
+        Inputs that stay unknown are logged once: their topic is silent.
+        """
         values = {}
         for channels in self._channels:
             group = channels.group
             data = channels.commanded() if group.is_output else channels.received()
-            unknown = 'not commanded since the boot' if group.is_output else ''
+            unknown = 'not commanded since the boot' if group.is_output else channels.missing
+            if not group.is_output:
+                self._warn(group.name, channels.missing if self._node.device.operational else '')
             separator = '' if group.is_digital else ' '
             values[group.name] = unknown if data is None else separator.join(map(str, data))
         config = self._node.device.config
         outputs = [e for c in self._channels if c.group.is_output for e in c.entries]
         return values | ({'outputs_on_loss': outputs_on_loss(config, outputs)} if outputs else {})
+
+    def _warn(self, name: str, missing: str) -> None:
+        self._looks[name] = self._looks[name] + 1 if missing else 0
+        if self._looks[name] == LOOKS:
+            self._node.get_logger().warning(
+                f'~/{name} is silent: {missing}; does the device send it when it starts, or by'
+                ' an event timer (event_timer in bus.yml)?'
+            )
 
     def _offer(self, channels: Channels) -> None:
         group, node = channels.group, self._node
