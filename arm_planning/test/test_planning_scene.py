@@ -215,10 +215,13 @@ def test_whatever_a_scene_raises_refuses_that_scene_only(monkeypatch: pytest.Mon
     node = TickingNode()
     monitor = SceneMonitor(node, panda())  # type: ignore[arg-type]
     before = monitor.snapshot
-    monkeypatch.setattr('arm_planning.ros.scene_monitor.apply_scene', lambda *_: 1 // 0)
-    node.receive['planning_scene'](PlanningScene())
+    with monkeypatch.context() as broken:
+        broken.setattr('arm_planning.ros.scene_monitor.apply_scene', lambda *_: 1 // 0)
+        for _ in range(3):
+            node.receive['planning_scene'](PlanningScene())
     assert monitor.snapshot is before
     assert 'planning_scene refused: CRASH: ZeroDivisionError' in node.warnings[0]
+    assert len(node.warnings) == 1  # a sensor may go on
 
 
 READY = panda().positions(

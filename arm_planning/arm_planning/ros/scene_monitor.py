@@ -74,6 +74,7 @@ class SceneMonitor:
         self._states = JointStateStore(robot.all_joints)
         self._before = self._mark = self._states.samples()  # from which speeds are measured
         self._marked = -math.inf
+        self._refused: dict[str, str] = {}  # what was refused last, by topic or service
         self.on_change: Callable[[], None] = lambda: None
         # first: a controller that has found it does not read the meshes of the other one
         self._collisions = node.create_publisher(PlanningScene, 'collision_scene', LATCHED)
@@ -189,14 +190,18 @@ class SceneMonitor:
         self._change(topic, as_scene(message))
 
     def _change(self, source: str, scene: PlanningScene) -> bool:
-        """Apply a scene; a refusal is logged and leaves the scene as it is."""
+        """Apply a scene; a refusal is logged, once in a row, and leaves the scene as it is."""
         known = self.snapshot.notes
         try:
             self.snapshot = apply_scene(self.snapshot, scene, self.positions())
         except Exception as error:  # noqa: BLE001  # a message must not end the program
             refusal = as_refusal(error)
-            self._node.get_logger().warning(f'{source} refused: {refusal.code.name}: {refusal}')
+            text = f'{source} refused: {refusal.code.name}: {refusal}'
+            if self._refused.get(source) != text:
+                self._node.get_logger().warning(text)
+            self._refused[source] = text
             return False
+        self._refused.pop(source, None)
         for note in self.snapshot.notes:
             if note not in known:
                 self._node.get_logger().warning(note)
@@ -233,6 +238,7 @@ class SceneMonitor:
     def _apply(
         self, request: ApplyPlanningScene.Request, response: ApplyPlanningScene.Response
     ) -> ApplyPlanningScene.Response:
+        self._refused.pop('apply_planning_scene', None)  # the log has the reason of each answer
         response.success = self._change('apply_planning_scene', request.scene)
         return response
 
