@@ -20,6 +20,7 @@ import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 import rclpy
+from rclpy.duration import Duration
 from ros_client import RosClient
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64, String
@@ -54,6 +55,7 @@ class Robot:
         positions: Where the joints are.
         orientation: Of the body, x, y, z, w.
         names: Under which they are published.
+        late: By how much their stamps are in the past [s]; None for none.
         largest_speed: The largest speed of a target so far in [rad/s].
         commands: All joint commands so far.
         states: All states that the node published.
@@ -66,6 +68,7 @@ class Robot:
         self.positions = list(FOLDED)
         self.orientation: Quaternion = IDENTITY
         self.names = list(ROBOT.names)
+        self.late: float | None = None
         self.largest_speed, self._stamp = 0.0, 0.0
         self._joints = node.create_publisher(JointState, 'joint_states', 10)
         self._imu = node.create_publisher(Imu, 'imu', 10)
@@ -85,9 +88,14 @@ class Robot:
         attitude = imu.orientation
         attitude.x, attitude.y, attitude.z, attitude.w = self.orientation
         imu.linear_acceleration.z = 9.81
+        if self.late is not None:
+            now = self.client.node.get_clock().now()
+            imu.header.stamp = (now - Duration(seconds=self.late)).to_msg()
         self._imu.publish(imu)
         still = [0.0] * len(self.names)
-        self._joints.publish(JointState(name=self.names, position=self.positions, velocity=still))
+        joints = JointState(name=self.names, position=self.positions, velocity=still)
+        joints.header = imu.header
+        self._joints.publish(joints)
 
     def _follow(self, message: Any) -> None:
         stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
@@ -98,6 +106,20 @@ class Robot:
         self._stamp = stamp
         self.positions = list(message.position)
         self.commands.append(message)
+
+    def walk(self) -> None:
+        """Request a walk from now on, and wait until it steps."""
+        assert self.mode('walk').success
+        self.until_state('walk')
+        message, before = Twist(), list(self.positions)
+        message.linear.x = 0.2
+        self.client.node.create_timer(0.1, lambda: self.twist.publish(message))
+
+        def steps() -> bool:
+            pairs = zip(self.positions, before, strict=True)
+            return bool(max(abs(a - b) for a, b in pairs) > 0.2)
+
+        self.client.spin_until(steps, 20.0, 'steps')
 
     def until_ready(self) -> None:
         """Wait until the node has received all that it needs."""
@@ -166,6 +188,38 @@ def test_stop_ends_a_walk_while_velocities_come(robot: Robot, isolation: Isolati
         answer = robot.client.trigger('stop')
         assert (answer.success, answer.message) == (True, 'stopped: walk; the mode is stand')
         robot.until_state('stand')
+
+
+def test_a_bridge_that_is_late_by_its_stamps_stops_the_walk(robot: Robot) -> None:
+    """Its messages arrive at their rate, and no target moves on by what they say."""
+    robot.late = 0.0
+    robot.begin()
+    robot.until_ready()
+    robot.walk()
+    robot.late = 0.3
+    robot.client.spin_until(
+        lambda: len({tuple(each.position) for each in robot.commands[-25:]}) == 1, 20.0, 'a stop'
+    )
+    robot.client.spin_until(
+        lambda: any('ms old' in each.message for each in robot.diagnostics[-1].status),
+        20.0,
+        'a warning',
+    )
+
+
+@pytest.mark.parametrize('late', [3600.0, -3600.0])
+def test_a_bridge_with_another_clock_walks_and_is_reported(robot: Robot, late: float) -> None:
+    """An hour off, either way: ages count from arrival, and the log says so once for a topic."""
+    robot.late = late
+    robot.begin()
+    robot.until_ready()
+    robot.walk()
+    for topic in ('/joint_states', '/imu'):
+        text = f'the clocks of {topic} and of this computer differ by '
+        found = [line.partition(text)[2] for line in robot.process.lines if text in line]
+        assert len(found) == 1
+        assert float(found[0].split()[0]) == pytest.approx(late, abs=5.0)
+        assert found[0].endswith('s; ages count from arrival')
 
 
 def test_from_lying_to_walking_and_back(robot: Robot) -> None:

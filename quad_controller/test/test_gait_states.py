@@ -315,6 +315,25 @@ def test_a_short_pause_of_the_controller_itself_is_no_silence_of_the_robot() -> 
     assert rig.controller.status.velocity.at_rest
 
 
+def test_old_messages_in_a_burst_after_a_pause_are_no_fault_and_late_ones_are() -> None:
+    """What was sent while the controller slept is read late, once; the reason says by how much."""
+    rig = standing()
+    still = JointSample(rig.positions, (0.0,) * 12)
+    late = RobotState(still, UPRIGHT, joints_age=0.7, imu_age=0.7)
+    rig.controller.step(late, 0.4)
+    rig.run(0.5)
+    assert rig.is_in(State.STAND)
+    for _ in range(round(0.4 / PERIOD)):
+        rig.controller.step(late, PERIOD)
+    assert rig.is_in(State.STAND)
+    for _ in range(round(0.4 / PERIOD)):
+        rig.controller.step(late, PERIOD)
+    assert rig.is_in(State.FAULT)
+    assert (
+        '/joint_states comes 0.7 s after its header.stamp' in rig.controller.clear_fault().message
+    )
+
+
 @pytest.mark.parametrize('goal', ['walk', 'lie', 'policy'])
 def test_a_controller_that_wakes_from_a_pause_in_motion_lies_down_from_where_it_is(
     goal: str,

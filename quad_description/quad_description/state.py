@@ -168,6 +168,8 @@ class RobotState:
     servo_problem: str | None = None
     # of the servos in [°C], by motor id; empty where they are not reported
     temperatures: Mapping[int, float] = field(default_factory=dict)
+    joints_age: float = 0.0  # how old the joint states were when they came in [s]
+    imu_age: float = 0.0  # how old the attitude was when it came in [s]
 
 
 class Backend(ABC):

@@ -2,6 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Frequent messages as serialized bytes in which only the stamp and numbers change."""
 
-from .serialized import FastPublisher, FastReader, MessageTemplate, SerializedTemplate
+from .serialized import FastPublisher, FastReader, MessageTemplate, SerializedTemplate, stamp_of
 
-__all__ = ['FastPublisher', 'FastReader', 'MessageTemplate', 'SerializedTemplate']
+__all__ = ['FastPublisher', 'FastReader', 'MessageTemplate', 'SerializedTemplate', 'stamp_of']

@@ -26,6 +26,7 @@ MISSES_MAX = 3  # messages of another form one after the other, until forms are 
 _MARK = -1.2345678901234567e30  # times 1, 2, 3...: numbers that no message holds by itself
 _SECONDS_MARK, _NANOSECONDS_MARK = 0x5EC0ABCD, 0xA0ABCDEF
 _ENCAPSULATION, _LITTLE_ENDIAN = 1, 1  # byte of a serialized message of its order [B]
+_HEADER = 4  # where the message itself begins [B]
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +146,12 @@ class FastPublisher:
         if template is None:
             template = self._templates[form] = SerializedTemplate(form)
         self._publisher.publish(template.fill(time, numbers))
+
+
+def stamp_of(data: bytes) -> int:
+    """Return the stamp [ns] of a serialized message that begins with its header."""
+    seconds, nanoseconds = struct.unpack_from(_order(data) + 'iI', data, _HEADER)
+    return int(seconds * NANOSECONDS + nanoseconds)
 
 
 class FastReader:

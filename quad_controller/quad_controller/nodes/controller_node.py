@@ -25,7 +25,7 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
-from message_templates import FastPublisher, FastReader, MessageTemplate
+from message_templates import FastPublisher, FastReader, MessageTemplate, stamp_of
 from node_runner import (
     create_deferred_service,
     destroyed_when_refused,
@@ -67,6 +67,8 @@ STAMPED = 'geometry_msgs/msg/TwistStamped'  # what Nav2 and ros2_control publish
 STAMPED_WARN_PERIOD = 60.0  # [s] between two errors that it cannot be received
 GAIT_WORDS = {'', 'gait'}  # instead of a policy's path
 WARN_PERIOD = 2.0  # [s] between two warnings of the same kind
+# [s] by which a measurement may be older, or of a later time, than now; beyond, clocks differ
+MAX_AGE, MAX_AHEAD = 10.0, 0.05
 
 Reply = TypeVar('Reply', SetMode.Response, Trigger.Response)
 
@@ -128,6 +130,7 @@ class ControllerNode(Node):
         self._subscribe()
         self._stamped: OtherTypeSubscription | None = None
         self._seen: set[str] = set()  # topics of estimates
+        self._other_clocks: set[str] = set()  # topics whose stamps were of no use
         self._arrived = {topic: threading.Event() for topic in ESTIMATES}
         if policy is not None:
             self._see_estimates(_estimates_for(policy))
@@ -257,7 +260,8 @@ class ControllerNode(Node):
     def _take_joints(self, data: bytes) -> None:
         message, numbers = self._joint_states.read(data)
         try:
-            self._loop.offer(joints=self._joints.read(message, numbers, self._targets))
+            joints = self._joints.read(message, numbers, self._targets)
+            self._loop.offer(joints=joints, joints_age=self._age('/joint_states', data))
         except ValueError as error:
             self._refuse(Fault.JOINTS, str(error))
             return
@@ -270,9 +274,23 @@ class ControllerNode(Node):
 
     def _take_imu(self, data: bytes) -> None:
         try:
-            self._loop.offer(imu=messages.imu_sample(*self._imu.read(data)))
+            imu = messages.imu_sample(*self._imu.read(data))
+            self._loop.offer(imu=imu, imu_age=self._age('/imu', data))
         except ValueError as error:
             self._refuse(Fault.IMU, str(error))
+
+    def _age(self, topic: str, data: bytes) -> float:
+        """Return how old a measurement is [s], by its stamp where that can be, else 0."""
+        stamp = stamp_of(data)
+        age = (self.get_clock().now().nanoseconds - stamp) / messages.NS
+        if -MAX_AHEAD <= age <= MAX_AGE:
+            return max(age, 0.0)
+        if topic not in self._other_clocks:
+            self._other_clocks.add(topic)
+            differ = f'the clocks of {topic} and of this computer differ by {age:.1f} s'
+            why = differ if stamp else f'{topic} has no header.stamp'
+            self.get_logger().warning(f'{why}; ages count from arrival')
+        return 0.0
 
     def _take_odometry(self, message: Odometry) -> None:
         linear = message.twist.twist.linear

@@ -36,7 +36,8 @@ class Health:
         self._count = count
         self._parameters = parameters
         self.newest = RobotState()  # the newest usable values, however old
-        self.ages = dict.fromkeys(AGED, math.inf)  # time since they came in [s]
+        self.ages = dict.fromkeys(AGED, math.inf)  # time since they were measured in [s]
+        self._delays = dict.fromkeys(SUBJECTS, 0.0)  # age of the newest when it came in [s]
         self.refused = 0  # samples that could not be used
         self._refusals: dict[Fault, tuple[str, float]] = {}  # reason, and its age [s]
         self._late = False
@@ -57,8 +58,11 @@ class Health:
             value = getattr(measurement, name)
             if value is not None and self._usable(name, value, problems):
                 taken[name] = value
-        ages = self.ages.items()
-        self.ages = {name: 0.0 if name in taken else age + waited for name, age in ages}
+        delays = {'joints': measurement.joints_age, 'imu': measurement.imu_age}
+        self._delays |= {name: delay for name, delay in delays.items() if name in taken}
+        for name, age in self.ages.items():  # what comes was not measured before what came
+            delay = delays.get(name, 0.0) if name in taken else math.inf
+            self.ages[name] = min(age + waited, delay)
         self.newest = replace(self.newest, **taken)
         self.refused += len(problems)
         battery = self.newest.battery
@@ -139,9 +143,9 @@ class Health:
         """Yield what keeps the robot from moving its legs, each with its reason and remedy."""
         parameters = self._parameters
         if self.ages['joints'] > parameters.fault_age:
-            yield Fault.JOINTS, self._silence(Fault.JOINTS, self.ages['joints'], '/joint_states')
+            yield Fault.JOINTS, self._silence('joints', '/joint_states')
         if parameters.require_imu and self.ages['imu'] > parameters.fault_age:
-            yield Fault.IMU, self._silence(Fault.IMU, self.ages['imu'], '/imu')
+            yield Fault.IMU, self._silence('imu', '/imu')
         if self.newest.imu is not None and (self._falling_for or 0.0) > parameters.fall_time:
             yield Fault.FALLEN, self._fall(self.newest.imu)
         if self.newest.battery is not None and (self._low_for or 0.0) > parameters.battery_time:
@@ -159,12 +163,18 @@ class Health:
         seen = replace(self.situation(), joints=joints, imu=imu)
         return policy.missing(seen) or policy.inexact(joints, stated=True)
 
-    def _silence(self, what: Fault, age: float, topic: str) -> str:
-        """Return why nothing was received for a time [s]."""
-        if what in self._refusals:
-            return self._refusals[what][0]
+    def _silence(self, name: str, topic: str) -> str:
+        """Return why nothing new was received."""
+        age, delay = self.ages[name], self._delays[name]
+        if SUBJECTS[name] in self._refusals:
+            return self._refusals[SUBJECTS[name]][0]
         if math.isinf(age):
             return f'none yet; is the hardware node running, and does it publish {topic}?'
+        if delay > self._parameters.hold_age:
+            return (
+                f'{topic} comes {delay:.1f} s after its header.stamp; look at the hardware node, '
+                'the network, and the clocks of both computers'
+            )
         return f'none for {age:.1f} s; look at the hardware node and its cable'
 
     def _waited(self, dt: float, *, received: bool) -> float:
