@@ -16,6 +16,7 @@ from canopen_core.standard import (
     mode_title,
     OperationMode,
     Statusword,
+    TARGET_OBJECTS,
     TORQUE_MODES,
 )
 
@@ -782,7 +783,8 @@ class Axis:
         if following is Following.FOLLOWS:
             return
         if following is Following.UNDECIDED:
-            self.node.image.skip_cycle()
+            index, subindex = TARGET_OBJECTS[mode.number]
+            self.node.image.skip_cycle(view.at(index), subindex)
             return
         self._following.clear()
         where = f'commanded to {setpoint:g}, it is at {position:g}'

@@ -343,9 +343,9 @@ class ProcessImage:
         for output in self.rpdos:
             output.reset()
 
-    def skip_cycle(self) -> None:
-        """Send no RPDO in this cycle."""
-        for output in self.rpdos:
+    def skip_cycle(self, index: int, subindex: int = 0) -> None:
+        """Send no RPDO with an object in this cycle; those of other axes leave."""
+        for output, _ in self._places.get((index, subindex), ()):
             output.skips = True
 
     def store(self, index: int, subindex: int, value: Number) -> list[SentRpdo]:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 import re
 
-from bus_rig import booted, VirtualNetwork
+from bus_rig import booted, Leader, VirtualNetwork
 from drive_samples import (
     bus_config,
     drive_config,
@@ -254,6 +254,21 @@ def test_the_axes_of_a_device_that_comes_back_are_braked_at_the_same_time(
             if drive.state is not DriveState.OPERATION_ENABLED:
                 left.setdefault(drive.number, net.now)
     assert max(left.values()) - min(left.values()) < 0.05
+
+
+def test_an_axis_that_is_seen_again_holds_up_no_other(net: VirtualNetwork) -> None:
+    """Where it was before: none of its set-points leaves for a cycle; the other goes on."""
+    for axis in (X, Y):
+        net.enable(OperationMode.CYCLIC_POSITION, axis)
+        net.master.attach(Leader(axis, heeds=False))
+    net.run(1.0)
+    net.lose(0x285, 0x305)  # positions of X, and set-points for it
+    net.run(0.7)
+    since = net.now
+    net.lose()
+    net.run(0.1)
+    of_x, of_y = (len(net.frames(cob_id, since=since)) for cob_id in (0x305, 0x505))
+    assert of_y - of_x == 1
 
 
 def test_a_fault_stops_its_axis_and_is_said_by_name(net: VirtualNetwork) -> None:
