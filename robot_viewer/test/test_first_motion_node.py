@@ -214,6 +214,7 @@ def test_each_likely_cause_has_its_correction() -> None:
         ('Switched on', 'Cyclic position', 0.1, 'not enabled'),
         ('Operation enabled', 'Interpolated position', 0.1, ''),
         ('Operation enabled', 'Profile position', 0.1, 'goes on when the page is lost: choose'),
+        ('Operation enabled', 'Profile position', 0.1, 'a small ~/target at a low 0x6081'),
         ('Operation enabled', 'Cyclic velocity', 0.1, 'position mode below Drives'),
         ('Operation enabled', '', 0.1, 'no mode'),
         ('', '', 0.1, 'no diagnostics'),

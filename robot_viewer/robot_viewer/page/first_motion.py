@@ -168,7 +168,8 @@ def problem_of(drive: Mapping[str, str], age: float) -> str:
     if mode not in MODES:
         return (
             f'it is in {mode or "no mode"}, in which a position is not followed, or goes on when '
-            'the page is lost: choose cyclic or interpolated position mode below Drives'
+            'the page is lost: choose cyclic or interpolated position mode below Drives. A drive '
+            'that has neither is tried without this guard: a small ~/target at a low 0x6081'
         )
     return ''
 
