@@ -144,7 +144,6 @@ def test_one_of_many_homings_at_a_time_is_done(arm: SimulatedArm) -> None:
 
 def test_units_are_those_of_the_masters_file(arm: SimulatedArm) -> None:
     """The answer says how the joint counts, and names the very file."""
-    bus, stat = panda_bus(), panda_bus().stat()
     answer = arm.client.call(ReadUnits, f'{JOINT}/read_units', ReadUnits.Request())
     assert answer.success, answer.message
     scale = answer.scale_pos_to_dev
@@ -152,8 +151,7 @@ def test_units_are_those_of_the_masters_file(arm: SimulatedArm) -> None:
     assert answer.scale_pos_from_dev == pytest.approx(1.0 / scale)
     assert answer.scale_vel_from_dev == pytest.approx(1.0 / answer.scale_vel_to_dev)
     assert (answer.device, answer.channel) == (JOINT[1:], -1)
-    assert Path(answer.bus_config) == bus
-    assert (answer.bus_config_inode, answer.bus_config_changed) == (stat.st_ino, stat.st_mtime_ns)
+    assert Path(answer.bus_config) == panda_bus()
 
 
 def test_halt_quick_stop_moves_and_streams(arm: SimulatedArm) -> None:

@@ -390,8 +390,6 @@ class Robot:
             gear=0.0,
             factor_scale=0.0,
             bus_config='/none/bus.yml',
-            bus_config_inode=0,
-            bus_config_changed=0,
             device=REQUEST.joint,
             channel=-1,
         )

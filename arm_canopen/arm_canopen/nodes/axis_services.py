@@ -59,7 +59,7 @@ class AxisServices:
         place: str,
         thread: NetworkThread,
         *,
-        file: BusFile,
+        file: Path,
     ) -> None:
         """``place`` is what the names begin with."""
         self._node = node
@@ -248,26 +248,8 @@ KEYS = (
 """Keys of bus.yml, which are the names of the fields of the answer, too."""
 
 
-@dataclass(frozen=True, slots=True)
-class BusFile:
-    """A bus.yml as the master has read it, so that a client recognizes the very file."""
-
-    path: Path  # where it is on this computer
-    inode: int = 0  # its inode; 0 when it is gone
-    changed: int = 0  # when it was changed last in [ns]; 0 when it is gone
-
-    @classmethod
-    def at(cls, path: Path) -> BusFile:
-        """Remember a file that was just read."""
-        try:
-            stat = path.stat()
-        except OSError:
-            return cls(path.absolute())
-        return cls(path.absolute(), stat.st_ino, stat.st_mtime_ns)
-
-
 def answer_units(
-    drive: Axis, file: BusFile, response: ReadUnits.Response, future: Future[FactorGroup]
+    drive: Axis, file: Path, response: ReadUnits.Response, future: Future[FactorGroup]
 ) -> ReadUnits.Response:
     """Fill in how an axis counts, by the drive and by bus.yml."""
     error = future.exception()
@@ -279,9 +261,7 @@ def answer_units(
     response.factor_scale = factors.position_scale
     for key in KEYS:
         setattr(response, key, getattr(drive.view.units.config, key))
-    response.bus_config = str(file.path)
-    response.bus_config_inode = file.inode
-    response.bus_config_changed = file.changed
+    response.bus_config = str(file)
     response.device = config.name
     response.channel = drive.config.channel if len(config.axes) > 1 else -1
     response.success = True  # last: an answer of which one part fails is sent, too
@@ -289,7 +269,7 @@ def answer_units(
 
 
 def offer_drive(
-    node: DeviceNode, axes: Sequence[AxisCommands], thread: NetworkThread, file: BusFile
+    node: DeviceNode, axes: Sequence[AxisCommands], thread: NetworkThread, file: Path
 ) -> DriveJointStates:
     """Offer services and topics of a drive with one axis or several; return its joint states."""
     for commands in axes:

@@ -43,7 +43,7 @@ from ..config.model import BusConfig
 from ..master.events import Event
 from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
-from .axis_services import BusFile, offer_drive
+from .axis_services import offer_drive
 from .device_node import (
     answer_read,
     answer_success,
@@ -213,7 +213,7 @@ class MasterProcess:
             device.name: DeviceNode(device, self._thread, self._output)
             for device in self._network.nodes.values()
         }
-        file = BusFile.at(config.file)
+        file = config.file.absolute()
         self._axes = {
             name: self._master.axes(each.device)
             for name, each in self._devices.items()
