@@ -34,7 +34,7 @@ from shape_msgs.msg import SolidPrimitive
 from arm_msgs.srv import InjectFault
 from robot_viewer.nodes.motion_planning import DRAGGED, HOLD_EXECUTE
 from robot_viewer.page.jog_panel import Actions, BASE, HOLD_TARGET
-from robot_viewer.page.robot_page import RobotPage
+from robot_viewer.page.robot_page import Overlay, RobotPage
 from robot_viewer.robot_state import ALLOW, Level, RobotState, Stop
 
 if TYPE_CHECKING:
@@ -577,7 +577,7 @@ def test_a_robot_that_stops_late(seen: Seen) -> None:
                 continue
             stage = 'stopped' if stands.is_set() else 'braking' if answers else ''
             state = RobotState('READY', Level.WELL, '')
-            more = {'stop': stage, 'simulated': True, 'program': '', 'listens': ''}
+            more: Overlay = {'stop': stage, 'simulated': True, 'program': '', 'listens': ''}
             served.show_state(state, {}, more)
 
     over, silent = threading.Event(), threading.Event()

@@ -155,7 +155,7 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
 def said(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Collect what the page says."""
     texts: list[str] = []
-    monkeypatch.setattr(robot.viewer.page, 'say', lambda text, **_: texts.append(text))
+    monkeypatch.setattr(robot.viewer.page._log, 'add', lambda *entry: texts.append(entry[2]))
     return texts
 
 

@@ -22,7 +22,7 @@ from node_runner.action_goals import GoalClient
 from ..page.jog_panel import History, motion_time
 from ..page.live import RELEASED_AFTER
 from ..page.robot_scene import travel
-from .interfaces import ActionCall, of_robot
+from .interfaces import ActionCall, of_robot, Report
 from .listening import Listening
 
 STATE_TYPE = 'control_msgs/msg/JointTrajectoryControllerState'
@@ -34,8 +34,6 @@ SETTLING_TIMEOUT = 1.0  # time in [s] after the end of a motion at which it is l
 SILENCE = 1.2
 """Time in [s] without a trajectory before an empty one says that what follows is a new request: a
 controller that was stopped in a stream wants a second."""
-
-Report = Callable[..., None]  # takes what became of a motion, and whether it has `failed`
 
 
 @dataclass(slots=True)

@@ -14,7 +14,7 @@ from functools import partial
 import sys
 import threading
 import traceback
-from typing import Any, TYPE_CHECKING
+from typing import Any, Protocol, TYPE_CHECKING
 
 from rclpy.client import Client
 from rclpy.node import Node
@@ -54,9 +54,14 @@ def stops_robot(node: str, services: Mapping[str, Collection[str]]) -> bool:
     )
 
 
-Report = Callable[..., None]
-"""Takes what was requested, what became of it, and whether it has `failed`."""
 TRIGGER = 'std_srvs/srv/Trigger'
+
+
+class Report(Protocol):
+    """Where it is said what became of a request."""
+
+    def __call__(self, text: str, *, failed: bool) -> None:
+        """Say it in words."""
 
 
 class TriggerCalls:
@@ -107,11 +112,11 @@ class TriggerCalls:
             bad = [f'{n.split("/")[-2]}: {said}' for n, (ok, said) in answers.items() if not ok]
             texts = bad or list(dict.fromkeys(said for _, said in answers.values() if said))
             count = f'{len(services) - len(bad)} of {len(services)} done'
-            self._report(what, '; '.join((count, *texts)), failed=bool(bad))
+            self._report(f'{what}: {"; ".join((count, *texts))}', failed=bool(bad))
             done(not bad)
 
         if not services:
-            self._report(what, 'is not offered', failed=True)
+            self._report(f'{what}: is not offered', failed=True)
             done(False)
             return
         self._running[what] = services

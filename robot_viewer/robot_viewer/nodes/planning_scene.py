@@ -32,6 +32,7 @@ from node_runner import LATCHED
 from ..page.robot_page import RobotPage
 from ..page.robot_scene import pose_of, put, RobotScene
 from ..page.style import add_button, add_choice
+from .interfaces import Report
 from .motion_plan import box_message, Message, pose_message, scene_change, transform_of
 
 WORLD_AND_ATTACHED = 16 | 4  # of moveit_msgs/PlanningSceneComponents
@@ -69,9 +70,7 @@ class SceneObject:
 class PlanningScene:
     """What move_group has in its scene; everything in the thread of the node."""
 
-    def __init__(
-        self, node: Node, page: RobotPage, ordered: Ordered, say: Callable[..., None]
-    ) -> None:
+    def __init__(self, node: Node, page: RobotPage, ordered: Ordered, say: Report) -> None:
         self._node, self._page, self._ordered, self._say = node, page, ordered, say
         self._apply: Client | None = None
         self._whole: Client | None = None

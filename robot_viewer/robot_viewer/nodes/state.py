@@ -44,7 +44,7 @@ from ..robot_state import (
 from .interfaces import TRIGGER, TriggerCalls
 
 if TYPE_CHECKING:
-    from ..page.robot_page import RobotPage
+    from ..page.robot_page import Overlay, RobotPage
 
 STATUS_AGE = 5.0  # time in [s] after which a status that does not come again is unknown
 STATUS_SILENCE = 3.5
@@ -227,7 +227,7 @@ class Judge:
         drawn = shown, tuple(known.values()), self._page.last
         if self._page.watched and (drawn != self._pushed or now - self._pushed_at > PUSH_PERIOD):
             self._pushed, self._pushed_at = drawn, now
-            more = {
+            more: Overlay = {
                 'stop': '' if self._stop is None else STAGES[self._stop.stands],
                 'simulated': self._simulated,
                 'program': program,

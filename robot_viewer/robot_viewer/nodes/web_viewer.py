@@ -154,8 +154,8 @@ class WebViewer(Node):
             let_go=lambda: order(self._controllers.let_go),
         )
         self.page = RobotPage(host, port, self.actions)
-        self._controllers = Controllers(self, self._listening, self._say, self.page.end_target)
-        self._grippers = Grippers(self, self._say)
+        self._controllers = Controllers(self, self._listening, self.page.say, self.page.end_target)
+        self._grippers = Grippers(self, self.page.say)
         self._judge = Judge(self, self.page, self._watch, self._triggers)
         self.border = Border(self, lambda text: self.page.say(text, failed=True))
         self._body = Body(self, self.page, self._listening, self._positions)
@@ -467,7 +467,7 @@ class WebViewer(Node):
         counted: set[str] = set()
 
         def take(service: str, ok: bool, text: str) -> None:
-            self._report(service, text, failed=not ok)
+            self._report(f'{service}: {text}', failed=not ok)
             answers[service] = ok, text
             _conclude(answer, answers, counted)
 
@@ -492,7 +492,7 @@ class WebViewer(Node):
         for service, others in doubtful.items():
             who = ', '.join(others) or 'a node that the graph does not show'
             text = f'offered by {who}, which leads neither drives nor legs: each drive is halted'
-            self._report(service, f'{text}, too. Give that service another name', failed=True)
+            self._report(f'{service}: {text}, too. Give that service another name', failed=True)
         counted |= (self._stops | halts) - doubtful.keys()
         if counted:
             _conclude(answer, answers, counted)
@@ -532,18 +532,15 @@ class WebViewer(Node):
             future.add_done_callback(partial(self._answered, f'mode {mode}'))
 
     def _answered(self, what: str, future: Future) -> None:
-        self._report(what, text_of(future), failed=not succeeded(future))
+        self._report(f'{what}: {text_of(future)}', failed=not succeeded(future))
 
-    def _say(self, text: str, *, failed: bool) -> None:
+    def _report(self, text: str, *, failed: bool) -> None:
         self.page.say(text, failed=failed)
-
-    def _report(self, what: str, text: str, *, failed: bool) -> None:
-        self.page.say(f'{what}: {text}', failed=failed)
         # a line of its own for each severity: rclpy refuses another one from the same line
         if failed:
-            self.get_logger().warning(f'{what}: {text}')
+            self.get_logger().warning(text)
         else:
-            self.get_logger().info(f'{what}: {text}')
+            self.get_logger().info(text)
 
 
 def _conclude(

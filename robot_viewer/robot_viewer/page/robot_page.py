@@ -12,7 +12,7 @@ from html import escape
 import io
 import math
 import time
-from typing import Any, Protocol
+from typing import Any, Protocol, TypedDict
 
 from urdf_reader import KinematicTree, Transform
 from viser import (
@@ -121,6 +121,15 @@ GROUPS = {
     'Diagnose': (Icon.STETHOSCOPE, ''),
 }
 """Icons, and what an empty group says."""
+
+
+class Overlay(TypedDict):
+    """What the overlay alone shows of a robot."""
+
+    stop: str  # the stage of the STOP that counts: braking, stopped, failed, or empty
+    simulated: bool
+    program: str  # the name of one that moves it; empty for none
+    listens: str  # where robots are looked for, in words
 
 
 class Panel(Protocol):
@@ -279,15 +288,8 @@ class RobotPage:
         if self._jog is not None and self._jog.target is not None:
             self.live.end(self._jog.target.hold)
 
-    def show_state(
-        self, state: RobotState, positions: Mapping[str, float], more: Mapping[str, object]
-    ) -> None:
-        """Show how the robot is, and enable what may be done then.
-
-        ``more`` is shown by the overlay alone: ``stop`` (the stage of the STOP that counts:
-        braking, stopped, failed, or empty), ``simulated``, ``program`` (the name of one that moves
-        it) and ``listens`` (where robots are looked for).
-        """
+    def show_state(self, state: RobotState, positions: Mapping[str, float], more: Overlay) -> None:
+        """Show how the robot is, and enable what may be done then."""
         self.live.movable = state.movable
         if self.robot is not None:
             self.robot.mark(state.faulty)
