@@ -183,6 +183,7 @@ class Fault(Enum):
 
     HALT_IGNORED = _odd_drive('has no halt: bit 8 does nothing')
     QUICK_STOP_IGNORED = _odd_drive('has no quick stop: bit 2 does nothing')
+    QUICK_STOP_FINAL = _odd_drive('is not enabled from Quick stop active (no transition 16)')
     MODE_REQUIRED = _odd_drive('refuses Operation enabled without a mode')
     MODE_ZERO_REFUSED = _odd_drive('refuses mode 0 in 0x6060')
     MODE_HELD_UNDER_HALT = _odd_drive('ignores 0x6060 while it is halted')

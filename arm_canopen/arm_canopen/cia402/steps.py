@@ -24,7 +24,7 @@ from .modes import Mode, ProfilePosition
 from .motion import Refusal, RefusalCause
 from .parameters import quirks_of
 from .state import FAULTY
-from .stop import RESUME_TIMEOUT, STOP_TIMEOUT
+from .stop import REACTION_TIME, RESUME_TIMEOUT, STOP_TIMEOUT
 
 BUFFER_CLEAR = 6  # sub-index of 0x60C4 (CiA 402-2, clause 12)
 BUFFER_EMPTY, BUFFER_OPEN = 0, 1
@@ -97,6 +97,7 @@ class AxisSteps:
             timeout += axis.stop.ramp_time()
         try:
             if enabling:
+                await self._leave_quick_stop(timeout)
                 await self._select_where_required(timeout)
             axis.goal = goal
             slow = 'if it only takes longer: `quirks: slow_states` in bus.yml'
@@ -122,6 +123,25 @@ class AxisSteps:
             await self._preload(shown, 'is not enabled')
         if axis.failure:
             raise self.refused('is not enabled')
+
+    async def _leave_quick_stop(self, timeout: float) -> None:
+        """Lead out of Quick stop active: by transition 16, or by 12 where the drive lacks that.
+
+        ABB's FEPL-02 lacks it (its table of commands). One that still brakes keeps its power.
+        """
+        axis, view = self.axis, self.axis.view
+
+        def left() -> bool:
+            return view.state is not DriveState.QUICK_STOP_ACTIVE or self._is_hopeless()
+
+        with contextlib.suppress(TimeoutError):
+            await self._scheduler.until(lambda: left() or view.stands, timeout)
+        for goal in (DriveState.OPERATION_ENABLED, DriveState.SWITCH_ON_DISABLED):
+            if left() or not view.stands:
+                return
+            axis.goal = goal
+            with contextlib.suppress(TimeoutError):
+                await self._scheduler.until(left, REACTION_TIME)
 
     async def _select_where_required(self, timeout: float) -> None:
         """Select the mode of bus.yml for a drive that refuses Operation enabled without one.

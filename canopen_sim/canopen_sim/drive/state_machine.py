@@ -286,7 +286,7 @@ class StateMachine:
             case 4:
                 self._axis.power_on(self._objects.slow_down)
                 return self._enable(now)
-            case 16 if self.quick_stop_option.stays:
+            case 16 if self.quick_stop_option.stays and Fault.QUICK_STOP_FINAL not in self._causes:
                 return self._enable(now)
             case 16:
                 return False

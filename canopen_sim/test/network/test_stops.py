@@ -610,6 +610,21 @@ def test_a_quick_stop_at_rest_ends_where_its_option_says(option: int) -> None:
     assert net.drives[JOINT].view.state is net.simulated().state is state
 
 
+@pytest.mark.parametrize('verb', ['enable', 'init', 'recover'])
+def test_a_drive_that_quick_stop_ends_for_is_enabled_by_the_way_through_no_power(
+    verb: str,
+) -> None:
+    """Transition 16 is optional; without it 12 and 2 to 4 lead to Operation enabled."""
+    writes = (*MOTION_WRITES, sdo_write(0x605A, 0, 6))
+    net = booted(drive_config(JOINT, NODE_ID, sdo_writes=writes))
+    net.devices[JOINT].faults.inject(FaultInjection(Fault.QUICK_STOP_FINAL), net.now)
+    net.enable(OperationMode.PROFILE_POSITION)
+    net.do(JOINT, 'quick_stop', preempt=True)
+    assert net.simulated().state is DriveState.QUICK_STOP_ACTIVE
+    assert 'Operation enabled' in net.do(JOINT, verb)
+    assert net.simulated().state is DriveState.OPERATION_ENABLED
+
+
 def test_shutdown_of_a_drive_that_is_off_or_faulted_ends_at_once() -> None:
     """It is seen to stand without power, so nothing has to be waited for."""
     net = booted(drive_config(JOINT, NODE_ID))
