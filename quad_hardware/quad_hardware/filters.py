@@ -133,7 +133,6 @@ The line lags by half a period; the parabola does not, and makes more of the rou
 """
 ERROR_SHARE = 0.02  # weight of the newest report in the mean square of the error
 TROT_ERROR = 0.5  # [rad/s] rms, by bytes of protocol v1, 50 times a second or oftener, in a trot
-SAME_TIME = 1e-6  # [s] between positions that were measured at once
 NOMINAL_PERIOD = 0.02  # [s] from which on it grows with the period, to the power of 1.5
 
 
@@ -168,7 +167,7 @@ class JointRate:
     def update(self, time: float, positions: Mapping[str, float]) -> dict[str, float]:
         """Add positions [rad]; return velocities [rad/s] of the same joints."""
         elapsed, last = time - self._time, self._last
-        if elapsed <= SAME_TIME and last.keys() == positions.keys():
+        if elapsed <= 0.0 and last.keys() == positions.keys():
             return dict(self._rates)  # the same report
         self._time, self._last = time, dict(positions)
         if last.keys() != positions.keys() or not 0.0 < elapsed <= MAX_GAP:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""hardware_node and the simulated robot: it stands up in physics, in both protocols."""
+"""hardware_node and the simulated robot: it stands up in physics, in each protocol."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from contextlib import ExitStack
 import math
 from pathlib import Path
 
-from isolation import reserve
+from diagnostic_msgs.msg import DiagnosticStatus
+from isolation import Isolation, reserve
 from processes import executable, RunningProcess
 import pytest
 from std_msgs.msg import Float64
@@ -28,8 +29,10 @@ STAND = [pose_positions(Pose.STAND)[name] for name in NAMES]
 class XgoRig(Rig):
     """The node with the simulated robot, each a process."""
 
+    arguments: tuple[str, ...] = ()  # of the simulated robot
+
     def _add_robot(self, stack: ExitStack, port: Path) -> None:
-        xgo = [executable('quad_sim', 'fake_xgo'), '--link', str(port)]
+        xgo = [executable('quad_sim', 'fake_xgo'), '--link', str(port), *self.arguments]
         process = stack.enter_context(RunningProcess(xgo, self._env))
         process.wait_for(str(port))
 
@@ -84,3 +87,25 @@ def test_the_old_protocol_does_as_well(rig: XgoRig) -> None:
     errors = rig.client.listen(Float64, '/joint_velocity_error', LATCHED)
     rig.client.spin_until(lambda: bool(errors), TIMEOUT, 'the error of joint velocities')
     assert errors[-1].data >= 0.5
+
+
+class DeveloperRig(XgoRig):
+    """The same with a mini and the vendor's developer firmware."""
+
+    arguments = ('--protocol', 'developer', '--preset', 'mini')
+
+
+def test_the_developer_firmware_does_as_well(isolation: Isolation, tmp_path: Path) -> None:
+    """It is found by itself; what it does not measure is said, and what it measures seldom."""
+    with DeveloperRig(isolation, tmp_path / 'x', '-p', 'preset:=mini') as rig:
+        rig.stream(STAND, 1.2)
+        assert list(rig.receive('/joint_states', 3).position) == pytest.approx(STAND, abs=0.1)
+        imu = rig.receive('/imu')
+        assert imu.linear_acceleration_covariance[0] == -1.0
+        assert imu.angular_velocity_covariance[0] == pytest.approx(0.2**2)
+        link = rig.wait_for_status('serial link', DiagnosticStatus.OK, '')
+        values = {value.key: value.value for value in link.values}
+        assert (values['protocol'], values['firmware']) == ('developer', 'M developer')
+        errors = rig.client.listen(Float64, '/joint_velocity_error', LATCHED)
+        seldom = 1.2  # [rad/s] 26 times a second; the first few reports know no rate
+        rig.client.spin_until(lambda: bool(errors) and errors[-1].data > seldom, TIMEOUT, 'error')

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import itertools
+import math
 import os
 from pathlib import Path
 import pty
@@ -27,8 +28,10 @@ from quad_description import (
 from quad_hardware import LinkError, NoAnswerError
 from quad_hardware.backend import recorded_in, SerialBackend
 from quad_hardware.doctor.main import check_port
+from quad_hardware.estimation import Estimator, EstimatorSettings
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.link import Driver, LinkOptions, LinkState
+from quad_hardware.link.dialects import DeveloperDialect
 from quad_hardware.link.open import open_session
 from quad_hardware.protocol import DEVELOPER, Frame, Kind, LEG_MOTORS, PROTOCOLS, Register, V1
 from quad_hardware.report import Report
@@ -95,6 +98,27 @@ def test_servos_are_measured_26_times_a_second() -> None:
         motors += [frame.payload[12:24] for frame in robot.run(PERIOD)]
     changes = sum(before != after for before, after in itertools.pairwise(motors))
     assert 23 <= changes <= 27
+
+
+def test_joint_velocities_are_of_what_was_measured_anew() -> None:
+    """Joints that turn evenly have an even velocity, though half of the pushes repeat them."""
+    robot = VirtualRobot(*ARGUMENTS, '--physics', 'none', protocol=DEVELOPER)
+    urdf = robot_urdf('mini')
+    servos = JointMap(map(servo_of, movable_joints(urdf)))
+    estimator, dialect = Estimator(urdf, servos, EstimatorSettings()), DeveloperDialect(0.0)
+    thigh, found = servos.names.index('fl_thigh_joint'), []
+    robot.send(Frame(Kind.WRITE, Register.MOTORS, bytes(12)))
+    robot.run(1.0)
+    for byte in range(60):
+        robot.send(Frame(Kind.WRITE, Register.MOTORS, bytes((4 * byte,)) * 12))
+        for frame in robot.run(PERIOD):
+            report = dialect.handle_frame(frame, robot.now)
+            assert report is not None
+            state = estimator.step(report)
+            assert state is not None
+            found.append((joints(state).velocities or ())[thigh])
+    speed = math.radians(4 * (93 + 66) / 255) / PERIOD
+    assert found[20:55] == pytest.approx([speed] * 35, rel=0.35)
 
 
 @pytest.fixture
