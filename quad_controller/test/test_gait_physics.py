@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import islice
 import math
+import operator
 from random import Random
 
 import pytest
@@ -17,15 +18,18 @@ from quad_builds import go2_urdf
 from quad_controller import (
     BodyPose,
     Controller,
+    find_policy,
     GaitGenerator,
     GaitParameters,
+    load_policy,
     ParameterError,
+    PolicyOptions,
     ServoModel,
     StateParameters,
     Velocity,
 )
 from quad_controller.gait.parameters import AS_TUNED, LOW_AND_WIDE
-from quad_description import quadruped, robot_urdf, RobotState, Targets
+from quad_description import OdometryState, quadruped, robot_urdf, RobotState, Targets
 from quad_description.rotations import about_z, multiply, roll_pitch_yaw
 from quad_gait_rig import FIRM, firm, MODEL, PERIOD, PhysicsRig
 from quad_hardware.estimation import (
@@ -301,26 +305,34 @@ def test_the_gait_keeps_its_speed_on_servos_of_any_stiffness(
 
 
 @pytest.mark.parametrize('velocity', [Velocity(0.2), Velocity(-0.15), Velocity(0.0, 0.1)])
-def test_odometry_follows_the_gait_on_the_nominal_servos(velocity: Velocity) -> None:
-    """Within 10 % of the way, by noisy joints and the targets that were sent."""
-    rig, random = PhysicsRig(), Random(1)
+@pytest.mark.parametrize(('mode', 'rightly'), [('walk', 0.9), ('policy', 0.68)])
+def test_odometry_follows_gait_and_policy(mode: str, rightly: float, velocity: Velocity) -> None:
+    """Within 10 % of the way, by noisy joints; a policy lifts its feet by 2 mm."""
+    policy, random = None, Random(1)
+    if mode == 'policy':
+        stand = GaitGenerator(MODEL, FIRM).stand_targets
+        policy = load_policy(find_policy('trot_ppo'), MODEL, stand, PolicyOptions(), PERIOD).runner
+    rig = PhysicsRig(firm(), FIRM, policy) if policy else PhysicsRig()
     odometry = LegOdometry(OdometrySettings(), MODEL.foot_radius)
 
-    def go(duration: float) -> tuple[float, float]:
-        for _ in range(round(duration / 0.02)):
+    def go(duration: float) -> tuple[OdometryState, float]:
+        right, steps = 0, round(duration / PERIOD)
+        for _ in range(steps):
             joints = [q + random.gauss(0.0, 0.0017) for q in rig.robot.joint_positions]
             feet, attitude = MODEL.foot_poses(joints), rig.robot.base_pose.orientation
             state = odometry.update(rig.robot.time, feet, attitude)
-            sent_at = rig.robot.time
-            odometry.command(sent_at, MODEL.feet(rig.step(velocity)))
-        return state.x, state.y
+            right += sum(map(operator.eq, state.standing, rig.robot.foot_contacts))
+            rig.step(velocity)
+        return state, right / (len(feet) * steps)
 
-    rig.mode('walk')
-    begun, start = go(3.0), rig.robot.base_pose.position
-    ended, end = go(5.0), rig.robot.base_pose.position
-    went = end[0] - start[0], end[1] - start[1]
-    found = ended[0] - begun[0], ended[1] - begun[1]
+    rig.mode(mode)
+    (begun, _), start = go(3.0), rig.robot.base_pose
+    (ended, right), end = go(5.0), rig.robot.base_pose
+    found = ended.x - begun.x, ended.y - begun.y
+    went = end.position[0] - start.position[0], end.position[1] - start.position[1]
+    assert math.hypot(*went) > 0.3
     assert math.dist(found, went) < 0.1 * math.hypot(*went)
+    assert right > rightly
 
 
 def yawed_imu(mounting: ImuMounting, state: RobotState) -> RobotState:

@@ -50,7 +50,6 @@ from .presets import (
 )
 from .state import (
     Backend,
-    ContactSource,
     EMPTY_BATTERY,
     ImuSample,
     JointSample,
@@ -69,7 +68,6 @@ __all__ = [
     'PRESETS',
     'STREAM_TIMEOUT',
     'Backend',
-    'ContactSource',
     'DescriptionError',
     'Feet',
     'FootPose',

@@ -10,7 +10,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import Enum
 import math
 from typing import TYPE_CHECKING
 
@@ -111,13 +110,6 @@ class ImuSample:
         return tilt_of(normalized(self.orientation))
 
 
-class ContactSource(Enum):
-    """How it is known which feet stand."""
-
-    COMMANDED_HEIGHT = 'commanded_height'  # where they were sent lowest, a servo's lag ago
-    MEASURED_HEIGHT = 'measured_height'  # lowest by joints and attitude: there are no commands
-
-
 @dataclass(frozen=True, slots=True)
 class OdometryState:
     """Where the body is, in the frame in which it began."""
@@ -131,7 +123,6 @@ class OdometryState:
     distance: float  # way so far [m]
     # feet that are taken to stand, in the order of :data:`.FEET`
     standing: tuple[bool, ...]
-    contact_source: ContactSource  # how that is known
     position_variance: float = 0.0  # of x and y [m²]; grows with the way and with each gap
     yaw_variance: float = 0.0  # [rad²]; grows with time
 

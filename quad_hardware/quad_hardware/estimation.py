@@ -6,16 +6,16 @@ How the IMU sits on the body turns what it reports into base_link. What the robo
 is derived: rates, the way, which feet stand, the height.
 
 Heading is from the attitude; where the body has walked to, from the legs that stand. There are no
-contact switches. A foot is taken to stand where its *commanded* height was the lowest, a servo's
-lag ago; without commands, where its measured height is. Heights are those above the ground that
-the feet were sent to, which may slope. The body moves opposite to the feet that stood at both ends
-of a period; without any the last velocity is held. The feet are balls that roll on the ground
-while the leg swings over them: their centres go a little way along, which is more than a tenth of
-the way (radius over height of the hip).
+contact switches. A foot is taken to stand, more or less surely, the nearer it is to the ground and
+the more the body goes over it as it goes on the whole: a foot that swings goes the other way. The
+ground is the plane of the places where the feet were lowest lately, which may slope. The feet are
+balls that roll on the ground while the leg swings over them: their centres go a little way along,
+which is more than a tenth of the way (radius over height of the hip).
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -23,7 +23,6 @@ import math
 from operator import itemgetter
 
 from quad_description import (
-    ContactSource,
     DescriptionError,
     FootPose,
     ImuSample,
@@ -97,11 +96,10 @@ def _signed(signs: Vector, values: Vector) -> Vector:
     return x, y, z
 
 
-Flags = tuple[bool, ...]
-
 MAX_GAP = 0.2  # [s] more than that cannot be bridged: the body may have been carried
-KEPT_COMMANDS = 32
 GROUND_TIME = 1.0  # [s] in which every foot stands, whatever the gait
+CREEP = 0.02  # [m/s] of a body whose feet hardly leave the ground; noise is slower
+SLIP = 0.07  # [m/s] a foot over which the body goes so much otherwise counts a quarter
 MIN_DEVIATION = 0.01  # [m] of the position, however short the way was
 DRIFT = 0.07  # share of the way that is the standard deviation of the position
 GAP_SPEED = 0.3  # [m/s] at which a robot that is not seen may have gone on
@@ -119,13 +117,8 @@ SCALES = (0.1, 10.0)
 class OdometrySettings:
     """How the legs are read."""
 
-    # 0.02 until servos have their commands, 0.04 until they have followed
-    delay: float = setting(0.06, 0.0, 0.3, 'lag of servos [s]')
-    # above the lowest foot
-    tolerance: float = setting(0.002, 0.0, 0.05, 'height of a foot down [m]')
-    margin: float = setting(0.02, 0.0, 0.1, 'around a swing, not counted [s]')
+    tolerance: float = setting(0.002, 0.0005, 0.05, 'height of a foot down [m]')
     cutoff: float = 5.0  # of the low-pass of the velocity that is published [Hz]
-    command_age: float = 0.3  # commands older than that are not looked at [s]
     scale_x: float = setting(1.0, *SCALES, 'factor of the way forward')
     scale_y: float = setting(1.0, *SCALES, 'factor of the way sideways')
 
@@ -143,10 +136,10 @@ class LegOdometry:
         """
         self._settings, self._lying_height = settings, lying_height
         self._radius = foot_radius
-        # replaced as a whole: commands come from another thread than measurements
-        self._commands: tuple[tuple[float, Sequence[Vector]], ...] = ()
-        self._ground: Vector | None = None  # its normal in the body, where that is known
-        self._last: tuple[float, Sequence[FootPose], Flags] | None = None
+        # where the feet were lately [s], [m], in the body turned level
+        self._lately: deque[tuple[float, list[Vector]]] = deque()
+        # when, where and how surely the feet stood
+        self._last: tuple[float, Sequence[FootPose], Sequence[float]] | None = None
         self._yaw0: float | None = None
         self._heading = 0.0  # [rad] of the last update
         self._keeps_heading = False
@@ -155,17 +148,6 @@ class LegOdometry:
         self._began_at: float | None = None
         self._fallen = False
         self._stepped_at = -math.inf  # when a foot was last in the air [s]
-
-    def command(self, time: float, feet: Sequence[Vector]) -> None:
-        """Note where the feet were sent.
-
-        Args:
-            time: When [s].
-            feet: Their centres in base_link [m].
-        """
-        self._commands = (*self._commands, (time, feet))[-KEPT_COMMANDS:]
-        lately = [places for t, places in self._commands if time - t <= GROUND_TIME]
-        self._ground = ground_normal(lately, self._settings.tolerance)
 
     def keep_heading(self) -> None:
         """Go on with the last heading: the next attitude counts its yaw from elsewhere."""
@@ -183,15 +165,18 @@ class LegOdometry:
             self._keeps_heading = False
         self._heading = yaw - self._yaw0
         rotation = multiply(about_z(-self._yaw0), attitude)
-        standing, source = self._standing(time, feet, rotation)
-        if self._began_at is None:
-            self._began_at = time
-        if not all(standing):
-            self._stepped_at = time
         turned = [
             FootPose(rotate(rotation, foot.position), multiply(rotation, foot.rotation))
             for foot in feet
         ]
+        heights = self._above_ground(time, [foot.position for foot in turned])
+        tolerance = self._settings.tolerance
+        standing = tuple(height <= tolerance for height in heights)
+        weights = [math.exp(-0.5 * (height / tolerance) ** 2) for height in heights]
+        if self._began_at is None:
+            self._began_at = time
+        if not all(standing):
+            self._stepped_at = time
         height = self._height(turned, standing)
         fallen = tilt_of(rotation) > MAX_TILT
         if fallen and not self._fallen:
@@ -203,8 +188,8 @@ class LegOdometry:
         if fallen or height <= self._lying_height or not 0.0 < elapsed <= MAX_GAP:
             self._held = self._smooth = REST  # the feet may move, and carry nothing
         else:
-            self._integrate(time, elapsed, turned, standing)
-        self._last = time, turned, standing
+            self._integrate(time, elapsed, turned, weights)
+        self._last = time, turned, weights
         return OdometryState(
             *self._place,
             height,
@@ -212,60 +197,54 @@ class LegOdometry:
             *self._smooth,
             self._distance,
             standing,
-            source,
             MIN_DEVIATION**2 + (DRIFT * self._distance) ** 2 + self._gaps,
             (YAW_DRIFT * (time - self._began_at)) ** 2,
         )
 
-    def _standing(
-        self, time: float, feet: Sequence[FootPose], rotation: Quaternion
-    ) -> tuple[Flags, ContactSource]:
-        source = ContactSource.COMMANDED_HEIGHT
-        settings, commands, ground = self._settings, self._commands, self._ground
-        at = time - settings.delay
-        recent = [places for t, places in commands if abs(t - at) <= settings.margin]
-        if not recent:
-            recent = [p for t, p in commands if at - settings.command_age <= t <= at][-1:]
-        if not recent:
-            recent, ground = [[foot.position for foot in feet]], None
-            source = ContactSource.MEASURED_HEIGHT
-        x, y, z = ground or rotate(conjugate(rotation), (0.0, 0.0, 1.0))
-        standing = (True,) * len(feet)
-        for places in recent:
-            heights = [x * px + y * py + z * pz for px, py, pz in places]
-            highest = min(heights) + settings.tolerance
-            standing = tuple(
-                stands and height <= highest
-                for stands, height in zip(standing, heights, strict=True)
-            )
-        return standing, source
+    def _above_ground(self, time: float, places: list[Vector]) -> list[float]:
+        """Return how high the feet are above the lowest of them, on ground that may slope [m]."""
+        lately = self._lately
+        lately.append((time, places))
+        while time - lately[0][0] > GROUND_TIME:
+            lately.popleft()
+        normal = ground_normal([each for _, each in lately], self._settings.tolerance)
+        x, y, z = normal or (0.0, 0.0, 1.0)
+        heights = [x * px + y * py + z * pz for px, py, pz in places]
+        lowest = min(heights)
+        return [height - lowest for height in heights]
 
     def _integrate(
-        self, time: float, elapsed: float, feet: Sequence[FootPose], standing: Flags
+        self, time: float, elapsed: float, feet: Sequence[FootPose], weights: Sequence[float]
     ) -> None:
         if self._last is None:
             return
-        _, last_feet, stood = self._last
+        _, last_feet, weighed = self._last
         cosine, sine = math.cos(self._heading), math.sin(self._heading)
-        pairs = zip(last_feet, feet, standing, stood, strict=True)
-        ways = [self._way(last, foot) for last, foot, *both in pairs if all(both)]
-        if ways:
-            x, y = (sum(way) / len(ways) / elapsed for way in zip(*ways, strict=True))
-            self._held = (
-                (cosine * x + sine * y) * self._settings.scale_x,
-                (cosine * y - sine * x) * self._settings.scale_y,
-            )
+        settings, (smooth_x, smooth_y) = self._settings, self._smooth
+        total = sum_x = sum_y = 0.0
+        for last, foot, *pair in zip(last_feet, feet, weighed, weights, strict=True):
+            x, y = self._way(last, foot)
+            ahead = settings.scale_x * (cosine * x + sine * y) / elapsed
+            left = settings.scale_y * (cosine * y - sine * x) / elapsed
+            slip = ((ahead - smooth_x) ** 2 + (left - smooth_y) ** 2) / SLIP**2
+            weight = min(pair) / (1.0 + slip) ** 2
+            total, sum_x, sum_y = total + weight, sum_x + weight * ahead, sum_y + weight * left
+        if total > 0.0:
+            self._held = sum_x / total, sum_y / total
         ahead, left = self._held[0] * elapsed, self._held[1] * elapsed
         self._place = (
             self._place[0] + cosine * ahead - sine * left,
             self._place[1] + sine * ahead + cosine * left,
         )
+        share = low_pass_share(settings.cutoff, elapsed)
+        held_x, held_y = self._held
+        self._smooth = (
+            smooth_x + share * (held_x - smooth_x),
+            smooth_y + share * (held_y - smooth_y),
+        )
         # a body over feet that stay comes back: it goes nowhere, and noise is no way
-        if time - self._stepped_at <= GROUND_TIME:
+        if time - self._stepped_at <= GROUND_TIME or math.hypot(*self._smooth) > CREEP:
             self._distance += math.hypot(ahead, left)
-        share = low_pass_share(self._settings.cutoff, elapsed)
-        (x, y), (held_x, held_y) = self._smooth, self._held
-        self._smooth = x + share * (held_x - x), y + share * (held_y - y)
 
     def _way(self, before: FootPose, after: FootPose) -> tuple[float, float]:
         """Return how far the body has gone over a foot that stands [m]."""
@@ -277,22 +256,22 @@ class LegOdometry:
             -rolled * x - after.position[1] + before.position[1],
         )
 
-    def _height(self, feet: Sequence[FootPose], standing: Flags) -> float:
+    def _height(self, feet: Sequence[FootPose], standing: Sequence[bool]) -> float:
         heights = [foot.position[2] for foot, stands in zip(feet, standing, strict=True) if stands]
         heights = heights or [foot.position[2] for foot in feet]
         return self._radius - sum(heights) / len(heights)
 
 
-def ground_normal(commands: Sequence[Sequence[Vector]], tolerance: float) -> Vector | None:
-    """Return the unit normal of the ground in the body, from where the feet were sent lately.
+def ground_normal(lately: Sequence[Sequence[Vector]], tolerance: float) -> Vector | None:
+    """Return the unit normal of the ground, from where the feet were lately.
 
     None when their lowest places are not in a plane: a foot was in the air all the time.
 
     Args:
-        commands: Feet in base_link, in the order of the legs [m]; one at least.
+        lately: Feet, in the order of the legs [m]; once at least.
         tolerance: How far from a plane they may be [m].
     """
-    fl, fr, bl, br = (min(places, key=_Z) for places in zip(*commands, strict=True))
+    fl, fr, bl, br = (min(places, key=_Z) for places in zip(*lately, strict=True))
     # across both diagonals
     ax, ay, az = fl[0] - br[0], fl[1] - br[1], fl[2] - br[2]
     bx, by, bz = fr[0] - bl[0], fr[1] - bl[1], fr[2] - bl[2]
@@ -361,15 +340,9 @@ class Estimator:
         lying = 0.0 if folded is None else LYING_MARGIN + radius - min(z for *_, z in folded)
         self._odometry = LegOdometry(settings.odometry, radius, lying)
 
-    def command(self, time: float, targets: Sequence[float]) -> None:
-        """Note what was sent to the legs: it shows which feet stand and which swing.
-
-        Args:
-            time: When, on the monotonic clock [s].
-            targets: Positions of the first joints, in their order [rad].
-        """
+    def command(self, targets: Sequence[float]) -> None:
+        """Note where the first joints were sent, in their order [rad]; some are not measured."""
         self._sent = {**self._sent, **dict(zip(self._joints.names, targets, strict=False))}
-        self._odometry.command(time, self._robot.feet(targets))
 
     def raised_feet(self, targets: Sequence[float]) -> tuple[str, ...]:
         """Return the feet that are in the air at targets of the first joints [rad]."""

@@ -189,7 +189,7 @@ class SerialRobot(ObservedRobot):
             self._warn('the developer firmware moves no arm: its joints stay as they are')
         command = self._commander.take(positions, self._place(now), now)
         if command is not None:
-            self._estimator.command(now, command.targets)
+            self._estimator.command(command.targets)
         return command is not None
 
     def refuse(self, error: CommandError) -> None:
@@ -221,7 +221,7 @@ class SerialRobot(ObservedRobot):
         now = time.monotonic()
         command = self._commander.go_down(self._place(now), now)
         if command is not None:
-            self._estimator.command(now, command.targets)
+            self._estimator.command(command.targets)
 
     @property
     def goes_down(self) -> bool:

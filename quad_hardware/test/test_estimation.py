@@ -472,9 +472,9 @@ def test_a_joint_that_is_not_reported_is_where_it_was_sent() -> None:
     joints = JointMap(map(servo_of, movable_joints(urdf)))
     estimator = Estimator(urdf, joints, EstimatorSettings())
     targets = [0.01 * place for place in range(len(joints.names))]
-    estimator.command(0.0, targets[:12])
-    estimator.command(0.0, targets)
-    estimator.command(0.0, [0.0] * 12)
+    estimator.command(targets[:12])
+    estimator.command(targets)
+    estimator.command([0.0] * 12)
     state = estimator.step(STATE)
     assert state is not None
     assert state.joints is not None

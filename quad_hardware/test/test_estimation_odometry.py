@@ -7,14 +7,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 import math
 import random
-import threading
 
 import numpy as np
 from numpy.typing import NDArray
 import pytest
 
 from quad_description import (
-    ContactSource,
     FootPose,
     movable_joints,
     OdometryState,
@@ -64,9 +62,7 @@ def stand(
 def test_ten_minutes_of_standing_make_the_place_no_less_sure() -> None:
     """Noise is no way; the heading drifts meanwhile."""
     odometry = LegOdometry(OdometrySettings(), 0.01)
-    feet = ROBOT.feet([0.0] * 12)
     for second in range(600):
-        odometry.command(float(second), feet)
         state = stand(odometry, second, second + 1.0)
     assert math.sqrt(state.position_variance) < 0.02
     assert math.radians(1.0) < math.sqrt(state.yaw_variance) < math.radians(20.0)
@@ -134,7 +130,6 @@ def test_both_feet_of_a_diagonal_stand_on_a_slope(degrees: float) -> None:
             (x, y, -0.1 + 0.02 * (leg in lifted))
             for leg, (x, y) in enumerate(((0.1, 0.1), (0.1, -0.1), (-0.1, 0.1), (-0.1, -0.1)))
         ]
-        odometry.command(tick * PERIOD, feet)
         attitude = from_rpy(0.0, pitched, 0.0)
         poses = [FootPose(foot, IDENTITY) for foot in feet]
         state = odometry.update(tick * PERIOD, poses, attitude)
@@ -150,39 +145,16 @@ def test_a_foot_that_is_held_up_does_not_tilt_the_ground() -> None:
     odometry = LegOdometry(OdometrySettings(), 0.0)
     feet = ((0.1, 0.1, -0.05), *flat[1:])
     for tick in range(60):
-        odometry.command(tick * PERIOD, feet)
         poses = [FootPose(foot, IDENTITY) for foot in feet]
         state = odometry.update(tick * PERIOD, poses, IDENTITY)
     assert state.standing == (False, True, True, True)
-
-
-def test_commands_may_come_from_another_thread() -> None:
-    """Any number of them while a measurement is taken."""
-    odometry, feet = LegOdometry(OdometrySettings(), 0.01), ROBOT.foot_poses([0.0] * 12)
-    centres = [foot.position for foot in feet]
-    stop = threading.Event()
-
-    def send() -> None:
-        time = 0.0
-        while not stop.is_set():
-            time += 1e-4
-            odometry.command(time, centres)
-
-    sender = threading.Thread(target=send)
-    sender.start()
-    try:
-        for tick in range(2000):
-            odometry.update(tick * PERIOD, feet, IDENTITY)
-    finally:
-        stop.set()
-        sender.join()
 
 
 def test_a_gap_is_no_way() -> None:
     """A robot that was carried to another stance while it was silent has not walked."""
     odometry = LegOdometry(OdometrySettings(), 0.01)
     state = odometry.update(0.0, ROBOT.foot_poses([0.0] * 12), IDENTITY)
-    assert (state.standing, state.contact_source) == ((True,) * 4, ContactSource.MEASURED_HEIGHT)
+    assert state.standing == (True,) * 4
     state = odometry.update(2.0, ROBOT.foot_poses([0.2] * 12), IDENTITY)
     assert (state.x, state.y, state.velocity_x) == (0.0, 0.0, 0.0)
 

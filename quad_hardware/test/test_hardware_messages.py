@@ -23,8 +23,6 @@ from tf2_msgs.msg import TFMessage
 
 from message_templates import MessageTemplate, SerializedTemplate
 from quad_description import (
-    ContactSource,
-    FEET,
     ImuSample,
     JointSample,
     movable_joints,
@@ -50,14 +48,12 @@ from quad_hardware.nodes.diagnostics import command_diagnostic, LinkDiagnostic, 
 from quad_hardware.nodes.parameters import Deviations, FootprintMode, Frames
 from quad_hardware.protocol import Fault, LEG_MOTORS, ParserCounters
 from quad_hardware.report import Report
-from quad_msgs.msg import FootContacts
 
 STAMP = Time(sec=1)
 FRAMES = Frames()
 PARENT = replace(FRAMES, footprint_mode=FootprintMode.PARENT)
 DEVIATIONS = Deviations(angular_velocity_stddev=0.15)
-COMMANDED = ContactSource.COMMANDED_HEIGHT
-PLACE = OdometryState(1.0, 2.0, 0.11, IDENTITY, 0.2, 0.05, 3.0, (True,) * 4, COMMANDED)
+PLACE = OdometryState(1.0, 2.0, 0.11, IDENTITY, 0.2, 0.05, 3.0, (True,) * 4)
 IMU = ImuSample(IDENTITY, (0.1, 0.2, 0.3), (0.0, 0.0, 9.8), rate_differentiated=True)
 ROTATIONS = st.builds(from_rpy, *[st.floats(-1.2, 1.2)] * 3)
 
@@ -218,15 +214,6 @@ def test_every_form_takes_its_numbers(
         deserialize_message(SerializedTemplate(template).fill(time, numbers), type(message))
         == message
     )
-
-
-@pytest.mark.parametrize('source', ContactSource)
-def test_each_source_of_contacts_is_one_of_the_message(source: ContactSource) -> None:
-    """By the name of its constant; those who subscribe compare with that."""
-    assert getattr(FootContacts, source.name) == source.value
-    template, numbers = robot_topics.foot_contacts(replace(PLACE, contact_source=source))
-    message = template.message(STAMP, numbers)
-    assert (message.source, list(message.name)) == (source.value, list(FEET))
 
 
 def test_an_unknown_charge_is_nan() -> None:

@@ -63,7 +63,7 @@ def walk(
         feet that were right.
     """
     robot, rng = Robot(URDF, ServoModel.FIRM, terrain), random.Random(1)
-    odometry = LegOdometry(OdometrySettings(delay=0.04), ROBOT.foot_radius)
+    odometry = LegOdometry(OdometrySettings(), ROBOT.foot_radius)
     standing = [STAND[name] for name in NAMES]
     neutral = np.array(ROBOT.feet(standing))
     neutral[:, 0] = [0.025, 0.025, -0.125, -0.125]
@@ -82,7 +82,6 @@ def walk(
         speed = velocity[0] * ramp, velocity[1] * ramp
         feet = trot(time / GAIT_PERIOD, speed, neutral).tolist()
         robot.set_targets(ROBOT.place(ROBOT.solve(feet), standing))
-        odometry.command(time, feet)
         robot.step(PERIOD)
     assert state is not None
     x, y, _ = np.array(robot.base_pose.position) - start

@@ -69,7 +69,7 @@ def test_it_stands_up(rig: XgoRig) -> None:
         to_base.transform.translation.z, abs=1e-6
     )
     for topic, source in (
-        ('/foot_contacts', FootContacts.COMMANDED_HEIGHT),
+        ('/foot_contacts', FootContacts.MEASURED_HEIGHT),
         ('/fake_xgo/foot_contacts', FootContacts.PHYSICS),
     ):
         contacts = rig.receive(topic)

@@ -104,7 +104,7 @@ def test_contacts_say_how_they_are_known() -> None:
     def text(feet: Collection[str], centre: Vector | None, source: str = 'physics') -> str:
         return Contacts(frozenset(feet), source).html(support(places, feet, LEVEL, centre))
 
-    stands = text(two, (0.0, 0.0, 0.0), 'commanded_height')
+    stands = text(two, (0.0, 0.0, 0.0), 'measured_height')
     assert 'feet on the ground: fl, rr<' in stands
     assert 'nothing senses it' in stands
     assert 'no support polygon' in stands
@@ -218,7 +218,7 @@ class Dog(ViewerRig):
         if self.sends_contacts:
             names = [f'{leg}_foot' for leg in LEGS]
             contact = [False, True, True, True]
-            source = FootContacts.COMMANDED_HEIGHT
+            source = FootContacts.MEASURED_HEIGHT
             self._contacts.publish(FootContacts(name=names, contact=contact, source=source))
 
 

@@ -134,14 +134,13 @@ def _odometry(
 
 
 def foot_contacts(state: OdometryState) -> tuple[MessageTemplate, Numbers]:
-    """Return which feet are taken to stand, and how that is known."""
-    return MessageTemplate(_foot_contacts, 0, (state.contact_source.value, *state.standing)), ()
+    """Return which feet are taken to stand."""
+    return MessageTemplate(_foot_contacts, 0, state.standing), ()
 
 
-def _foot_contacts(stamp: Time, _numbers: Numbers, source: str, *contacts: bool) -> FootContacts:
-    return FootContacts(
-        header=Header(stamp=stamp), name=list(FEET), contact=list(contacts), source=source
-    )
+def _foot_contacts(stamp: Time, _numbers: Numbers, *contacts: bool) -> FootContacts:
+    source, header = FootContacts.MEASURED_HEIGHT, Header(stamp=stamp)
+    return FootContacts(header=header, name=list(FEET), contact=list(contacts), source=source)
 
 
 def transforms(state: OdometryState, frames: Frames) -> tuple[MessageTemplate, Numbers]:

@@ -270,7 +270,6 @@ class Body:
 
 
 SOURCES: Mapping[str, str] = {
-    'commanded_height': 'estimated by where they were sent; nothing senses it',
     'measured_height': 'estimated by joints and attitude; nothing senses it',
     'physics': 'true: the simulation knows',
 }
