@@ -400,7 +400,8 @@ class Axis:
         if self.resetting and state is DriveState.FAULT:
             if self._reset_began is None:
                 self._reset_began = self._scheduler.now
-            return Command(fault_reset(state, self._scheduler.now - self._reset_began))
+            elapsed = self._scheduler.now - self._reset_began
+            return Command(fault_reset(state, elapsed, self.period))
         self._reset_began = None
         goal = self.goal if self.stop.goal is None else self.stop.goal
         return Command.DISABLE_VOLTAGE if goal is None else next_command(state, goal)

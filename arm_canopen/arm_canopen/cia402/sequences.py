@@ -171,7 +171,9 @@ class StopCommands:
 
 
 EDGE_CYCLES = 3  # of SYNC in which a drive sees bit 4 cleared
-HOMING_START = 0.1  # [s] after which a drive has overwritten the homing bits of the last time
+HOMING_START, START_CYCLES = 0.1, 6
+"""Time in [s], and cycles of SYNC, after which a drive has overwritten the homing bits of the
+last time: with a slow SYNC it gets its start later."""
 
 
 class HomingProgress(Enum):
@@ -247,7 +249,7 @@ async def _run(steps: AxisSteps, homing: Homing, what: str) -> None:
     await steps.pause(EDGE_CYCLES * axis.period)
     homing.started = True
     try:
-        await steps.pause(HOMING_START)
+        await steps.pause(max(HOMING_START, START_CYCLES * axis.period))
         since = steps.now
         await steps.until(
             lambda: is_cut() or is_over(),

@@ -17,7 +17,7 @@ from ..master.process_image import SentRpdo
 from ..master.remote_node import RemoteNode
 
 _S = DriveState
-RESET_PULSE = 0.05  # [s] for which bit 7 of a fault reset is set, and then cleared
+RESET_PULSE = 0.05  # [s] for which bit 7 of a fault reset is set at least, and then cleared
 
 
 class Command(IntEnum):
@@ -81,13 +81,14 @@ def next_command(state: DriveState, target: DriveState) -> Command:
     return _COMMANDS.get((state, target), Command.DISABLE_VOLTAGE)
 
 
-def fault_reset(state: DriveState, elapsed: float) -> int:
+def fault_reset(state: DriveState, elapsed: float, period: float = 0.0) -> int:
     """Return the controlword that resets a fault by its rising edge, again and again.
 
-    Each level lasts long enough for a drive that looks at the controlword less often than the
-    master sends it; ``elapsed`` is the time since the first in [s].
+    Each level lasts for two SYNC of a ``period`` in [s], and long enough for a drive that looks
+    at the controlword less often; ``elapsed`` is the time since the first in [s].
     """
-    if state is not DriveState.FAULT or int(elapsed / RESET_PULSE) % 2:
+    pulse = max(RESET_PULSE, 2.0 * period)
+    if state is not DriveState.FAULT or int(elapsed / pulse) % 2:
         return Command.DISABLE_VOLTAGE
     return Command.FAULT_RESET
 

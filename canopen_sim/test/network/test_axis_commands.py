@@ -153,6 +153,31 @@ def test_home_is_a_command_of_its_own() -> None:
     assert net.drives[JOINT].view.position == pytest.approx(0.2, abs=1e-3)
 
 
+SLOW_SYNC = pytest.mark.parametrize('period', [0.05, 0.1, 0.2])
+
+
+@SLOW_SYNC
+def test_the_bits_of_the_last_homing_end_no_other(period: float) -> None:
+    """With a slow SYNC the drive gets its start, and takes them back, later."""
+    fast = (*MOTION_WRITES, sdo_write(0x6099, 1, 2_000), sdo_write(0x6099, 2, 1_000))
+    net = booted(full_drive(sdo_writes=fast), sync_period=period, cycle_period=period)
+    net.enable(OperationMode.PROFILE_POSITION)
+    for _ in range(2):
+        assert 'homed by method 17' in net.result(net.home(17), 60.0)
+        assert net.motor() == pytest.approx(0.05, abs=0.01)
+        net.target(0.5)
+        net.run(3.0)
+
+
+@SLOW_SYNC
+def test_a_fault_that_lasts_is_reset_by_a_later_edge(period: float) -> None:
+    """Bit 7 falls and rises again, however slow SYNC is."""
+    net = booted(full_drive(), sync_period=period, cycle_period=period)
+    net.devices[JOINT].faults.inject(FaultInjection(Fault.ENCODER_LOSS, duration=1.5), net.now)
+    net.run(1.0)
+    assert 'Operation enabled' in net.do(JOINT, 'recover')
+
+
 def test_a_homing_method_that_fails_says_so() -> None:
     """A method that the drive does not have, and one that ends in a homing error."""
     net = with_modes()
