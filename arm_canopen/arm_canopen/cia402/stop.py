@@ -27,7 +27,7 @@ from canopen_core.standard import (
 from ..master.events import Severity
 from ..master.scheduler import completed, Promise, Scheduler, Task
 from .modes import Mode, NO_BITS, ProfilePosition
-from .state import AxisState
+from .state import AxisState, WINDOW
 from .state_machine import Command, ControlwordOutput
 
 HALT_BIT = int(Controlword.HALT)
@@ -246,6 +246,11 @@ class StopSequence:
         return min(RAMP_MAX, self._view.speed / self._deceleration)
 
     @property
+    def _elapsed(self) -> float:
+        """Time since the present step began in [s]."""
+        return self._scheduler.now - self._began
+
+    @property
     def _deceleration(self) -> float:
         parameters = self._view.parameters
         return min(parameters.quick_stop_deceleration, parameters.profile.deceleration)
@@ -311,7 +316,8 @@ class StopSequence:
             with view.looking():
                 await self._lead(
                     DriveState.QUICK_STOP_ACTIVE,
-                    lambda: self.disabled or self.rests,
+                    # a motor that has only begun to follow its target still seems to stand
+                    lambda: self.disabled or (self.rests and self._elapsed > WINDOW),
                     STOP_TIMEOUT + RAMP_MAX,
                 )
                 braked = not self._gives_up()
@@ -368,7 +374,7 @@ class StopSequence:
             return now > self._unseen_after
         self._note_sight()
         idle = view.stands and view.shown_state in MAY_MOVE
-        if idle and now - self._began > STOP_TIMEOUT:
+        if idle and self._elapsed > STOP_TIMEOUT:
             return True
         return self._braking.fails(now, view, self._deceleration)
 

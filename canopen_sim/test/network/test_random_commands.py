@@ -98,7 +98,13 @@ FAULTS = (
     *(MASTER_UNHEARD, BUS_DOWN),
 )
 DEVIATIONS = (
-    *(Fault.HALT_IGNORED, Fault.QUICK_STOP_IGNORED, Fault.MODE_REQUIRED, Fault.MODE_ZERO_REFUSED),
+    *(
+        Fault.HALT_IGNORED,
+        Fault.QUICK_STOP_IGNORED,
+        Fault.QUICK_STOP_FINAL,
+        Fault.MODE_REQUIRED,
+        Fault.MODE_ZERO_REFUSED,
+    ),
     *(Fault.MODE_HELD_UNDER_HALT, Fault.ARRIVED_WHEN_DISABLED, Fault.EMCY_FLOOD),
     *(Fault.SDO_FOUR_BYTES, Fault.SDO_NO_SIZE, Fault.SDO_SHORT),
 )
@@ -791,6 +797,16 @@ FOUND: tuple[Scenario, ...] = (
         Kind((Fault.MODE_REQUIRED,), options=((0x6007, 0),)),
         (('enable', None), ('mode', OperationMode.VELOCITY, None), ('fault', BUS_DOWN, 2.0, None)),
         OperationMode.PROFILE_POSITION,
+    ),
+    Scenario(  # a motor that has only begun to follow its target stands no more
+        Kind(transmission=ASYNCHRONOUS, slow=True),
+        (
+            ('enable', None),
+            ('mode', OperationMode.CYCLIC_POSITION, None),
+            ('target', -0.62, 0.02),
+            ('quick_stop', None),
+        ),
+        OperationMode.INTERPOLATED_POSITION,
     ),
     Scenario(  # the words of a quick stop keep the halt up, by RPDO and by SDO
         Kind((Fault.QUICK_STOP_IGNORED,)), (), OperationMode.PROFILE_TORQUE
