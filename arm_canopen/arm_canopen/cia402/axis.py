@@ -757,7 +757,8 @@ class Axis:
         lost, self._followed = self._followed and not follows, follows
         if lost:
             rests = isinstance(mode, InterpolatedPosition) and not mode.velocity
-            if not rests:  # in mode 7 bit 12 may go where nothing moves
+            # in mode 7 bit 12 may go where nothing moves, in mode 10 by a halt
+            if not (rests or self.halt_bits):
                 self.released(Refusal(RefusalCause.NOT_FOLLOWING, 'bit 12'))
                 self.warn(f'does not follow its set-points any more (bit 12): {self.describe()}')
         if isinstance(mode, CyclicPosition):

@@ -84,6 +84,15 @@ def full(net: VirtualNetwork) -> None:
     assert net.drives[JOINT].view.statusword & Statusword.SET_POINT_ACKNOWLEDGE
 
 
+def test_a_halt_in_mode_10_is_not_said_to_be_a_lost_command() -> None:
+    """Bit 12 goes with bit 8, as commanded."""
+    net = running_in(OperationMode.CYCLIC_TORQUE)
+    net.target(100.0)
+    net.run(0.5)
+    net.do(JOINT, 'halt')
+    assert not net.reported(Severity.WARNING)
+
+
 def test_an_immediate_move_does_not_wait_for_a_full_drive() -> None:
     """What is said to go at once goes at once, and what the drive held is discarded."""
     net = running_in(OperationMode.PROFILE_POSITION)
