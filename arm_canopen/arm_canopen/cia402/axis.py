@@ -191,6 +191,11 @@ class Axis:
         return commanded
 
     @property
+    def is_up_to_date(self) -> bool:
+        """Whether the cycle has seen the present state; a new goal would change what it means."""
+        return self._state is self.view.state
+
+    @property
     def stays_enabled(self) -> bool:
         """Whether it is enabled, and no command is on its way that changes that."""
         return self.view.state is DriveState.OPERATION_ENABLED and self._enables

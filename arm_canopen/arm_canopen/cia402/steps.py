@@ -71,7 +71,8 @@ class AxisSteps:
 
         def ready() -> bool:
             known = to_stop and axis.view.state is not DriveState.UNKNOWN
-            return known or axis.view.ready or not axis.node.operational
+            seen = axis.view.ready and axis.is_up_to_date
+            return known or seen or not axis.node.operational
 
         try:
             await self._scheduler.until(ready, READY_TIMEOUT)

@@ -625,6 +625,16 @@ def test_a_drive_that_quick_stop_ends_for_is_enabled_by_the_way_through_no_power
     assert net.simulated().state is DriveState.OPERATION_ENABLED
 
 
+@pytest.mark.parametrize('verb', ['quick_stop', 'shutdown'])
+def test_a_stop_that_is_followed_by_enable_at_once_is_no_loss_of_power(verb: str) -> None:
+    """The cycle may not have seen yet that the drive left Operation enabled, as commanded."""
+    net = booted(drive_config(JOINT, NODE_ID))
+    net.enable(OperationMode.PROFILE_POSITION)
+    net.do(JOINT, verb)
+    assert 'Operation enabled' in net.do(JOINT, 'enable')
+    assert not net.reported(Severity.ERROR)
+
+
 def test_shutdown_of_a_drive_that_is_off_or_faulted_ends_at_once() -> None:
     """It is seen to stand without power, so nothing has to be waited for."""
     net = booted(drive_config(JOINT, NODE_ID))
