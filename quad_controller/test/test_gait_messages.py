@@ -33,7 +33,7 @@ from quad_controller.nodes.messages import (
 from quad_controller.policy.observation import gravity
 from quad_controller.policy.options import GravitySource
 from quad_description import ImuSample, JointSample, Targets
-from quad_description.rotations import from_rpy
+from quad_description.rotations import conjugate, from_rpy, rotate
 from quad_gait_rig import ARM_ROBOT, FOLDED, PERIOD, Rig, ROBOT, tilted, UPRIGHT
 
 TEST_TIMEOUT = 10.0  # [s]
@@ -50,7 +50,8 @@ def joints(reader: JointReader, message: JointState, sent: Targets) -> JointSamp
 
 def sample(message: Imu) -> ImuSample:
     """Read a message as it comes from a raw subscription."""
-    return imu_sample(*FastReader(Imu, *IMU_NUMBERS).read(serialize_message(message)))
+    read = FastReader(Imu, *IMU_NUMBERS).read(serialize_message(message))
+    return imu_sample(*read, ROBOT.rotation_of)
 
 
 @given(st.permutations(range(14)))
@@ -122,6 +123,22 @@ def test_what_an_imu_does_not_measure_is_not_taken_for_zero() -> None:
         sample(imu(attitude=-1.0))
     assert sample(imu(rate=-1.0)).angular_velocity is None
     assert gravity(sample(imu(force=-1.0)), GravitySource.ACCEL) == (0.0, 0.0, -1.0)
+
+
+def test_an_imu_is_read_in_the_frame_that_its_header_names() -> None:
+    """Upside down and turned, of a level body: attitude, rate and force are those of the body."""
+    mounted, message = from_rpy(math.pi, 0.0, 2.0), imu()
+    message.header.frame_id = 'imu_link'
+    for field, value in zip('xyzw', mounted, strict=True):
+        setattr(message.orientation, field, value)
+    for vector in (message.angular_velocity, message.linear_acceleration):
+        turned = rotate(conjugate(mounted), (vector.x, vector.y, vector.z))
+        vector.x, vector.y, vector.z = turned
+    read = FastReader(Imu, *IMU_NUMBERS).read(serialize_message(message))
+    found = imu_sample(*read, {'imu_link': mounted}.__getitem__)
+    assert found.orientation == pytest.approx((0.0, 0.0, 0.0, 1.0))
+    assert found.angular_velocity == pytest.approx((0.2, 0.0, 0.0))
+    assert found.acceleration == pytest.approx((0.0, 0.0, 9.8))
 
 
 def with_variance(index: int, variance: float) -> Imu:

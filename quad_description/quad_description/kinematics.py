@@ -25,6 +25,7 @@ from urdf_reader import (
     JointKind,
     KinematicTree,
     link_poses,
+    NO_ROTATION,
     Quaternion,
     read_urdf,
     rotate,
@@ -310,6 +311,11 @@ class Quadruped:
         """Places of the joints that belong to no leg (those of an arm)."""
         taken = {index for indices in self.leg_indices for index in indices}
         return tuple(index for index in range(len(self.names)) if index not in taken)
+
+    def rotation_of(self, link: str) -> Quaternion:
+        """Return how a link is turned in the body at zero, (x, y, z, w); an unknown one is not."""
+        pose = link_poses(self.tree, {}, body_link(self.tree)).get(link)
+        return NO_ROTATION if pose is None else pose.rotation
 
     def leg_angles(self, positions: Sequence[float]) -> list[Vector]:
         """Return the joint positions of each leg from those of all joints [rad]."""

@@ -11,7 +11,7 @@ from pathlib import Path
 import time
 
 from black_box import BlackBox, BlackBoxSettings
-from quad_description import preset_of, RobotState
+from quad_description import preset_of, quadruped, RobotState
 
 from .commander import JointCommander
 from .estimation import Estimator, EstimatorSettings
@@ -71,6 +71,8 @@ class ObservedRobot:
         self.on_refusal: Callable[[str], None] = lambda _: None
         self._settings = settings
         self._begin()
+        # how a link is turned in the body
+        self.rotation_of = quadruped(settings.urdf).rotation_of
 
     def _begin(self) -> None:
         settings = self._settings

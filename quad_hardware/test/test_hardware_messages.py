@@ -100,7 +100,7 @@ def test_joints_keep_their_order() -> None:
 
 def imu(sample: ImuSample) -> Imu:
     """The message of a sample."""
-    template, numbers = robot_topics.imu(sample, DEVIATIONS, 'imu_link')
+    template, numbers = robot_topics.imu(sample, DEVIATIONS, 'imu_link', IDENTITY)
     message: Imu = template.message(STAMP, numbers)
     return message
 
@@ -133,7 +133,7 @@ def test_joints_are_stamped_when_they_were_measured(monkeypatch: pytest.MonkeyPa
     clock = SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=100_000_000_000))
     node: Any = SimpleNamespace(create_publisher=create_publisher, get_clock=lambda: clock)
     estimator = Estimator(urdf, joints, EstimatorSettings())
-    robot: Any = SimpleNamespace(names=joints.names)
+    robot: Any = SimpleNamespace(names=joints.names, rotation_of=lambda _: IDENTITY)
     monkeypatch.setattr(robot_topics, 'time', SimpleNamespace(monotonic=lambda: 5.5))
     measured = estimator.step(state)
     assert measured is not None
@@ -193,8 +193,8 @@ BARE = replace(IMU, angular_velocity=None, acceleration=None)
 FORMS: list[MessageTemplate] = [
     joint_template(1),
     joint_template(12),
-    robot_topics.imu(IMU, DEVIATIONS, 'imu_link')[0],
-    robot_topics.imu(BARE, DEVIATIONS, '')[0],
+    robot_topics.imu(IMU, DEVIATIONS, 'imu_link', IDENTITY)[0],
+    robot_topics.imu(BARE, DEVIATIONS, '', IDENTITY)[0],
     robot_topics.odometry(IMU, PLACE, DEVIATIONS, FRAMES)[0],
     robot_topics.odometry(BARE, PLACE, DEVIATIONS, replace(FRAMES, base_frame='a longer name'))[0],
     robot_topics.transforms(PLACE, FRAMES)[0],

@@ -18,8 +18,8 @@ from isolation import Isolation
 import pytest
 from rclpy.node import Node
 from sensor_msgs.msg import BatteryState, Imu, JointState
-from std_msgs.msg import String
-from urdf_reader import centre_of_mass, from_rpy, link_poses, read_urdf, Vector
+from std_msgs.msg import Header, String
+from urdf_reader import centre_of_mass, from_rpy, link_poses, multiply, read_urdf, Vector
 from viewer_rig import in_domain, ViewerRig
 
 from node_runner import LATCHED
@@ -46,7 +46,8 @@ URDF = f"""<robot name="dog"><link name="body"/>{
         '<axis xyz="0 0 1"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint>'
         for name, (x, y) in LEGS.items()
     )
-}</robot>"""
+}<link name="imu_link"/><joint name="imu" type="fixed"><origin rpy="3.14159265 0 2"/>
+<parent link="body"/><child link="imu_link"/></joint></robot>"""
 TREE = read_urdf(URDF)
 SOURCE_CONSTANTS = [name for name, value in vars(FootContacts).items() if isinstance(value, str)]
 SOURCE_CONSTANTS = [name for name in SOURCE_CONSTANTS if name.isupper()]
@@ -212,8 +213,9 @@ class Dog(ViewerRig):
     def _publish(self) -> None:
         positions = [self.lift, 0.0, 0.0, 0.0]
         self._states.publish(JointState(name=list(LEGS), position=positions))
-        x, y, z, w = from_rpy(0.1, 0.0, 0.0)
-        self._imu.publish(Imu(orientation=Quaternion(x=x, y=y, z=z, w=w)))
+        x, y, z, w = multiply(from_rpy(0.1, 0.0, 0.0), from_rpy(math.pi, 0.0, 2.0))
+        turned = Quaternion(x=x, y=y, z=z, w=w)
+        self._imu.publish(Imu(header=Header(frame_id='imu_link'), orientation=turned))
         self._battery.publish(BatteryState(percentage=0.75, voltage=7.4))
         if self.sends_contacts:
             names = [f'{leg}_foot' for leg in LEGS]

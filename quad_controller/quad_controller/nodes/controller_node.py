@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime, timezone
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 import sys
 import threading
@@ -112,6 +112,7 @@ class ControllerNode(Node):
         self._recorder = self._make_recorder() if settings.record else None
         self._joint_states = FastReader(JointState, 'position', 'velocity')
         self._imu = FastReader(Imu, *messages.IMU_NUMBERS)
+        self._rotation_of = cache(settings.robot.rotation_of)
         self._joints = messages.JointReader(settings.robot)
         self._filter = messages.CommandFilter(
             settings.robot, others_move=bool(settings.arm_pose or policy is not None)
@@ -274,7 +275,7 @@ class ControllerNode(Node):
 
     def _take_imu(self, data: bytes) -> None:
         try:
-            imu = messages.imu_sample(*self._imu.read(data))
+            imu = messages.imu_sample(*self._imu.read(data), self._rotation_of)
             self._loop.offer(imu=imu, imu_age=self._age('/imu', data))
         except ValueError as error:
             self._refuse(Fault.IMU, str(error))

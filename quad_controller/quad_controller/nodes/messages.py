@@ -29,7 +29,14 @@ from std_msgs.msg import Header
 from message_definitions import DefinitionError, message_definition
 from node_runner import init_ros
 from quad_description import FEET, ImuSample, JointSample, Quadruped, Targets
-from quad_description.rotations import normalized, roll_pitch_yaw
+from quad_description.rotations import (
+    conjugate,
+    multiply,
+    normalized,
+    Quaternion,
+    roll_pitch_yaw,
+    rotate,
+)
 from quad_msgs.msg import ControllerStep, FootContacts, JointCommand
 from rosbag_files import BagError, BagWriter, OfferedQos, Topic, WriterOptions
 
@@ -55,12 +62,15 @@ IMU_NUMBERS = tuple(
 """What :func:`imu_sample` reads of a message."""
 
 
-def imu_sample(message: Imu, numbers: Sequence[float]) -> ImuSample:
-    """Return the attitude of a message; imu_link has the axes of base_link.
+def imu_sample(
+    message: Imu, numbers: Sequence[float], rotation_of: Callable[[str], Quaternion]
+) -> ImuSample:
+    """Return what a message says of base_link.
 
     Args:
         message: What was measured, but for its numbers.
         numbers: As :data:`IMU_NUMBERS` names them.
+        rotation_of: Gives the rotation of a frame in base_link.
 
     Raises:
         ValueError: The orientation is not measured, or a variance of it is none.
@@ -78,11 +88,12 @@ def imu_sample(message: Imu, numbers: Sequence[float]) -> ImuSample:
                 'publish 0 or more, all zeros where it is unknown (REP 145)'
             )
     x, y, z, w, *rest = numbers
-    (rx, ry, rz), (fx, fy, fz) = rest[:3], rest[3:]
+    turned = rotation_of(message.header.frame_id)
+    rate, felt = (rotate(turned, (x, y, z)) for x, y, z in (rest[:3], rest[3:]))
     return ImuSample(
-        (x, y, z, w),
-        None if message.angular_velocity_covariance[0] == UNMEASURED else (rx, ry, rz),
-        None if message.linear_acceleration_covariance[0] == UNMEASURED else (fx, fy, fz),
+        multiply((x, y, z, w), conjugate(turned)),
+        None if message.angular_velocity_covariance[0] == UNMEASURED else rate,
+        None if message.linear_acceleration_covariance[0] == UNMEASURED else felt,
         math.sqrt(max(covariance[0], covariance[4])),
     )
 

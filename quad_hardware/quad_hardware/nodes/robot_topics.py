@@ -63,12 +63,22 @@ def _joint_states(stamp: Time, numbers: Numbers, *names: str) -> JointState:
     )
 
 
-def imu(sample: ImuSample, deviations: Deviations, frame: str) -> tuple[MessageTemplate, Numbers]:
-    """Return attitude, angular velocity and specific force; zeros for what is not measured."""
+def imu(
+    sample: ImuSample, deviations: Deviations, frame: str, turned: Rotation
+) -> tuple[MessageTemplate, Numbers]:
+    """Return attitude, angular velocity and specific force; zeros for what is not measured.
+
+    Args:
+        frame: Name of the frame that they are in.
+        turned: Its rotation in base_link, in which the sample is.
+    """
+    body = conjugate(turned)
     acceleration = None if sample.acceleration is None else deviations.linear_acceleration_stddev
     known = _tilt(sample, deviations), _rate(sample, deviations), acceleration
-    rate, felt = sample.angular_velocity or _ZERO, sample.acceleration or _ZERO
-    return MessageTemplate(_imu, 10, (frame, known)), (*sample.orientation, *rate, *felt)
+    rate = rotate(body, sample.angular_velocity or _ZERO)
+    felt = rotate(body, sample.acceleration or _ZERO)
+    orientation = multiply(sample.orientation, turned)
+    return MessageTemplate(_imu, 10, (frame, known)), (*orientation, *rate, *felt)
 
 
 def _imu(
@@ -265,6 +275,7 @@ class RobotTopics:
         self._node, self._robot = node, robot
         self._frames, self._deviations = frames, deviations
         self._steady = steady
+        self._imu_turned = robot.rotation_of(frames.imu_frame)
         self._joint_states = FastPublisher(
             node.create_publisher(JointState, 'joint_states', SENSOR_DEPTH)
         )
@@ -299,7 +310,7 @@ class RobotTopics:
             return
         deviations, frames, stamp = self._deviations, self._frames, self._stamp(state.time)
         for publisher, (template, numbers) in (
-            (self._imu, imu(measured, deviations, frames.imu_frame)),
+            (self._imu, imu(measured, deviations, frames.imu_frame, self._imu_turned)),
             (self._odom, odometry(measured, way, deviations, frames)),
             (self._contacts, foot_contacts(way)),
         ):

@@ -26,6 +26,7 @@ from urdf_reader import (
     from_rpy,
     KinematicTree,
     link_poses,
+    multiply,
     PointMass,
     Quaternion,
     rotate,
@@ -259,6 +260,10 @@ class Body:
         turn = message.orientation
         measured = message.orientation_covariance[0] != NOT_MEASURED
         self._attitude = (turn.x, turn.y, turn.z, turn.w) if measured else None
+        frames = {} if self._tree is None else link_poses(self._tree, {})
+        if self._attitude is not None and (mounted := frames.get(message.header.frame_id)):
+            x, y, z, w = mounted.rotation
+            self._attitude = multiply(self._attitude, (-x, -y, -z, w))
 
     def _take_contacts(self, message: Any) -> None:  # noqa: ANN401  # quad_msgs may not be there
         pairs = zip(message.name, message.contact, strict=False)
