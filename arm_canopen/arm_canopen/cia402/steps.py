@@ -271,7 +271,7 @@ class AxisSteps:
         try:
             await self.until(
                 lambda: axis.view.state not in FAULTY,
-                self.quirks.state_timeout,
+                self.quirks.state_timeout + axis.stop.ramp_time(),  # it may brake first (0x605E)
                 'the end of the fault',
             )
         finally:

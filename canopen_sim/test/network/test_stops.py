@@ -635,6 +635,19 @@ def test_a_stop_that_is_followed_by_enable_at_once_is_no_loss_of_power(verb: str
     assert not net.reported(Severity.ERROR)
 
 
+def test_recover_waits_for_the_end_of_the_reaction_to_the_fault() -> None:
+    """A drive cannot be reset while it brakes, on a ramp of seven seconds here."""
+    writes = (*MOTION_WRITES, sdo_write(0x6085, 0, round(SCALE / 7.0)))
+    net = booted(drive_config(JOINT, NODE_ID, sdo_writes=writes))
+    net.enable(OperationMode.PROFILE_VELOCITY)
+    net.target(1.0)
+    net.run(1.0)
+    net.simulated().raise_fault(0x4310, net.now)
+    net.run(0.1)
+    assert net.simulated().state is DriveState.FAULT_REACTION_ACTIVE
+    assert 'Operation enabled' in net.do(JOINT, 'recover')
+
+
 def test_shutdown_of_a_drive_that_is_off_or_faulted_ends_at_once() -> None:
     """It is seen to stand without power, so nothing has to be waited for."""
     net = booted(drive_config(JOINT, NODE_ID))
