@@ -56,7 +56,7 @@ class Health:
         taken: dict[str, Any] = {}
         for name in (*AGED, 'battery', 'servo_problem'):
             value = getattr(measurement, name)
-            if value is not None and self._usable(name, value, problems):
+            if value is not None and self._usable(SUBJECTS.get(name), value, problems):
                 taken[name] = value
         delays = {'joints': measurement.joints_age, 'imu': measurement.imu_age}
         self._delays |= {name: delay for name, delay in delays.items() if name in taken}
@@ -206,17 +206,17 @@ class Health:
         rates = f'{_turn_rate(imu):.1f} rad/s, faster than {fastest:g}'
         return f'the body turns at {rates}; when it does not, /imu is wrong: look at the cable'
 
-    def _usable(self, name: str, value: Any, problems: list[str]) -> bool:  # noqa: ANN401
+    def _usable(self, what: Fault | None, value: object, problems: list[str]) -> bool:
         """Whether a value has no problem; one that has is refused."""
-        if name == 'battery':
-            return math.isfinite(value)
-        problem, what = '', SUBJECTS.get(name)
+        problem = ''
         if isinstance(value, JointSample):
             problem = value.problem(self._count)
         elif isinstance(value, ImuSample):
             problem = value.problem()
-        elif name == 'linear_velocity' and not all(map(math.isfinite, value)):
+        elif isinstance(value, tuple) and not all(map(math.isfinite, value)):
             problem = 'a velocity of the body that is not finite'
+        elif isinstance(value, float) and not math.isfinite(value):
+            return False  # a charge that is not known
         if problem:
             problems.append(f'refused {problem}')
         if what and problem:
