@@ -25,7 +25,7 @@ from processes import find_children
 import psutil
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, BrowserType, Locator, Page
+    from playwright.sync_api import Browser, Locator, Page
     from processes import RunningProcess
 
 NAMES = ('chromium', 'chromium-browser', 'google-chrome')
@@ -81,7 +81,6 @@ GROUPS = 4  # tabs of each page
 
 
 _started: list[Browser] = []
-_scripts: list[str] = []
 
 
 def url_of(robot: RunningProcess, timeout: float) -> str:
@@ -122,8 +121,7 @@ def browser(prefix: Sequence[str] = ()) -> Iterator[Browser]:
         command = shlex.join([*prefix, *_polite(), _program()])
         script.write_text(f'#!/bin/sh\nexec {command} "$@"\n')
         script.chmod(0o700)
-        _scripts.append(str(script))
-        started = launch(playwright.chromium)
+        started = playwright.chromium.launch(executable_path=script, args=OPTIONS)
         _started.append(started)
         try:
             yield started
@@ -132,13 +130,7 @@ def browser(prefix: Sequence[str] = ()) -> Iterator[Browser]:
             raise
         finally:
             _started.remove(started)
-            _scripts.pop()
             started.close()
-
-
-def launch(kind: BrowserType) -> Browser:
-    """Start one more, in the same way."""
-    return kind.launch(executable_path=_scripts[-1], args=OPTIONS)
 
 
 def _polite() -> tuple[str, ...]:
@@ -149,21 +141,12 @@ def _polite() -> tuple[str, ...]:
     return POLITE if tried.returncode else (*UNPRIVILEGED, *POLITE)
 
 
-def launch_to_kill(kind: BrowserType) -> tuple[Browser, psutil.Process]:
-    """Start one more, and return it with the first of its processes."""
-    others = {process.pid for process in processes()}
-    started = launch(kind)
-    fresh = [process for process in processes() if process.pid not in others]
-    known = others | {process.pid for process in fresh}
-    (first,) = (process for process in fresh if process.ppid() not in known)
-    return started, first
+def crash(page: Page) -> None:
+    """End the process of a page: it has no time to say so."""
+    from playwright.sync_api import Error
 
-
-def kill(first: psutil.Process) -> None:
-    """Kill all processes of a browser at once."""
-    for process in [*first.children(recursive=True), first]:
-        with suppress(psutil.NoSuchProcess):
-            process.kill()
+    with suppress(Error):  # it never arrives there
+        page.goto('chrome://crash')
 
 
 def _program() -> str:

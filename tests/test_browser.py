@@ -475,12 +475,10 @@ def test_who_does_not_look_moves_nothing(seen: Seen, way: str) -> None:
     seen.wait_for_rest()
 
 
-def test_a_page_that_is_killed_moves_nothing(seen: Seen) -> None:
-    """With a button held; the browser has no time to say so."""
-    launched, first = chromium.launch_to_kill(seen.browser.browser_type)
-    page = chromium.open_page(launched, seen.url)
-    seen.jog(page)
-    chromium.kill(first)
+def test_a_page_that_crashes_moves_nothing(seen: Seen) -> None:
+    """With a button held; it has no time to say so."""
+    seen.jog(page := chromium.open_page(seen.browser, seen.url))
+    chromium.crash(page)
     seen.wait_for_rest()
 
 

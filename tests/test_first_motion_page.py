@@ -21,6 +21,7 @@ from canopen_tools.cli.main import main as canopen
 from first_motion import JointKind
 from robot_viewer.nodes.first_motion import HOLD, PRESS_ANEW
 from robot_viewer.page.first_motion import Saw
+from robot_viewer.robot_state import ALLOW
 
 if TYPE_CHECKING:
     from isolation import Isolation
@@ -137,30 +138,10 @@ def prepare(page: Page, distance: str) -> None:
     page.get_by_text(f'It will move {moves},').wait_for()
 
 
-def hold_beyond_the_end(page: Page, other: Page, joint: Joint) -> None:
-    """A press for one motion moves nothing in the next one."""
-    prepare(page, '-2')
-    joint.move(page)
-    page.get_by_text('What did the real joint do?').wait_for()
-    joint.wait_for_rest()
-    stood = joint.angle
-    prepare(other, '2')
-    joint.wait_for_rest()
-    page.mouse.up()
-    prepare(page, '3')
-    page.get_by_text('at rest').wait_for()
-    joint.wait_for_rest()
-    assert joint.angle == stood
-    chromium.picture(page, 'first-motion-ready')
-    joint.move(page)
-    page.mouse.up()
-    joint.wait_for_rest()
-
-
 def test_a_wrong_sign_and_scale_are_found_on_the_page(
     isolation: Isolation, tmp_path: Path
 ) -> None:
-    """Nothing moves for a page that was killed, nor after STOP; its lines correct bus.yml."""
+    """Nothing moves for a page that has crashed, nor after STOP; its lines correct bus.yml."""
     truth, folder = tmp_path / 'truth', tmp_path / 'arm'
     simulated = write_bus(truth, PER_TURN)
     bus_yml = write_bus(folder, -PER_TURN / 4)
@@ -175,17 +156,12 @@ def test_a_wrong_sign_and_scale_are_found_on_the_page(
         bringup.wait_for('are enabled', STARTING)
         joint = Joint(runner)
 
-        launched, first = chromium.launch_to_kill(browser.browser_type)
-        page = chromium.open_page(launched, url)
+        page = chromium.open_page(browser, url)
         prepare(page, '20')
         assert joint.angle == 0.0
         joint.move(page)
-        chromium.kill(first)
+        page.mouse.up()
         joint.wait_for_rest()
-        assert abs(joint.angle) < 4.0, '20 deg of the wrong scale are 5'
-
-        page = chromium.open_page(browser, url)
-        open_first_motion(page)
         page.get_by_text('at rest').wait_for()
         chromium.press(page.get_by_role('button', name='That is enough'))
         page.get_by_text('ended by you before the target').wait_for()
@@ -205,12 +181,20 @@ def test_a_wrong_sign_and_scale_are_found_on_the_page(
         assert shoulder.scale_pos_to_dev == pytest.approx(PER_TURN / math.tau)
         assert elbow.scale_pos_to_dev == pytest.approx(-PER_TURN / 4 / math.tau)
 
-        hold_beyond_the_end(page, chromium.open_page(browser, url), joint)
         prepare(page, '-20')
+        page.get_by_text('at rest').wait_for()
+        chromium.picture(page, 'first-motion-ready')
         joint.move(page)
         page.keyboard.press('Space')
         joint.wait_for_rest()
         page.get_by_text('ended by a stop; prepare it anew').wait_for()
         assert joint.state is DriveState.OPERATION_ENABLED, 'it holds'
         page.mouse.up()
+
+        chromium.act(page, ALLOW)
+        prepare(page, '20')
+        stood = joint.angle
+        joint.move(page)
+        chromium.crash(page)
         joint.wait_for_rest()
+        assert abs(joint.angle - stood) < 4.0, '20 deg of the wrong scale are 5'
