@@ -98,7 +98,7 @@ def _signed(signs: Vector, values: Vector) -> Vector:
 
 MAX_GAP = 0.2  # [s] more than that cannot be bridged: the body may have been carried
 GROUND_TIME = 1.0  # [s] in which every foot stands, whatever the gait
-CREEP = 0.02  # [m/s] of a body whose feet hardly leave the ground; noise is slower
+CREEP = 0.04  # [m/s] of a body whose feet hardly leave the ground; noise is slower
 SLIP = 0.07  # [m/s] a foot over which the body goes so much otherwise counts a quarter
 MIN_DEVIATION = 0.01  # [m] of the position, however short the way was
 DRIFT = 0.07  # share of the way that is the standard deviation of the position
@@ -221,13 +221,15 @@ class LegOdometry:
         _, last_feet, weighed = self._last
         cosine, sine = math.cos(self._heading), math.sin(self._heading)
         settings, (smooth_x, smooth_y) = self._settings, self._smooth
+        # a body over feet that stay comes back: it goes nowhere, and noise is no way
+        rests = time - self._stepped_at > GROUND_TIME and math.hypot(*self._smooth) <= CREEP
         total = sum_x = sum_y = 0.0
         for last, foot, *pair in zip(last_feet, feet, weighed, weights, strict=True):
             x, y = self._way(last, foot)
             ahead = settings.scale_x * (cosine * x + sine * y) / elapsed
             left = settings.scale_y * (cosine * y - sine * x) / elapsed
             slip = ((ahead - smooth_x) ** 2 + (left - smooth_y) ** 2) / SLIP**2
-            weight = min(pair) / (1.0 + slip) ** 2
+            weight = 1.0 if rests else min(pair) / (1.0 + slip) ** 2
             total, sum_x, sum_y = total + weight, sum_x + weight * ahead, sum_y + weight * left
         if total > 0.0:
             self._held = sum_x / total, sum_y / total
@@ -242,8 +244,7 @@ class LegOdometry:
             smooth_x + share * (held_x - smooth_x),
             smooth_y + share * (held_y - smooth_y),
         )
-        # a body over feet that stay comes back: it goes nowhere, and noise is no way
-        if time - self._stepped_at <= GROUND_TIME or math.hypot(*self._smooth) > CREEP:
+        if not rests:
             self._distance += math.hypot(ahead, left)
 
     def _way(self, before: FootPose, after: FootPose) -> tuple[float, float]:
