@@ -349,6 +349,13 @@ def test_a_clip_of_scaled_values_is_undone(tmp_path: Path) -> None:
         read_contract_file(path)
 
 
+def test_a_history_of_an_older_step_alone_is_refused(tmp_path: Path) -> None:
+    """It would be taken for the newest step."""
+    path = tmp_path / 'config.yaml'
+    path.write_text('xgo: {observations: [gravity_vec], observations_history: [1]}')
+    assert 'observations_history [1] has gaps' in read_contract_file(path).refusals[0]
+
+
 def test_the_table_has_values_and_origins(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -418,8 +418,8 @@ class Controller:
         if request.state is State.GET_UP:
             if self._machine.state in ON_FEET:
                 return 'it is on its legs, and tilted; a fall stops it, then it may get up'
-            swings = self._parameters.get_up_swings
-            return get_up_refusal(self._health, self._latch, swings=swings)
+            swings, arm = self._parameters.get_up_swings, bool(self._robot.others)
+            return get_up_refusal(self._health, self._latch, swings=swings, arm=arm)
         if self._latch.texts:
             return (
                 f'{"; ".join(self._latch.texts)}; call ~/clear_fault when that is corrected. '

@@ -191,10 +191,10 @@ def stands(imu: ImuSample | None) -> bool:
     return imu is None or imu.is_uncertain or imu.tilt < LEVEL
 
 
-def get_up_refusal(health: Health, latch: FaultLatch, *, swings: bool) -> str:
+def get_up_refusal(health: Health, latch: FaultLatch, *, swings: bool, arm: bool) -> str:
     """Return why a robot cannot get up now, nothing when it may try; a fall is no reason.
 
-    ``swings``: it may throw itself off its back.
+    ``swings``: it may throw itself off its back; ``arm``: it has one.
     """
     if others := latch.texts_without(Fault.FALLEN):
         return f'{"; ".join(others)}; call ~/clear_fault when that is corrected'
@@ -209,7 +209,7 @@ def get_up_refusal(health: Health, latch: FaultLatch, *, swings: bool) -> str:
     if health.spins:
         return 'it turns faster than max_turn_rate: wait until it is at rest, or look at the gyro'
     if not swings and lying_on(imu.down) is Lying.BACK:
-        return ON_ITS_BACK
+        return WITH_AN_ARM if arm else ON_ITS_BACK
     return health.unmeasured(None)
 
 
@@ -253,7 +253,7 @@ class GetUp(Motion):
         if imu is None or imu.is_uncertain:
             self._blind += dt
             if self._blind > BLIND_DEADLINE:
-                self.failure = f'nobody measures how it lies; look at /imu, or {BY_HAND}'
+                self.failure = f'how it lies is not measured; look at /imu, or {BY_HAND}'
             return self._last
         self._blind = 0.0
         self._time += dt

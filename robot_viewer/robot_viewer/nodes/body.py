@@ -291,7 +291,7 @@ class Contacts:
     def html(self, found: Support) -> str:
         """Return it in words."""
         names = ', '.join(sorted(foot.removesuffix(FOOT) for foot in self.feet)) or 'none'
-        source = SOURCES.get(self.source, self.source or 'nobody says how that is known')
+        source = SOURCES.get(self.source, self.source or 'the source is not stated')
         margin = found.margin
         if margin is None:  # the line stays in its place
             stable = 'centre of mass unknown: the description has no masses'

@@ -81,7 +81,7 @@ def _observation(config: Mapping[str, Any], origin: str, refusals: list[str]) ->
     observation: Values = {'terms': terms}
     if 'clip_obs' in config:
         observation['clip'] = config['clip_obs']
-    if len(history) > 1:
+    if history != [0]:
         for term in terms.values():
             term['history'] = len(history)
         observation['history'] = _history(config, list(history), origin, refusals)
