@@ -185,14 +185,15 @@ def open_page(
         options: Of playwright.
     """
     page = browser.new_page(**({'viewport': SIZE} | options))  # type: ignore[arg-type]
-    page.set_default_timeout(PAGE_TIMEOUT)
+    page.set_default_timeout(3 * PAGE_TIMEOUT)  # its program is compiled
     page.add_init_script(FEW_PICTURES + DRAWN_ON_DEMAND)
     page.add_init_script(f'window.drawn = {str(drawn).lower()}')
-    page.goto(url)
+    page.goto(url, wait_until='commit')  # what it shows tells that it is there
     # viser's own warning of a software renderer covers the scene
     page.add_style_tag(content='.mantine-Notifications-root { display: none }')
     page.locator('#rv-robot b').filter(has_text=re.compile(robot)).wait_for(state='attached')
     page.locator('[role=tab]').nth(GROUPS - 1).wait_for()  # by another connection, maybe later
+    page.set_default_timeout(PAGE_TIMEOUT)
     return page
 
 
