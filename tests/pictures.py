@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
 DOCS = Path(__file__).parents[1] / 'docs'
-DESK, PHONE = {'width': 1200, 'height': 640}, {'width': 390, 'height': 844}  # [px]
+DESK, PHONE = {'width': 1200, 'height': 680}, {'width': 390, 'height': 844}  # [px]
 STARTING = 90.0  # [s]
 MOVING = 10.0  # [s] until the picture
 
@@ -57,6 +57,7 @@ def take_one(browser: Browser, url: str, group: str, size: dict[str, int], path:
     )
     chromium.show(page, group)
     page.wait_for_timeout(1e3 * MOVING)
+    chromium.state_is(page, '(MOVING|WALKING)')
     page.screenshot(path=path, timeout=3 * chromium.PAGE_TIMEOUT)
     page.close()
 

@@ -271,7 +271,7 @@ def _values(values: dict[str, str]) -> list[KeyValue]:
 
 TYPE = 'quad_msgs/msg/ControllerStep'
 NS = 1_000_000_000
-BACKLOG = 500  # steps that wait at most: 10 s
+BACKLOG = 500  # steps that wait at most: 10 s at 50 Hz
 FLUSH_PERIOD = 1.0  # [s] after which what was written outlives the process
 
 
