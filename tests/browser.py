@@ -188,7 +188,7 @@ def open_page(
     page.set_default_timeout(3 * PAGE_TIMEOUT)  # its program is compiled
     page.add_init_script(FEW_PICTURES + DRAWN_ON_DEMAND)
     page.add_init_script(f'window.drawn = {str(drawn).lower()}')
-    page.goto(url, wait_until='commit')  # what it shows tells that it is there
+    page.goto(url, wait_until='commit')  # what it shows counts
     # viser's own warning of a software renderer covers the scene
     page.add_style_tag(content='.mantine-Notifications-root { display: none }')
     page.locator('#rv-robot b').filter(has_text=re.compile(robot)).wait_for(state='attached')
