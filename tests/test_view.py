@@ -82,7 +82,7 @@ def see_feet(url: str, dog: RunningProcess) -> None:
         chromium.state_is(page, 'READY')
         chromium.show(page, 'Body')
         page.get_by_text('feet on the ground: bl, br, fl, fr').wait_for()
-        page.get_by_text('estimated by where they were sent; nothing senses it').wait_for()
+        page.get_by_text('estimated by joints and attitude; nothing senses it').wait_for()
         page.get_by_text('inside the support').wait_for()
         chromium.picture(page, 'feet')
         with suspended(dog, '/hardware_node'):
