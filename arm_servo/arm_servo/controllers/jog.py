@@ -29,8 +29,8 @@ MIN_COMMAND_FACTOR = 0.1  # least share of a command that is carried out while h
 SLOWED, HASTENED = 0.1, 0.4
 """Least times in which the share of a command falls to nothing and comes back in [s]."""
 
-SOLVE_PERIOD = 8e-3
-"""How long joint speeds count where cycles are shorter, in [s]: each plans the way there."""
+SOLVE_PERIOD = 16e-3
+"""How long joint speeds count at least, in whole cycles, in [s]: each plans the way there."""
 
 REST_SPEED_FACTOR = 0.02
 """Share of a joint's speed below which a released jog needs no line any more."""
@@ -208,7 +208,9 @@ class Jog(Controller):
 
     def take(self, command: Command, fresh_until: float, client: Hashable) -> None:
         """Set the command, which counts until a steady time in [s]."""
-        self._command, self._fresh_until, self.client = command, fresh_until, client
+        if self._command is None or not _equal(command, self._command):
+            self._command = command
+        self._fresh_until, self.client = fresh_until, client
         self._slowing_since = None
 
     def update(self, arm: ArmState, period: float) -> RobotState | None:
@@ -243,6 +245,18 @@ class Jog(Controller):
             self._slowing_since = now
             self._slowed = replace(self._command, twist=np.zeros(6))
         return self._slowed if now - self._slowing_since <= MAX_SLOW_DOWN_TIME else None
+
+
+def _equal(one: Command, other: Command) -> bool:
+    """Return whether a command repeats another; poses are always followed anew."""
+    match one, other:
+        case JointCommand(), JointCommand():
+            pairs = (one.velocity, other.velocity), (one.commanded, other.commanded)
+        case TwistCommand(axes=None), TwistCommand(axes=None) if one.link == other.link:
+            pairs = ((one.twist, other.twist),)
+        case _:
+            return False
+    return all(np.array_equal(*pair) for pair in pairs)
 
 
 def _approach(error: Array, gain: float, fastest: float, deceleration: float) -> Array:
