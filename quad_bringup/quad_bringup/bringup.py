@@ -186,8 +186,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--servo',
         metavar='MODEL',
-        help='servos of a simulated robot: nominal (as published), firm (which trot_ppo was '
-        'trained with), vendor_rl (soft, of the vendor), or kp=4,delay=0.04 (default: nominal)',
+        help='servos of a simulated robot: nominal (as published), firm (they follow), '
+        'vendor_rl (soft, of the vendor), or kp=4,delay=0.04 (default: nominal)',
     )
     way = parser.add_mutually_exclusive_group()
     way.add_argument(

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import csv
 import json
 from pathlib import Path
@@ -12,11 +13,12 @@ import re
 import numpy as np
 import onnx
 import pytest
+import yaml
 
 from quad_controller import find_policy
 from quad_controller.attach_contract import run as attach
 from quad_controller.policy.contract.build import build_contract
-from quad_controller.policy.contract.mjlab import read_metadata
+from quad_controller.policy.contract.mjlab import CONTRACT_KEY, read_metadata
 from quad_controller.policy.contract.model import PolicyContract, Source
 from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy_check.main import ExitCode, run
@@ -25,7 +27,7 @@ from quad_gait_rig import joined, metadata, ROBOT, write_policy
 SHIPPED = str(find_policy('trot_ppo'))
 TURN = ['--walk', '0.2', '0', '0.3', '--duration', '4', '--servo', 'firm']
 """A way and a turn, for which left is not right."""
-DAMPING = -0.3
+DAMPING = -0.5
 """Of an action by the angular velocity in [s/rad]."""
 MIRRORS = {
     name: name[0] + name[1].translate(str.maketrans('lr', 'rl')) + name[2:] for name in ROBOT.names
@@ -141,12 +143,33 @@ def test_a_wrong_contract_is_found_before_a_motor_moves(
 def test_a_term_that_a_walk_cannot_check_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The shipped policy hardly uses the angular velocity; one that damps by it does."""
+    """The shipped policy uses all of its terms; here is one that another is given in vain."""
+    path, width = tmp_path / 'policy.onnx', load_contract().width
+    write_wider(path, range(width), width + 3)
+    (stated,) = (p.value for p in onnx.load(path).metadata_props if p.key == CONTRACT_KEY)
+    contract = yaml.safe_load(stated)
+    contract['observation']['terms']['speed'] = {'source': 'linear_velocity', 'frame': 'base'}
+    (tmp_path / 'contract.yaml').write_text(yaml.safe_dump(contract, sort_keys=False))
+    assert attach([str(path), str(tmp_path / 'contract.yaml')]) == 0
+    capsys.readouterr()
     named = re.compile('^note: (.*) hardly counts', re.MULTILINE)
-    hardly = {SHIPPED: {'angular_velocity'}, str(damped(tmp_path / 'policy.onnx')): set[str]()}
-    for policy, terms in hardly.items():
+    for policy, terms in ((SHIPPED, set[str]()), (str(path), {'speed'})):
         assert run([policy, *TURN]) == 0
         assert set(named.findall(capsys.readouterr().out)) == terms
+
+
+def write_wider(path: Path, places: Sequence[int], width: int) -> Path:
+    """Write the shipped policy as one that sees more, and heeds what is in some places of it."""
+    model = onnx.load(SHIPPED)
+    (given,) = model.graph.input
+    model.graph.initializer.append(onnx.numpy_helper.from_array(np.array(places), 'heeded'))
+    pick = onnx.helper.make_node('Gather', ['more', 'heeded'], [given.name], axis=1)
+    model.graph.node.insert(0, pick)
+    kind = onnx.helper.make_tensor_value_info('more', onnx.TensorProto.FLOAT, [1, width])
+    model.graph.input.remove(given)
+    model.graph.input.append(kind)
+    onnx.save(model, path)
+    return path
 
 
 HISTORY = 6
@@ -155,21 +178,11 @@ HISTORY = 6
 
 def with_history(path: Path) -> Path:
     """Write the shipped policy as one that sees steps, of each term the newest last."""
-    model = onnx.load(SHIPPED)
-    (given,) = model.graph.input
-    widths = [term.width for term in load_contract().terms]
     places, start = list[int](), 0
-    for width in widths:
-        start += HISTORY * width
-        places.extend(range(start - width, start))
-    model.graph.initializer.append(onnx.numpy_helper.from_array(np.array(places), 'newest'))
-    pick = onnx.helper.make_node('Gather', ['steps', 'newest'], [given.name], axis=1)
-    model.graph.node.insert(0, pick)
-    kind = onnx.helper.make_tensor_value_info('steps', onnx.TensorProto.FLOAT, [1, start])
-    model.graph.input.remove(given)
-    model.graph.input.append(kind)
-    onnx.save(model, path)
-    return path
+    for term in load_contract().terms:
+        start += HISTORY * term.width
+        places.extend(range(start - term.width, start))
+    return write_wider(path, places, start)
 
 
 @pytest.mark.parametrize('newest', ['last', 'first'])

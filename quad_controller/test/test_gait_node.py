@@ -314,6 +314,7 @@ def test_another_policy_is_loaded_while_it_walks(robot: Robot, tmp_path: Path) -
     names = joined(['fl_hip', *ROBOT.names[1:]])
     # before the robot lives: it is silent as long as this process writes
     renamed = write_policy(tmp_path / 'renamed.onnx', metadata(joint_names=names))
+    still = write_policy(tmp_path / 'still.onnx', metadata())
     reports = robot.client.listen(String, 'controller_node/policy', LATCHED)
     inexact = robot.client.node.create_publisher(Float64, 'joint_velocity_error', LATCHED)
     inexact.publish(Float64(data=0.5))
@@ -323,9 +324,9 @@ def test_another_policy_is_loaded_while_it_walks(robot: Robot, tmp_path: Path) -
     robot.until_state('walk')
     assert 'neither a file nor shipped' in robot.load('no_such').message
     assert 'not in the robot: fl_hip' in robot.load(str(renamed)).message
-    answer = robot.load('trot_ppo')
+    answer = robot.load(str(still))
     assert answer.success, answer.message
-    assert 'stands, then follows trot_ppo.onnx; sha256 ' in answer.message
+    assert 'stands, then follows still.onnx; sha256 ' in answer.message
     robot.until_state('policy')
     robot.process.wait_for('error of 0.50 rad/s rms, and nothing says with what noise')
     robot.client.spin_until(lambda: bool(reports), 20.0, 'the report')

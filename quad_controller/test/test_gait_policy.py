@@ -11,6 +11,7 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
+import numpy.typing as npt
 from policy_export import export, Layers
 import pytest
 
@@ -343,8 +344,9 @@ def test_odd_options_are_refused(values: dict[str, float]) -> None:
         PolicyOptions(**values)  # type: ignore[arg-type]
 
 
-def test_an_exported_network_answers_as_in_numpy(tmp_path: Path) -> None:
-    """ONNX Runtime and numpy agree on the same network, normalisation included."""
+@pytest.mark.parametrize('mirrored', [False, True])
+def test_an_exported_network_answers_as_in_numpy(tmp_path: Path, mirrored: bool) -> None:
+    """ONNX Runtime and numpy agree on the same network, normalisation and mirror included."""
     random = np.random.default_rng(3)
     first, second = (
         random.standard_normal(size).astype(np.float32) for size in ((47, 16), (16, 12))
@@ -354,14 +356,22 @@ def test_an_exported_network_answers_as_in_numpy(tmp_path: Path) -> None:
         random.uniform(0.1, 2.0, 47).astype(np.float32),
         [first, second],
         [random.standard_normal(size).astype(np.float32) for size in (16, 12)],
+        (-np.eye(47, dtype=np.float32), -np.eye(12, dtype=np.float32)) if mirrored else None,
     )
     export(network, tmp_path / 'net.onnx', metadata())
     loaded = OnnxNetwork(tmp_path / 'net.onnx')
+
+    def answer(seen: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+        inner = seen @ first + network.biases[0]
+        inner = np.where(inner > 0.0, inner, np.expm1(np.minimum(inner, 0.0)))
+        result: npt.NDArray[np.float32] = inner @ second + network.biases[1]
+        return result
+
     rows = random.standard_normal((5, 1, 47)).astype(np.float32)
     for row in rows:
-        inner = (row - network.mean) / network.deviation @ first + network.biases[0]
-        inner = np.where(inner > 0.0, inner, np.expm1(np.minimum(inner, 0.0)))
-        assert loaded.run(row) == pytest.approx(inner @ second + network.biases[1], abs=1e-4)
+        seen = (row - network.mean) / network.deviation
+        wanted = 0.5 * (answer(seen) - answer(-seen)) if mirrored else answer(seen)
+        assert loaded.run(row) == pytest.approx(wanted, abs=1e-4)
     assert loaded.metadata['joint_names'] == joined(JOINTS)
 
 

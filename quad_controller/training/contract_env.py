@@ -51,7 +51,7 @@ PLANT = Randomization(
     delay=(0.0, 0.06),
     backlash=(0.0, 0.026),
     refresh=(0.0, 0.04),
-    kick=(-1.6, 1.6),
+    kick=(-0.4, 0.4),
     kick_interval=2.0,
 )
 """What differs in the end: servos of 1 to 12 N m/rad, with up to 1.5 degrees of play."""

@@ -17,15 +17,43 @@ import numpy as np
 import onnx
 from onnx import numpy_helper
 from policy_export import Floats, Layers
+from scipy.linalg import block_diag
 from skrl.models.jax import DeterministicMixin, GaussianMixin, Model
 
 from quad_controller.exceptions import PolicyError
+from quad_controller.policy.contract.model import PolicyContract, Source
 
 HIDDEN = (128, 128)
+JOINTS = np.kron(np.kron(np.eye(2), np.eye(2)[::-1]), np.eye(3)).astype(np.float32)
+"""Joints of the left legs for those of the right; their axes are each other's mirror images."""
+MIRROR = {
+    Source.ANGULAR_VELOCITY: np.diag([-1, 1, -1]),
+    Source.GRAVITY: np.diag([1, -1, 1]),
+    Source.COMMAND: np.diag([1, -1, -1]),
+    Source.PHASE: -np.eye(2),  # a trot's other pair of legs steps half a cycle later
+    Source.JOINT_POSITIONS: JOINTS,
+    Source.JOINT_VELOCITIES: JOINTS,
+    Source.LAST_ACTION: JOINTS,
+}
+"""What each term of an observation is for a robot that is this one's mirror image."""
+SEEN_MIRROR = block_diag(*MIRROR.values()).astype(np.float32)
+
+
+def check_terms(contract: PolicyContract) -> None:
+    """Check that the observation has the terms of :data:`MIRROR`, in their order.
+
+    Raises:
+        PolicyError: It has others.
+    """
+    if [term.source for term in contract.terms] != list(MIRROR):
+        raise PolicyError(f'this training needs the terms {[each.value for each in MIRROR]}')
 
 
 class Actor(GaussianMixin, Model):  # type: ignore[misc]
-    """Answers observations with the mean of the actions to try."""
+    """Answers observations with the mean of the actions to try.
+
+    Seen in a mirror it answers the mirror image: it drifts to no side by itself.
+    """
 
     def __init__(
         self,
@@ -43,7 +71,8 @@ class Actor(GaussianMixin, Model):  # type: ignore[misc]
     def __call__(self, inputs: dict[str, Any], role: str) -> tuple[jax.Array, dict[str, Any]]:
         """Return the mean actions, and the logarithm of the deviation."""
         seen = inputs['observations'][:, :-UNSEEN]
-        mean = _layers(seen, self.num_actions, last=0.1)
+        layers = _layers(self.num_actions, last=0.1)
+        mean = 0.5 * (_through(layers, seen) + _through(layers, seen @ SEEN_MIRROR) @ JOINTS)
         deviation = self.param('log_std', linen.initializers.zeros, (self.num_actions,))
         return mean, {'log_std': deviation}
 
@@ -66,14 +95,18 @@ class Judge(DeterministicMixin, Model):  # type: ignore[misc]
     @linen.compact  # type: ignore[untyped-decorator]
     def __call__(self, inputs: dict[str, Any], role: str) -> tuple[jax.Array, dict[str, Any]]:
         """Return one number for each state."""
-        return _layers(inputs['observations'], 1, last=1.0), {}
+        return _through(_layers(1, last=1.0), inputs['observations']), {}
 
 
-def _layers(values: jax.Array, outputs: int, last: float) -> jax.Array:
-    for size in HIDDEN:
-        values = linen.elu(linen.Dense(size)(values))
+def _layers(outputs: int, last: float) -> list[linen.Dense]:
     scale = linen.initializers.variance_scaling(last, 'fan_in', 'truncated_normal')
-    return linen.Dense(outputs, kernel_init=scale)(values)
+    return [*(linen.Dense(size) for size in HIDDEN), linen.Dense(outputs, kernel_init=scale)]
+
+
+def _through(layers: list[linen.Dense], values: jax.Array) -> jax.Array:
+    for layer in layers[:-1]:
+        values = linen.elu(layer(values))
+    return layers[-1](values)
 
 
 class Normaliser:
@@ -117,11 +150,17 @@ def learned_in(path: Path, actor: Actor) -> Normaliser:
                 f'({" and ".join(map(str, HIDDEN))} units): begin with trot_ppo, or with a policy '
                 'that this training wrote'
             )
+        if not place:  # normalised so that both images are, and answered as before
+            mean, deviation = found['mean'], found['deviation']
+            even = 0.5 * (mean + mean @ SEEN_MIRROR)
+            broad = 0.5 * (deviation + deviation @ np.abs(SEEN_MIRROR))
+            bias = bias + ((even - mean) / deviation) @ kernel
+            kernel = kernel * (broad / deviation)[:, None]
         layers[f'Dense_{place}'] = {'kernel': jnp.array(kernel), 'bias': jnp.array(bias)}
     actor.state_dict = actor.state_dict.replace(params={**params, 'params': layers})
     return Normaliser(
-        np.append(found['mean'], np.zeros(UNSEEN, np.float32)),
-        np.append(found['deviation'], np.ones(UNSEEN, np.float32)),
+        np.append(even, np.zeros(UNSEEN, np.float32)),
+        np.append(broad, np.ones(UNSEEN, np.float32)),
     )
 
 
@@ -134,4 +173,5 @@ def layers_of(actor: Actor, normaliser: Normaliser) -> Layers:
         normaliser.deviation[:-UNSEEN],
         [np.asarray(each['kernel'], np.float32) for each in dense],
         [np.asarray(each['bias'], np.float32) for each in dense],
+        (SEEN_MIRROR, JOINTS),
     )

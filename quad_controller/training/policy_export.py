@@ -27,23 +27,36 @@ class Layers:
     deviation: Floats  # the inputs are divided by it
     weights: Sequence[Floats]  # one matrix for each layer, inputs by outputs
     biases: Sequence[Floats]  # one row for each layer
+    # Matrices that mirror normalised inputs, and outputs. The answer is then the mean of theirs
+    # and of the mirror image of their answer in the mirror. None for theirs alone.
+    mirror: tuple[Floats, Floats] | None = None
 
 
 def export(layers: Layers, path: Path, metadata: Mapping[str, str]) -> None:
     """Write a network."""
     tensors: dict[str, Floats] = {'mean': layers.mean, 'deviation': layers.deviation}
+    last = len(layers.weights) - 1
+    answers = ['actions'] if layers.mirror is None else ['here', 'mirrored']
     nodes = [
         helper.make_node('Sub', ['obs', 'mean'], ['centred']),
-        helper.make_node('Div', ['centred', 'deviation'], ['value0']),
+        helper.make_node('Div', ['centred', 'deviation'], [f'{answers[0]}_value0']),
     ]
-    last = len(layers.weights) - 1
+    if layers.mirror is not None:
+        tensors['seen_mirror'], tensors['action_mirror'] = layers.mirror
+        nodes.append(
+            helper.make_node('MatMul', ['here_value0', 'seen_mirror'], ['mirrored_value0'])
+        )
     for layer, (weight, bias) in enumerate(zip(layers.weights, layers.biases, strict=True)):
         tensors[f'weight{layer}'], tensors[f'bias{layer}'] = weight, bias
-        out = 'actions' if layer == last else f'sum{layer}'
-        inputs = [f'value{layer}', f'weight{layer}', f'bias{layer}']
-        nodes.append(helper.make_node('Gemm', inputs, [out]))
-        if layer != last:
-            nodes.append(helper.make_node('Elu', [out], [f'value{layer + 1}']))
+        for answer in answers:
+            out = answer if layer == last else f'{answer}_sum{layer}'
+            inputs = [f'{answer}_value{layer}', f'weight{layer}', f'bias{layer}']
+            nodes.append(helper.make_node('Gemm', inputs, [out]))
+            if layer != last:
+                nodes.append(helper.make_node('Elu', [out], [f'{answer}_value{layer + 1}']))
+    if layers.mirror is not None:
+        nodes.append(helper.make_node('MatMul', ['mirrored', 'action_mirror'], ['back']))
+        nodes.append(helper.make_node('Mean', ['here', 'back'], ['actions']))
     graph = helper.make_graph(
         nodes,
         'policy',

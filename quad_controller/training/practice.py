@@ -12,7 +12,7 @@ from time import monotonic
 from typing import Any
 
 from contract_env import contract_of, PERIOD, PLANT, walking_env
-from networks import Actor, explore, Judge, layers_of, learned_in, Normaliser
+from networks import Actor, check_terms, explore, Judge, layers_of, learned_in, Normaliser
 import numpy as np
 import numpy.typing as npt
 from policy_export import export
@@ -28,11 +28,11 @@ from quad_controller.policy.contract.build import build_contract
 from quad_controller.policy.contract.mjlab import CONTRACT_KEY
 from quad_sim.env import ProcessVectorEnv, Randomization
 
-ROLLOUT = 32  # steps of each environment between two updates
-JUDGE_ALONE = 20  # updates at the beginning that change the judge only
+ROLLOUT = 128  # steps of each environment between two updates
+JUDGE_ALONE = 8  # updates at the beginning that change the judge only
 FULL_AT = 0.5  # of the time: then the randomization is whole
 SHARE_STEP = 0.1  # the randomization grows by
-RATE = 2e-4
+RATE = 3e-4
 STEPS_UNKNOWN = 1_000_000_000  # skrl wants to know how many; here the clock ends it
 
 
@@ -172,13 +172,13 @@ def _terms(infos: Mapping[str, Any]) -> list[Mapping[str, float]]:
 def _settings(normaliser: Normaliser, curves: Path) -> PPO_CFG:
     return PPO_CFG(
         rollouts=ROLLOUT,
-        learning_epochs=5,
-        mini_batches=4,
+        learning_epochs=4,
+        mini_batches=8,
         discount_factor=0.99,
         gae_lambda=0.95,
         learning_rate=(RATE, 1e-3),
         learning_rate_scheduler=(KLAdaptiveLR, None),
-        learning_rate_scheduler_kwargs=({'kl_threshold': 0.016, 'max_lr': 1e-3}, {}),
+        learning_rate_scheduler_kwargs=({'kl_threshold': 0.012, 'max_lr': 1e-3}, {}),
         grad_norm_clip=1.0,
         value_loss_scale=1.0,
         observation_preprocessor=Normaliser,
@@ -198,7 +198,7 @@ def _settings(normaliser: Normaliser, curves: Path) -> PPO_CFG:
     )
 
 
-DEVIATION = 0.18  # of the actions that are tried when practice begins: 0.05 rad
+DEVIATION = 0.12  # of the actions that are tried when practice begins: 0.05 rad
 
 
 def train(
@@ -213,7 +213,9 @@ def train(
     skrl.config.jax.key = seed
     skrl.logger.setLevel('WARNING')
     document = contract_of(start, f'PPO from {start.stem} (quad_sim/Walk-v0, 1 to 12 N m/rad)')
-    make = partial(walking_env, build_contract(document), PLANT)
+    contract = build_contract(document)
+    check_terms(contract)
+    make = partial(walking_env, contract, PLANT)
     with closing(ProcessVectorEnv(make, environments)) as envs:
         actor = Actor(envs.single_observation_space, envs.single_action_space)
         actor.init_state_dict(role='policy')

@@ -73,8 +73,7 @@ class ServoModel(Enum):
     NOMINAL is the default: published figures of the vendor's servos and of the serial bus servos
     that they are made of (sources in the README). VENDOR_RL is the actuator in the vendor's newer
     training environment (luwu_mjlab): policies trained there expect it. FIRM is no real servo, but
-    stiff enough to show what a gait or policy does when the servos follow; trot_ppo was trained
-    with it.
+    stiff enough to show what a gait or policy does when the servos follow.
     """
 
     NOMINAL = 'nominal'
