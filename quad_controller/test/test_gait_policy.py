@@ -361,10 +361,10 @@ def test_an_exported_network_answers_as_in_numpy(tmp_path: Path, mirrored: bool)
     export(network, tmp_path / 'net.onnx', metadata())
     loaded = OnnxNetwork(tmp_path / 'net.onnx')
 
-    def answer(seen: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    def answer(seen: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
         inner = seen @ first + network.biases[0]
         inner = np.where(inner > 0.0, inner, np.expm1(np.minimum(inner, 0.0)))
-        result: npt.NDArray[np.float32] = inner @ second + network.biases[1]
+        result: npt.NDArray[np.floating] = inner @ second + network.biases[1]
         return result
 
     rows = random.standard_normal((5, 1, 47)).astype(np.float32)

@@ -13,11 +13,11 @@ from flax import linen
 import gymnasium
 import jax
 import jax.numpy as jnp
+from jax.scipy.linalg import block_diag
 import numpy as np
 import onnx
 from onnx import numpy_helper
 from policy_export import Floats, Layers
-from scipy.linalg import block_diag
 from skrl.models.jax import DeterministicMixin, GaussianMixin, Model
 
 from quad_controller.exceptions import PolicyError
@@ -36,7 +36,7 @@ MIRROR = {
     Source.LAST_ACTION: JOINTS,
 }
 """What each term of an observation is for a robot that is this one's mirror image."""
-SEEN_MIRROR = block_diag(*MIRROR.values()).astype(np.float32)
+SEEN_MIRROR = np.asarray(block_diag(*MIRROR.values()), np.float32)
 
 
 def check_terms(contract: PolicyContract) -> None:
