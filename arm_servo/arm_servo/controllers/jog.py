@@ -251,12 +251,11 @@ def _equal(one: Command, other: Command) -> bool:
     """Return whether a command repeats another; poses are always followed anew."""
     match one, other:
         case JointCommand(), JointCommand():
-            pairs = (one.velocity, other.velocity), (one.commanded, other.commanded)
-        case TwistCommand(axes=None), TwistCommand(axes=None) if one.link == other.link:
-            pairs = ((one.twist, other.twist),)
-        case _:
-            return False
-    return all(np.array_equal(*pair) for pair in pairs)
+            same = np.array_equal(one.commanded, other.commanded)
+            return same and np.array_equal(one.velocity, other.velocity)
+        case TwistCommand(axes=None), TwistCommand(axes=None):
+            return one.link == other.link and np.array_equal(one.twist, other.twist)
+    return False
 
 
 def _approach(error: Array, gain: float, fastest: float, deceleration: float) -> Array:

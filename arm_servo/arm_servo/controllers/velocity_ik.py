@@ -74,7 +74,7 @@ class VelocityBounds:
         limits = model.limits
         self._model, self._settings, self._limits = model, settings, limits
         margins = np.array(settings.joint_margins)
-        change = 1.5 * limits.acceleration**2 / limits.jerk + 0.01 * limits.acceleration
+        change = 1.5 * limits.acceleration**2 / limits.jerk + 0.025 * limits.acceleration
         # plain numbers by joint, as an array of few is slower than its numbers one by one
         self._joints = list(
             zip(
@@ -83,7 +83,8 @@ class VelocityBounds:
                 limits.velocity.tolist(),
                 limits.acceleration.tolist(),
                 limits.jerk.tolist(),
-                # what a speed can change by while its acceleration builds up and down, and more
+                # what a speed can change by while its acceleration builds up and down, and
+                # in the cycles of one solution
                 change.tolist(),
                 strict=True,
             )
