@@ -5,8 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+import contextlib
 from pathlib import Path
 import signal
+import subprocess
 import sys
 import time
 
@@ -138,10 +140,16 @@ def test_what_is_recorded_is_played(env: Mapping[str, str], tmp_path: Path) -> N
     with record(env, second, *topics) as recorder:
         recorder.wait_for(RECORDING)
         words = ['bag', 'play', str(first), '--remap', '/numbers:=/counted', '--delay', '2']
-        with RunningProcess([*PROGRAM, *words], env) as player:
+        with RunningProcess([*PROGRAM, *words, '-r', '0.2'], env) as player:
+            # one that stands still at the end misses nothing: the player waits for it
+            until(lambda: arrived(second, '/counted') > 0, recorder)
+            recorder.signal(signal.SIGSTOP)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                player.wait(3.0)
+            recorder.signal(signal.SIGCONT)
             assert player.wait(60.0) == 0
         assert f"topics of '{first}', " in player.output
-        assert 'Set rate to 1\n' in player.output
+        assert 'Set rate to 0.2\n' in player.output
         assert 'Playback until timestamp: -1' in player.output
         assert 'SPACE' not in player.output  # there is no keyboard
         until(lambda: arrived(second, '/counted') == 300, recorder)

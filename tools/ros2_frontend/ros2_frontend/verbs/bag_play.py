@@ -23,6 +23,7 @@ from ..ros.graph import Graph, open_session, Session
 
 _RIGHT = '\x1b[C'  # the key as a terminal sends it
 _NANO = 1_000_000_000
+ACK_TIMEOUT = 5.0  # [s] for a subscription that is slow to acknowledge the last messages
 
 
 def _remap(text: str) -> tuple[str, str]:
@@ -125,6 +126,7 @@ def play(args: Namespace) -> None:
                 count = player.play(reader.messages(names, start), start, end, poll)
                 if not args.loop or not count:
                     break
+            player.finish()
 
 
 @contextlib.contextmanager
@@ -228,6 +230,13 @@ class Player:
                 publisher.publish(message.data)
                 count += 1
         return count
+
+    def finish(self) -> None:
+        """Wait until subscriptions have the last messages: they are lost with their publisher."""
+        from rclpy.duration import Duration  # rclpy is imported by the session
+
+        for publisher in self._publishers.values():
+            publisher.wait_for_all_acked(Duration(seconds=ACK_TIMEOUT))
 
     def _await(self, moment: int, poll: Callable[[], int]) -> None:
         while True:
