@@ -198,7 +198,7 @@ def _settings(normaliser: Normaliser, curves: Path) -> PPO_CFG:
     )
 
 
-DEVIATION = 0.12  # of the actions that are tried when practice begins: 0.05 rad
+DEVIATION = 0.12  # of the actions that are tried when practice begins: 0.03 rad
 
 
 def train(

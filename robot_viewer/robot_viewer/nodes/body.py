@@ -74,6 +74,7 @@ class Body:
         self._feet: tuple[str, ...] = ()
         self.offered = False  # on the page
         self._attitude: Quaternion | None = None
+        self._mounted: dict[str, Quaternion] = {}  # how links are turned in the body at zero
         self.battery = ''
         self._masses: tuple[PointMass, ...] = ()
         self._radius = 0.0
@@ -92,6 +93,7 @@ class Body:
     def describe(self, tree: KinematicTree) -> None:
         """Use another robot."""
         self._tree, self._feet = tree, feet_of(tree)
+        self._mounted = {link: pose.rotation for link, pose in link_poses(tree, {}).items()}
         self._masses, self._radius = (), 0.0
         self._contacts = self._support = None
         if not self._feet:
@@ -260,9 +262,9 @@ class Body:
         turn = message.orientation
         measured = message.orientation_covariance[0] != NOT_MEASURED
         self._attitude = (turn.x, turn.y, turn.z, turn.w) if measured else None
-        frames = {} if self._tree is None else link_poses(self._tree, {})
-        if self._attitude is not None and (mounted := frames.get(message.header.frame_id)):
-            x, y, z, w = mounted.rotation
+        mounted = self._mounted.get(message.header.frame_id)
+        if self._attitude is not None and mounted is not None:
+            x, y, z, w = mounted
             self._attitude = multiply(self._attitude, (-x, -y, -z, w))
 
     def _take_contacts(self, message: Any) -> None:  # noqa: ANN401  # quad_msgs may not be there

@@ -23,7 +23,7 @@ from ..ros.graph import Graph, open_session, Session
 
 _RIGHT = '\x1b[C'  # the key as a terminal sends it
 _NANO = 1_000_000_000
-ACK_TIMEOUT = 5.0  # [s] for a subscription that is slow to acknowledge the last messages
+ACK_TIMEOUT = 5.0  # [s] for all subscriptions that are slow to acknowledge the last messages
 
 
 def _remap(text: str) -> tuple[str, str]:
@@ -235,8 +235,10 @@ class Player:
         """Wait until subscriptions have the last messages: they are lost with their publisher."""
         from rclpy.duration import Duration  # rclpy is imported by the session
 
+        deadline = time.monotonic() + ACK_TIMEOUT
         for publisher in self._publishers.values():
-            publisher.wait_for_all_acked(Duration(seconds=ACK_TIMEOUT))
+            left = max(deadline - time.monotonic(), 0.0)
+            publisher.wait_for_all_acked(Duration(seconds=left))
 
     def _await(self, moment: int, poll: Callable[[], int]) -> None:
         while True:
