@@ -11,7 +11,7 @@ import json
 import os
 from pathlib import Path
 import sys
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 import browser as chromium
 from isolation import Isolation
@@ -21,6 +21,9 @@ import pytest
 from terminals import held_key
 
 from dds_network import NETWORK_VARIABLE, PROFILE_VARIABLE
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
 
 pytestmark = pytest.mark.scenario
 
@@ -156,6 +159,20 @@ def test_a_link_that_is_cut_or_slow_stops_the_arm_and_heals(isolation: Isolation
                 assert 'leads neither' not in viewer.wait_for('/stop: ')
 
 
+def hold_until_it_moves(page: Page, button: str, watch: RunningProcess) -> None:
+    """Hold a button, anew where the page let it go: on a busy machine the robot may be silent."""
+    for last in (False, False, True):
+        chromium.hold(page, button)
+        try:
+            watch.wait_until_last('^moving', 20.0)
+        except AssertionError:
+            if last or page.locator('.rv-held').count():
+                raise
+            page.mouse.up()
+        else:
+            return
+
+
 @pytest.mark.timeout(300)
 @pytest.mark.skipif(bool(chromium.lacking()), reason=chromium.lacking())
 def test_a_page_of_the_other_side_jogs_and_stops_with_the_link(isolation: Isolation) -> None:
@@ -176,17 +193,18 @@ def test_a_page_of_the_other_side_jogs_and_stops_with_the_link(isolation: Isolat
                 ('Turn Z +', Condition(cut=True)),
                 ('Turn Z −', Condition(delay=0.15)),
             ):
-                chromium.hold(page, turn)
-                watch.wait_until_last('^moving')
+                hold_until_it_moves(page, turn, watch)
                 link.condition = fault
                 watch.wait_until_last('^still')
                 if fault.cut:
                     chromium.state_is(page, 'NO CONTACT WITH THE ROBOT')
+                    why = page.locator('#rv-why').text_content() or ''
+                    assert why.startswith(f'{turn}: Nothing for')
                 link.condition = Condition()
                 if fault.cut:
                     chromium.state_is(page, 'READY')
                     page.mouse.up()
-                    chromium.hold(page, turn)
+                    hold_until_it_moves(page, turn, watch)
                 watch.wait_until_last('^moving')
                 chromium.state_is(page, 'MOVING')
                 page.mouse.up()
