@@ -44,8 +44,6 @@ from canopen_core.standard import (
     TIME_PRODUCER,
 )
 
-from .eds_lint import LISTS, proper_list
-
 Keys: TypeAlias = dict[str, str]
 DcfObject: TypeAlias = dict[str, Keys]
 """The sections of an object, by what follows its index in their titles."""
@@ -127,8 +125,8 @@ def _numbers(name: str, words: Sequence[int], size: int = 0) -> DcfObject:
 def _text(head: Mapping[str, Keys], objects: Mapping[int, DcfObject]) -> str:
     """Return the text of a DCF: the sections before the objects, their lists, and the objects."""
     sections = dict(head)
-    for title in LISTS.values():
-        indices = sorted(index for index in objects if proper_list(index) == title)
+    for title in LISTS:
+        indices = sorted(index for index in objects if _list_of(index) == title)
         sections[title] = {'SupportedObjects': str(len(indices))} | {
             str(number): f'0x{index:04X}' for number, index in enumerate(indices, start=1)
         }
@@ -141,6 +139,14 @@ def _text(head: Mapping[str, Keys], objects: Mapping[int, DcfObject]) -> str:
     )
 
 
+def _list_of(index: int) -> str:
+    """Return the list that an object stands in (CiA 306-1, 4.6.2)."""
+    if index in (Index.DEVICE_TYPE, Index.ERROR_REGISTER, Index.IDENTITY):
+        return LISTS[0]
+    return LISTS[2 if 0x2000 <= index < 0x6000 else 1]
+
+
+LISTS = ('MandatoryObjects', 'OptionalObjects', 'ManufacturerObjects')
 U8, U16, U32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
 RO, RW, WO = AccessType.READ_ONLY, AccessType.READ_WRITE, AccessType.WRITE_ONLY
 DUMMY_TYPES = (*range(0x01, 0x08), 0x10, *range(0x12, 0x17), *range(0x18, 0x1C))

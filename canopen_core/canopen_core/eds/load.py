@@ -55,7 +55,7 @@ def load_eds(path: str | os.PathLike[str]) -> Eds:
     """
     path = Path(path)
     findings = Findings()
-    ini = read_ini(read_eds_text(path, findings))
+    ini = read_ini(_read_text(path, findings))
     node_id = _node_id(ini)
     dictionary = ObjectDictionary(ObjectReader(ini).entries(), source=str(path), node_id=node_id)
     if not len(dictionary):
@@ -66,12 +66,7 @@ def load_eds(path: str | os.PathLike[str]) -> Eds:
     return Eds(path, dictionary, node_id, _dummy_types(ini), findings.warnings)
 
 
-def read_eds_text(path: Path, findings: Findings) -> str:
-    """Return the text of an EDS or DCF.
-
-    Raises:
-        ConfigError: The file is missing, unreadable or too large to be one.
-    """
+def _read_text(path: Path, findings: Findings) -> str:
     try:
         if not path.is_file():
             findings.error(Place(path), 'there is no such file', 'correct the path of the EDS')
