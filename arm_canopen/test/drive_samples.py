@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from arm_canopen import BusConfig, NodeConfig
-from arm_canopen.config import MasterConfig, PdoConfig, SdoWrite
+from arm_canopen.config import MasterConfig, PdoConfig, RPDO, SdoWrite, TPDO
 from canopen_core.eds import load_eds
 from canopen_core.standard import MappedObject, ObjectDictionary, rpdo_default, tpdo_default
 
@@ -46,7 +46,10 @@ def pdo(number: int, cob_id: int, *objects: tuple[int, int], transmission: int =
         entry = dictionary.get(index, subindex)
         assert entry is not None
         mapping.append(MappedObject(index, subindex, entry.data_type))
-    return PdoConfig(number, True, cob_id, transmission, mapping=tuple(mapping), configured=True)
+    direction = TPDO if cob_id & 0x80 else RPDO
+    return PdoConfig(
+        direction, number, True, cob_id, transmission, mapping=tuple(mapping), configured=True
+    )
 
 
 def sdo_write(index: int, subindex: int, value: int) -> SdoWrite:

@@ -11,7 +11,7 @@ from typing import TypeAlias
 import pytest
 
 from arm_canopen import BusConfig, NodeConfig
-from arm_canopen.config import MasterConfig, PdoConfig
+from arm_canopen.config import MasterConfig, PdoConfig, RPDO, TPDO
 from canopen_core.standard import DataType, MappedObject, ObjectDictionary, ObjectEntry
 
 REPOSITORY = Path(__file__).parents[2]
@@ -55,7 +55,8 @@ def _mapped(*objects: tuple[int, DataType]) -> tuple[MappedObject, ...]:
 
 
 def _pdo(number: int, cob_id: int, *objects: tuple[int, DataType]) -> PdoConfig:
-    return PdoConfig(number, True, cob_id, 1, mapping=_mapped(*objects))
+    direction = TPDO if cob_id & 0x80 else RPDO
+    return PdoConfig(direction, number, True, cob_id, 1, mapping=_mapped(*objects))
 
 
 DRIVE = NodeConfig(
@@ -67,7 +68,7 @@ DRIVE = NodeConfig(
     tpdos=(
         _pdo(1, 0x182, (0x6041, DataType.UNSIGNED16), (0x6061, DataType.INTEGER8)),
         _pdo(2, 0x2A5, (0x6064, DataType.INTEGER32), (0x5FFF, DataType.UNSIGNED8)),
-        PdoConfig(3, enabled=False, cob_id=0x382, transmission=1),
+        PdoConfig(TPDO, 3, enabled=False, cob_id=0x382, transmission=1),
     ),
     rpdos=(_pdo(1, 0x202, (0x6040, DataType.UNSIGNED16), (0x6060, DataType.INTEGER8)),),
 )

@@ -49,8 +49,8 @@ class Channels:
     def __init__(self, device: RemoteNode, group: IoGroup) -> None:
         places = {
             (mapped.index, mapped.subindex)
-            for direction, pdo in device.config.pdos
-            if pdo.enabled and direction.name == group.direction
+            for pdo in device.config.pdos
+            if pdo.enabled and pdo.direction.name == group.direction
             for mapped in pdo.mapping
         }
         entries = group.entries(device.config.dictionary, places)

@@ -21,7 +21,7 @@ from drive_samples import (
 import pytest
 
 from arm_canopen import BusError, CanopenError, CodecError, NodeConfig, OperationMode
-from arm_canopen.config import check_bus, PdoConfig
+from arm_canopen.config import check_bus, PdoConfig, RPDO
 from canopen_core.can import Frame
 from canopen_core.standard import (
     AccessType,
@@ -177,7 +177,13 @@ def test_an_object_of_the_vendor_is_no_target_nor_offset(index: int) -> None:
     )
     config = drive_config(JOINT, 2)
     mapped = PdoConfig(
-        4, True, SPEEDS, 1, mapping=(MappedObject(index, 0, entry.data_type),), configured=True
+        RPDO,
+        4,
+        True,
+        SPEEDS,
+        1,
+        mapping=(MappedObject(index, 0, entry.data_type),),
+        configured=True,
     )
     config = replace(
         config,

@@ -28,7 +28,7 @@ from canopen_core.standard import (
 )
 
 from ..keys import HUNDRED_MICROSECONDS, MILLISECONDS
-from .bus import BusConfig, Direction, EVENT_TIMER_SUBINDEX, NodeConfig, PdoConfig, SdoWrite, TPDO
+from .bus import BusConfig, EVENT_TIMER_SUBINDEX, NodeConfig, PdoConfig, SdoWrite, TPDO
 
 COB_ID_BITS = COB_ID_INVALID | COB_ID_EXTENDED | CAN_ID_MASK
 """Bits that bus.yml decides of a COB-ID; the device has bit 30 as it can."""
@@ -122,9 +122,9 @@ def held_after_boot(
     """
     fixed = (
         write
-        for direction, pdo in node.pdos
+        for pdo in node.pdos
         if pdo.configured and pdo.enabled and pdo.fixed_mapping
-        for write in _mapping(direction, pdo, f'{direction.name}.{pdo.number}', fixed=True)
+        for write in _mapping(pdo, pdo.key, fixed=True)
     )
     writes = [*fixed, *assumed_cob_ids(node), *boot_writes(bus, node, consumers)]
     return list({write.address: write for write in writes}.values())  # the last one counts
@@ -189,11 +189,11 @@ def _writes(
         leading += 1
     for write in node.sdo_writes[:leading]:
         yield from _written(write, unless_default=True)
-    for direction, pdo in sorted(node.pdos, key=lambda each: each[0] is TPDO):
+    for pdo in node.rpdos + node.tpdos:
         if pdo.configured:
-            yield from _pdo(bus, node, direction, pdo)
+            yield from _pdo(bus, node, pdo)
         elif pdo.event_time is not None:  # of a TPDO that is otherwise left as the device has it
-            for parameter in _parameters(bus, node, direction, pdo):
+            for parameter in _parameters(bus, node, pdo):
                 if parameter.subindex == EVENT_TIMER_SUBINDEX:
                     yield parameter
     for write in node.sdo_writes[leading:]:
@@ -237,12 +237,10 @@ def _error_control(bus: BusConfig, node: NodeConfig) -> Iterator[BootWrite]:
             yield BootWrite(index, 0, data, key, requested, unless_default=True)
 
 
-def _pdo(
-    bus: BusConfig, node: NodeConfig, direction: Direction, pdo: PdoConfig
-) -> Iterator[BootWrite]:
+def _pdo(bus: BusConfig, node: NodeConfig, pdo: PdoConfig) -> Iterator[BootWrite]:
     """Configure a PDO: disable, parameters, mapping, enable (CiA 301, 7.5.2.36)."""
-    index, key = direction.communication + pdo.number - 1, f'{direction.name}.{pdo.number}'
-    is_given = _is_given(bus, node, direction, pdo, 'cob_id')
+    index, key = pdo.communication, pdo.key
+    is_given = _is_given(bus, node, pdo, 'cob_id')
     yield BootWrite(
         index,
         1,
@@ -255,22 +253,18 @@ def _pdo(
     )
     if not pdo.enabled:
         return
-    yield from _parameters(bus, node, direction, pdo)
+    yield from _parameters(bus, node, pdo)
     if not pdo.fixed_mapping:
-        given, count = _is_given(bus, node, direction, pdo, 'mapping'), len(pdo.mapping)
+        given, temporary = _is_given(bus, node, pdo, 'mapping'), bool(pdo.mapping)
         zero, mapping_key = encode(DataType.UNSIGNED8, 0), f'{key}.mapping'
-        mapping = direction.mapping + pdo.number - 1
-        yield BootWrite(mapping, 0, zero, mapping_key, given, temporary=count > 0)
-        yield from _mapping(direction, pdo, mapping_key, requested=given)
+        yield BootWrite(pdo.mapping_index, 0, zero, mapping_key, given, temporary=temporary)
+        yield from _mapping(pdo, mapping_key, requested=given)
     data = encode(DataType.UNSIGNED32, pdo.cob_id)
     yield BootWrite(index, 1, data, f'{key}.cob_id', is_given, mask=COB_ID_BITS)
 
 
-def _parameters(
-    bus: BusConfig, node: NodeConfig, direction: Direction, pdo: PdoConfig
-) -> Iterator[BootWrite]:
-    index = direction.communication + pdo.number - 1
-    deadline = TIMER_KEY if direction is TPDO else 'event_deadline'
+def _parameters(bus: BusConfig, node: NodeConfig, pdo: PdoConfig) -> Iterator[BootWrite]:
+    deadline = TIMER_KEY if pdo.direction is TPDO else 'event_deadline'
     event_time = _units(pdo.event_time, MILLISECONDS)
     for subindex, name, data_type, value in (
         (2, 'transmission', DataType.UNSIGNED8, pdo.transmission),
@@ -279,16 +273,16 @@ def _parameters(
         (6, 'sync_start', DataType.UNSIGNED8, pdo.sync_start),
     ):
         if value is not None:
-            key = f'{direction.name}.{pdo.number}.{name}'
-            data, given = encode(data_type, value), _is_given(bus, node, direction, pdo, name)
-            yield BootWrite(index, subindex, data, key, given, unless_default=True)
+            data, given = encode(data_type, value), _is_given(bus, node, pdo, name)
+            key = f'{pdo.key}.{name}'
+            yield BootWrite(pdo.communication, subindex, data, key, given, unless_default=True)
 
 
 def _mapping(
-    direction: Direction, pdo: PdoConfig, key: str, *, requested: bool = True, fixed: bool = False
+    pdo: PdoConfig, key: str, *, requested: bool = True, fixed: bool = False
 ) -> Iterator[BootWrite]:
     """Yield the mapped objects, and then their number."""
-    index, count = direction.mapping + pdo.number - 1, len(pdo.mapping)
+    index, count = pdo.mapping_index, len(pdo.mapping)
     for subindex, mapped in enumerate(pdo.mapping, start=1):
         data = encode(DataType.UNSIGNED32, mapped.word)
         yield BootWrite(index, subindex, data, key, requested, fixed=fixed)
@@ -296,18 +290,15 @@ def _mapping(
         yield BootWrite(index, 0, encode(DataType.UNSIGNED8, count), key, requested, fixed=fixed)
 
 
-def _is_given(
-    bus: BusConfig, node: NodeConfig, direction: Direction, pdo: PdoConfig, key: str
-) -> bool:
+def _is_given(bus: BusConfig, node: NodeConfig, pdo: PdoConfig, key: str) -> bool:
     """Return whether bus.yml gives a key of a PDO, or a DCF the object."""
-    if is_requested(bus, node, direction.name, str(pdo.number), key):
+    if is_requested(bus, node, pdo.direction.name, str(pdo.number), key):
         return True
     if key == TIMER_KEY:  # which a DCF may leave to its default beside other parameters
-        index = direction.communication + pdo.number - 1
-        entry = node.dictionary.get(index, EVENT_TIMER_SUBINDEX)
+        entry = node.dictionary.get(pdo.communication, EVENT_TIMER_SUBINDEX)
         return entry is not None and entry.configured
-    objects = direction.mapping if key == 'mapping' else direction.communication
-    return node.dictionary.is_configured(objects + pdo.number - 1)
+    index = pdo.mapping_index if key == 'mapping' else pdo.communication
+    return node.dictionary.is_configured(index)
 
 
 def _consumers_of_dcf(node: NodeConfig) -> dict[int, int]:
@@ -321,11 +312,10 @@ def _consumers_of_dcf(node: NodeConfig) -> dict[int, int]:
 
 def assumed_cob_ids(node: NodeConfig) -> Iterator[BootWrite]:
     """Yield the COB-IDs that the device should have by its node id, though not by its EDS."""
-    for direction, pdo in node.pdos:
+    for pdo in node.pdos:
         if pdo.assumed and pdo.enabled and not pdo.configured:
-            index, key = direction.communication + pdo.number - 1, f'{direction.name}.{pdo.number}'
             data = encode(DataType.UNSIGNED32, pdo.cob_id)
-            yield BootWrite(index, 1, data, key, mask=COB_ID_BITS, fixed=True)
+            yield BootWrite(pdo.communication, 1, data, pdo.key, mask=COB_ID_BITS, fixed=True)
 
 
 def _written(write: SdoWrite, *, unless_default: bool = False) -> Iterator[BootWrite]:

@@ -94,6 +94,7 @@ RPDO = Direction(
 class PdoConfig:
     """One PDO of a device, named from the device's side."""
 
+    direction: Direction
     number: int  # 1 for the objects 0x1400/0x1600 or 0x1800/0x1A00, and so on
     enabled: bool  # the PDO exists (bit 31 of its COB-ID is clear)
     cob_id: int  # its 11-bit CAN identifier; 0 when it is disabled and has none
@@ -112,10 +113,30 @@ class PdoConfig:
     # where bus.yml has its COB-ID, else the PDO or the device
     place: Place = field(default=Place(), compare=False)
 
+    @property
+    def title(self) -> str:
+        """Name as people write it, such as ``TPDO 1``."""
+        return f'{self.direction.title} {self.number}'
+
+    @property
+    def key(self) -> str:
+        """Key in bus.yml, such as ``tpdo.1``."""
+        return f'{self.direction.name}.{self.number}'
+
+    @property
+    def communication(self) -> int:
+        """Index of its communication parameter."""
+        return self.direction.communication + self.number - 1
+
+    @property
+    def mapping_index(self) -> int:
+        """Index of its mapping parameter."""
+        return self.direction.mapping + self.number - 1
+
 
 def with_event_timer(pdo: PdoConfig, dictionary: ObjectDictionary) -> PdoConfig:
     """Return a TPDO of a drive with an event timer, if it needs one and has none."""
-    index = Index.TPDO_COMMUNICATION + pdo.number - 1
+    index = pdo.communication
     entry = dictionary.get(index, EVENT_TIMER_SUBINDEX)
     chosen = pdo.event_time is not None or pdo.transmission < EVENT_DRIVEN
     if chosen or not _carries_state(pdo) or entry is None or not entry.access.writable:
@@ -407,11 +428,9 @@ class NodeConfig:
         return None if entry is None else entry.default
 
     @property
-    def pdos(self) -> Iterator[tuple[Direction, PdoConfig]]:
+    def pdos(self) -> tuple[PdoConfig, ...]:
         """All PDOs, the TPDOs first."""
-        for direction, pdos in ((TPDO, self.tpdos), (RPDO, self.rpdos)):
-            for pdo in pdos:
-                yield direction, pdo
+        return self.tpdos + self.rpdos
 
     @property
     def uses_node_guarding(self) -> bool:

@@ -28,7 +28,7 @@ from canopen_core.standard import (
 
 from ..keys import MICROSECONDS
 from .boot_plan import boot_writes, WATCH_KEY
-from .bus import BusConfig, Direction, NodeConfig, PdoConfig, TPDO
+from .bus import BusConfig, NodeConfig, PdoConfig, TPDO
 from .device_checks import check_drive, check_io_device, check_pdos, Subject
 from .drive_units import axis_units, AxisUnits, check_units
 
@@ -254,9 +254,9 @@ def check_identifiers(subjects: Sequence[Subject]) -> None:
     """Refuse identifiers that two services have, and services where the master does not look."""
     owners: dict[int, tuple[str, Place]] = {}
     for subject in subjects:
-        for direction, pdo in subject.pdos():
-            title = f'{direction.title} {pdo.number} of {subject.node.name}'
-            owners.setdefault(pdo.cob_id, (title, subject.pdo_place(direction, pdo, 'cob_id')))
+        for pdo in subject.pdos():
+            title = f'{pdo.title} of {subject.node.name}'
+            owners.setdefault(pdo.cob_id, (title, subject.pdo_place(pdo, 'cob_id')))
     for subject in subjects:
         _check_emergency(subject)
         value = subject.value(Index.EMCY_COB_ID)
@@ -351,11 +351,10 @@ def estimate_load(config: BusConfig, bitrate: int | None = None) -> LoadEstimate
         traffic += _periodic(
             node.name, 'heartbeat', CobId.HEARTBEAT + node.node_id, 1, node.heartbeat_producer
         )
-        for direction, pdo in subject.pdos():
+        for pdo in subject.pdos():
             size = min((sum(mapped.bits for mapped in pdo.mapping) + 7) // 8, PAYLOAD_MAX)
-            rate, reason = _rate(subject, direction, pdo)
-            service = f'{direction.title} {pdo.number}'
-            traffic.append(Traffic(node.name, service, pdo.cob_id, size, rate, reason))
+            rate, reason = _rate(subject, pdo)
+            traffic.append(Traffic(node.name, pdo.title, pdo.cob_id, size, rate, reason))
         traffic += _guarding(node)
         traffic += _polling(subject)
     return LoadEstimate(bitrate or config.master.bitrate, tuple(traffic))
@@ -402,10 +401,10 @@ def _polling(subject: Subject) -> Iterator[Traffic]:
             yield Traffic(node.name, service, cob_id + node.node_id, PAYLOAD_MAX, rate, reason)
 
 
-def _rate(subject: Subject, direction: Direction, pdo: PdoConfig) -> tuple[float, str]:
+def _rate(subject: Subject, pdo: PdoConfig) -> tuple[float, str]:
     """Return how often a PDO is sent in [1/s], and why."""
     master = subject.bus.master
-    if direction is not TPDO:
+    if pdo.direction is not TPDO:
         if not subject.node.is_drive:
             return 0.0, 'when a value is sent'
         return 1 / master.cycle_period, 'every cycle'

@@ -67,9 +67,9 @@ class Subject:
         place = self.bus.place_of(self.node.name, *names)
         return place if place.line else replace(place, line=self.node.line)
 
-    def pdo_place(self, direction: Direction, pdo: PdoConfig, key: str = '') -> Place:
+    def pdo_place(self, pdo: PdoConfig, *key: str) -> Place:
         """Return the place of a PDO, or of one of its keys."""
-        return self.place(direction.name, str(pdo.number), *([key] if key else []))
+        return self.place(pdo.direction.name, str(pdo.number), *key)
 
     def object_place(self, index: int, subindex: int) -> Place:
         """Return the place of the value of an object: the sdo list, or else the EDS."""
@@ -95,18 +95,16 @@ class Subject:
                 if number is not None:
                     yield UsedMode(axis, OperationMode(number), key)
 
-    def pdos(self) -> Iterator[tuple[Direction, PdoConfig]]:
-        """Yield the PDOs that are in use."""
-        for direction, pdo in self.node.pdos:
-            if pdo.enabled and pdo.mapping:
-                yield direction, pdo
+    def pdos(self) -> list[PdoConfig]:
+        """Return the PDOs that are in use."""
+        return [pdo for pdo in self.node.pdos if pdo.enabled and pdo.mapping]
 
     def carriers(self, direction: Direction, index: int, subindex: int = 0) -> list[PdoConfig]:
         """Return the PDOs in use that carry an object."""
         return [
             pdo
-            for way, pdo in self.pdos()
-            if way is direction
+            for pdo in self.pdos()
+            if pdo.direction is direction
             and any((m.index, m.subindex) == (index, subindex) for m in pdo.mapping)
         ]
 
@@ -114,14 +112,13 @@ class Subject:
         """Return the inhibit time of a TPDO in [s], by bus.yml or else the EDS; 0 for none."""
         if pdo.inhibit_time is not None:
             return pdo.inhibit_time
-        units = self.value(Index.TPDO_COMMUNICATION + pdo.number - 1, 3)
-        return (units or 0) / HUNDRED_MICROSECONDS
+        return (self.value(pdo.communication, 3) or 0) / HUNDRED_MICROSECONDS
 
     def event_time(self, pdo: PdoConfig) -> float:
         """Return the event timer of a TPDO in [s], by bus.yml or else the EDS; 0 for none."""
         if pdo.event_time is not None:
             return pdo.event_time
-        return (self.value(Index.TPDO_COMMUNICATION + pdo.number - 1, 5) or 0) / MILLISECONDS
+        return (self.value(pdo.communication, 5) or 0) / MILLISECONDS
 
 
 def object_name(index: int) -> str:
@@ -138,44 +135,44 @@ LATE_FACTOR = 1.5  # periods that a frame may come late before its deadline stri
 
 def check_pdos(subject: Subject) -> None:
     """Check every PDO in use."""
-    for direction, pdo in subject.pdos():
-        if direction is TPDO and subject.node.is_drive:
+    for pdo in subject.pdos():
+        if pdo.direction is TPDO and subject.node.is_drive:
             _check_loss(subject, pdo)
         if SYNCHRONOUS_MAX < pdo.transmission < 254:
-            _check_reserved(subject, direction, pdo)
+            _check_reserved(subject, pdo)
         if pdo.sync_start:
-            _check_sync_start(subject, direction, pdo)
-        if direction is not TPDO:
-            _check_deadline(subject, direction, pdo)
+            _check_sync_start(subject, pdo)
+        if pdo.direction is not TPDO:
+            _check_deadline(subject, pdo)
         elif pdo.transmission <= SYNCHRONOUS_MAX:
-            _check_useless_times(subject, direction, pdo)
+            _check_useless_times(subject, pdo)
         else:
-            _check_events(subject, direction, pdo)
+            _check_events(subject, pdo)
 
 
 def _check_loss(subject: Subject, pdo: PdoConfig) -> None:
     if loss_unnoticed(pdo, longest_silence(pdo, subject.bus.master.sync_period)):
         subject.findings.warning(
-            subject.pdo_place(TPDO, pdo, 'transmission'),
+            subject.pdo_place(pdo, 'transmission'),
             f'the loss of TPDO {pdo.number} goes unnoticed (transmission {pdo.transmission}, '
             'no event timer or SYNC), and the drive is led by what it sent before',
             "write 'transmission: 1' (with SYNC), or 255 and 'event_timer: 100'",
         )
 
 
-def _check_reserved(subject: Subject, direction: Direction, pdo: PdoConfig) -> None:
+def _check_reserved(subject: Subject, pdo: PdoConfig) -> None:
     remote = pdo.transmission in REMOTE_TYPES
     what = 'waits for remote frames, which the master never sends' if remote else 'is reserved'
     subject.findings.warning(
-        subject.pdo_place(direction, pdo, 'transmission'),
-        f'{direction.title} {pdo.number}: transmission type {pdo.transmission} {what}',
+        subject.pdo_place(pdo, 'transmission'),
+        f'{pdo.title}: transmission type {pdo.transmission} {what}',
         "write 'transmission: 1' (with SYNC) or 255 (on events)",
     )
 
 
-def _check_sync_start(subject: Subject, direction: Direction, pdo: PdoConfig) -> None:
+def _check_sync_start(subject: Subject, pdo: PdoConfig) -> None:
     overflow = subject.bus.master.sync_overflow
-    place = subject.pdo_place(direction, pdo, 'sync_start')
+    place = subject.pdo_place(pdo, 'sync_start')
     if not overflow:
         subject.findings.warning(
             place,
@@ -190,33 +187,33 @@ def _check_sync_start(subject: Subject, direction: Direction, pdo: PdoConfig) ->
         )
 
 
-def _check_deadline(subject: Subject, direction: Direction, pdo: PdoConfig) -> None:
+def _check_deadline(subject: Subject, pdo: PdoConfig) -> None:
     cycle = subject.bus.master.cycle_period
     if pdo.event_time and pdo.event_time < LATE_FACTOR * cycle:
         subject.findings.warning(
-            subject.pdo_place(direction, pdo, 'event_deadline'),
+            subject.pdo_place(pdo, 'event_deadline'),
             f'the device misses RPDO {pdo.number} after {pdo.event_time * 1e3:g} ms, but it comes '
             f'every {cycle * 1e3:g} ms: a frame that is a little late is a fault',
             f'take at least {2 * cycle * 1e3:g}',
         )
 
 
-def _check_useless_times(subject: Subject, direction: Direction, pdo: PdoConfig) -> None:
+def _check_useless_times(subject: Subject, pdo: PdoConfig) -> None:
     for key, time in (('inhibit_time', pdo.inhibit_time), ('event_timer', pdo.event_time)):
         if time:
             subject.findings.warning(
-                subject.pdo_place(direction, pdo, key),
+                subject.pdo_place(pdo, key),
                 f'{key} has no effect: TPDO {pdo.number} is sent with SYNC (transmission '
                 f'{pdo.transmission})',
                 "remove it, or write 'transmission: 255'",
             )
 
 
-def _check_events(subject: Subject, direction: Direction, pdo: PdoConfig) -> None:
+def _check_events(subject: Subject, pdo: PdoConfig) -> None:
     inhibit, timer = subject.inhibit_time(pdo), subject.event_time(pdo)
     if timer and inhibit > timer:
         subject.findings.warning(
-            subject.pdo_place(direction, pdo, 'inhibit_time'),
+            subject.pdo_place(pdo, 'inhibit_time'),
             f'inhibit_time {inhibit * 1e3:g} ms is longer than event_timer {timer * 1e3:g} ms',
             'make inhibit_time (unit 0.1 ms) the shorter one',
         )
@@ -224,7 +221,7 @@ def _check_events(subject: Subject, direction: Direction, pdo: PdoConfig) -> Non
     if restless and not inhibit:
         names = ' and '.join(object_name(mapped.index) for mapped in restless)
         subject.findings.warning(
-            subject.pdo_place(direction, pdo),
+            subject.pdo_place(pdo),
             f'TPDO {pdo.number} is sent on change (transmission {pdo.transmission}), and {names} '
             'never stands still: it may flood the bus',
             "write 'transmission: 1', or an inhibit_time",
@@ -312,7 +309,7 @@ def _check_one_frame(subject: Subject, offset: int) -> None:
             else 'they take effect at different times, and one of the frames may be lost'
         )
         subject.findings.warning(
-            subject.pdo_place(RPDO, targets[0]),
+            subject.pdo_place(targets[0]),
             f'{object_name(index + offset)} is in RPDO {targets[0].number}, the controlword that '
             f'belongs to it in RPDO {controls[0].number}: {when}',
             'map both into one RPDO',
@@ -372,7 +369,7 @@ def _check_cyclic(subject: Subject, used: UsedMode) -> None:
             kind = carriers[0].transmission
             how = f'with every {kind}th SYNC' if 1 < kind <= SYNCHRONOUS_MAX else 'on change'
             subject.findings.warning(
-                subject.pdo_place(TPDO, carriers[0], 'transmission'),
+                subject.pdo_place(carriers[0], 'transmission'),
                 f'{object_name(used.at(index))} comes only {how} (transmission {kind}), mode '
                 f'{used.mode.value} needs it in every cycle',
                 "write 'transmission: 1'",
@@ -384,7 +381,7 @@ def _check_target_time(subject: Subject, used: UsedMode) -> None:
     for pdo in subject.carriers(RPDO, used.at(index), subindex):
         if pdo.transmission > SYNCHRONOUS_MAX:
             subject.findings.warning(
-                subject.pdo_place(RPDO, pdo, 'transmission'),
+                subject.pdo_place(pdo, 'transmission'),
                 f'the target of mode {used.mode.value} takes effect when its frame arrives '
                 f'(transmission {pdo.transmission}): the axes do not move at the same time',
                 "write 'transmission: 1'",
@@ -406,8 +403,8 @@ def _check_module(subject: Subject) -> None:
         direction = RPDO if group.is_output else TPDO
         mapped = {
             (each.index, each.subindex)
-            for way, pdo in subject.pdos()
-            if way is direction
+            for pdo in subject.pdos()
+            if pdo.direction is direction
             for each in pdo.mapping
         }
         entries = group.entries(node.dictionary, mapped)
@@ -434,12 +431,12 @@ def _check_input_events(subject: Subject) -> None:
     """Warn about analogue inputs that are sent on change, which CiA 401 has disabled."""
     if subject.node.dictionary.get(ANALOG_EVENTS) is None or subject.value(ANALOG_EVENTS):
         return
-    for direction, pdo in subject.pdos():
+    for pdo in subject.pdos():
         on_change = pdo.transmission >= EVENT_DRIVEN and not subject.event_time(pdo)
         carries = any(mapped.index in ANALOG_INPUTS.indices for mapped in pdo.mapping)
-        if direction is TPDO and on_change and carries:
+        if pdo.direction is TPDO and on_change and carries:
             subject.findings.warning(
-                subject.pdo_place(TPDO, pdo),
+                subject.pdo_place(pdo),
                 f'TPDO {pdo.number} is sent on change, but 0x6423 is FALSE: no change of an '
                 'analogue input is sent',
                 'write 1 to 0x6423 below sdo, or set an event_timer',

@@ -70,57 +70,34 @@ class YamlMap:
 Item: TypeAlias = Scalar | YamlList | YamlMap
 
 
-BEGINNING = "begin with the sections 'options:', 'master:', 'defaults:' and 'nodes:'"
-
-
-def read_document(
-    path: str | os.PathLike[str],
-    findings: Findings,
-    kind: str = 'bus.yml',
-    beginning: str = BEGINNING,
-) -> YamlMap:
-    """Read a YAML file whose top level is a mapping; findings gets duplicate keys and the like.
+def read_document(file: Path, findings: Findings) -> YamlMap:
+    """Read a bus.yml, whose top level is a mapping; findings gets duplicate keys and the like.
 
     Raises:
         ConfigError: The file is missing or unreadable, is not YAML, or is no mapping.
     """
-    file = Path(path)
-    item = _read(file, findings, kind)
-    if isinstance(item, YamlMap):
-        return item
-    findings.error(
-        Place(file),
-        'the file is empty' if item is None else 'the top level is not a mapping',
-        beginning,
-    )
-    findings.raise_errors()
-    return YamlMap(Place(file))
-
-
-def _read(file: Path, findings: Findings, kind: str) -> Item | None:
-    item: Item | None = None
+    place = Place(file)
     try:
         root = yaml.compose(_read_text(file), Loader=yaml.SafeLoader)
-        if root is not None:
-            item = _Converter(file, findings).convert(root, Place(file))
+        item = None if root is None else _Converter(file, findings).convert(root, place)
+        if isinstance(item, YamlMap):
+            return item
+        message = 'the file is empty' if item is None else 'the top level is not a mapping'
+        remedy = "begin with the sections 'options:', 'master:', 'defaults:' and 'nodes:'"
     except OSError as error:
-        remedy = f'correct the path of the {kind}'
-        findings.error(Place(file), f'cannot be read: {error.strerror or error}', remedy)
+        message = f'cannot be read: {error.strerror or error}'
+        remedy = 'correct the path of the bus.yml'
     except RecursionError:
-        findings.error(Place(file), 'nested too deeply', f'a {kind} needs five levels')
+        message, remedy = 'nested too deeply', 'a bus.yml needs five levels'
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        place = Place(file, mark.line + 1) if mark else Place(file)
+        place = Place(file, mark.line + 1) if mark else place
         said = ', '.join(text for text in (error.context, error.problem) if text)
-        findings.error(
-            place, f'not YAML: {said}', 'check indentation, colons, brackets and quotes'
-        )
+        message, remedy = f'not YAML: {said}', 'check indentation, colons, brackets and quotes'
     except (yaml.YAMLError, ValueError) as error:
-        findings.error(Place(file), f'not YAML: {error}', 'save the file as UTF-8 text')
-    else:
-        return item
-    findings.raise_errors()
-    return None
+        message, remedy = f'not YAML: {error}', 'save the file as UTF-8 text'
+    findings.error(place, message, remedy)
+    raise ConfigError(findings.errors)
 
 
 def _read_text(file: Path) -> str:
@@ -152,9 +129,8 @@ class _Converter:
             )
             return Scalar(place, '', ScalarKind.NULL)
         self._open.add(identity)
-        item = self._convert(node, place)
+        item = self._done[identity] = self._convert(node, place)
         self._open.discard(identity)
-        self._done[identity] = item
         return item
 
     def _convert(self, node: yaml.Node, place: Place) -> Item:

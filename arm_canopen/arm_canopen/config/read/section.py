@@ -3,7 +3,8 @@
 """Reading a section of bus.yml by its table of keys, with the traps of YAML 1.1 named.
 
 YAML 1.1 reads ``off`` as false, ``010`` as 8, ``1:30`` as 90 and ``1e-5`` as text. Where the
-meaning is beyond doubt the value is taken, elsewhere it is refused with what to write instead.
+meaning is beyond doubt the value is taken, elsewhere it is refused with what to write instead:
+readers of one value raise a RefusedError, those of a section add it to the findings.
 """
 
 from __future__ import annotations
@@ -42,11 +43,7 @@ def describe(item: Item) -> str:
 
 
 def scalar(item: Item, wanted: str) -> Scalar:
-    """Return a value that is neither a list nor a mapping nor empty.
-
-    Raises:
-        RefusedError: It is.
-    """
+    """Return a value that is neither a list nor a mapping nor empty."""
     if isinstance(item, Scalar) and item.kind is not ScalarKind.NULL:
         return item
     raise RefusedError(
@@ -64,15 +61,15 @@ def key_number(name: str, high: int) -> int | None:
 def integer(item: Item) -> int:
     """Read a whole number: decimal, ``0x`` hexadecimal or ``0b`` binary; quotes do not matter.
 
-    Raises:
-        RefusedError: It is none, or one that people and YAML read differently (``010``).
+    One that people and YAML read differently (``010``) is refused.
     """
     value = scalar(item, 'a whole number')
     text = value.text.strip()
-    if LEADING_ZERO.fullmatch(text) and abs(decimal := _decimal(text)) > 7:
+    decimal = text.replace('_', '')[:NUMBER_LENGTH_MAX]
+    if LEADING_ZERO.fullmatch(text) and abs(int(decimal)) > 7:
         raise RefusedError(
             f'{text} is ambiguous: YAML reads a leading zero as octal',
-            f'write {decimal}, or 0x... for hexadecimal',
+            f'write {int(decimal)}, or 0x... for hexadecimal',
         )
     if SEXAGESIMAL.fullmatch(text):
         raise RefusedError(
@@ -86,17 +83,11 @@ def integer(item: Item) -> int:
         ) from None
 
 
-def _decimal(text: str) -> int:
-    return int(text.replace('_', '')[:NUMBER_LENGTH_MAX])
-
-
 def _whole(text: str) -> int:
     if len(text) > NUMBER_LENGTH_MAX:
         raise ValueError(text)
-    if LEADING_ZERO.fullmatch(text):
-        return _decimal(text)
     try:
-        return int(text, 0)
+        return int(text, 10 if LEADING_ZERO.fullmatch(text) else 0)
     except ValueError:
         number = float(text)  # 10.0 and 1e3 are whole numbers, too
         if not number.is_integer():
@@ -105,11 +96,7 @@ def _whole(text: str) -> int:
 
 
 def number(item: Item) -> float:
-    """Read a finite number; ``1e-5`` without a point counts, although YAML 1.1 takes it for text.
-
-    Raises:
-        RefusedError: It is none.
-    """
+    """Read a finite number; ``1e-5`` without a point counts, although it is text in YAML 1.1."""
     value = scalar(item, 'a number')
     try:
         result = float(_whole(value.text.strip()) if 'x' in value.text else value.text)
@@ -123,11 +110,7 @@ def number(item: Item) -> float:
 
 
 def boolean(item: Item) -> bool:
-    """Read a boolean: true, yes, on, 1 and their opposites.
-
-    Raises:
-        RefusedError: It is none; text in quotes never is, as loaders take "false" for true.
-    """
+    """Read true, yes, on, 1 or their opposites; not in quotes: loaders take "false" for true."""
     value = scalar(item, 'true or false')
     word = value.text.lower()
     if not value.quoted and word in TRUE_WORDS | FALSE_WORDS:
@@ -139,11 +122,7 @@ def boolean(item: Item) -> bool:
 
 
 def text(item: Item) -> str:
-    """Read a text.
-
-    Raises:
-        RefusedError: It is a list, a mapping or nothing, or YAML takes it for something else.
-    """
+    """Read a text; what YAML takes for something else needs quotes."""
     value = scalar(item, 'a text')
     if value.kind is ScalarKind.TEXT or value.quoted:
         return value.text
@@ -193,11 +172,7 @@ def _read_key(key: Key, item: Item, values: dict[str, Any], findings: Findings) 
 
 
 def convert(key: Key, item: Item) -> Any:  # noqa: ANN401  # the kind decides
-    """Return a value in units of the file.
-
-    Raises:
-        RefusedError: It is of another kind or out of range.
-    """
+    """Return a value in units of the file, of the kind and in the range of its key."""
     value, why = CONVERTERS[key.kind](item), f'; {key.why}' if key.why else ''
     if key.choices is not None and value not in key.choices:
         known = ', '.join(f'{number} {title}' for number, title in key.choices.items())

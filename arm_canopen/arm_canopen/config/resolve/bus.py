@@ -30,7 +30,7 @@ from canopen_core import ConfigError, Findings, Place, RefusedError
 from canopen_core.standard import CAN_ID_MASK
 
 from ..model import BusConfig, MasterConfig, NodeConfig
-from ..model.bus import Direction, PdoConfig, RPDO, TPDO
+from ..model.bus import PdoConfig, RPDO, TPDO
 from ..model.checks import check_bus, Report
 from ..read.document import EdsFiles, Item, read_document, YamlList, YamlMap
 from ..read.section import block, describe, integer, read_section
@@ -371,35 +371,27 @@ def assign_cob_ids(nodes: Sequence[NodeConfig], findings: Findings) -> tuple[Nod
     are warnings; two RPDOs with one identifier, of which one frame would move two axes, are an
     error.
     """
-    used = {pdo.cob_id for node in nodes for _, pdo in node.pdos if pdo.enabled}
+    used = {pdo.cob_id for node in nodes for pdo in node.pdos if pdo.enabled}
     free = iter([cob_id for cob_id in FREE_RANGE if cob_id not in used])
     result = []
     for node in nodes:
         tpdos, rpdos = (
-            tuple(_assigned(node, direction, pdo, free, findings) for pdo in pdos)
-            for direction, pdos in ((TPDO, node.tpdos), (RPDO, node.rpdos))
+            tuple(_assigned(node, pdo, free, findings) for pdo in pdos)
+            for pdos in (node.tpdos, node.rpdos)
         )
         result.append(replace(node, tpdos=tpdos, rpdos=rpdos))
     owners: dict[int, tuple[str, PdoConfig]] = {}
     commanded: dict[int, tuple[str, PdoConfig]] = {}  # those of RPDOs
     for node in result:
-        for direction, pdo in node.pdos:
+        for pdo in node.pdos:
             if pdo.enabled and pdo.cob_id:
-                own = _title(node, direction, pdo), pdo
-                _check(own, owners, commanded if direction is RPDO else {}, findings)
+                own = f'{pdo.title} of {node.name}', pdo
+                _check(own, owners, commanded if pdo.direction is RPDO else {}, findings)
     return tuple(result)
 
 
-def _title(node: NodeConfig, direction: Direction, pdo: PdoConfig) -> str:
-    return f'{direction.title} {pdo.number} of {node.name}'
-
-
 def _assigned(
-    node: NodeConfig,
-    direction: Direction,
-    pdo: PdoConfig,
-    free: Iterator[int],
-    findings: Findings,
+    node: NodeConfig, pdo: PdoConfig, free: Iterator[int], findings: Findings
 ) -> PdoConfig:
     if pdo.cob_id != AUTO_ID:
         return pdo
@@ -407,7 +399,7 @@ def _assigned(
     if not cob_id:
         findings.error(
             pdo.place,
-            f'no free COB-ID is left for {_title(node, direction, pdo)} between 0x680 and 0x6DF',
+            f'no free COB-ID is left for {pdo.title} of {node.name} between 0x680 and 0x6DF',
             'write a COB-ID that the bus does not use',
         )
     return replace(pdo, cob_id=cob_id)

@@ -262,12 +262,12 @@ class DeviceReader:
 
     def _check_sync(self, node: NodeConfig, master: MasterConfig) -> None:
         """Warn about PDOs that wait for a SYNC that the master does not send."""
-        for direction, pdo in node.pdos:
+        for pdo in node.pdos:
             synchronous = pdo.enabled and pdo.transmission <= SYNCHRONOUS_MAX
             if pdo.configured and synchronous and not master.sync_period:
                 self._findings.warning(
                     pdo.place,
-                    f'{direction.title} {pdo.number} of {node.name} waits for SYNC (transmission '
+                    f'{pdo.title} of {node.name} waits for SYNC (transmission '
                     f'{pdo.transmission}), but the master sends none',
                     "write 'sync_period: 10000' into the section master, or 'transmission: 255'",
                 )
@@ -308,15 +308,10 @@ class DeviceReader:
 
     def _check_drive_pdos(self, node: NodeConfig) -> None:
         """Report what a drive lacks in its PDOs, and refuse what has no sign for its direction."""
-        mapped = [
-            (direction, pdo, each)
-            for direction, pdo in node.pdos
-            if pdo.enabled
-            for each in pdo.mapping
-        ]
+        mapped = [(pdo, each) for pdo in node.pdos if pdo.enabled for each in pdo.mapping]
         for axis, (direction, first, verb) in product(node.axes, CYCLIC_OBJECTS):
             index = first + AXIS_OFFSET * axis.channel
-            if not any(way is direction and each.index == index for way, _, each in mapped):
+            if not any(pdo.direction is direction and each.index == index for pdo, each in mapped):
                 self._findings.warning(
                     self._section.place,
                     f'no enabled {direction.title} carries {object_address(index)} '
@@ -324,12 +319,12 @@ class DeviceReader:
                     f'{axis.name or "the drive"} cannot be {verb} in the cycle',
                     f'map it below {direction.name}',
                 )
-        for direction, pdo, each in mapped:
+        for pdo, each in mapped:
             unsigned = each.data_type in UNSIGNED_BITS or each.data_type is DataType.BOOLEAN
             if unsigned and is_signed(each.index, each.subindex):
                 self._findings.error(
                     pdo.place,
-                    f'{direction.title} {pdo.number} of {node.name} carries '
+                    f'{pdo.title} of {node.name} carries '
                     f'{object_address(each.index, each.subindex)} as {each.data_type.name}, which '
                     'holds no negative value',
                     'correct its DataType in the EDS (0x0003 INTEGER16, 0x0004 INTEGER32), or the '

@@ -70,24 +70,24 @@ class PdoReader:
         for number in numbers:
             pdo = self._default(direction, number)
             if number in wanted:
-                pdo = self._configured(direction, pdo, wanted[number])
+                pdo = self._configured(pdo, wanted[number])
             elif pdo.enabled:
                 # the warnings of this mapping matter, as the PDO is in use
                 eds_mapping(direction, number, self._eds, self._findings)
-                self._warn_of_assumption(direction, pdo)
+                self._warn_of_assumption(pdo)
             pdos.append(pdo)
         return tuple(pdos)
 
-    def _title(self, direction: Direction, pdo: PdoConfig) -> str:
-        return f'{direction.title} {pdo.number} of {self._name}'
+    def _title(self, pdo: PdoConfig) -> str:
+        return f'{pdo.title} of {self._name}'
 
-    def _warn_of_assumption(self, direction: Direction, pdo: PdoConfig) -> None:
+    def _warn_of_assumption(self, pdo: PdoConfig) -> None:
         """Report a COB-ID that the file has for another node id, which boot looks up."""
-        entry = self._eds.dictionary.get(direction.communication + pdo.number - 1, 1)
+        entry = self._eds.dictionary.get(pdo.communication, 1)
         if entry is not None and entry.literal is not None and pdo.mapping:
             self._findings.warning(
                 Place(self._eds.path, entry.line, f'[{entry.index:04X}sub1]'),
-                f'COB-ID 0x{entry.literal & CAN_ID_MASK:03X} of {self._title(direction, pdo)} is '
+                f'COB-ID 0x{entry.literal & CAN_ID_MASK:03X} of {self._title(pdo)} is '
                 f'not that of node {self._node_id}; it is taken to have 0x{pdo.cob_id:03X}, which '
                 'is compared at boot',
                 'name the PDO in bus.yml with cob_id: auto, so that it is written',
@@ -118,6 +118,7 @@ class PdoReader:
             cob_id = COB_ID_INVALID
         enabled = not cob_id & (COB_ID_INVALID | COB_ID_EXTENDED) and bool(cob_id & CAN_ID_MASK)
         return PdoConfig(
+            direction,
             number,
             enabled,
             cob_id & CAN_ID_MASK,
@@ -140,47 +141,41 @@ class PdoReader:
                 found[key.field] = entry.default / (key.unit or 1)
         return found
 
-    def _configured(self, direction: Direction, pdo: PdoConfig, section: YamlMap) -> PdoConfig:
+    def _configured(self, pdo: PdoConfig, section: YamlMap) -> PdoConfig:
         """Lay the values of bus.yml over a PDO of the EDS."""
-        values = read_section(section, PDO_KEYS[direction.name], self._findings)
-        self._check_parameters(direction, pdo, section, values)
+        values = read_section(section, PDO_KEYS[pdo.direction.name], self._findings)
+        self._check_parameters(pdo, section, values)
         fixed: dict[str, Any] = {'configured': True, 'place': section.place}
         pdo = replace(pdo, **{'enabled': True} | values | fixed)
         entries = listing(section, 'mapping', self._findings)
         if entries is not None:
-            pdo = self._with_mapping(direction, pdo, entries)
+            pdo = self._with_mapping(pdo, entries)
         if pdo.enabled and not (pdo.mapping or (entries and entries.items)):
             self._findings.error(
                 section.place,
-                f'{self._title(direction, pdo)} is enabled, but maps nothing',
+                f'{self._title(pdo)} is enabled, but maps nothing',
                 "write its mapping, or 'enabled: false'",
             )
-        return self._with_cob_id(direction, pdo, section.entries.get('cob_id'))
+        return self._with_cob_id(pdo, section.entries.get('cob_id'))
 
-    def _with_mapping(self, direction: Direction, pdo: PdoConfig, entries: YamlList) -> PdoConfig:
-        mapping = read_mapping(direction, pdo.number, entries, self._eds, self._findings)
+    def _with_mapping(self, pdo: PdoConfig, entries: YamlList) -> PdoConfig:
+        mapping = read_mapping(pdo, entries, self._eds, self._findings)
         if pdo.fixed_mapping and mapping != pdo.mapping:
             self._findings.error(
                 entries.place,
-                f'the mapping of {self._title(direction, pdo)} is fixed (read-only in the EDS)',
+                f'the mapping of {self._title(pdo)} is fixed (read-only in the EDS)',
                 'remove it, the mapping of the EDS counts',
             )
         return replace(pdo, mapping=mapping)
 
-    def _check_parameters(
-        self, direction: Direction, pdo: PdoConfig, section: YamlMap, values: dict[str, Any]
-    ) -> None:
+    def _check_parameters(self, pdo: PdoConfig, section: YamlMap, values: dict[str, Any]) -> None:
         """Refuse what the device has no sub-index for, and transmission types without use."""
-        communication = direction.communication + pdo.number - 1
-        for key in PDO_KEYS[direction.name]:
-            subindex = SUBINDICES.get(key.field)
-            if subindex is None or key.field not in values:
-                continue
-            if (communication, subindex) not in self._eds.dictionary:
+        for key in PDO_KEYS[pdo.direction.name]:
+            address = pdo.communication, SUBINDICES.get(key.field, 0)
+            if address[1] and key.field in values and address not in self._eds.dictionary:
                 self._findings.error(
                     section.entries[key.name].place,
-                    f'the device cannot do this: {object_address(communication, subindex)} is not '
-                    'in its EDS',
+                    f'the device cannot do this: {object_address(*address)} is not in its EDS',
                     'remove the key',
                 )
         transmission = values.get('transmission')
@@ -191,17 +186,18 @@ class PdoReader:
                 'take 0 to 240 (with SYNC), or 254 or 255 (on events)',
             )
 
-    def _with_cob_id(self, direction: Direction, pdo: PdoConfig, item: Item | None) -> PdoConfig:
+    def _with_cob_id(self, pdo: PdoConfig, item: Item | None) -> PdoConfig:
         """Add the COB-ID: a number, ``auto`` or the EDS's own."""
         if item is None:
             if pdo.enabled and not pdo.cob_id:
-                what = f'{self._title(direction, pdo)} has no COB-ID in the EDS'
+                what = f'{self._title(pdo)} has no COB-ID in the EDS'
                 self._findings.error(pdo.place, what, "write 'cob_id: auto'")
             return pdo
         pdo = replace(pdo, place=item.place)
         if isinstance(item, Scalar) and item.text.lower() == AUTO:
             if pdo.number <= PREDEFINED_MAX:
-                return replace(pdo, cob_id=direction.default_cob_id(pdo.number, self._node_id))
+                cob_id = pdo.direction.default_cob_id(pdo.number, self._node_id)
+                return replace(pdo, cob_id=cob_id)
             return replace(pdo, cob_id=AUTO_ID) if pdo.enabled else pdo
         try:
             cob_id = integer(item)
@@ -313,13 +309,13 @@ def _from_word(
 
 
 def read_mapping(
-    direction: Direction, number: int, entries: YamlList, eds: Eds, findings: Findings
+    pdo: PdoConfig, entries: YamlList, eds: Eds, findings: Findings
 ) -> tuple[MappedObject, ...]:
     """Read the list ``mapping`` that bus.yml gives a PDO; report what cannot be mapped."""
-    objects = (_mapped_object(direction, item, eds, findings) for item in entries.items)
+    objects = (_mapped_object(pdo.direction, item, eds, findings) for item in entries.items)
     mapping = tuple(mapped for mapped in objects if mapped is not None)
     bits = sum(mapped.bits for mapped in mapping)
-    slots = mapping_slots(direction, number, eds.dictionary)
+    slots = mapping_slots(pdo.direction, pdo.number, eds.dictionary)
     if bits > PDO_BITS_MAX:
         findings.error(
             entries.place,
@@ -329,8 +325,7 @@ def read_mapping(
     elif len(mapping) > slots:
         findings.error(
             entries.place,
-            f'{len(mapping)} objects are mapped, {direction.title} {number} of this device takes '
-            f'at most {slots}',
+            f'{len(mapping)} objects are mapped, {pdo.title} of this device takes at most {slots}',
             'move objects to another PDO',
         )
     return mapping
