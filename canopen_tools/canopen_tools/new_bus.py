@@ -8,7 +8,7 @@ What an EDS leaves open is not guessed: the caller gives it, or learns what is m
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import groupby
 import json
 import math
@@ -23,7 +23,6 @@ from arm_canopen.config import (
     RPDO,
     RPM,
     TPDO,
-    UNSET,
 )
 from canopen_core import CanopenError
 from canopen_core.eds import Eds
@@ -46,7 +45,6 @@ from canopen_core.standard import (
 )
 
 TURN = 2.0 * math.pi  # a turn in [rad]
-SAME = 0.01  # share by which two scales may differ and still say the same
 FAR = 10.0
 """How many times the increments of the factor group a user may enter without being asked."""
 
@@ -57,15 +55,12 @@ class NewBusError(CanopenError):
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """How far an increment is, as the user entered it."""
+    """How far an increment is."""
 
     # increments of the drive per rad or m of the joint; negative for the other direction
     scale: float
     said: str  # the same in words
     slides: bool = False  # the joint slides, so that the scale is per m
-    # velocity units of the drive per rad/s or m/s; None where the user has not entered it
-    velocity: float | None = None
-    velocity_said: str = ''  # the same in words
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +72,7 @@ class NewDevice:
     eds: Eds  # its EDS
     # mode of operation; None takes the best one that the EDS names
     mode: OperationMode | None = None
-    units: Units | None = None  # units of the joint; None where the factor group says them
+    units: Units | None = None  # as the user entered them; None where the factor group says them
     # turns of what the drive counts in rpm, or in the unit of angles that it names in 0x60A9, for
     # one turn or 1 m of the joint; None where the user has not entered it
     rpm: float | None = None
@@ -93,30 +88,21 @@ class NewDevice:
         return FactorGroup.read(self.number)
 
     @property
-    def velocity_unit(self) -> NamedUnit | None:
-        """What 0x60A9 names; None where it names nothing."""
-        return self.factors.velocity_unit
-
-    @property
     def has_open_units(self) -> bool:
         """Whether neither its EDS nor the user says how far an increment of its joint is."""
-        return self.is_drive and said_units(self) is None and not says_units(self.factors)
+        return self.is_drive and self.units is None and not says_units(self.factors)
 
     @property
-    def open_velocity(self) -> str:
-        """What is unknown about its velocities, with the remedy; empty where nothing is open."""
-        named, units = self.velocity_unit, _position_units(self) if self.is_drive else None
-        if named is None or units is None or self.rpm is not None or _is_of_joint(self, units):
-            return ''
-        who = f'{self.name}: 0x60A9 of the EDS has {named.text} as unit'
-        correct = 'or correct 0x60A9 in the EDS by the manual'
-        if named.slides:
-            return f'{who}, and the joint turns; give --metre where it slides, {correct}'
-        one = '1 m' if units.slides else 'one turn'
-        return (
-            f'{who}, and does not say of which shaft; give --rpm {self.name}=TURNS, turns of the'
-            f' motor for {one} of the joint, 1 where the drive knows the gear, {correct}'
-        )
+    def open_velocity(self) -> NamedUnit | None:
+        """The unit in 0x60A9, where it is not known of which shaft the velocity is; else None.
+
+        It is of what the positions are of (CiA 402-2). Beside units that the user entered a turn
+        may be one of the motor.
+        """
+        named, units = self.factors.velocity_unit, self.units
+        if named is None or units is None or self.rpm is not None or named.counts:
+            return None
+        return None if named.slides and units.slides else named
 
     def number(self, index: int, subindex: int = 0) -> int:
         """Return what an object holds by the EDS; 0 where unknown."""
@@ -129,123 +115,66 @@ def says_units(factors: FactorGroup) -> bool:
     return factors.gear is not None and bool(scale) and not is_coarse(scale)
 
 
-def said_units(device: NewDevice) -> Units | None:
-    """Return the units that are written out: as the user entered them, else as named; or None."""
-    units, named = _position_units(device), device.velocity_unit
-    if units is None:
-        return None
-    if device.rpm is not None:
-        return _with_turns(device, units, device.rpm)
-    if named is None or not _is_of_joint(device, units):
-        return units
-    said = f'0x60A9 of the EDS: its unit is {named.text}'
-    return replace(units, velocity=_velocity(named, units.scale), velocity_said=said)
+def written_units(device: NewDevice) -> Units | None:
+    """Return the units that are written out; None where the master reads them from the drive.
+
+    What an EDS names in 0x60A8 does not count: it is a default that the maker changes by
+    parameters.
+    """
+    factors = device.factors
+    if device.units is not None or device.rpm is None or not says_units(factors):
+        return device.units
+    objects = ', '.join(f'0x{index:04X}' for index in factors.position_objects)
+    return Units(factors.position_scale, f'{objects} of the EDS; per rad')
 
 
 def velocity_scale(device: NewDevice, units: Units) -> tuple[float, str]:
     """Return the scale of velocities, and who says it.
 
     Raises:
-        NewBusError: 0x60A9 and 0x6096 differ, or it is not known of what the velocity is.
+        NewBusError: It is not known of what the velocity is.
     """
-    if device.open_velocity:
-        raise NewBusError(device.open_velocity)
-    factor = device.factors.velocity_factor
-    if units.velocity is not None:
-        by_factor = abs(units.scale) * (factor or 1.0)
-        is_same = math.isclose(by_factor, units.velocity, rel_tol=SAME)
-        if not is_same and device.rpm is None and factor not in {None, UNSET}:
-            raise NewBusError(
-                f'{device.name}: {units.velocity_said}, which is {units.velocity:g} for 1 of the'
-                f' joint per second, and by 0x6096 of the EDS it is {by_factor:g}; correct the'
-                f' EDS by the manual, or give --rpm {device.name}=TURNS'
-            )
-        return math.copysign(units.velocity, units.scale), units.velocity_said
-    if factor:
-        return units.scale * factor, 'by 0x6096 of the EDS'
-    turns = '60 * turns per m' if units.slides else '60 * turns of the motor per turn / (2 pi)'
-    said = 'increments per second, where the manual says nothing else'
-    return units.scale, f'{said}; rpm: {turns}, by --rpm {device.name}=TURNS'
-
-
-def contradiction(device: NewDevice, units: Units) -> str:
-    """Return what to look at where the units and the factor group differ; else nothing.
-
-    A user's entry may differ by a gear that the drive does not know, but not by far; where it
-    is far less than the factor group has, the check of the file warns.
-    """
+    one = '1 m' if units.slides else 'one turn'
+    if (named := device.open_velocity) is not None:
+        raise NewBusError(
+            f'{device.name}: 0x60A9 of the EDS has {named.text} as unit, and does not say of which'
+            f' shaft; give --rpm {device.name}=TURNS, turns of the motor for {one} of the joint,'
+            ' 1 where the drive knows the gear, or correct 0x60A9 in the EDS by the manual'
+        )
     factors = device.factors
-    if not says_units(factors) or _is_same(factors, units):
+    named, factor = factors.velocity_unit, factors.velocity_factor
+    if device.rpm is not None:
+        is_angle = named is not None and not named.slides and not named.counts
+        unit = named if named is not None and is_angle else RPM
+        velocity = device.rpm * (TURN if units.slides else 1.0) / unit.size
+        why = f'{unit.text} by 0x60A9 of the EDS' if is_angle else 'rpm'
+        why += f', {device.rpm:g} turns for {one} of the joint, as said'
+    elif named is not None:
+        velocity = (abs(units.scale) if named.counts else 1.0) / named.size
+        why = f'0x60A9 of the EDS: its unit is {named.text}'
+    elif factor:
+        velocity, why = abs(units.scale) * factor, 'by 0x6096 of the EDS'
+    else:
+        turns = '60 * turns per m' if units.slides else '60 * turns of the motor per turn / (2 pi)'
+        why = 'increments per second, where the manual says nothing else; rpm: '
+        velocity, why = abs(units.scale), f'{why}{turns}, by --rpm {device.name}=TURNS'
+    return math.copysign(velocity, units.scale), why
+
+
+def contradiction(device: NewDevice) -> str:
+    """Return what to look at where an entry has far more than the factor group; else nothing.
+
+    It may differ by a gear that the drive does not know; where it is far less, the check of the
+    file warns.
+    """
+    factors, units = device.factors, device.units
+    if units is None or units.slides or not says_units(factors):
         return ''
-    is_said, ratio_to_group = device.units is not None, abs(units.scale) / factors.position_scale
-    if is_said and (units.slides or ratio_to_group < FAR):
+    if abs(units.scale) / factors.position_scale < FAR:
         return ''
     return (
         f'its factor group has {factors.position_scale:g} per rad: try which it is by a first'
         ' motion on the page'
-    )
-
-
-def _position_units(device: NewDevice) -> Units | None:
-    """Return the units that the user entered, else those that the drive names; None for none.
-
-    What an EDS names in 0x60A8 does not count: it is a default that the maker changes by
-    parameters. Those of the factor group are written out where the
-    master would not read from the drive what velocities are.
-    """
-    if device.units is not None:
-        return device.units
-    factors, named = device.factors, device.velocity_unit
-    scale = factors.position_scale
-    is_read = named is None or math.isclose(
-        _velocity(named, scale), factors.velocity_scale, rel_tol=SAME
-    )
-    if (is_read and device.rpm is None) or not says_units(factors):
-        return None
-    objects = ', '.join(f'0x{index:04X}' for index in factors.position_objects)
-    return Units(scale, f'{objects} of the EDS; per rad')
-
-
-def _is_of_joint(device: NewDevice, units: Units) -> bool:
-    """Whether the velocity that 0x60A9 names is that of the joint.
-
-    It is of what the positions are of, by CiA 402-2. Where another source says what the joint is
-    in increments, a turn may be one of the motor, unless the factor group says the same.
-    """
-    named, factors = device.velocity_unit, device.factors
-    if named is None or named.counts:
-        return True
-    if named.slides or units.slides:
-        return named.slides and units.slides
-    return device.units is None or (says_units(factors) and _is_same(factors, units))
-
-
-def _velocity(named: NamedUnit, scale: float) -> float:
-    """Return velocity units for 1 of the joint per second, at increments for 1 of it."""
-    return (abs(scale) if named.counts else 1.0) / named.size
-
-
-def _with_turns(device: NewDevice, units: Units, turns: float) -> Units:
-    """Return units with velocities of what turns so often for a turn or 1 m of the joint."""
-    named = device.velocity_unit
-    is_angle = named is not None and not named.slides and not named.counts
-    unit = named if named is not None and is_angle else RPM
-    per, one = (TURN, '1 m') if units.slides else (1.0, 'one turn')
-    said = f'{turns:g} turns for {one} of the joint, as said'
-    if math.isclose(unit.size, RPM.size):
-        formula = f'60 * {turns:g}' + ('' if units.slides else ' / (2 pi)')
-        said = f'rpm, {said}: {formula}'
-    else:
-        said = f'{unit.text} by 0x60A9 of the EDS, {said}'
-    if named is not None and not is_angle:
-        said += f'; 0x60A9 of the EDS has {named.text}'
-    return replace(units, velocity=turns * per / unit.size, velocity_said=said)
-
-
-def _is_same(factors: FactorGroup, units: Units) -> bool:
-    """Whether a factor group has the same increments per rad."""
-    return not units.slides and math.isclose(
-        abs(units.scale), factors.position_scale, rel_tol=SAME
     )
 
 
@@ -401,7 +330,7 @@ def _interpolation(device: NewDevice, period_ms: int) -> Iterator[str]:
 def _units(device: NewDevice) -> Iterator[str]:
     if not device.is_drive:
         return
-    factors, units = device.factors, said_units(device)
+    factors, units = device.factors, written_units(device)
     if units is not None:
         velocity, why = velocity_scale(device, units)
         yield f'scale_pos_to_dev: {units.scale!r}  # {units.said}'
@@ -412,7 +341,7 @@ def _units(device: NewDevice) -> Iterator[str]:
         if units.scale < 0.0:
             yield 'scale_eff_to_dev: -1.0  # torque turns with the position'
             yield 'scale_eff_from_dev: -1.0'
-        if doubt := contradiction(device, units):
+        if doubt := contradiction(device):
             yield f'# {doubt}'
     elif says_units(factors):
         turn = factors.position_scale * TURN

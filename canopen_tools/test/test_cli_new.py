@@ -158,23 +158,18 @@ FACTOR = (
     Row(0x6096, 1, 'Numerator', 7, 'rw', '60'),
     Row(0x6096, 2, 'Divisor', 7, 'rw', '4096'),
 )
-A_TURN = 628_318.5  # [inc] by the factor group of the sample
 
 
 @pytest.mark.parametrize(
     ('rows', 'options', 'velocity', 'words'),
     [
-        # the factor group says what the joint is in increments, and a turn is one of the joint
-        ([RPM, RPM_PER_S], ['--turn', f'arm=-{A_TURN}'], -60 / TURN, '1 turns/min'),
-        # somebody else says it, and what turns so fast
-        ([RPM], ['--turn', 'arm=1000', '--rpm', 'arm=26'], 26 * 60 / TURN, '# rpm, 26 turns'),
+        ([RPM, RPM_PER_S], ['--turn', 'arm=-1000', '--rpm', 'arm=1'], -60 / TURN, '1 turns/min'),
         ([TENTHS], ['--turn', 'arm=1000', '--rpm', 'arm=26'], 26 * 600 / TURN, '0.1 turns/min by'),
-        ([RPM], ['--metre', 'arm=5000', '--rpm', 'arm=20'], 20 * 60, '# rpm, 20 turns for 1 m'),
+        ([RPM], ['--metre', 'arm=5000', '--rpm', 'arm=20'], 20 * 60, ', 20 turns for 1 m'),
         ([METRES], ['--metre', 'arm=5000'], 1.0, '1 m/s'),
         ([COUNTS], ['--turn', 'arm=-1000'], -1000 / TURN, '0x60A9 of the EDS: its unit is 1 incr'),
-        # 0x6096 that agrees, and 0x60A9 that is overruled
-        ([RPM, *FACTOR], ['--turn', 'arm=4096', '--rpm', 'arm=1'], 60 / TURN, '# rpm, 1 turns'),
-        ([COUNTS], ['--turn', 'arm=1000', '--rpm', 'arm=2'], 120 / TURN, 'has 1 increments/s'),
+        # 0x60A9 and 0x6096 are overruled
+        ([COUNTS, *FACTOR], ['--turn', 'arm=9', '--rpm', 'arm=2'], 120 / TURN, '# rpm, 2 turns'),
         # 0x6096 alone; torque turns with the position
         (FACTOR, ['--turn', 'arm=-4096', '--mode', 'arm=1'], -60 / TURN, 'by 0x6096 of the EDS'),
     ],
@@ -281,12 +276,7 @@ def test_several_axes_are_not_made_one(
             '0x60A9 of the EDS has 1 turns/min .*of which shaft; give --rpm arm=TURNS',
         ),
         ((*SAMPLE, RPM), ['--metre', 'arm=1000'], 'turns of the motor for 1 m of the joint'),
-        ((*SAMPLE, METRES), ['--turn', 'arm=1000'], '1 m/s .*the joint turns; give --metre'),
-        (
-            (*SAMPLE, COUNTS, *FACTOR),
-            [],
-            '1 increments/s, which is 100000 .*0x6096 of the EDS it is 1464.84; correct the EDS',
-        ),
+        ((*SAMPLE, METRES), ['--turn', 'arm=1000'], '1 m/s .*correct 0x60A9 in the EDS'),
         (SAMPLE, ['--turn', 'arm=far'], '--turn arm=far: give a number'),
         (without(0x60C1), ['--mode', 'arm=7'], r'0x6502 .*0x81. has no mode 7 .*, it has 1, 8;'),
         (SAMPLE, ['--mode', 'arm=3'], '--mode arm=3: choose one of 8 .cyclic position'),

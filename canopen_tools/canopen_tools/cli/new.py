@@ -16,7 +16,7 @@ import sys
 from canopen_core.eds import load_eds
 from canopen_core.standard import OperationMode
 
-from ..new_bus import BEST_FIRST, bus_text, contradiction, NewDevice, said_units, TURN, Units
+from ..new_bus import BEST_FIRST, bus_text, contradiction, NewDevice, TURN, Units
 from .arguments import node_id, print_line, SubParsers, UsageError
 from .check import show_check
 
@@ -25,6 +25,29 @@ PERIOD_MS = 10  # time between two SYNC in [ms]
 # what a person writes for a turn or a metre of the joint, and for its gear
 INCREMENTS = 'a number of increments other than 0, such as 360000, -36000.5 or 2000*50'
 TURNS = 'turns of the motor for one of the joint, a number above 0 such as 100'
+OPTIONS = {
+    'turn': (
+        'INCREMENTS',
+        (
+            'increments of a drive for one turn of its joint, gear included; negative where it '
+            'turns the other way (default: the factor group of the drive)'
+        ),
+    ),
+    'metre': ('INCREMENTS', 'the same for 1 m of a joint that slides'),
+    'rpm': (
+        'TURNS',
+        (
+            'the drive counts velocities in rpm: turns of its motor for one turn (or 1 m) of the '
+            'joint, its gear; 1 for rpm of the joint (default: 0x60A9, 0x6096, increments per '
+            'second)'
+        ),
+    ),
+    'mode': (
+        'MODE',
+        '1, 7 or 8: mode of operation of a drive (default: the best one that 0x6502 names)',
+    ),
+}
+"""What is said of a drive by its name: the value, and the help."""
 
 
 def add_new(parsers: SubParsers) -> None:
@@ -38,49 +61,12 @@ def add_new(parsers: SubParsers) -> None:
         epilog='example: canopen new shoulder=drive.eds@2 elbow=drive.eds@3 --turn elbow=360000',
     )
     add = parser.add_argument
-    add(
-        'devices',
-        metavar='DEVICE',
-        nargs='+',
-        help='NAME=FILE.eds@NODE: name, EDS and node id of each',
-    )
-    add(
-        '--turn',
-        metavar='NAME=INCREMENTS',
-        action='append',
-        default=[],
-        help='increments of a drive for one turn of its joint, gear included; negative where it '
-        'turns the other way (default: the factor group of the drive)',
-    )
-    add(
-        '--metre',
-        metavar='NAME=INCREMENTS',
-        action='append',
-        default=[],
-        help='the same for 1 m of a joint that slides',
-    )
-    add(
-        '--rpm',
-        metavar='NAME=TURNS',
-        action='append',
-        default=[],
-        help='the drive counts velocities in rpm: turns of its motor for one turn (or 1 m) of the '
-        'joint, its gear; 1 for rpm of the joint (default: 0x60A9, 0x6096, increments per second)',
-    )
-    add(
-        '--mode',
-        metavar='NAME=MODE',
-        action='append',
-        default=[],
-        help='1, 7 or 8: mode of operation of a drive (default: the best one that 0x6502 names)',
-    )
-    add(
-        '--period',
-        metavar='MS',
-        type=_period,
-        default=PERIOD_MS,
-        help='time between two SYNC in ms (default: %(default)s)',
-    )
+    name = 'NAME=FILE.eds@NODE: name, EDS and node id of each'
+    add('devices', metavar='DEVICE', nargs='+', help=name)
+    for option, (value, text) in OPTIONS.items():
+        add(f'--{option}', metavar=f'NAME={value}', action='append', default=[], help=text)
+    period = 'time between two SYNC in ms (default: %(default)s)'
+    add('--period', metavar='MS', type=_period, default=PERIOD_MS, help=period)
     add('--output', metavar='FILE', type=Path, default=Path('bus.yml'), help='default: bus.yml')
     add('--force', action='store_true', help='overwrite it')
     parser.set_defaults(run=run)
@@ -96,9 +82,8 @@ def run(options: argparse.Namespace) -> int:
     _write(devices, bus_text(devices, options.period), output)
     print_line(f'{output} is written; what it says and why is in it')
     for device in devices:
-        units = said_units(device) if device.is_drive else None
-        if units is not None and (doubt := contradiction(device, units)):
-            print_line(f'{device.name}: {units.scale:g} per rad, {doubt}')
+        if device.units is not None and (doubt := contradiction(device)):
+            print_line(f'{device.name}: {device.units.scale:g} per rad, {doubt}')
     return show_check(output)
 
 
@@ -205,8 +190,7 @@ def _asked(device: NewDevice) -> NewDevice:
         )
         number = _answer('turn', device, question, '--turn or --metre')
         device = replace(device, units=_units('turn', number))
-    named = device.velocity_unit
-    if device.open_velocity and named is not None and not named.slides:
+    if (named := device.open_velocity) is not None:
         question = (
             f'its velocities are in {named.text} by 0x60A9: turns of the motor for one turn (or '
             '1 m) of the joint, 1 where the drive knows the gear'
