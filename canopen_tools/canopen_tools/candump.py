@@ -186,10 +186,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the program; return 0, or 1 when the bus or a file cannot be read."""
     parser = _parser()
     try:
-        arguments = split_ros_arguments(sys.argv[1:] if argv is None else argv)
-        options = parser.parse_args(arguments.own)
-        options.bus = options.bus or arguments.parameters.get('can_interface_name') or 'auto'
-        options.bus_config = options.bus_config or arguments.parameters.get('bus_config')
+        own, parameters = split_ros_arguments(sys.argv[1:] if argv is None else argv)
+        options = parser.parse_args(own)
+        options.bus = options.bus or parameters.get('can_interface_name') or 'auto'
+        options.bus_config = options.bus_config or parameters.get('bus_config')
         options.filter = FrameFilter(options.filter)
     except ValueError as error:
         parser.error(str(error))

@@ -280,9 +280,7 @@ def test_colors_paint_the_meaning_and_alerts_are_red() -> None:
 )
 def test_ros_arguments_are_taken_out(line: str, own: str, parameters: dict[str, str]) -> None:
     """What is for ROS ends at `--` or at the end; the rest is the program's own."""
-    arguments = split_ros_arguments(line.split())
-    assert arguments.own == own.split()
-    assert arguments.parameters == parameters
+    assert split_ros_arguments(line.split()) == (own.split(), parameters)
 
 
 @pytest.mark.parametrize('line', ['--ros-args -p', '--ros-args -p a', '--ros-args -p :=1'])

@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
 import difflib
 import os
 import sys
@@ -194,50 +193,33 @@ def counted(number: int, noun: str) -> str:
     return f'{number} {noun}' if number == 1 else f'{number} {noun}s'
 
 
-_BEGIN, _END = '--ros-args', '--'
 _PARAMETER = frozenset({'-p', '--param'})
 _WITH_VALUE = frozenset(
     {'-r', '--remap', '--params-file', '-e', '--enclave', '--log-level', '--log-config-file'}
 )
 
 
-@dataclass(slots=True)
-class Arguments:
-    """A command line, taken apart."""
-
-    own: list[str] = field(default_factory=list)  # what is not for ROS
-    # values of ``-p name:=value`` by name, without the node's name before it
-    parameters: dict[str, str] = field(default_factory=dict)
-
-
-def split_ros_arguments(argv: Sequence[str]) -> Arguments:
-    """Split the ROS arguments from a command line without the program.
+def split_ros_arguments(argv: Sequence[str]) -> tuple[list[str], dict[str, str]]:
+    """Split a command line: what is not for ROS, and values of ``-p name:=value`` by name.
 
     Raises:
         ValueError: A parameter has no value, or an option nothing behind it.
     """
-    arguments = Arguments()
-    words = iter(argv)
-    in_ros = False
+    own: list[str] = []
+    parameters: dict[str, str] = {}
+    words, in_ros = iter(argv), False
     for word in words:
-        if word == _BEGIN:
-            in_ros = True
+        if word == '--ros-args' or (in_ros and word == '--'):
+            in_ros = word == '--ros-args'
         elif not in_ros:
-            arguments.own.append(word)
-        elif word == _END:
-            in_ros = False
+            own.append(word)
         elif word in _PARAMETER | _WITH_VALUE:
             value = next(words, None)
             if value is None:
                 raise ValueError(f'{word} needs a value')
+            name, assigned, text = value.partition(':=')
+            if word in _PARAMETER and not (name and assigned):
+                raise ValueError(f'{value!r} is not a parameter; write name:=value')
             if word in _PARAMETER:
-                name, text = _parameter(value)
-                arguments.parameters[name] = text
-    return arguments
-
-
-def _parameter(rule: str) -> tuple[str, str]:
-    name, assigned, value = rule.partition(':=')
-    if not assigned or not name:
-        raise ValueError(f'{rule!r} is not a parameter; write name:=value')
-    return name.rpartition(':')[2], value
+                parameters[name.rpartition(':')[2]] = text  # without the node's name before it
+    return own, parameters

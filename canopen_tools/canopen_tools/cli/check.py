@@ -15,6 +15,7 @@ from arm_canopen.config import (
     check_file,
     LoadEstimate,
     MOTION_OBJECTS,
+    Report,
     RPDO,
     TPDO,
     Traffic,
@@ -80,17 +81,26 @@ def show_check(
     The bit rate in [bit/s] replaces that of the file. Strict makes warnings errors.
     """
     report = check_file(path, bit_rate)
-    for problem in report.errors:
-        print_problem(problem, 'error', RED)
-    for problem in report.warnings:
-        print_problem(problem, 'warning', YELLOW)
+    _print_problems(report)
     if report.units:
         _print_units(report.units)
         _print_motion(report.units)
     if report.load is not None and report.load.traffic:
         _print_load(report.load, each=frames)
+    return _conclude(report, f'{path}: ', strict=strict)
+
+
+def _print_problems(report: Report | EdsReport) -> None:
+    for problem in report.errors:
+        print_problem(problem, 'error', RED)
+    for problem in report.warnings:
+        print_problem(problem, 'warning', YELLOW)
+
+
+def _conclude(report: Report | EdsReport, subject: str, *, strict: bool) -> int:
+    """Print the last line of a report; return its exit code."""
     errors, warnings = len(report.errors), len(report.warnings)
-    print_line(f'{path}: {counted(errors, "error")}, {counted(warnings, "warning")}')
+    print_line(f'{subject}{counted(errors, "error")}, {counted(warnings, "warning")}')
     return 1 if errors or (strict and warnings) else 0
 
 
@@ -204,20 +214,13 @@ def add_eds(parsers: SubParsers) -> None:
 
 def check_eds(options: argparse.Namespace) -> int:
     """Check files; return the exit code."""
-    reports = [_show_report(path, lint_eds(path)) for path in options.files]
-    bad = any(report.errors or (options.strict and report.warnings) for report in reports)
-    return 1 if bad else 0
-
-
-def _show_report(path: Path, report: EdsReport) -> EdsReport:
-    for problem in report.errors:
-        print_problem(problem, 'error', RED)
-    for problem in report.warnings:
-        print_problem(problem, 'warning', YELLOW)
-    what = f'{_summary(report.eds)}; ' if report.eds is not None else ''
-    errors, warnings = len(report.errors), len(report.warnings)
-    print_line(f'{path}: {what}{counted(errors, "error")}, {counted(warnings, "warning")}')
-    return report
+    code = 0
+    for path in options.files:
+        report = lint_eds(path)
+        _print_problems(report)
+        what = f'{_summary(report.eds)}; ' if report.eds is not None else ''
+        code |= _conclude(report, f'{path}: {what}', strict=options.strict)
+    return code
 
 
 def _summary(eds: Eds) -> str:

@@ -39,11 +39,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     parser = _parser()
     try:
-        arguments = split_ros_arguments(sys.argv[1:] if argv is None else argv)
+        own, parameters = split_ros_arguments(sys.argv[1:] if argv is None else argv)
     except ValueError as error:
         parser.error(str(error))
-    options = parser.parse_args(arguments.own)
-    apply_parameters(options, arguments.parameters)
+    options = parser.parse_args(own)
+    apply_parameters(options, parameters)
     try:
         code = int(options.run(options))
         sys.stdout.flush()

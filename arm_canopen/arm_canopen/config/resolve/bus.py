@@ -58,7 +58,8 @@ def load_bus(
             remedy.
     """
     folder = None if bus_config_path is None else Path(bus_config_path)
-    config, findings = _read_and_resolve(Path(path), folder)
+    findings = Findings()
+    config = resolve_bus(Path(path), folder, findings)
     findings.raise_errors()
     return config
 
@@ -68,25 +69,17 @@ def check_file(path: str | os.PathLike[str], bitrate: int | None = None) -> Repo
 
     The bit rate in [bit/s] replaces that of bus.yml.
     """
+    findings = Findings()
     try:
-        config, findings = _read_and_resolve(Path(path), None)
+        config = resolve_bus(Path(path), None, findings)
     except ConfigError as error:
         return Report(error.problems, ())
     return check_bus(config, bitrate, findings)
 
 
-def _read_and_resolve(file: Path, bus_config_path: Path | None) -> tuple[BusConfig, Findings]:
-    """Make as much of a bus as can be understood, and collect everything that is wrong."""
-    findings = Findings()
-    document = read_document(file, findings)
-    return resolve_bus(document, file, bus_config_path, findings), findings
-
-
-def resolve_bus(
-    document: YamlMap, file: Path, bus_config_path: Path | None, findings: Findings
-) -> BusConfig:
+def resolve_bus(file: Path, bus_config_path: Path | None, findings: Findings) -> BusConfig:
     """Make a bus, without what is wrong, of its bus.yml and the EDS files that this names."""
-    layout = lay_out(document, findings)
+    layout = lay_out(read_document(file, findings), findings)
     options = Options(**read_section(layout.options, OPTION_KEYS, findings))
     settings, config = read_master(layout.master, findings)
     beside = file.parent.absolute()
@@ -380,13 +373,13 @@ def assign_cob_ids(nodes: Sequence[NodeConfig], findings: Findings) -> tuple[Nod
             for pdos in (node.tpdos, node.rpdos)
         )
         result.append(replace(node, tpdos=tpdos, rpdos=rpdos))
-    owners: dict[int, tuple[str, PdoConfig]] = {}
-    commanded: dict[int, tuple[str, PdoConfig]] = {}  # those of RPDOs
+    owners: dict[int, list[tuple[str, PdoConfig]]] = {}
     for node in result:
         for pdo in node.pdos:
             if pdo.enabled and pdo.cob_id:
-                own = f'{pdo.title} of {node.name}', pdo
-                _check(own, owners, commanded if pdo.direction is RPDO else {}, findings)
+                title, others = f'{pdo.title} of {node.name}', owners.setdefault(pdo.cob_id, [])
+                _check(title, pdo, others, findings)
+                others.append((title, pdo))
     return tuple(result)
 
 
@@ -406,28 +399,25 @@ def _assigned(
 
 
 def _check(
-    own: tuple[str, PdoConfig],
-    owners: dict[int, tuple[str, PdoConfig]],
-    commanded: dict[int, tuple[str, PdoConfig]],
-    findings: Findings,
+    title: str, pdo: PdoConfig, owners: list[tuple[str, PdoConfig]], findings: Findings
 ) -> None:
-    """Report an identifier that is reserved, or has an owner already."""
-    title, pdo = own
+    """Report an identifier that is reserved, or has owners already."""
     for purpose in (purpose for ids, purpose in RESERVED if pdo.cob_id in ids):
         message = f'COB-ID 0x{pdo.cob_id:03X} of {title} is not for PDOs ({purpose})'
         _report(findings, [pdo], message)
-    owner = owners.setdefault(pdo.cob_id, own)
-    other = commanded.setdefault(pdo.cob_id, own) if pdo.mapping else own
-    both_command = other is not own
-    owner = other if both_command else owner
-    if owner is not own:
+    commanding = [each for each in owners if _commands(each[1])] if _commands(pdo) else []
+    for name, other in (commanding or owners)[:1]:
         _report(
             findings,
-            [pdo, owner[1]],
-            f'COB-ID 0x{pdo.cob_id:03X} of {title} is also that of {owner[0]} '
-            f'(line {owner[1].place.line})',
-            certain=both_command,
+            [pdo, other],
+            f'COB-ID 0x{pdo.cob_id:03X} of {title} is also that of {name} '
+            f'(line {other.place.line})',
+            certain=bool(commanding),
         )
+
+
+def _commands(pdo: PdoConfig) -> bool:
+    return pdo.direction is RPDO and bool(pdo.mapping)
 
 
 def _report(

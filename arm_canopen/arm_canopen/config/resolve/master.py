@@ -20,26 +20,15 @@ from .sdo_list import error_behaviours
 
 MASTER_PACKAGE = 'canopen_master_driver'
 DRIVERS = {
-    'ros2_canopen::MasterDriver': MASTER_PACKAGE,
-    'ros2_canopen::LifecycleMasterDriver': MASTER_PACKAGE,
-    'ros2_canopen::ProxyDriver': 'canopen_proxy_driver',
-    'ros2_canopen::LifecycleProxyDriver': 'canopen_proxy_driver',
-    'ros2_canopen::Cia402Driver': 'canopen_402_driver',
-    'ros2_canopen::LifecycleCia402Driver': 'canopen_402_driver',
+    f'ros2_canopen::{cycle}{kind}Driver': package
+    for kind, package in (
+        ('Master', MASTER_PACKAGE),
+        ('Proxy', 'canopen_proxy_driver'),
+        ('Cia402', 'canopen_402_driver'),
+    )
+    for cycle in ('', 'Lifecycle')
 }
 """Package that has each driver class of ros2_canopen."""
-BASE_CLASSES = {
-    'ros2_canopen::CanopenDriver': (
-        "'ros2_canopen::Cia402Driver' for a drive, 'ros2_canopen::ProxyDriver' for another device"
-    ),
-    'ros2_canopen::LifecycleCanopenDriver': (
-        "'ros2_canopen::LifecycleCia402Driver' for a drive, 'ros2_canopen::LifecycleProxyDriver' "
-        'for another device'
-    ),
-    'ros2_canopen::CanopenMaster': "'ros2_canopen::MasterDriver'",
-    'ros2_canopen::LifecycleCanopenMaster': "'ros2_canopen::LifecycleMasterDriver'",
-}
-"""Classes that no bus.yml can name, and what is meant."""
 
 NAMESPACE = re.compile(r'/?([A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?')
 CONFIG_KEYS = keys_of(MasterConfig)
@@ -161,9 +150,6 @@ def check_driver(section: YamlMap, name: str, findings: Findings, *, for_master:
 
 
 def _remedy(name: str, names: list[str], for_master: bool) -> str:
-    base = BASE_CLASSES.get(name)
-    if base is not None:
-        return f'it is a base class of ros2_canopen; take {base}'
     if name in DRIVERS:
         return f'it is for {"devices" if for_master else "the master"}; take {names[0]!r} here'
     close = difflib.get_close_matches(name, names, n=1)
