@@ -157,12 +157,10 @@ class EdsValue:
 
 
 def parse_integer(text: str) -> int:
-    """Read a whole number: decimal (leading zeros allowed) or hexadecimal with ``0x``.
-
-    A comment behind it (``; ...``) is ignored.
+    """Read a decimal (leading zeros allowed) or hexadecimal number, before a comment (``;``).
 
     Raises:
-        ValueError: It is none.
+        ValueError: It is no whole number.
     """
     text = text.partition(';')[0].strip()
     if len(text) > INTEGER_DIGITS_MAX or not INTEGER.fullmatch(text):
@@ -172,10 +170,7 @@ def parse_integer(text: str) -> int:
 
 
 def parse_value(data_type: DataType, text: str) -> EdsValue | None:
-    """Read a DefaultValue, ParameterValue or limit.
-
-    Returns:
-        The value, or None when the text is empty or the type has no value in a file (DOMAIN).
+    """Read a DefaultValue, ParameterValue or limit; None of an empty text and of a DOMAIN.
 
     Raises:
         ValueError: The text is no value of this type.

@@ -16,7 +16,7 @@ from pathlib import Path
 import re
 from typing import TypeVar
 
-from ..exceptions import Findings, Place, Problem
+from ..exceptions import ConfigError, Problem
 from ..standard.datatypes import DataType, integer_range, REAL_FORMATS, Value
 from ..standard.dictionary import (
     AccessType,
@@ -54,30 +54,26 @@ def load_eds(path: str | os.PathLike[str]) -> Eds:
         ConfigError: The file is missing, unreadable or has no objects.
     """
     path = Path(path)
-    findings = Findings()
-    ini = read_ini(_read_text(path, findings))
+    ini = read_ini(_read_text(path))
     node_id = _node_id(ini)
     dictionary = ObjectDictionary(ObjectReader(ini).entries(), source=str(path), node_id=node_id)
     if not len(dictionary):
-        findings.error(Place(path), 'no object in this file', 'name an EDS or DCF file of CiA 306')
-        findings.raise_errors()
-    for line, key, message in ini.oddities:
-        findings.warning(Place(path, line, key), message, TOLERATED)
-    return Eds(path, dictionary, node_id, _dummy_types(ini), findings.warnings)
+        remedy = 'name an EDS or DCF file of CiA 306'
+        raise ConfigError([Problem(path, 0, '', 'no object in this file', remedy)])
+    warnings = (Problem(path, line, key, text, TOLERATED) for line, key, text in ini.oddities)
+    return Eds(path, dictionary, node_id, _dummy_types(ini), tuple(dict.fromkeys(warnings)))
 
 
-def _read_text(path: Path, findings: Findings) -> str:
+def _read_text(path: Path) -> str:
+    message, remedy = 'there is no such file', 'correct the path of the EDS'
     try:
-        if not path.is_file():
-            findings.error(Place(path), 'there is no such file', 'correct the path of the EDS')
-        elif path.stat().st_size > SIZE_MAX:
-            findings.error(Place(path), 'larger than 16 MiB', 'name an EDS or DCF file')
-        else:
-            return decode_text(path.read_bytes())
+        if path.is_file():
+            if path.stat().st_size <= SIZE_MAX:
+                return decode_text(path.read_bytes())
+            message, remedy = 'larger than 16 MiB', 'name an EDS or DCF file'
     except (OSError, ValueError) as error:
-        findings.error(Place(path), f'cannot be read: {error}', 'correct its path or permissions')
-    findings.raise_errors()
-    return ''
+        message, remedy = f'cannot be read: {error}', 'correct its path or permissions'
+    raise ConfigError([Problem(path, 0, '', message, remedy)])
 
 
 def _node_id(ini: IniFile) -> int | None:
@@ -162,17 +158,6 @@ class ObjectReader:
                 yield self._entry(index, 0, section, code)
         elif not parts:
             self._odd(section, '', f'{code.name} without sub-indices')
-        else:
-            self._check_count(section, parts)
-
-    def _check_count(self, section: IniSection, parts: dict[int, IniSection]) -> None:
-        count = self._number(section, 'subnumber', len(parts))
-        if count != len(parts):
-            self._odd(
-                section,
-                'subnumber',
-                f'SubNumber is {count}, but {len(parts)} sub-indices are defined',
-            )
 
     def _object_code(self, section: IniSection) -> ObjectCode:
         number = self._number(section, 'objecttype', ObjectCode.VAR)
@@ -298,26 +283,19 @@ class ObjectReader:
                     yield from _compact_mapping(mapping + number)
 
     def _check_lists(self, compact: set[int]) -> None:
-        """Compare the three lists of objects with the sections, which compact ones do not need."""
-        listed: set[int] = set()
-        for name in LISTS:
-            section = self._ini.sections.get(name)
-            if section is not None:
-                listed |= self._listed(section)
-        missing = sorted(listed - self._objects.keys() - compact)
-        unlisted = sorted(self._objects.keys() - listed)
-        if missing:
-            self._ini.odd(0, f'listed, but without a section: {_hexadecimal(missing)}')
-        if unlisted and listed:
-            self._ini.odd(0, f'in no list of objects: {_hexadecimal(unlisted)}')
+        """Report objects of the three lists that have no section, which compact ones do not need.
 
-    def _listed(self, section: IniSection) -> set[int]:
-        keys = [key for key in section.values if key != 'supportedobjects']
-        count = self._number(section, 'supportedobjects', len(keys))
-        if count != len(keys):
-            message = f'SupportedObjects is {count}, but {len(keys)} are listed'
-            self._odd(section, 'supportedobjects', message)
-        return {self._number(section, key, 0) for key in keys} - {0}
+        Files of which a part is missing look like that.
+        """
+        listed = {
+            self._number(section, key, 0)
+            for name in LISTS
+            if (section := self._ini.sections.get(name)) is not None
+            for key in section.values
+            if key != 'supportedobjects'
+        }
+        if missing := sorted(listed - {0} - self._objects.keys() - compact):
+            self._ini.odd(0, f'listed, but without a section: {_hexadecimal(missing)}')
 
     def _odd(self, section: IniSection, key: str, message: str) -> None:
         self._ini.odd(section.line_of(key), message, f'[{section.title}]')
