@@ -120,7 +120,6 @@ LIFECYCLE = 'driver: "ros2_canopen::LifecycleCia402Driver"'
 REFUSED = [
     Case('nod_id: 3', "mean 'node_id'"),
     Case('colour: red', 'unknown key .* known here: node_id'),
-    Case('sync_period: 5', 'belongs to master'),
     Case('options: {}', 'belongs to the top level'),
     Case('node_id: 0', '0 is out of range; take 1 to 127'),
     Case('node_id: 255', '255 is out of range'),
@@ -129,23 +128,17 @@ REFUSED = [
     Case('node_id: 1:30', 'base 60'),
     Case('node_id: 2.5', 'got 2.5'),
     Case('node_id:', 'got nothing'),
-    Case('node_id: [2]', 'got a list'),
     Case('node_id: off', 'reads it as a boolean'),
     Case('mandatory: maybe', "got 'maybe'"),
     Case('mandatory: "false"', 'without quotes'),
     Case('namespace: on', 'as a boolean.* quotes'),
-    Case('namespace: a b', 'no ROS namespace'),
+    Case('namespace: a b', "no ROS namespace .* like '/left/arm'"),
     Case('remappings: {a: 1}', 'in quotes'),
     Case('remappings: x', 'keys with values'),
     Case('scale_pos_to_dev: 0', '0 is out of range.* other than 0'),
     Case('scale_vel_to_dev: .nan', r'\.nan'),
-    Case('offset_pos_to_dev: inf', 'finite'),
     Case('switching_state: 7', '5 Operation ena'),
     Case('position_mode: 3', '8 Cyclic posit'),
-    Case('velocity_mode: 8', '3 Profile velo'),
-    Case('period: 0', '1 to 60000'),
-    Case('boot_timeout_ms: -1', '1 to 600000'),
-    Case('heartbeat_producer: 70000', '0 to 65535'),
     Case('heartbeat_multiplier: 0.5', 'below 1 every heartbeat'),
     Case('driver: "ros2_canopen::CIA402Driver"', "mean 'ros2_canopen::Cia402Driver'"),
     Case('driver: "ros2_canopen::MasterDriver"', 'for the master'),
@@ -153,18 +146,13 @@ REFUSED = [
     Case('driver: Rocket', 'ProxyDriver'),
     Case(LIFECYCLE, 'is a lifecycle driver, but the master has a plain one'),
     Case('num_channels: 2', 'has 1 of 2 axes'),
-    Case('num_channels: 9', '8 axes'),
     Case('channels: []', '0 entries for 1 channels'),
     Case('channel_names: [a, b]', '2 names for 1'),
-    Case('recovery: always', "unknown policy 'always'"),
+    Case('recovery: always', "'always' is not allowed here; take one of: manual"),
     Case('software_file: x', 'vendor'),
-    Case('software_version: 1', 'not checked'),
-    Case('restore_configuration: 128', '0 to 127'),
-    Case('configuration_file: x.bin', 'sdo list'),
     Case('eds: drive.eds\ndcf: drive.eds', "there are 'eds' and 'dcf'"),
     Case('scale_from_factor_group: true', 'no factor group'),
     Case('scale_from_factor_group: true\nscale_pos_to_dev: 5', 'given twice'),
-    master('node_id: 200', '1 to 127'),
     master('sync_period: 10', '10 ms is 10000'),
     master('sync_overflow: 1', '0 or 2 to 240'),
     master('baudrate: 42', '500 kbit/s'),
@@ -174,7 +162,6 @@ REFUSED = [
     Case('perod: 10', "mean 'period'", section='defaults'),
     top('option: {dcf_path: "."}', "mean 'options'", 'option'),
     top('joint2: {node_id: 3}', "below 'nodes:'", 'joint2'),
-    top('options: []', 'got a list'),
     top('options: {heartbeat_multiplier: x}', "'x'"),
     Case('tpdo: [1]', 'got a list'),
     Case('tpdo: {9: {}}', r'TPDO 9 \(0x1808\).* 1, 2, 3'),
@@ -183,20 +170,15 @@ REFUSED = [
     Case('tpdo:\n  1: {enabled: true}\n  enabled: true # <-', 'below a PDO num', 'tpdo.enabled'),
     Case('tpdo:\n  1:\n    enabled: true\n  cob_id: auto # <-', 'no PDO number', 'tpdo.cob_id'),
     Case('tpdo: {1: {map: []}}', "'mapping'"),
-    Case('tpdo: {1: {event_deadline: 5}}', 'belongs to a number below rpdo'),
-    Case('tpdo: {1: {transmission: 300}}', '0 to 255'),
     Case('tpdo: {1: {transmission: 252}}', 'remote frames'),
     Case('tpdo: {1: {inhibit_time: 70000}}', 'the unit is 100 microseconds'),
     Case('tpdo: {1: {cob_id: 0}}', "no 11-bit.* 'auto'"),
     Case('tpdo: {1: {cob_id: 0x80000181}}', "no 11-bit .*'enabled: false'"),
     Case('tpdo: {1: {cob_id: car}}', "got 'car'"),
     Case('tpdo: {1: {cob_id: 0x80}}', 'SYNC'),
-    Case('tpdo: {1: {cob_id: 0x605}}', 'SDO requ'),
-    Case('tpdo: {1: {cob_id: 0x702}}', 'heartbeats'),
     Case('tpdo: {5: {mapping: [{index: 0x6041}]}}', 'no COB-ID in the EDS', 'tpdo.5'),
     Case('tpdo: {2: {}}', 'maps nothing'),
     Case('tpdo: {1: {mapping: []}}', 'maps nothing', 'tpdo.1'),
-    Case('tpdo: {1: {mapping: x}}', 'a list'),
     Case('tpdo: {1: {mapping: [x]}}', "an object, got 'x'", 'tpdo.1.mapping[0]'),
     mapped('0x6041, value: 1', 'entry of sdo', '.value'),
     mapped('0x6042', '0x6042:00 is not in the EDS'),
@@ -209,7 +191,6 @@ REFUSED = [
     mapped('0x2003}' + ', {index: 0x2003}' * 7 + ', {index: 0x2003', 'takes at most 8', '$'),
     Case('rpdo: {1: {sync_start: 5}}', 'belongs to a number below tpdo'),
     Case('sdo: 5', 'expected a list, got 5'),
-    Case('sdo: [7]', 'expected an object, got 7', 'sdo[0]'),
     Case('sdo: [{value: 1}]', "no 'index'", 'sdo[0]'),
     written('0x6081, sub: 0, value: 1', "mean 'sub_index'", '.sub'),
     written('0x10000', '16 bits', '.index'),
@@ -217,14 +198,12 @@ REFUSED = [
     written('0x60C2, sub_index: 3, value: 1', 'sub-indices are 0, 1, 2'),
     written('0x6041, value: 1', '0x6041:00 Statusword is read-only'),
     written('0x6098, value: 200', 'for these bits write -56', '.value'),
-    written('0x60C2, sub_index: 1, value: 256', 'take 0 to 255', '.value'),
     written('0x6081, value: 60000', '60000 is beyond its limits', '.value'),
     written('0x2000, value: -0.5', '0x2000:00 Gain: -0.5 is beyond its limits', '.value'),
     written('0x2001, value: 5', "'5'", '.value'),
     written('0x2002, value: zz', '0A 1B', '.value'),
     written('0x2003, value: 7', 'true or', '.value'),
     written('0x1A00, sub_index: 0, value: 0', 'below tpdo: 1:'),
-    written('0x1402, sub_index: 1, value: 0', 'below rpdo: 3:'),
     written('0x1017, value: 100', 'set heartbeat_producer'),
     Case('error_behavior: {x: 1}', 'no sub-index'),
     Case('error_behavior: {2: 1}', '0x1029:02 is not in the EDS'),
@@ -240,15 +219,13 @@ LACKING = [
 ]
 
 NO_SYNC = CLEAN.replace('  sync_period: 10000\n', '')
-APART = 'rpdo: {{1: {{mapping: [{{index: 0x6040}}]}}, 2: {{transmission: {}, {}}}}}'
-TARGET = 'mapping: [{index: 0x607A}]'
+APART = 'rpdo: {1: {mapping: [{index: 0x6040}]}, 2: {mapping: [{index: 0x607A}]}}'
 TPDO_2, RPDO_1 = 'tpdo: {{2: {{{}}}}}', 'rpdo: {{1: {{{}}}}}'
 INHIBIT = 'tpdo.2.inhibit_time'
 WARNINGS = [
     written('0x60C2, sub_index: 1, value: 50', '50 ms, but SYNC .* value 10 to .* -3 to'),
     Case('position_mode: 8 # <-\nsdo: []', 'not written, by the EDS 1 ms, but SYNC'),
-    Case(APART.format(255, TARGET), 'at different times.* map both into one', 'rpdo.2'),
-    Case(APART.format(1, TARGET), 'both take effect with SYNC', 'rpdo.2'),
+    Case(APART, 'late or lost.* map both into one', 'rpdo.2'),
     Case('velocity_mode: 3', r'mode 3 .profile velocity. go by SDO, .* 0x60FF'),
     Case('position_mode: 7', r'mode 7 .* the EDS names in 0x6502 \(0xA5\)'),
     Case('tpdo: {1: {mapping: [{index: 0x6041}]}}', 'no enabled TPDO carries 0x6064', '^position'),
@@ -272,7 +249,6 @@ WARNINGS = [
     written('0x1019, value: 10', 'to end at 10 .0x1019., the master counts to 0'),
     written('0x6081, value: 1}, {index: 0x6081, value: 2', 'again in line 26 with another value'),
     Case('period: 20', 'every 10 ms, not every 20 ms'),
-    Case('package: wrong', "is in the package 'canopen_402_driver'"),
     Case('scale_pos_to_dev: 57.3', 'is 0.0573, not 1'),
     Case('scale_vel_from_dev: 2', 'is 2000, not 1'),
     Case('scale_eff_from_dev: 0.001', 'is 0.001, not 1'),
@@ -432,12 +408,14 @@ def test_the_prbt_guide_loads_as_printed(tmp_path: Path) -> None:
 
 def test_all_problems_are_reported_at_once(tmp_path: Path) -> None:
     """Of all sections and files, in the order of the lines; warnings come along."""
-    text = added('joint1', 'colour: red\nsdo: [{index: 0x6082}]\nmandatory: 7\npackage: wrong')
+    text = added(
+        'joint1', 'colour: red\nsdo: [{index: 0x6082}]\nmandatory: 7\nscale_vel_from_dev: 2'
+    )
     report = report_of(tmp_path, text.replace('sync_period: 10000', 'sync_period: 1'))
     lines = [problem.line for problem in report.errors]
     assert lines == sorted(lines)
     assert len(lines) == 4
-    assert listed(report.warnings, "package 'canopen_402_driver'")
+    assert listed(report.warnings, 'is 2000, not 1')
     assert check_file(tmp_path / 'none.yml').load is None
 
 
@@ -536,7 +514,7 @@ BY_EDS: list[tuple[str, str, str, int]] = [
     (TWO_AXES, f"{TWO}\nchannel_names: [elbow, 'left arm']", '!no name for a ROS node', 1),
     (TWO_AXES, f"{TWO}\nchannel_names: [elbow, '1st']", '!no name for a ROS node', 1),
     (TWO_AXES, f"{TWO}\nchannel_names: [elbow, '']", '!no name for a ROS node', 1),
-    (TWO_AXES, f'{TWO}\nchannel_names: [a, a]', '!two channels have one name', 1),
+    (TWO_AXES, f'{TWO}\nchannel_names: [a, a]', "!both have an axis 'a'", 1),
     (TWO_AXES, f'{TWO}\nchannel_names: [joint2, elbow]', "!both have an axis 'joint2'", 1),
 ]
 

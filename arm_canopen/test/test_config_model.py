@@ -7,19 +7,13 @@ from __future__ import annotations
 from operator import attrgetter
 from pathlib import Path
 import shutil
-from typing import Any
 
 from config_samples import added, ARTICLE_BUS, BUS, errors_of, load_text, TWO_AXES_EDS, write_bus
 from eds_samples import DRIVE_ROWS, eds_text, Row
-from hypothesis import given
-from hypothesis import strategies as st
 import pytest
 
 from arm_canopen import BusConfig, DriveState, load_bus, NodeConfig
 from arm_canopen.config import DEFAULT_DRIVE, Identity, PdoConfig, RecoveryPolicy, SdoWrite
-from arm_canopen.config.read.document import Item, Scalar, ScalarKind, YamlMap
-from arm_canopen.config.resolve.bus import merge_device
-from canopen_core import Place
 from canopen_core.eds import load_eds
 from canopen_core.standard import CAN_ID_MASK, DataType
 
@@ -31,10 +25,6 @@ DRIVE_EDS = Path(__file__).parents[1] / 'eds' / 'cia402_drive.eds'
     [
         ('remappings: {joint_states: js}', 'remappings', {'joint_states': 'js'}),
         ('sdo_timeout_ms: 50', 'sdo_timeout', 0.05),
-        ('boot_timeout_ms: 2500', 'boot_timeout', 2.5),
-        ('period: 40', 'poll_period', 0.04),
-        ('heartbeat_producer: 50', 'uses_node_guarding', False),
-        ('heartbeat_producer: 50', 'heartbeat_producer', 0.05),
         ('heartbeat_producer: 50', 'heartbeat_timeout', pytest.approx(0.15)),
         ('heartbeat_producer: 50\nheartbeat_multiplier: 2', 'heartbeat_timeout', 0.1),
         ('heartbeat_producer: 0', 'heartbeat_timeout', 0.0),
@@ -43,12 +33,7 @@ DRIVE_EDS = Path(__file__).parents[1] / 'eds' / 'cia402_drive.eds'
         ('scale_eff_to_dev: 8', 'drive.scale_eff_from_dev', 0.125),
         ('switching_state: 2', 'drive.switching_state', DriveState.SWITCH_ON_DISABLED),
         ('switching_state: 8', 'drive.switching_state', DriveState.OPERATION_ENABLED),
-        ('homing_timeout_seconds: 30', 'drive.homing_timeout', 30.0),
-        ('target_timeout_ms: 50', 'drive.target_timeout', 0.05),
         ('recovery: auto', 'drive.recovery', RecoveryPolicy.AUTO),
-        ('offset_pos_to_dev: 1', 'drive.scale_pos_to_dev', 1000.0),
-        ('scale_from_factor_group: false', 'drive.scale_from_factor_group', False),
-        ('eds: drive.eds', 'eds.name', 'drive.eds'),
     ],
 )
 def test_keys_of_a_device(tmp_path: Path, piece: str, attribute: str, value: object) -> None:
@@ -62,16 +47,12 @@ def test_keys_of_a_device(tmp_path: Path, piece: str, attribute: str, value: obj
     [
         ('remappings: {a: b}', 'remappings', {'a': 'b'}),
         ('baudrate: 125', 'bitrate', 125_000),
-        ('sync_window: 2000', 'sync_window', 0.002),
-        ('boot_time: 2000', 'boot_time', 2.0),
         ('nmt_inhibit_time: 50', 'nmt_inhibit_time', 0.005),
         ('time_cob_id: 0x40000100', 'time_period', 1.0),
         ('time_cob_id: 0x80000100', 'time_period', 0.0),
         ('time_period_ms: 500', 'time_period', 0.5),
         ('time_period_ms: 500', 'time_cob_id', 0x40000100),
-        ('sync_period: 5000', 'sync_period', 0.005),
         ('sync_period: 5000', 'cycle_period', 0.005),
-        ('boot_timeout: 500', 'boot_timeout', 0.5),
         ('heartbeat_producer: 0', 'heartbeat_timeout', 0.0),
         ('heartbeat_producer: 100\nheartbeat_multiplier: 5', 'heartbeat_timeout', 0.5),
     ],
@@ -304,45 +285,6 @@ def test_lists_of_writes_merge_by_object(
     (node,) = load_text(tmp_path, text).nodes
     writes = [(write.index, int.from_bytes(write.data, 'little')) for write in node.sdo_writes]
     assert writes == expected
-
-
-KEYS = st.sampled_from('abcd')
-TREES = st.recursive(
-    st.integers(0, 9), lambda children: st.dictionaries(KEYS, children, max_size=3), max_leaves=8
-)
-SECTIONS = st.dictionaries(KEYS, TREES, max_size=4)
-PLACE = Place(Path('x.yml'))
-
-
-def section(tree: dict[str, object]) -> YamlMap:
-    """Turn nested dicts into a document."""
-    entries: dict[str, Item] = {}
-    for key, value in tree.items():
-        if isinstance(value, dict):
-            entries[key] = section(value)
-        else:
-            entries[key] = Scalar(PLACE, str(value), ScalarKind.INTEGER)
-    return YamlMap(PLACE, entries)
-
-
-def merged(below: Any, above: Any) -> Any:
-    """Merge nested dicts: the oracle."""
-    if not isinstance(below, dict) or not isinstance(above, dict):
-        return above
-    return below | {
-        key: merged(below[key], value) if key in below else value for key, value in above.items()
-    }
-
-
-@pytest.mark.slow
-@given(below=SECTIONS, above=SECTIONS)
-def test_merging_is_deep_and_the_upper_wins(
-    below: dict[str, object], above: dict[str, object]
-) -> None:
-    """Merging two sections is merging nested dicts; nothing given is changed."""
-    lower, upper = section(below), section(above)
-    assert merge_device(lower, upper) == section(merged(below, above))
-    assert (lower, upper) == (section(below), section(above))
 
 
 @pytest.mark.parametrize(

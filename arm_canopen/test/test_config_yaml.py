@@ -8,8 +8,8 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 import random
-import re
-from typing import Any, NamedTuple
+import runpy
+from typing import Any
 
 from config_samples import (
     added,
@@ -35,46 +35,28 @@ from arm_canopen.config.sections import (
     OPTION_KEYS,
     RPDO_KEYS,
     SDO_KEYS,
-    SECTIONS,
     TPDO_KEYS,
 )
 from canopen_core.eds import load_eds
 
-PAGE = Path(__file__).parents[1] / 'docs' / 'bus_yml.md'
-TITLES = {
-    'options': 'options',
-    'master': 'master',
-    'A device, or `defaults`': 'device',
-    'A drive, or `defaults`': 'device',
-    'A number below `tpdo`': 'tpdo',
-    'A number below `rpdo`': 'rpdo',
-    'An entry of `sdo`': 'sdo',
+PACKAGE = Path(__file__).parents[1]
+MAKER = runpy.run_path(str(PACKAGE / 'tools' / 'make_key_table.py'))
+"""The names of the tool that writes docs/bus_yml.md."""
+TABLES = {
+    'options': OPTION_KEYS,
+    'master': MASTER_KEYS,
+    'device': DEVICE_KEYS + DRIVE_KEYS,
+    'tpdo': TPDO_KEYS,
+    'rpdo': RPDO_KEYS,
+    'sdo': SDO_KEYS,
 }
-ROW = re.compile(r'^\| `(\w+)` \| .*? \| (.*?) \| .+ \|$')
+SCALARS = [(name, key) for name, keys in TABLES.items() for key in keys if key.kind != Kind.BLOCK]
+DEFAULTS = [(name, key) for name, key in SCALARS if MAKER['_default'](key)]
 GUARDING = (
     Row(0x100C, 0, 'Guard time', 6, 'rw', '0'),
     Row(0x100D, 0, 'Life time factor', 5, 'rw', '0'),
 )
 EDS = eds_text((*DRIVE_ROWS, *GUARDING))
-
-
-class KeyRow(NamedTuple):
-    """A row of the page."""
-
-    section: str  # where the key stands
-    key: str  # its name
-    default: str  # what counts without it, empty when that depends on others
-
-
-def key_rows() -> list[KeyRow]:
-    """Read the page."""
-    found, section = [], ''
-    for line in PAGE.read_text('utf-8').splitlines():
-        if line.startswith('## '):
-            section = TITLES[line[3:]]
-        elif (row := ROW.match(line)) and row[1] != 'key':
-            found.append(KeyRow(section, row[1], row[2]))
-    return found
 
 
 def bus_with(section: str = '', **keys: Any) -> dict[str, Any]:
@@ -115,39 +97,22 @@ def load(folder: Path, bus: dict[str, Any]) -> BusConfig:
 EMPTY: Any = None  # two dictionaries of one EDS are not equal
 
 
-@pytest.mark.parametrize('row', [row for row in key_rows() if row.default], ids=str)
-def test_the_default_is_what_counts_without_the_key(tmp_path: Path, row: KeyRow) -> None:
-    """A bus.yml that writes it is the same bus as one that leaves it out."""
-    value = yaml.safe_load(row.default)
-    assert load(tmp_path, bus_with(row.section, **{row.key: value})) == load(tmp_path, bus_with())
+def test_the_page_is_made_of_the_tables() -> None:
+    """By tools/make_key_table.py, after each change of the keys."""
+    assert (PACKAGE / 'docs' / 'bus_yml.md').read_text('utf-8') == MAKER['page']()
 
 
-def test_every_key_is_on_the_page_and_no_other() -> None:
-    """Of those that are read; a key that is not on the page is refused as unknown."""
-    read = {key.name for keys in SECTIONS.values() for key in keys}
-    assert {row.key for row in key_rows()} == read
+@pytest.mark.parametrize(
+    ('section', 'key'), DEFAULTS, ids=lambda each: getattr(each, 'name', each)
+)
+def test_the_default_is_what_counts_without_the_key(
+    tmp_path: Path, section: str, key: Key
+) -> None:
+    """A bus.yml that writes what the page says is the same bus as one that leaves it out."""
+    value = yaml.safe_load(MAKER['_default'](key))
+    assert load(tmp_path, bus_with(section, **{key.name: value})) == load(tmp_path, bus_with())
 
 
-@pytest.mark.parametrize('section', sorted({row.section for row in key_rows()}))
-def test_a_key_that_is_not_on_the_page_is_refused(tmp_path: Path, section: str) -> None:
-    """With the names that are known there, all of which are on the page."""
-    with pytest.raises(ConfigError) as refused:
-        load(tmp_path, bus_with(section, zzz=1))
-    (problem,) = refused.value.problems
-    names = problem.remedy.partition('known here: ')[2].split(', ')
-    here = {row.key for row in key_rows() if row.section == section}
-    assert set(names) == here
-
-
-TABLES = {
-    'options': OPTION_KEYS,
-    'master': MASTER_KEYS,
-    'device': DEVICE_KEYS + DRIVE_KEYS,
-    'tpdo': TPDO_KEYS,
-    'rpdo': RPDO_KEYS,
-    'sdo': SDO_KEYS,
-}
-SCALARS = [(name, key) for name, keys in TABLES.items() for key in keys if key.kind != Kind.BLOCK]
 OTHERS: dict[str, Any] = {
     'driver': 'ros2_canopen::LifecycleMasterDriver',
     'device.driver': 'ros2_canopen::ProxyDriver',
@@ -165,8 +130,7 @@ def other_value(section: str, key: Key) -> Any:
     if key.kind is Kind.TEXT:
         return OTHERS.get(f'{section}.{key.name}', OTHERS.get(key.name, 'text'))
     if key.kind is Kind.BOOLEAN:
-        defaults = {row.key: row.default for row in key_rows() if row.section == section}
-        return defaults.get(key.name) == 'false'
+        return key.default is False
     if key.choices is not None:
         return min(key.choices)
     low, high = key.span or (0, 7)
@@ -184,10 +148,7 @@ def bus_of(folder: Path, key: Key, section: str, **keys: Any) -> BusConfig | Non
         return None
 
 
-KEY_IDS = [f'{section}-{key.name}' for section, key in SCALARS]
-
-
-@pytest.mark.parametrize(('section', 'key'), SCALARS, ids=KEY_IDS)
+@pytest.mark.parametrize(('section', 'key'), SCALARS, ids=lambda each: getattr(each, 'name', each))
 def test_a_key_counts_or_is_said_to_be_ignored(tmp_path: Path, section: str, key: Key) -> None:
     """No key is read and never used: another value makes another bus, or one that is refused."""
     for file in (tmp_path / 'other.eds', tmp_path / 'others' / 'drive.eds'):

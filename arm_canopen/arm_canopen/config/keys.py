@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from enum import auto, Enum
+import re
 from typing import Any
 
 MILLISECONDS = 1e3  # per second
@@ -54,7 +55,8 @@ class Key:
     # units of the file per unit of the model, 1000 for [ms]; None for no conversion
     unit: float | None = None
     zero: bool | None = None  # True allows 0 beside the span, False refuses it
-    choices: Mapping[int, str] | None = None  # the only values allowed, with their meaning
+    choices: Mapping[Any, str] | None = None  # the only values allowed, with their meaning
+    form: re.Pattern[str] | None = None  # that a text must have; ``why`` says it
     use: Use = Use.READ
     why: str = ''  # reason for the default, the range or the use, as the user reads it
     name: str = ''

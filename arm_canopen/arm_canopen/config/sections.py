@@ -18,6 +18,8 @@ and None where other sections or the EDS decide.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
+import re
 from typing import Any
 
 from canopen_core.standard import NODE_ID_MAX, NODE_ID_MIN
@@ -27,25 +29,22 @@ from .model.bus import MasterConfig, NodeConfig, RETRY_FACTOR, U16_MAX, U32_MAX
 from .model.drive import DriveConfig
 
 U8_MAX = 0xFF
+NAMESPACE = re.compile(r'/?([A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?')
 NO_DICTIONARY = 'the master has no object dictionary of its own'
 
 
-def _multiplier(default: float | None) -> Any:  # noqa: ANN401
-    return key(
-        default,
-        'heartbeats that may be missing before the sender counts as lost',
-        (1, 1000),
-        why='below 1 every heartbeat would count as lost',
-    )
-
-
-def _retry_factor(default: int | None) -> Any:  # noqa: ANN401
-    return key(
-        default,
-        'answers to node guarding that may be missing',
-        (1, U8_MAX),
-        why='a device is lost after so many missing answers to node guarding',
-    )
+_multiplier = partial(
+    key,
+    text='heartbeats that may be missing before the sender counts as lost',
+    span=(1, 1000),
+    why='below 1 every heartbeat would count as lost',
+)
+_retry_factor = partial(
+    key,
+    text='answers to node guarding that may be missing',
+    span=(1, U8_MAX),
+    why='a device is lost after so many missing answers to node guarding',
+)
 
 
 def _own_identity(subindex: int) -> Any:  # noqa: ANN401
@@ -74,7 +73,9 @@ class _NodeSettings:
     )
     driver: str = key('', 'class of the driver, e.g. `ros2_canopen::Cia402Driver`')
     package: str | None = key(None, 'ROS package of the driver; not needed', use=Use.IGNORED)
-    namespace: str = key('', 'ROS namespace of the node')
+    namespace: str = key(
+        '', 'ROS namespace of the node', form=NAMESPACE, why="write it like '/left/arm'"
+    )
     remappings: None = key(None, 'ROS remappings, from name to name')
 
 

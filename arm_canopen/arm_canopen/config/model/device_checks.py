@@ -247,11 +247,7 @@ def check_drive(subject: Subject) -> None:
 
 
 def period_setting(period: float) -> tuple[int, int] | None:
-    """Return value and exponent of 0x60C2 for a period in [s] (CiA 402-2, 0x60C2).
-
-    Returns:
-        The two numbers, None when the object cannot hold the period.
-    """
+    """Return value and exponent of 0x60C2 for a period in [s]; None where it cannot hold it."""
     for exponent in PERIOD_EXPONENTS:
         units = period * 10**-exponent
         if 1 <= round(units) <= 0xFF and abs(units - round(units)) < 1e-6 * units:
@@ -302,16 +298,10 @@ def _check_one_frame(subject: Subject, offset: int) -> None:
         targets = subject.carriers(RPDO, index + offset, subindex)
         if not controls or not targets or any(pdo in controls for pdo in targets):
             continue
-        together = all(pdo.transmission <= SYNCHRONOUS_MAX for pdo in (controls[0], targets[0]))
-        when = (
-            'both take effect with SYNC, but one of the frames may be lost'
-            if together
-            else 'they take effect at different times, and one of the frames may be lost'
-        )
         subject.findings.warning(
             subject.pdo_place(targets[0]),
             f'{object_name(index + offset)} is in RPDO {targets[0].number}, the controlword that '
-            f'belongs to it in RPDO {controls[0].number}: {when}',
+            f'belongs to it in RPDO {controls[0].number}: one of the frames may be late or lost',
             'map both into one RPDO',
         )
 

@@ -305,6 +305,9 @@ class DriveConfig:
         name='target_timeout_ms',
     )
     recovery: RecoveryPolicy = key(  # noqa: RUF009
-        RecoveryPolicy.MANUAL, '`manual` or `auto`: after a loss (our own key)', kind=Kind.TEXT
+        RecoveryPolicy.MANUAL,
+        '`manual` or `auto`: after a loss (our own key)',
+        kind=Kind.TEXT,
+        choices={'manual': '(until ~/recover)', 'auto': '(enabled again)'},
     )
     quirks: str = key('', 'where the drive deviates from CiA 402 (our own key)')

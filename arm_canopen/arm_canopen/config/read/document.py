@@ -66,6 +66,11 @@ class YamlMap:
     # values by the text of their key; whole numbers as keys are written in decimal
     entries: dict[str, Item] = field(default_factory=dict)
 
+    def place_of(self, key: str) -> Place:
+        """Return the place of a key, that of the mapping when the key is absent."""
+        item = self.entries.get(key)
+        return item.place if item is not None else self.place
+
 
 Item: TypeAlias = Scalar | YamlList | YamlMap
 

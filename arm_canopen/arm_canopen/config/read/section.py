@@ -11,15 +11,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 import difflib
+from functools import partial
 import math
 import re
-from typing import Any
+from typing import Any, TypeVar
 
 from canopen_core import Findings, RefusedError
 
 from ..keys import Key, Kind, Use
 from ..sections import SECTIONS, TOP_LEVEL
 from .document import Item, Scalar, ScalarKind, YamlList, YamlMap
+
+T = TypeVar('T')
 
 TRUE_WORDS = frozenset({'true', 'yes', 'on', 'y', '1'})
 FALSE_WORDS = frozenset({'false', 'no', 'off', 'n', '0'})
@@ -131,6 +134,15 @@ def text(item: Item) -> str:
     )
 
 
+def attempt(reader: Callable[[Item], T], item: Item, findings: Findings) -> T | None:
+    """Return what a reader makes of a value; None where it refuses, which the findings have."""
+    try:
+        return reader(item)
+    except RefusedError as reason:
+        findings.refuse(item.place, reason)
+        return None
+
+
 CONVERTERS: dict[Kind | None, Callable[[Item], Any]] = {
     Kind.INTEGER: integer,
     Kind.NUMBER: number,
@@ -154,15 +166,14 @@ def read_section(mapping: YamlMap, keys: Sequence[Key], findings: Findings) -> d
 
 
 def _read_key(key: Key, item: Item, values: dict[str, Any], findings: Findings) -> None:
-    try:
-        value: Any = None if key.kind is Kind.BLOCK else convert(key, item)
-    except RefusedError as reason:
-        findings.refuse(item.place, reason)
-        return
-    if key.is_kept:
-        values[key.field] = value if key.unit is None else value / key.unit
-    if value is not None and value == key.default:
-        return
+    if key.kind is not Kind.BLOCK:
+        value = attempt(partial(convert, key), item, findings)
+        if value is None:
+            return
+        if key.is_kept:
+            values[key.field] = value if key.unit is None else value / key.unit
+        if value == key.default:
+            return
     if key.use is Use.REFUSED:
         findings.error(
             item.place, f'{describe(item)} is not supported: {key.why}', 'remove the key'
@@ -174,9 +185,11 @@ def _read_key(key: Key, item: Item, values: dict[str, Any], findings: Findings) 
 def convert(key: Key, item: Item) -> Any:  # noqa: ANN401  # the kind decides
     """Return a value in units of the file, of the kind and in the range of its key."""
     value, why = CONVERTERS[key.kind](item), f'; {key.why}' if key.why else ''
+    if key.form is not None and not key.form.fullmatch(value):
+        raise RefusedError(f'{value!r} is no {key.text}', key.why)
     if key.choices is not None and value not in key.choices:
         known = ', '.join(f'{number} {title}' for number, title in key.choices.items())
-        raise RefusedError(f'{value} is not allowed here', f'take one of: {known}{why}')
+        raise RefusedError(f'{describe(item)} is not allowed here', f'take one of: {known}{why}')
     if not _in_range(key, value):
         wanted = 'a value other than 0'
         if key.span is not None:
@@ -219,28 +232,25 @@ def remedy_for(name: str, names: Sequence[str]) -> str:
 
 def block(mapping: YamlMap, name: str, findings: Findings) -> YamlMap | None:
     """Return a section within a section, None when it is absent or of the wrong kind."""
-    item = mapping.entries.get(name)
-    if item is None or isinstance(item, YamlMap):
-        return item
-    findings.error(
-        item.place,
-        f'expected keys with values, got {describe(item)}',
-        f'indent the keys of {name!r} below it, or remove it',
-    )
-    return None
+    wanted = 'keys with values', f'indent the keys of {name!r} below it, or remove it'
+    return _part(mapping, name, YamlMap, wanted, findings)
 
 
 def listing(mapping: YamlMap, name: str, findings: Findings) -> YamlList | None:
     """Return a list within a section, None when it is absent or of the wrong kind."""
+    remedy = "write entries as '- {index: 0x6040, sub_index: 0}' below it, or remove it"
+    return _part(mapping, name, YamlList, ('a list', remedy), findings)
+
+
+def _part(
+    mapping: YamlMap, name: str, kind: type[T], wanted: tuple[str, str], findings: Findings
+) -> T | None:
     item = mapping.entries.get(name)
-    if item is None or isinstance(item, YamlList):
-        return item
-    findings.error(
-        item.place,
-        f'expected a list, got {describe(item)}',
-        "write entries as '- {index: 0x6040, sub_index: 0}' below it, or remove it",
-    )
-    return None
+    if item is not None and not isinstance(item, kind):
+        expected, remedy = wanted
+        findings.error(item.place, f'expected {expected}, got {describe(item)}', remedy)
+        return None
+    return item
 
 
 def texts(mapping: YamlMap, name: str, findings: Findings) -> dict[str, str]:
@@ -248,10 +258,6 @@ def texts(mapping: YamlMap, name: str, findings: Findings) -> dict[str, str]:
     section = block(mapping, name, findings)
     result: dict[str, str] = {}
     for key, item in section.entries.items() if section else ():
-        if isinstance(item, Scalar) and item.kind is ScalarKind.TEXT:
-            result[key] = item.text
-        else:
-            findings.error(
-                item.place, f'expected a text, got {describe(item)}', 'put it in quotes'
-            )
+        if (value := attempt(text, item, findings)) is not None:
+            result[key] = value
     return result

@@ -21,7 +21,7 @@ Last come the COB-IDs: free ones are given out, reserved and doubled ones refuse
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 import difflib
 import os
 from pathlib import Path
@@ -30,7 +30,7 @@ from canopen_core import ConfigError, Findings, Place, RefusedError
 from canopen_core.standard import CAN_ID_MASK
 
 from ..model import BusConfig, MasterConfig, NodeConfig
-from ..model.bus import PdoConfig, RPDO, TPDO
+from ..model.bus import CYCLE_PERIOD, PdoConfig, RPDO, TPDO
 from ..model.checks import check_bus, Report
 from ..read.document import EdsFiles, Item, read_document, YamlList, YamlMap
 from ..read.section import block, describe, integer, read_section
@@ -79,28 +79,23 @@ def check_file(path: str | os.PathLike[str], bitrate: int | None = None) -> Repo
 
 def resolve_bus(file: Path, bus_config_path: Path | None, findings: Findings) -> BusConfig:
     """Make a bus, without what is wrong, of its bus.yml and the EDS files that this names."""
-    layout = lay_out(read_document(file, findings), findings)
-    options = Options(**read_section(layout.options, OPTION_KEYS, findings))
-    settings, config = read_master(layout.master, findings)
+    option_section, master_section, devices = lay_out(read_document(file, findings), findings)
+    options = Options(**read_section(option_section, OPTION_KEYS, findings))
+    settings, config = read_master(master_section, findings)
     beside = file.parent.absolute()
     eds_files = EdsFiles(beside if bus_config_path is None else bus_config_path, beside)
-    readers = {
-        name: DeviceReader(name, section, findings) for name, section in layout.devices.items()
-    }
-    periods = [reader.poll_period for reader in readers.values()]
-    master = build_master(
-        layout.master, settings, config, options, findings, device_periods=periods
-    )
-    nodes = [
-        node
-        for reader in readers.values()
-        if (node := reader.read(options, eds_files, master, settings)) is not None
-    ]
-    _check_lifecycle(master, nodes, readers, findings)
-    unique = _check_node_ids(layout.master, settings.node_id, nodes, readers, findings)
-    _check_axis_names(unique, readers, findings)
+    master = build_master(master_section, settings, config, options, findings)
+    readers = (DeviceReader(name, section, findings) for name, section in devices.items())
+    read = (reader.read(options, eds_files, master, settings) for reader in readers)
+    nodes = [node for node in read if node is not None]
+    if not master.sync_period:
+        cycle_period = min((node.poll_period for node in nodes), default=CYCLE_PERIOD)
+        master = replace(master, cycle_period=cycle_period)
+    sections = {'master': master_section, **devices}
+    _check_lifecycle(master, nodes, sections, findings)
+    unique = _check_node_ids(settings.node_id, nodes, sections, findings)
+    _check_axis_names(unique, sections, findings)
     finished = assign_cob_ids(unique, findings)
-    sections = {'master': layout.master, **layout.devices}
     locations = dict(at for name, item in sections.items() for at in _walk((name,), item))
     return BusConfig(file, master, finished, findings.warnings, locations)
 
@@ -118,7 +113,7 @@ def _walk(names: tuple[str, ...], item: Item) -> Iterator[tuple[tuple[str, ...],
 def _check_lifecycle(
     master: MasterConfig,
     nodes: Sequence[NodeConfig],
-    readers: Mapping[str, DeviceReader],
+    sections: Mapping[str, YamlMap],
     findings: Findings,
 ) -> None:
     """Refuse a mixture of managed and plain nodes, which cannot be brought up in order."""
@@ -128,26 +123,25 @@ def _check_lifecycle(
         kinds = ('a lifecycle driver', 'a plain one')
         mine, others = kinds if node.is_lifecycle else kinds[::-1]
         findings.error(
-            readers[node.name].place_of('driver'),
+            sections[node.name].place_of('driver'),
             f'{node.driver} is {mine}, but the master has {others} ({master.driver})',
             'take lifecycle drivers for all or for none',
         )
 
 
 def _check_node_ids(
-    master: YamlMap,
     master_id: int | None,
     nodes: Sequence[NodeConfig],
-    readers: Mapping[str, DeviceReader],
+    sections: Mapping[str, YamlMap],
     findings: Findings,
 ) -> list[NodeConfig]:
     """Refuse doubled node ids; returns the devices that have one of their own."""
     owners: dict[int, tuple[str, Place]] = {}
     if master_id is not None:
-        owners[master_id] = ('the master', master.entries['node_id'].place)
+        owners[master_id] = ('the master', sections['master'].place_of('node_id'))
     unique = []
     for node in nodes:
-        own = readers[node.name].place_of('node_id')
+        own = sections[node.name].place_of('node_id')
         name, place = owners.setdefault(node.node_id, (node.name, own))
         if name == node.name:
             unique.append(node)
@@ -161,36 +155,29 @@ def _check_node_ids(
 
 
 def _check_axis_names(
-    nodes: Sequence[NodeConfig], readers: Mapping[str, DeviceReader], findings: Findings
+    nodes: Sequence[NodeConfig], sections: Mapping[str, YamlMap], findings: Findings
 ) -> None:
-    """Refuse an axis that has the name of another device's axis: each is a joint of its own."""
+    """Refuse an axis that has the name of another one: each is a joint of its own."""
     owners: dict[str, str] = {}
     for node in nodes:
         for axis in node.axes:
-            owner = owners.setdefault(axis.name, node.name)
-            if owner != node.name:
+            if (owner := owners.get(axis.name)) is not None:
                 findings.error(
-                    readers[node.name].place_of('channel_names'),
+                    sections[node.name].place_of('channel_names'),
                     f'{node.name} and {owner} both have an axis {axis.name!r}',
                     'give each a name of its own',
                 )
+            owners[axis.name] = node.name
 
 
 NODES_REMEDY = "write a mapping: 'nodes:', below it 'joint1:', below that 'node_id: 2'"
 
 
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """The sections of a bus.yml."""
+def lay_out(root: YamlMap, findings: Findings) -> tuple[YamlMap, YamlMap, dict[str, YamlMap]]:
+    """Find the sections of either format: ``options``, ``master``, and the devices in order.
 
-    options: YamlMap  # the section ``options``, empty when absent
-    master: YamlMap  # the section ``master``, empty when absent
-    # each device with the ``defaults`` below its own values, in the order of the file
-    devices: dict[str, YamlMap] = field(default_factory=dict)
-
-
-def lay_out(root: YamlMap, findings: Findings) -> Layout:
-    """Find the sections of either format."""
+    The first two are empty when absent; ``defaults`` lie below the own values of each device.
+    """
     root = _lifted(root, findings)
     new = 'nodes' in root.entries or 'defaults' in root.entries
     devices = _new_devices(root, findings) if new else _old_devices(root, findings)
@@ -200,7 +187,7 @@ def lay_out(root: YamlMap, findings: Findings) -> Layout:
         block(root, name, findings) or YamlMap(replace(root.place, key=name))
         for name in ('options', 'master')
     )
-    return Layout(options, master, devices)
+    return options, master, devices
 
 
 def _lifted(root: YamlMap, findings: Findings) -> YamlMap:

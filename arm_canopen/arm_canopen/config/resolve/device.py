@@ -11,7 +11,7 @@ import math
 import re
 from typing import Any
 
-from canopen_core import Findings, Place, RefusedError
+from canopen_core import Findings, Place
 from canopen_core.eds import Eds
 from canopen_core.standard import (
     AXIS_OFFSET,
@@ -35,14 +35,13 @@ from ..model.bus import (
     Identity,
     MasterConfig,
     NodeConfig,
-    POLL_PERIOD,
     RPDO,
     TPDO,
     with_event_timer,
 )
 from ..model.drive import DriveConfig, RecoveryPolicy
 from ..read.document import EdsFiles, Item, YamlMap
-from ..read.section import describe, listing, read_section, text, texts
+from ..read.section import attempt, describe, listing, read_section, text, texts
 from ..sections import (
     CHANNEL_KEYS,
     DEVICE_KEYS,
@@ -52,7 +51,7 @@ from ..sections import (
     Options,
     SCALE_KEYS,
 )
-from .master import check_driver, check_namespace
+from .master import check_driver
 from .pdos import PdoReader
 from .sdo_list import parameter_writes, read_writes
 
@@ -64,7 +63,7 @@ CYCLIC_OBJECTS = ((RPDO, Index.CONTROLWORD, 'enabled'), (TPDO, Index.STATUSWORD,
 
 
 class DeviceReader:
-    """Reads one device; what its section has for the cycle of the master is there at once."""
+    """Reads one device."""
 
     def __init__(self, name: str, section: YamlMap, findings: Findings) -> None:
         """Read the keys of a section, whose defaults are merged, but for its PDOs and objects."""
@@ -77,17 +76,10 @@ class DeviceReader:
             for keys in (DRIVE_KEYS, CONFIG_KEYS)
         )
         drive = read_drive(section, drive_values, findings)
-        self.poll_period: float = self._values.get('poll_period', POLL_PERIOD)
         self.settings = DeviceSettings(**values)
         check_node_name(name, section.place, findings)
-        check_namespace(section, self.settings.namespace, findings)
         check_driver(section, self.settings.driver, findings, for_master=False)
         self._axes = read_axes(name, section, self.settings.num_channels, drive, findings)
-
-    def place_of(self, key: str) -> Place:
-        """Return the place of a key, that of the section when the key is absent."""
-        item = self._section.entries.get(key)
-        return item.place if item is not None else self._section.place
 
     def read(
         self,
@@ -195,7 +187,7 @@ class DeviceReader:
         given = (dictionary.number(Index.PRODUCER_HEARTBEAT) or 0) / MILLISECONDS
         if entry is None and wanted:
             self._findings.error(
-                self.place_of('heartbeat_producer'),
+                self._section.place_of('heartbeat_producer'),
                 'the device has no heartbeat: 0x1017 is not in its EDS',
                 'remove the key, or use the EDS that fits the device',
             )
@@ -203,7 +195,7 @@ class DeviceReader:
             return given
         if not entry.access.writable:
             self._findings.error(
-                self.place_of('heartbeat_producer'),
+                self._section.place_of('heartbeat_producer'),
                 f'the heartbeat is fixed at {given * 1e3:g} ms: 0x1017 is read-only in the EDS',
                 'remove the key, the period of the EDS counts',
             )
@@ -214,14 +206,14 @@ class DeviceReader:
         entry, wanted = dictionary.get(Index.GUARD_TIME), self.settings.guard_time
         if wanted and producer:
             self._findings.warning(
-                self.place_of('guard_time'),
+                self._section.place_of('guard_time'),
                 f'not used: the device sends a heartbeat every {producer * 1e3:g} ms',
                 "remove the key, or write 'heartbeat_producer: 0'",
             )
             return 0.0
         if wanted and (entry is None or not entry.access.writable):
             self._findings.error(
-                self.place_of('guard_time'),
+                self._section.place_of('guard_time'),
                 'the device cannot be guarded: no writable 0x100C in its EDS',
                 'remove the key, and set heartbeat_producer',
             )
@@ -238,23 +230,23 @@ class DeviceReader:
         capable = entry is not None and entry.access.writable
         if wanted and not capable:
             self._findings.error(
-                self.place_of('heartbeat_consumer'),
+                self._section.place_of('heartbeat_consumer'),
                 'the device cannot watch the master: no writable 0x1016:01 in its EDS',
                 'remove the key, or use the EDS that fits the device',
             )
         if wanted and not master.heartbeat_producer:
             self._findings.error(
-                self.place_of('heartbeat_consumer'),
+                self._section.place_of('heartbeat_consumer'),
                 'the master sends no heartbeat that the device could watch',
                 "write 'heartbeat_producer: 200' into the section master",
             )
         return capable and master.heartbeat_producer > 0 and wanted is not False
 
     def _check_period(self, master: MasterConfig) -> None:
-        period = self.poll_period
-        if 'period' in self._section.entries and master.sync_period not in (0.0, period):
+        period = self._values.get('poll_period', master.sync_period)
+        if master.sync_period not in (0.0, period):
             self._findings.warning(
-                self.place_of('period'),
+                self._section.place_of('period'),
                 f'SYNC is the clock: PDOs come every {master.sync_period * 1e3:g} ms, not every '
                 f'{period * 1e3:g} ms; only objects that no PDO carries are read so often',
                 'make period equal to sync_period',
@@ -274,7 +266,7 @@ class DeviceReader:
 
     def _check_profile(self, node: NodeConfig) -> None:
         """Refuse the drive profile's driver for a device that is no drive."""
-        place = self.place_of('driver')
+        place = self._section.place_of('driver')
         if not drive_axes(node.dictionary):
             names = ' and '.join(
                 f'{object_address(index)} ({index.name.lower()})'
@@ -300,7 +292,7 @@ class DeviceReader:
         if 0 < len(present) < len(node.axes):
             words = (object_address(Index.CONTROLWORD + AXIS_OFFSET * axis) for axis in present)
             self._findings.error(
-                self.place_of('num_channels'),
+                self._section.place_of('num_channels'),
                 f'the EDS has {len(present)} of {len(node.axes)} axes, with the controlword '
                 f'{", ".join(words)}',
                 'correct num_channels, or use the EDS that fits the device',
@@ -350,7 +342,6 @@ INVERSES = (
     ('scale_acc_from_dev', 'scale_acc_to_dev'),
     ('scale_acc_to_dev', 'scale_acc_from_dev'),
 )
-POLICIES = {policy.value: policy for policy in RecoveryPolicy}
 
 
 def read_drive(section: YamlMap, values: dict[str, Any], findings: Findings) -> DriveConfig:
@@ -366,10 +357,7 @@ def read_drive(section: YamlMap, values: dict[str, Any], findings: Findings) -> 
             )
         values['switching_state'] = state
     if 'recovery' in values:
-        text, place = values['recovery'], section.entries['recovery'].place
-        if text not in POLICIES:
-            findings.error(place, f'unknown policy {text!r}', f'take {" or ".join(POLICIES)}')
-        values['recovery'] = POLICIES.get(text, RecoveryPolicy.MANUAL)
+        values['recovery'] = RecoveryPolicy(values['recovery'])
     return _with_scales(DriveConfig(), section, values, findings)
 
 
@@ -402,9 +390,6 @@ def read_axes(
                 'give as many as there are channels',
             )
             return (drive,)
-    if len(set(names)) != count:
-        place = section.entries['channel_names'].place
-        findings.error(place, 'two channels have one name', 'give each a name of its own')
     return tuple(
         _axis(replace(drive, name=name, channel=channel), part, findings)
         for channel, (name, part) in enumerate(zip(names, parts, strict=True))
@@ -458,10 +443,8 @@ def _with_scales(
 
 
 def _axis_name(item: Item, findings: Findings) -> str:
-    try:
-        name = text(item)
-    except RefusedError as reason:
-        findings.refuse(item.place, reason)
+    name = attempt(text, item, findings)
+    if name is None:
         return ''
     check_node_name(name, item.place, findings)
     return name

@@ -37,7 +37,7 @@ from canopen_core.standard import (
 
 from ..model.bus import Direction, PdoConfig, RPDO, TPDO
 from ..read.document import Item, Scalar, YamlList, YamlMap
-from ..read.section import block, describe, integer, key_number, listing, read_section
+from ..read.section import attempt, block, describe, integer, key_number, listing, read_section
 from ..sections import MAPPING_KEYS, RPDO_KEYS, TPDO_KEYS
 from .sdo_list import find_entry, read_object
 
@@ -196,13 +196,10 @@ class PdoReader:
         pdo = replace(pdo, place=item.place)
         if isinstance(item, Scalar) and item.text.lower() == AUTO:
             if pdo.number <= PREDEFINED_MAX:
-                cob_id = pdo.direction.default_cob_id(pdo.number, self._node_id)
-                return replace(pdo, cob_id=cob_id)
+                own = pdo.direction.default_cob_id(pdo.number, self._node_id)
+                return replace(pdo, cob_id=own)
             return replace(pdo, cob_id=AUTO_ID) if pdo.enabled else pdo
-        try:
-            cob_id = integer(item)
-        except RefusedError as reason:
-            self._findings.refuse(item.place, reason)
+        if (cob_id := attempt(integer, item, self._findings)) is None:
             return pdo
         if 0 < cob_id <= CAN_ID_MASK:
             return replace(pdo, cob_id=cob_id)

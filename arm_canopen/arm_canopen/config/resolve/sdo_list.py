@@ -65,23 +65,16 @@ def read_writes(
     """Return what a section (defaults merged) wants written at boot, in the order of writing."""
     writes = []
     for address, value, place, timeout in _wanted(device, findings):
+        at = place
         try:
-            _check_purpose(*address)
-            entry = find_entry(dictionary, *address)
-        except RefusedError as reason:
-            findings.refuse(place, reason)
-            continue
-        if not entry.access.writable:
-            what = f'{entry} is read-only ({entry.access.value}) in the EDS'
-            findings.error(place, what, 'remove the entry')
-            continue
-        try:
+            entry = _writable(dictionary, *address)
+            at = value.place
             data = encode_value(entry, value)
             _check_emergency(entry, data)
         except RefusedError as reason:
-            findings.refuse(value.place, reason)
-            continue
-        writes.append(SdoWrite(*address, data, timeout, place))
+            findings.refuse(at, reason)
+        else:
+            writes.append(SdoWrite(*address, data, timeout, place))
     return tuple(writes)
 
 
@@ -115,11 +108,7 @@ def error_behaviours(section: YamlMap, findings: Findings) -> Iterator[tuple[int
 
 
 def read_object(item: Item, keys: tuple[Key, ...], findings: Findings) -> dict[str, Any] | None:
-    """Read ``{index, sub_index}`` and more of an entry of ``sdo`` or ``mapping``.
-
-    Returns:
-        The values by field, None when the findings have the reason.
-    """
+    """Return the values of an entry of ``sdo`` or ``mapping`` by field; None where it is wrong."""
     example = '{index: 0x6081, sub_index: 0}'
     if not isinstance(item, YamlMap):
         findings.error(item.place, f'expected an object, got {describe(item)}', f'write {example}')
@@ -130,8 +119,8 @@ def read_object(item: Item, keys: tuple[Key, ...], findings: Findings) -> dict[s
     return values if 'index' in values else None
 
 
-def _check_purpose(index: int, subindex: int) -> None:
-    """Refuse objects that the master writes itself; a second writer would contradict it."""
+def _writable(dictionary: ObjectDictionary, index: int, subindex: int) -> ObjectEntry:
+    """Return an object that may be written; a second writer would contradict the master."""
     if pdo := pdo_object(index):
         raise RefusedError(
             f'{object_address(index)} configures a PDO, and the master would not know of it',
@@ -142,6 +131,11 @@ def _check_purpose(index: int, subindex: int) -> None:
             f'{object_address(index)} is written by the master, which has to know it',
             f'set {key} instead',
         )
+    entry = find_entry(dictionary, index, subindex)
+    if not entry.access.writable:
+        what = f'{entry} is read-only ({entry.access.value}) in the EDS'
+        raise RefusedError(what, 'remove the entry')
+    return entry
 
 
 def _check_emergency(entry: ObjectEntry, data: bytes) -> None:
@@ -156,11 +150,7 @@ def _check_emergency(entry: ObjectEntry, data: bytes) -> None:
 
 
 def find_entry(dictionary: ObjectDictionary, index: int, subindex: int) -> ObjectEntry:
-    """Return an object of a device.
-
-    Raises:
-        RefusedError: The device does not have it; the remedy names the sub-indices that it has.
-    """
+    """Return an object of a device; the remedy names the sub-indices that it has instead."""
     entry = dictionary.get(index, subindex)
     if entry is not None:
         return entry
@@ -173,11 +163,7 @@ def find_entry(dictionary: ObjectDictionary, index: int, subindex: int) -> Objec
 
 
 def encode_value(entry: ObjectEntry, item: Item) -> bytes:
-    """Encode a value as an object holds it.
-
-    Raises:
-        RefusedError: It is of another kind, or beyond the limits of the type or the EDS.
-    """
+    """Encode a value as an object holds it, within the limits of its type and the EDS."""
     value = _value(entry.data_type, item)
     try:
         data = encode(entry.data_type, value)
