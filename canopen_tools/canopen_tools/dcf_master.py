@@ -10,7 +10,6 @@ up in 0x2000 + n - 1, the n-th RPDO is TPDO n and comes from 0x2200 + n - 1. The
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TypeAlias
 
@@ -153,22 +152,12 @@ DUMMY_TYPES = (*range(0x01, 0x08), 0x10, *range(0x12, 0x17), *range(0x18, 0x1C))
 """Integer types, which a PDO may have as gaps."""
 
 
-@dataclass(frozen=True, slots=True)
-class Side:
-    """What one direction of PDOs is called in the master's dictionary."""
-
-    own: Direction  # the direction as the master sees it
-    values: int  # first object with the values
-    remote_number: int  # first object that holds whose PDO it is
-    remote_mapping: int  # first object with the mapping of the device
-    access: AccessType
-
-
-SIDES: dict[str, Side] = {
-    TPDO.name: Side(RPDO, 0x2000, 0x5800, 0x5A00, AccessType.READ_WRITE_RPDO),
-    RPDO.name: Side(TPDO, 0x2200, 0x5C00, 0x5E00, AccessType.READ_WRITE_TPDO),
+SIDES: dict[str, tuple[Direction, int, int, int, AccessType]] = {
+    TPDO.name: (RPDO, 0x2000, 0x5800, 0x5A00, AccessType.READ_WRITE_RPDO),
+    RPDO.name: (TPDO, 0x2200, 0x5C00, 0x5E00, AccessType.READ_WRITE_TPDO),
 }
-"""By the direction as the device sees it."""
+"""By the direction as the device sees it: the direction as the master sees it, the first objects
+with the values, with the device's node id and PDO number, and with its mapping; access."""
 
 
 def master_dcf(config: BusConfig, upload_files: Mapping[int, str]) -> str:
@@ -183,7 +172,12 @@ def master_dcf(config: BusConfig, upload_files: Mapping[int, str]) -> str:
     }
     counts = {}
     for direction in (TPDO, RPDO):
-        pdos = list(_pdos(config, direction))
+        pdos = [
+            (node, pdo)
+            for node in config.nodes
+            for pdo in node.pdos
+            if pdo.direction is direction and pdo.enabled and pdo.mapping
+        ]
         if len(pdos) > PDO_COUNT_MAX:
             raise CodecError(
                 f'{len(pdos)} {direction.title}s of the devices; a master has {PDO_COUNT_MAX}'
@@ -285,18 +279,11 @@ def _communication(config: BusConfig) -> Iterator[tuple[int, DcfObject]]:
     yield 0x102A, _var('NMT inhibit time', U16, RW, inhibit)
 
 
-def _pdos(config: BusConfig, direction: Direction) -> Iterator[tuple[NodeConfig, PdoConfig]]:
-    for node in config.nodes:
-        for pdo in node.tpdos if direction is TPDO else node.rpdos:
-            if pdo.enabled and pdo.mapping:
-                yield node, pdo
-
-
 def _mirrored(
     direction: Direction, pdos: Iterable[tuple[NodeConfig, PdoConfig]]
 ) -> Iterator[tuple[int, DcfObject]]:
     """Yield what the master has for the PDOs of one direction of all devices."""
-    side = SIDES[direction.name]
+    own, first_values, first_number, first_mapping, access = SIDES[direction.name]
     places: dict[tuple[int, int, int], int] = {}  # node id, object -> mapping entry
     remote = f'Remote {direction.title}'
     for position, (node, pdo) in enumerate(pdos):
@@ -308,19 +295,19 @@ def _mirrored(
                 entry = node.dictionary.get(mapped.index, mapped.subindex)
                 name = entry.name if entry is not None else object_address(*address[1:])
                 name = f'{node.name}: {name}'
-                values.append(_keys(name, mapped.data_type, side.access, mappable=True))
-                place = (side.values + position) << 16 | len(values) << 8 | mapped.bits
+                values.append(_keys(name, mapped.data_type, access, mappable=True))
+                place = (first_values + position) << 16 | len(values) << 8 | mapped.bits
                 places[address] = place
             words.append(places[address])
-        yield side.own.communication + position, _communication_parameter(side.own, pdo)
-        yield side.own.mapping + position, _numbers(f'{side.own.title} mapping parameter', words)
+        yield own.communication + position, _communication_parameter(own, pdo)
+        yield own.mapping + position, _numbers(f'{own.title} mapping parameter', words)
         if values:
-            name = f'Mapped application objects for {side.own.title} {position + 1}'
-            yield side.values + position, _record(name, values)
+            name = f'Mapped application objects for {own.title} {position + 1}'
+            yield first_values + position, _record(name, values)
         whose = f'0x{pdo.number << 8 | node.node_id:08X}'
-        yield side.remote_number + position, _var(f'{remote} number and node-ID', U32, RW, whose)
+        yield first_number + position, _var(f'{remote} number and node-ID', U32, RW, whose)
         words = [mapped.word for mapped in pdo.mapping]
-        yield side.remote_mapping + position, _numbers(f'{remote} mapping parameter', words)
+        yield first_mapping + position, _numbers(f'{remote} mapping parameter', words)
 
 
 def _communication_parameter(own: Direction, pdo: PdoConfig) -> DcfObject:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import groupby
 import json
 import math
 
@@ -129,11 +128,7 @@ def written_units(device: NewDevice) -> Units | None:
 
 
 def velocity_scale(device: NewDevice, units: Units) -> tuple[float, str]:
-    """Return the scale of velocities, and who says it.
-
-    Raises:
-        NewBusError: It is not known of what the velocity is.
-    """
+    """Return the scale of velocities, and who says it."""
     one = '1 m' if units.slides else 'one turn'
     if (named := device.open_velocity) is not None:
         raise NewBusError(
@@ -214,18 +209,13 @@ def bus_text(devices: Sequence[NewDevice], period_ms: int) -> str:
         if twice := sorted({value for value in values if values.count(value) > 1}):
             raise NewBusError(f'{what} {twice[0]} is there twice; give each device its own')
     free = {*range(NODE_ID_MIN, NODE_ID_MAX + 1)} - {device.node_id for device in devices}
-    if not free:
-        raise NewBusError(
-            f'all node ids, {NODE_ID_MIN} to {NODE_ID_MAX}, are those of devices, and the master '
-            'needs one; put a device on another bus'
-        )
     lines = [
         '# Made by `canopen new`: what follows a # is why. After a change: canopen check bus.yml',
         'options:',
         '  dcf_path: "@BUS_CONFIG_PATH@"  # the EDS files lie beside this file',
         '',
         'master:',
-        f'  node_id: {min(free)}  # the lowest one that no device has',
+        f'  node_id: {min(free, default=NODE_ID_MIN)}  # the lowest one that no device has',
         '  driver: "ros2_canopen::MasterDriver"',
         '  package: "canopen_master_driver"',
         f'  sync_period: {1000 * period_ms}  # [us]',
@@ -282,7 +272,6 @@ def _kind(device: NewDevice, period_ms: int) -> Iterator[str]:
 def _mode(device: NewDevice) -> tuple[OperationMode, str]:
     bits = device.number(Index.SUPPORTED_MODES)
     if device.mode is not None:
-        _check_offered(device, device.mode, bits)
         return device.mode, 'as asked'
     offered = [mode for mode in BEST_FIRST if bits & mode.support_bit]
     best = f'the best of 0x6502 in the EDS (0x{bits:08X})'
@@ -297,23 +286,6 @@ def _mode(device: NewDevice) -> tuple[OperationMode, str]:
     raise NewBusError(
         f'{device.name}: {device.eds.path.name} {what}, the modes that the drive has; look'
         f' into its manual and choose with --mode {device.name}=8: {known}'
-    )
-
-
-def _check_offered(device: NewDevice, mode: OperationMode, bits: int) -> None:
-    """Refuse a mode that the drive lacks by its own word, where its target is missing, too.
-
-    One that has its target is left to the check, as EDS files err in 0x6502.
-    """
-    target = device.eds.dictionary.get(*TARGET_OBJECTS[mode])
-    is_carried = target is not None and RPDO.mappable(target)
-    if not bits or bits & mode.support_bit or is_carried:
-        return
-    has = ', '.join(str(int(each)) for each in OperationMode if bits & each.support_bit)
-    raise NewBusError(
-        f'{device.name}: 0x6502 in the EDS (0x{bits:X}) has no mode {int(mode)}'
-        f' ({mode.title.lower()}), it has {has or "none of the standard"}; leave --mode'
-        f' {device.name}={int(mode)} out for the best of these'
     )
 
 
@@ -368,66 +340,56 @@ def _acceleration(device: NewDevice, velocity: float) -> str:
 
 def _pdos(device: NewDevice, direction: Direction, wanted: Sequence[_Wanted]) -> Iterator[str]:
     """Write the PDOs of a direction: as few as hold the objects, the others off."""
-    dictionary = device.eds.dictionary
-    numbers = direction.numbers(dictionary)
-    free = [number for number in numbers if not is_fixed(direction, number, dictionary)]
-    entries, left_out = _mappable(device, direction, wanted)
-    placed: list[tuple[int, ObjectEntry]] = []
-    place, bits, slots = -1, 0, 0
-    for each, entry in entries:
-        size = bit_length(entry.data_type) or PDO_BITS_MAX
-        while (size > bits or not slots) and place < len(free):
-            place += 1
-            bits = PDO_BITS_MAX
-            slots = mapping_slots(direction, free[place], dictionary) if place < len(free) else 0
-        if place == len(free):
-            what = f'the EDS has {len(free)} {direction.title}s that can be mapped'
-            if each.lack:
-                raise _needed(device, each, what)
-            left_out.append(f'{entry}: {what}')
-            continue
-        placed.append((free[place], entry))
-        bits, slots = bits - size, slots - 1
+    placed, left_out = _placed(device, direction, wanted)
     yield f'{direction.name}:'
-    for reason in left_out:
-        yield f'  # without {reason}'
-    used = set()
-    for number, pairs in groupby(placed, key=lambda pair: pair[0]):
-        used.add(number)
+    yield from left_out
+    for number, entries in placed.items():
         yield f'  {number}:'
         yield '    cob_id: "auto"'
         yield '    transmission: 0x01  # with each SYNC'
         yield '    mapping:'
-        for _, entry in pairs:
+        for entry in entries:
             index, subindex = entry.address
             yield f'      - {{index: 0x{index:04X}, sub_index: {subindex}}}  # {entry.name}'
-    for number in numbers:
-        if number not in used:
+    for number in direction.numbers(device.eds.dictionary):
+        if number not in placed:
             yield f'  {number}: {{enabled: false}}'
 
 
-def _mappable(
+def _placed(
     device: NewDevice, direction: Direction, wanted: Sequence[_Wanted]
-) -> tuple[list[tuple[_Wanted, ObjectEntry]], list[str]]:
-    """Return what a direction can carry, and what not, with the reason."""
-    entries, left_out = [], []
+) -> tuple[dict[int, list[ObjectEntry]], list[str]]:
+    """Return what each PDO carries, by its number, and lines on what is left out."""
+    dictionary = device.eds.dictionary
+    numbers = direction.numbers(dictionary)
+    free = [number for number in numbers if not is_fixed(direction, number, dictionary)]
+    following = ((number, mapping_slots(direction, number, dictionary)) for number in free)
+    placed: dict[int, list[ObjectEntry]] = {}
+    left_out = []
+    number, bits, slots = 0, 0, 0
     for each in wanted:
-        entry = device.eds.dictionary.get(each.index, each.subindex)
-        if entry is not None and direction.mappable(entry):
-            entries.append((each, entry))
-            continue
-        what = 'the EDS lacks it' if entry is None else 'the EDS says it cannot be mapped'
-        if each.lack:
-            raise _needed(device, each, what)
-        left_out.append(f'0x{each.index:04X}: {what}')
-    return entries, left_out
-
-
-def _needed(device: NewDevice, wanted: _Wanted, what: str) -> NewBusError:
-    return NewBusError(
-        f'{device.name}: {device.eds.path.name}: 0x{wanted.index:04X}: {what}, and {wanted.lack};'
-        ' correct the EDS (PDOMapping, AccessType) by the manual'
-    )
+        entry, what = dictionary.get(each.index, each.subindex), ''
+        if entry is None:
+            what = 'the EDS lacks it'
+        elif not direction.mappable(entry):
+            what = 'the EDS says it cannot be mapped'
+        else:
+            size = bit_length(entry.data_type) or PDO_BITS_MAX
+            while size > bits or not slots:
+                (number, slots), bits = next(following, (0, 1)), PDO_BITS_MAX
+            if number:
+                placed.setdefault(number, []).append(entry)
+                bits, slots = bits - size, slots - 1
+            else:
+                what = f'the EDS has {len(free)} {direction.title}s that can be mapped'
+        if what and each.lack:
+            raise NewBusError(
+                f'{device.name}: {device.eds.path.name}: 0x{each.index:04X}: {what}, and '
+                f'{each.lack}; correct the EDS (PDOMapping, AccessType) by the manual'
+            )
+        if what:
+            left_out.append(f'  # without 0x{each.index:04X}: {what}')
+    return placed, left_out
 
 
 def _writable(entry: ObjectEntry | None) -> bool:

@@ -10,9 +10,8 @@ else that ROS knows is taken and means nothing.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-import difflib
 import os
 import sys
 from typing import Any, TYPE_CHECKING, TypeAlias
@@ -25,39 +24,17 @@ class UsageError(CanopenError):
     """The command line names something that does not exist; nothing was sent yet."""
 
 
-class SuggestingParser(argparse.ArgumentParser):
-    """Names the likely verb or option where one is misspelt; its sub-parsers do so, too."""
+class StrictParser(argparse.ArgumentParser):
+    """Takes options by their whole names only, and so do its sub-parsers."""
 
     def __init__(self, **settings: Any) -> None:  # noqa: ANN401  # those of argparse
         super().__init__(**settings, allow_abbrev=False)
 
-    def parse_known_args(  # type: ignore[override]  # without the overloads of typeshed
-        self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
-    ) -> tuple[argparse.Namespace, list[str]]:
-        """Parse what is known; end with a message where the rest resembles an option."""
-        parsed, rest = super().parse_known_args(args, namespace)
-        for text in rest:
-            option = text.partition('=')[0]
-            if option.startswith('--') and (hint := _hint(option, self._option_string_actions)):
-                self.error(f'unknown option {option}{hint}')
-        return parsed, rest
-
-    def _check_value(self, action: argparse.Action, value: object) -> None:
-        choices = action.choices
-        if choices is not None and value not in choices and (hint := _hint(str(value), choices)):
-            raise argparse.ArgumentError(action, f'unknown {value!r}{hint}')
-        super()._check_value(action, value)
-
 
 if TYPE_CHECKING:
-    SubParsers: TypeAlias = argparse._SubParsersAction[SuggestingParser]  # noqa: SLF001
+    SubParsers: TypeAlias = argparse._SubParsersAction[StrictParser]  # noqa: SLF001
 else:
     SubParsers = object
-
-
-def _hint(text: str, known: Iterable[object]) -> str:
-    close = difflib.get_close_matches(text, [str(each) for each in known], n=1)
-    return f'; did you mean {close[0]}?' if close else ''
 
 
 BITRATE_MIN, BITRATE_MAX = 10_000, 1_000_000  # [bit/s] CiA 301, table 1

@@ -126,22 +126,15 @@ def device_writes(
 
 def master_writes(config: BusConfig) -> list[SdoWrite]:
     """Return what the master writes to its own dictionary; none makes the file unnecessary."""
-    writes = []
-    serial = config.master.identity.serial_number
-    if serial:
-        writes.append(_u32(Index.IDENTITY, 4, serial))
+    numbers = [(int(Index.IDENTITY), 4, config.master.identity.serial_number)]
     for node in config.nodes:
-        for index, number in (
-            (EXPECTED_REVISION, node.identity.revision_number),
-            (EXPECTED_SERIAL, node.identity.serial_number),
-        ):
-            if number:
-                writes.append(_u32(index, node.node_id, number))
-    return writes
-
-
-def _u32(index: int, subindex: int, value: int) -> SdoWrite:
-    return SdoWrite(index, subindex, encode(DataType.UNSIGNED32, value))
+        numbers.append((EXPECTED_REVISION, node.node_id, node.identity.revision_number))
+        numbers.append((EXPECTED_SERIAL, node.node_id, node.identity.serial_number))
+    return [
+        SdoWrite(index, subindex, encode(DataType.UNSIGNED32, number))
+        for index, subindex, number in numbers
+        if number
+    ]
 
 
 def _is_needed(node: NodeConfig, write: BootWrite, *, complete: bool) -> bool:

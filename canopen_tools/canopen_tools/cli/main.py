@@ -17,7 +17,7 @@ import sys
 
 from canopen_core import CanopenError
 
-from .arguments import apply_parameters, split_ros_arguments, SuggestingParser, UsageError, warn
+from .arguments import apply_parameters, split_ros_arguments, StrictParser, UsageError, warn
 from .check import add_check, add_eds
 from .dcf import add_dcf
 from .new import add_new
@@ -60,7 +60,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = SuggestingParser(
+    parser = StrictParser(
         prog='canopen', description='Checks, reads and sets CANopen files, devices and buses.'
     )
     verbs = parser.add_subparsers(title='verbs', metavar='VERB', required=True)

@@ -24,7 +24,7 @@ DEVICE = re.compile('(?P<name>[A-Za-z][A-Za-z0-9_]*)=(?P<file>.+)@(?P<node>[^@]+
 PERIOD_MS = 10  # time between two SYNC in [ms]
 # what a person writes for a turn or a metre of the joint, and for its gear
 INCREMENTS = 'a number of increments other than 0, such as 360000, -36000.5 or 2000*50'
-TURNS = 'turns of the motor for one of the joint, a number above 0 such as 100'
+TURNS = 'turns of the motor for one of the joint, a number above 0 (without sign) such as 100'
 OPTIONS = {
     'turn': (
         'INCREMENTS',
@@ -116,11 +116,11 @@ def _with_choices(options: argparse.Namespace, devices: Sequence[NewDevice]) -> 
     """Return the devices with the units and modes of the command line."""
     drives = [device.name for device in devices if device.is_drive]
     units = {
-        name: _units(option, _typed(option, name, value))
+        name: _units(option, _number(option, value, name))
         for option in ('turn', 'metre')
         for name, value in _pairs(option, getattr(options, option), drives)
     }
-    rpm = {n: _typed('rpm', n, value) for n, value in _pairs('rpm', options.rpm, drives)}
+    rpm = {n: _number('rpm', value, n) for n, value in _pairs('rpm', options.rpm, drives)}
     modes = {n: _mode(n, value) for n, value in _pairs('mode', options.mode, drives)}
     return [
         replace(
@@ -144,24 +144,15 @@ def _pairs(option: str, texts: Iterable[str], drives: Sequence[str]) -> Iterator
         yield name, value
 
 
-def _typed(option: str, name: str, text: str) -> float:
-    """Read the number of an option on the command line."""
-    try:
-        return _number(option, text)
-    except UsageError as error:
-        raise UsageError(f'--{option} {name}={text}: {error}') from error
-
-
-def _number(option: str, text: str) -> float:
+def _number(option: str, text: str, name: str = '') -> float:
     """Read increments (--turn, --metre) or turns (--rpm, whose sign is that of the increments)."""
     try:
         number = math.prod(float(factor) for factor in text.split('*'))
     except ValueError:
         number = math.nan
     if not math.isfinite(number) or number == 0.0 or (option == 'rpm' and number < 0.0):
-        if option == 'rpm':
-            raise UsageError(f'give {TURNS}, not {text!r}; the sign is that of the increments')
-        raise UsageError(f'give {INCREMENTS}, not {text!r}')
+        where = f'--{option} {name}={text}: ' if name else ''
+        raise UsageError(f'{where}give {TURNS if option == "rpm" else INCREMENTS}, not {text!r}')
     return number
 
 

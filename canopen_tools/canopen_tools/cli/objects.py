@@ -86,7 +86,7 @@ def read(options: argparse.Namespace) -> int:
         session = Session(bus, target.bus)
         warn_of_master(session, target)
         for entry in entries:
-            data = _upload(session, target, entry)
+            data = _read_entry(session, target, entry)
             if options.value:
                 print_line(_plain(entry, data))
             else:
@@ -113,7 +113,7 @@ def write(options: argparse.Namespace) -> int:
             print_line(f'{title} was written')
             return 0
         try:
-            held = _upload(session, target, entry)
+            held = _read_entry(session, target, entry)
         except SdoAbortError as error:  # commands, and what restarts the device
             print_line(f'{title} was written')
             warn(f'it cannot be read back: {error}')
@@ -141,10 +141,8 @@ def _data(target: Target, entry: ObjectEntry, options: argparse.Namespace) -> by
         raise UsageError(f'{entry}: {error}') from error
 
 
-def _upload(session: Session, target: Target, entry: ObjectEntry) -> bytes:
-    client = session.client(target.node_id, target.name, target.dictionary)
-    long = entry.data_type in LONG_TYPES
-    data = session.read(client, *entry.address, target.timeout, block=long)
+def _read_entry(session: Session, target: Target, entry: ObjectEntry) -> bytes:
+    data = _read(session, target, *entry.address, block=entry.data_type in LONG_TYPES)
     return sdo.fitted(entry.data_type, data)  # of the type that --type names
 
 
@@ -178,11 +176,6 @@ def add_diff(parsers: SubParsers) -> None:
         'Exit code: 0 when all is equal, 1, 2 wrong usage.',
     )
     add_node_arguments(parser)
-    parser.add_argument(
-        '--defaults',
-        action='store_true',
-        help='compare objects that bus.yml does not configure with their defaults in the EDS',
-    )
     parser.add_argument('--all', action='store_true', help='show what is equal, too')
     parser.set_defaults(run=diff)
 
@@ -190,13 +183,11 @@ def add_diff(parsers: SubParsers) -> None:
 def diff(options: argparse.Namespace) -> int:
     """Compare a device; return the exit code."""
     target = find_target(options)
-    _objects(
-        target, {}, defaults=options.defaults
-    )  # what cannot be is reported before the bus opens
+    _objects(target, {})  # what cannot be is reported before the bus opens
     with open_bus(options.can) as bus:
         session = Session(bus, target.bus)
         warn_of_master(session, target)
-        objects = _objects(target, _consumers(session, target), defaults=options.defaults)
+        objects = _objects(target, _consumers(session, target))
         rows = [_compared(session, target, expected) for expected in objects]
     different = [row for row in rows if row[0] != '=']
     if shown := rows if options.all else different:
@@ -220,24 +211,16 @@ def _consumers(session: Session, target: Target) -> HeldConsumers:
     return held
 
 
-def _objects(target: Target, consumers: HeldConsumers, *, defaults: bool) -> list[BootWrite]:
+def _objects(target: Target, consumers: HeldConsumers) -> list[BootWrite]:
     """Return what to compare; consumers are what the device has in 0x1016, by sub-index."""
-    configured: list[BootWrite] = []
     if target.bus is not None and target.config is not None:
-        configured = expected_objects(target.bus, target.config, consumers)
-    if not configured and not target.described:
+        return expected_objects(target.bus, target.config, consumers)
+    if not target.described:
         raise UsageError(
             f'no file describes {target.name}; give --bus-config BUS.yml with this '
             'device in it, or --eds FILE'
         )
-    if configured and not defaults:
-        return configured
-    known = {(item.index, item.subindex) for item in configured}
-    return configured + [
-        item
-        for item in expected_defaults(target.dictionary)
-        if (item.index, item.subindex) not in known
-    ]
+    return list(expected_defaults(target.dictionary))
 
 
 def expected_objects(
@@ -268,11 +251,13 @@ def _identity(node: NodeConfig) -> Iterator[BootWrite]:
         yield BootWrite(index, subindex, encode(DataType.UNSIGNED32, value), key)
 
 
-def _read(session: Session, target: Target, index: int, subindex: int) -> bytes:
+def _read(
+    session: Session, target: Target, index: int, subindex: int, *, block: bool = False
+) -> bytes:
     if session.masters:
         session.await_quiet(target.node_id)
     client = session.client(target.node_id, target.name, target.dictionary)
-    return session.read(client, index, subindex, target.timeout)
+    return session.read(client, index, subindex, target.timeout, block=block)
 
 
 def _compared(session: Session, target: Target, expected: BootWrite) -> tuple[str, ...]:
