@@ -92,11 +92,11 @@ class Kinematics:
         self._plain = len(columns) == len(self.joints)
 
     def with_others(self, places: Mapping[str, float]) -> Kinematics:
-        """Return the same group with joints beside it elsewhere.
+        """Return a copy in which joints outside the group have other positions.
 
         Args:
-            places: Where they stand in [rad], by joint; those that are left out stay. Joints that
-                are not among :attr:`others` count nothing, so the state of a robot will do.
+            places: Their positions in [rad], by joint. Joints left out keep theirs; joints that
+                are not in :attr:`others` are ignored, so a state of the whole robot is accepted.
 
         Raises:
             CommandError: A position is not finite.

@@ -143,8 +143,8 @@ def arc_around(start: Pose, center: Array, end: Pose) -> Arc:
     across = np.cross(first, last)
     if np.linalg.norm(across) < COLLINEAR_TOLERANCE:
         raise _no_circle(
-            'start, center and goal are on a line, which makes no plane (half a circle, or none);'
-            ' give an interim point'
+            'start, center and goal are on a line (half a circle, or no arc), so the plane is not'
+            ' defined; give an interim point'
         )
     # through start and goal exactly: the center on the plane between them that is nearest
     chord = end.position - start.position
@@ -167,7 +167,7 @@ ROTATION_STEP = 0.05  # greatest rotation between two places in [rad], where the
 
 @dataclass(frozen=True, slots=True)
 class JumpThresholds:
-    """What counts as a jump of the joints between two places; 0 does not look."""
+    """Limits above which a step between two points is a joint jump; 0 for no limit."""
 
     relative: float = 0.0  # times the mean step of the path, in joint space
     revolute: float = 0.0  # greatest step of a joint that turns in [rad]

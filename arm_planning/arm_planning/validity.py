@@ -117,7 +117,7 @@ class ValidityCheck:
         return None
 
     def path(self, path: Path) -> Violation | None:
-        """Return what is wrong with a path, of its positions; None for nothing."""
+        """Return where a path violates position limits or clearances; None if it is valid."""
         beyond = farthest_beyond(path, self._limits.lower, self._limits.upper)
         if beyond is not None:
             positions = path.at(beyond.time).position

@@ -84,7 +84,7 @@ def unpack(definition: str, data: bytes) -> Step:
         ValueError: The bytes are of something else.
     """
     if data[:4] != ENCAPSULATION:
-        raise ValueError('no message in little endian CDR')
+        raise ValueError('the message is not little-endian CDR')
     view, place, values = memoryview(data)[4:], STAMP_SIZE, {}
     own, _, _ = definition.partition('\n===')  # behind it stand the definitions of nested types
     fields = [line.partition('#')[0].split() for line in own.splitlines()]

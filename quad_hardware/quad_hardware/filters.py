@@ -88,11 +88,11 @@ ZERO: Vector = (0.0, 0.0, 0.0)
 
 
 def low_pass_share(cutoff: float, elapsed: float) -> float:
-    """Return the weight of the newest value in a first-order low-pass.
+    """Return the weight of the newest value in a first-order low-pass filter.
 
     Args:
-        cutoff: Frequency at which the amplitude is 0.7 [Hz]; infinite lets everything through.
-        elapsed: Since the value before [s].
+        cutoff: Frequency at which the amplitude is 0.7 [Hz]; an infinite one filters nothing.
+        elapsed: Time since the previous value [s].
     """
     return 1.0 - math.exp(-2.0 * math.pi * cutoff * elapsed)
 

@@ -307,7 +307,7 @@ class KinematicRobot:
     def set_torque(
         self, on: bool, joints: Iterable[str] | None = None, *, hold: bool = True
     ) -> None:
-        """Switch servos on or off, as the robot in physics does; they do not fall."""
+        """Switch servos on or off; one that is off does not fall or move to new targets."""
         names = self.joint_names if joints is None else tuple(joints)
         self._on |= dict.fromkeys(names, on)
         missed = {name: self._missed.pop(name) for name in names if on and name in self._missed}

@@ -113,7 +113,7 @@ class PseudoTerminal:
             return b''
 
     def write(self, data: bytes) -> None:
-        """Send bytes; those that are not read are lost, as on a wire."""
+        """Send bytes; those that the full buffer of the reader cannot hold are lost."""
         with suppress(BlockingIOError):
             os.write(self._master, data)
 

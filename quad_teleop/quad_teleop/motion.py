@@ -194,7 +194,7 @@ class ControllerReport:
     time: float  # when it came [s]
 
     def is_fresh(self, now: float) -> bool:
-        """Return whether it still counts at a time [s]."""
+        """Return whether the report is recent enough to use at a time [s]."""
         return now - self.time < REPORT_TIMEOUT
 
 

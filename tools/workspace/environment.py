@@ -69,11 +69,11 @@ class Environment:
         return fingerprint(*ros, python, str(self.layout.venv), fingerprint_files(files))
 
     def steps(self, state: EnvironmentState | None, names: Iterable[str]) -> list[Step]:
-        """List what has to be done, nothing when all is there.
+        """Return the steps that are left to do, none if the environment is complete.
 
-        Whatever changes the environment first takes its state away, so an interrupted change of
-        any kind leads to a new environment. Names are what is needed besides: `DEV`, `DOCS`, and
-        packages, of which some have a requirements file of their own.
+        Each change deletes the state file first, so after an interrupted change everything is
+        made anew. ``names`` are additions to the base: `DEV`, `DOCS`, and packages (those without
+        a requirements file add nothing).
         """
         fresh = state is not None and state.base == self.base
         there = state.additions if fresh and state is not None else {}

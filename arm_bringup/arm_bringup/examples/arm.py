@@ -182,7 +182,7 @@ class ArmDemo(Demo[ServiceClient]):
         return int(value) if math.isfinite(value) else 0
 
     def bus_line(self) -> str:
-        """Return how the bus and its cycle are."""
+        """Return frame rate, load and losses of the bus, and jitter of its cycle, in one line."""
         return ', '.join(self._bus_figures())
 
     def _bus_figures(self) -> tuple[str, str]:

@@ -23,10 +23,10 @@ def clamp(value: float, largest: int) -> int:
 
 
 class Scale:
-    """Converts one quantity of a drive.
+    """Converts one quantity of a drive between user units and device units.
 
-    To the device it is ``value * to_dev + offset_to_dev``, and from it ``value * from_dev +
-    offset_from_dev``, as ros2_canopen has it: bus.yml may scale the two ways differently.
+    A device gets ``value * to_dev + offset_to_dev``; a value that it sends is read as ``value *
+    from_dev + offset_from_dev``. As in ros2_canopen, bus.yml sets both directions separately.
     """
 
     __slots__ = ('_from_dev', '_limits', '_offset_from_dev', '_offset_to_dev', 'to_dev')

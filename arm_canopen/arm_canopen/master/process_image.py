@@ -62,7 +62,7 @@ class SyncRound:
         self._sync_time = now
 
     def answer(self, timestamp: float) -> None:
-        """An expected TPDO has come, at a steady time in [s]."""
+        """Count an expected TPDO; ``timestamp`` is its steady time of arrival in [s]."""
         self.late += 0.0 < self._window < timestamp - self._sync_time
         self.pending -= 1
         if self.pending == 0:

@@ -362,7 +362,7 @@ class RemoteNode:
 
 @dataclass(frozen=True, slots=True)
 class NodeStatus:
-    """How a device was at one moment."""
+    """Snapshot of the state of one device."""
 
     name: str  # name in bus.yml
     node_id: int  # CANopen node id

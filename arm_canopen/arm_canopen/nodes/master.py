@@ -223,7 +223,7 @@ def _check_names(configs: Sequence[BusConfig], named: str) -> None:
             if name in taken:
                 raise CanopenError(
                     f'{config.file}: there is a node {"/".join(name).lstrip("/")!r} on another '
-                    "bus already; give master and defaults of each bus a 'namespace'"
+                    "bus already; set 'namespace' in the sections master and defaults of each file"
                 )
             taken.add(name)
 

@@ -290,11 +290,11 @@ class MasterProcess:
         self._joint_states.publish_robot(description)
 
     def attach(self, source: MotionSource) -> Future[None]:
-        """Attach a motion source, as :meth:`.CanopenMaster.begin_attach`."""
+        """Attach a motion source; see :meth:`.CanopenMaster.begin_attach`."""
         return self._master.begin_attach(source)
 
     def detach(self, source: MotionSource) -> Future[None]:
-        """End a motion source, as :meth:`.CanopenMaster.begin_detach`."""
+        """Detach a motion source; see :meth:`.CanopenMaster.begin_detach`."""
         return self._master.begin_detach(source)
 
     def _report(self, event: Event) -> None:

@@ -178,7 +178,7 @@ def padded(shape: Shape, padding: float, scale: float = 1.0) -> Native:
 
 
 def check_padding(link: str, padding: float, scale: float) -> None:
-    """Refuse a padding that is negative, a scale that is not positive, and what is not finite."""
+    """Reject a negative padding, a scale of 0 or less, and values that are not finite."""
     if not (0.0 <= padding < float('inf') and 0.0 < scale < float('inf')):
         raise SceneError(
             f'{link}: padding {padding:g} m and scale {scale:g}: the padding must be 0 or more,'

@@ -136,7 +136,7 @@ class MoveGroupParameters:
 
 
 def declare_parameters(node: Node, package: MoveItPackage | None = None) -> MoveGroupParameters:
-    """Declare what describes the robot, read what is for its planners, log what has no effect."""
+    """Declare the parameters that describe the robot, and read those of the planners."""
     given = given_values(node)
     places: dict[str, Place] = {}
     if package is not None:

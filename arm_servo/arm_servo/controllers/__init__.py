@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What moves an arm: jogging, a trajectory or a single target, each by one interface."""
+"""Controllers of an arm behind one interface: jogging, trajectories, single targets."""

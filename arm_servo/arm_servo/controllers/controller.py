@@ -126,7 +126,7 @@ CONTINUED = Outcome(GoalCode.SUCCESSFUL, 'a further target goes on from it')
 
 
 def refused(error: BaseException) -> Outcome:
-    """Return the outcome of a motion that does not begin."""
+    """Convert an error to the outcome of a motion that did not start."""
     code = error.code if isinstance(error, GoalError) else GoalCode.INVALID_GOAL
     if isinstance(error, ArmError):
         return Outcome(code, str(error))

@@ -1,23 +1,22 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The guardian: a small process that stops the others when their supervisor was killed.
+"""The guardian: a small process that stops the others if their supervisor is killed.
 
-A supervisor that gets SIGKILL (or is the victim of the memory killer) stops no process, and its
-processes would go on: a master with enabled drives. So the supervisor starts this process first
-and keeps one end of a pipe to it. When the pipe ends without ``bye``, the supervisor is gone,
-and the guardian stops the processes in the same order and by the same signals: both do so by
-:class:`StopSequence`.
+A supervisor that is killed (by SIGKILL, or by the kernel when memory runs out) stops nothing: a
+master would go on with enabled drives. So the supervisor starts the guardian first and keeps one
+end of a pipe to it. If the pipe closes without ``bye``, the guardian stops the processes in the
+supervisor's order and by the same signals: both use :class:`StopSequence`.
 
-It runs ``python -I -S``, so it needs the standard library only and starts in a few milliseconds,
-in its own session, so that no Ctrl-C reaches it.
+It runs ``python -I -S``: it needs only the standard library and starts in a few milliseconds. It
+has its own session, so Ctrl-C does not reach it.
 
-Messages are lines of JSON:
+Messages are lines of JSON; ``steps`` are signals, each with the time to wait after it in [s]:
 
-=====================================================  ==================================
-``{"pid": 7, "name": "master", "order": 0, "steps": [[2, 5.0], [9, 2.0]]}``  take it in
-``{"gone": "master"}``                                 it has ended
-``{"bye": true}``                                      the supervisor ends by itself
-=====================================================  ==================================
+=============================================================================  ==================
+``{"pid": 7, "name": "master", "order": 0, "steps": [[2, 5.0], [9, 2.0]]}``    watch this process
+``{"gone": "master"}``                                                         it has ended
+``{"bye": true}``                                                              normal end
+=============================================================================  ==================
 """
 
 from __future__ import annotations

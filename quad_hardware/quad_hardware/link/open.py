@@ -76,7 +76,7 @@ class LinkOptions:
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """A robot that was found, and how to talk to it."""
+    """An open connection to a robot, with the parser and dialect of its protocol."""
 
     port: SerialPort  # the open port, owned by the holder of the session
     firmware: str  # version of the robot

@@ -192,10 +192,10 @@ class Function:
             raise CodecError(f'{self.name}: {given} do not fit its fields') from error
 
     def unpack(self, payload: bytes) -> dict[str, tuple[float, ...]]:
-        """Decode a payload; repeated fields are run together over all groups.
+        """Decode a payload; a repeated field has the values of all groups in one tuple.
 
         Raises:
-            CodecError: The payload has a length that the function does not have.
+            CodecError: The function has no payload of this length.
         """
         if not self.accepts(len(payload)) or len(payload) % self.length:
             raise CodecError(f'{self.name}: payload of {len(payload)} bytes, not {self.length}')

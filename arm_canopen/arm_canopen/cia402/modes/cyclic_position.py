@@ -48,7 +48,7 @@ class TargetLine:
         self._interval: float | None = None  # [s]
 
     def extend(self, target: float) -> None:
-        """Begin with the next target."""
+        """Set the next target, and update the mean interval between targets."""
         before = self._since if self._interval is None else self._interval
         self._interval = before + LEARNING * (self._since - before)
         self._left, self._since = SPREAD * self._interval, 0.0
