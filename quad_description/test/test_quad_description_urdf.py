@@ -39,6 +39,7 @@ builds = pytest.mark.parametrize(('preset', 'arm'), BUILDS)
 # roll axis, knee and pad of a left leg at zero [m], as the vendor's model has them
 HIP_X = {'f': 0.04946, 'b': -0.10059}
 ANGLE = st.floats(-1.0, 1.0)
+ROOT, MINI = parse(robot_urdf('mini')), quadruped(robot_urdf('mini'))
 BROKEN = (
     '<robot><link name="b"/><link name="c"/>'
     '<joint name="a" type="revolute"><parent link="b"/><child link="c"/>{}</joint></robot>'
@@ -103,31 +104,19 @@ def test_feet_are_where_the_vendor_has_them(leg: str) -> None:
 @pytest.mark.parametrize('leg', LEGS)
 @given(hip=ANGLE, thigh=ANGLE, calf=ANGLE)
 def test_legs_bend_as_the_conventions_say(leg: str, hip: float, thigh: float, calf: float) -> None:
-    """The foot follows from roll about -+x and pitches about y, with the numbers of the leg."""
+    """The foot follows from roll about -+x and pitches about y, in the URDF and in closed form."""
     at = {
         f'{leg}_{name}_joint': q
         for name, q in zip(('hip', 'thigh', 'calf'), (hip, thigh, calf), strict=True)
     }
-    foot, _ = link_pose(parse(robot_urdf('mini')), f'{leg}_foot', at)
+    foot, _ = link_pose(ROOT, f'{leg}_foot', at)
     side, (x, y) = SIDE[leg], np.eye(3)[:2]
     shank = rotation(y, calf) @ np.array([0.0715, -side * 0.0186, -0.0226])
     below = rotation(y, thigh) @ (np.array([0, 0, -0.0599]) + shank)
     expected = rotation(-side * x, hip) @ (np.array([-0.0186, side * 0.0496, 0]) + below)
     expected += [HIP_X[leg[0]], side * 0.0225, -0.02207]
     assert foot == pytest.approx(expected, abs=1e-9)
-
-
-@pytest.mark.parametrize('leg', LEGS)
-@given(hip=ANGLE, thigh=ANGLE, calf=ANGLE)
-def test_foot_positions_are_those_of_the_urdf(
-    leg: str, hip: float, thigh: float, calf: float
-) -> None:
-    """The closed form and the chain of the URDF's joints agree."""
-    names = (f'{leg}_{joint}_joint' for joint in ('hip', 'thigh', 'calf'))
-    at = dict(zip(names, (hip, thigh, calf), strict=True))
-    expected, _ = link_pose(parse(robot_urdf('mini')), f'{leg}_foot', at)
-    robot = quadruped(robot_urdf('mini'))
-    feet = robot.feet([at.get(name, 0.0) for name in robot.names])
+    feet = MINI.feet([at.get(name, 0.0) for name in MINI.names])
     assert feet[LEGS.index(leg)] == pytest.approx(expected, abs=1e-9)
 
 

