@@ -99,8 +99,7 @@ class Jogger:
 
 @pytest.mark.slow
 @pytest.mark.parametrize('name', ROBOTS)
-@pytest.mark.parametrize('down', [0.0, 0.3])
-@pytest.mark.parametrize(('speed', 'hold'), [(0.2, 0.0), (0.3, 1.5)])
+@pytest.mark.parametrize(('down', 'speed', 'hold'), [(0.0, 0.2, 0.0), (0.3, 0.3, 1.5)])
 def test_an_arm_comes_back_from_the_border_on_the_same_side(
     name: str, down: float, speed: float, hold: float
 ) -> None:
@@ -310,27 +309,19 @@ CONTACTS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize('name', ROBOTS)
-@pytest.mark.parametrize('twist', TWISTS, ids=str)
-def test_no_trap_in_contact(name: str, twist: Array) -> None:
-    """With links overlapping each direction moves, or the report names what blocks it."""
+def test_no_trap_in_contact(name: str) -> None:
+    """With links overlapping each direction moves, or the report names why; one parts them."""
     model = robot(name)
     start = np.array(CONTACTS[name])
-    before = model.clearance(start)
+    before, ends = model.clearance(start), []
     assert before < 0.005
-    result = run(model, start, TwistCommand(twist), 1.0)
-    assert moves_or_reports(model, result, twist)
-    assert model.clearance(result.states[-1].position) > min(before, 0.004) - 1e-3
-    kept(model, result)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('name', ROBOTS)
-def test_contact_can_be_left(name: str) -> None:
-    """With links overlapping there is a direction in which they come apart."""
-    model = robot(name)
-    start = np.array(CONTACTS[name])
-    ends = [run(model, start, TwistCommand(twist), 1.0).states[-1].position for twist in TWISTS]
-    assert max(map(model.clearance, ends)) > model.clearance(start) + 0.01
+    for asked in TWISTS:
+        result = run(model, start, TwistCommand(asked), 1.0)
+        assert moves_or_reports(model, result, asked), asked
+        kept(model, result)
+        ends.append(model.clearance(result.states[-1].position))
+    assert min(ends) > min(before, 0.004) - 1e-3
+    assert max(ends) > before + 0.01
 
 
 @pytest.mark.slow
