@@ -54,10 +54,11 @@ def foreign(isolation: Isolation, **variables: str) -> dict[str, str]:
 def brought_up(
     host: Host, isolation: Isolation, *arguments: str, **variables: str
 ) -> Iterator[RunningProcess]:
-    """Bring a simulated arm up on a host, with its drives enabled."""
-    command = [executable('arm_bringup', 'bringup'), 'panda', '--simulate', '--enable', *arguments]
+    """Bring a simulated arm up on a host: its drives alone, or with ``--enable`` what moves it."""
+    alone = [] if '--enable' in arguments else ['--drives-only']
+    command = [executable('arm_bringup', 'bringup'), 'panda', '--simulate', *alone, *arguments]
     with host.run([*command, '--can', isolation.bus], isolation.env | variables) as bringup:
-        bringup.wait_for('drives are enabled', 90.0)
+        bringup.wait_for('all is ready' if alone else 'drives are enabled', 90.0)
         yield bringup
 
 
@@ -134,7 +135,7 @@ def test_a_link_that_is_cut_or_slow_stops_the_arm_and_heals(isolation: Isolation
     with two_linked_hosts() as (robot, desk, link):
         env = isolation.env | {NETWORK_VARIABLE: desk.interface}
         with (
-            brought_up(robot, isolation, '--network', robot.interface) as bringup,
+            brought_up(robot, isolation, '--enable', '--network', robot.interface) as bringup,
             robot.run([sys.executable, CLIENT, 'watch'], isolation.env) as watch,
             desk.run([executable('robot_viewer', 'web_viewer')], env) as viewer,
             held_key('1', desk.command(key), env),
@@ -180,7 +181,7 @@ def test_a_page_of_the_other_side_jogs_and_stops_with_the_link(isolation: Isolat
     with two_linked_hosts() as (robot, desk, link):
         env = isolation.env | {NETWORK_VARIABLE: desk.interface}
         with (
-            brought_up(robot, isolation, '--network', robot.interface),
+            brought_up(robot, isolation, '--enable', '--network', robot.interface),
             robot.run([sys.executable, CLIENT, 'watch'], isolation.env) as watch,
             desk.run([executable('robot_viewer', 'web_viewer')], env) as viewer,
             chromium.browser(desk.command([])) as browser,
