@@ -231,32 +231,6 @@ def test_a_program_that_cannot_begin_says_why(
         assert words in process.output
 
 
-def test_a_goal_and_a_jog_move_drives_elsewhere(isolation: Isolation) -> None:
-    """A goal is reached; a jog takes over from the next one, without a jump; it ends at rest."""
-    command = [executable('arm_bringup', 'bringup'), 'panda', '--controller-only']
-    with TopicArm(isolation, command, 'all is ready') as arm:
-        reach(arm.client, goal_to([0.3, *READY[1:]], 2.0))
-        assert arm.at[0] == pytest.approx(0.3, abs=1e-6)
-        run = GoalRun(arm.client, goal_to([1.0, *READY[1:]], 6.0))
-        arm.client.spin_until(lambda: arm.at[0] > 0.35, 10.0, 'motion')
-        publisher = arm.client.node.create_publisher(JointJog, '/servo_node/delta_joint_cmds', 10)
-        jog = JointJog(joint_names=['panda_joint1'], velocities=[-1.0])
-        arm.client.node.create_timer(0.02, lambda: publisher.publish(jog))
-        arm.client.spin_until(lambda: arm.at[0] < 0.2, 10.0, 'motion the other way')
-        result = run.wait()[1]
-        assert result.error_code == FollowJointTrajectory.Result.INVALID_GOAL
-        assert 'jogging took over' in result.error_string
-        assert max(abs(b[0] - a[0]) for a, b in pairwise(arm.arrays)) < 0.01
-        assert not arm.trajectories  # they would go to the trajectory controller
-        names = arm.client.node.get_node_names()
-        assert 'robot_state_publisher' not in names
-        arm.process.signal(signal.SIGINT)
-        arm.client.spin_until(lambda: not arm.process.is_running(), 15.0, 'end of the bring-up')
-        assert arm.process.wait() == 0
-        steps = [abs(b[0] - a[0]) for a, b in pairwise(arm.arrays)]
-        assert steps[-1] < 1e-4
-
-
 def test_each_group_has_a_topic_of_its_own(isolation: Isolation, tmp_path: Path) -> None:
     """Two arms and a gripper move at the same time; one is canceled, and the others go on."""
     groups = {**ARMS, 'hand': (GRIPPER,)}
@@ -306,8 +280,6 @@ def test_each_group_has_a_topic_of_its_own(isolation: Isolation, tmp_path: Path)
 FOLDED = [0.0, 1.7, 0.0, -3.0, 0.0, 1.5, 0.7]
 """A pose of the Panda within its limits, with the forearm in its base."""
 
-FREE = [0.3, *READY[1:]]
-
 
 def prism(radius: float, length: float) -> str:
     """Return a prism of eight sides along z as Wavefront OBJ."""
@@ -344,8 +316,11 @@ def folder(tmp_path: Path) -> Path:
     return folder
 
 
-def test_a_goal_in_which_meshes_meet_is_refused(isolation: Isolation, folder: Path) -> None:
-    """With the links and the time; another one is reached."""
+def test_a_goal_and_a_jog_move_drives_elsewhere(isolation: Isolation, folder: Path) -> None:
+    """A goal is reached; a jog takes over from the next one, without a jump; it ends at rest.
+
+    One in which meshes meet is refused with the links and the time.
+    """
     command = [executable('arm_bringup', 'bringup'), str(folder), '--controller-only']
     with TopicArm(isolation, command, 'all is ready') as arm:
         refused = GoalRun(arm.client, goal_to(FOLDED, 6.0)).wait()[1]
@@ -353,5 +328,23 @@ def test_a_goal_in_which_meshes_meet_is_refused(isolation: Isolation, folder: Pa
         assert 'would collide at' in refused.error_string
         assert 'panda_link' in refused.error_string
         assert arm.at == READY
-        reach(arm.client, goal_to(FREE, 2.0))
-        assert arm.at[0] == pytest.approx(FREE[0], abs=1e-6)
+        reach(arm.client, goal_to([0.3, *READY[1:]], 2.0))
+        assert arm.at[0] == pytest.approx(0.3, abs=1e-6)
+        run = GoalRun(arm.client, goal_to([1.0, *READY[1:]], 6.0))
+        arm.client.spin_until(lambda: arm.at[0] > 0.35, 10.0, 'motion')
+        publisher = arm.client.node.create_publisher(JointJog, '/servo_node/delta_joint_cmds', 10)
+        jog = JointJog(joint_names=['panda_joint1'], velocities=[-1.0])
+        arm.client.node.create_timer(0.02, lambda: publisher.publish(jog))
+        arm.client.spin_until(lambda: arm.at[0] < 0.2, 10.0, 'motion the other way')
+        result = run.wait()[1]
+        assert result.error_code == FollowJointTrajectory.Result.INVALID_GOAL
+        assert 'jogging took over' in result.error_string
+        assert max(abs(b[0] - a[0]) for a, b in pairwise(arm.arrays)) < 0.01
+        assert not arm.trajectories  # they would go to the trajectory controller
+        names = arm.client.node.get_node_names()
+        assert 'robot_state_publisher' not in names
+        arm.process.signal(signal.SIGINT)
+        arm.client.spin_until(lambda: not arm.process.is_running(), 15.0, 'end of the bring-up')
+        assert arm.process.wait() == 0
+        steps = [abs(b[0] - a[0]) for a, b in pairwise(arm.arrays)]
+        assert steps[-1] < 1e-4
