@@ -22,10 +22,12 @@ if TYPE_CHECKING:
 
 pytestmark = [pytest.mark.scenario, pytest.mark.timeout(400)]
 
-SEED = 30
+SEED = 145
+"""Frames doubled and lost, a killed master; a bridge that is stopped, and noise. The others are
+killed in test_arm_faults and test_quad_faults."""
 
 
-@pytest.mark.parametrize(('robot', 'events'), [(ArmVictim, 5), (QuadVictim, 4)])
+@pytest.mark.parametrize(('robot', 'events'), [(ArmVictim, 3), (QuadVictim, 2)])
 def test_nothing_moves_unasked_and_all_recovers(
     isolation: Isolation, tmp_path: Path, robot: type[ArmVictim | QuadVictim], events: int
 ) -> None:
