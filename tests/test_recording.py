@@ -221,7 +221,7 @@ def test_a_replay_ends_when_the_master_comes(isolation: Isolation, tmp_path: Pat
         player.wait_for('runs already')
 
 
-DURATION = 10.0  # [s] of walking
+DURATION = 4.0  # [s] of walking
 RATE = 30.0  # [1/s]; what a topic of a cycle has at least
 SEVERAL = {'/rosout', '/parameter_events', '/diagnostics', '/tf', '/tf_static'}
 """Topics that several nodes publish."""
