@@ -31,7 +31,7 @@ from arm_trajectory import Path
 
 pytestmark = pytest.mark.slow
 
-SEEDS = range(int(os.environ.get('PLANNING_SEEDS', '6')))
+SEEDS = range(int(os.environ.get('PLANNING_SEEDS', '2')))
 """Of the random scenes; more of them by the environment."""
 
 OVERLAP_TOLERANCE = 1e-6  # overlap that counts as rounding in [m]

@@ -51,19 +51,13 @@ LEVEL = math.radians(5.0)
 
 @pytest.mark.parametrize(
     'velocity',
-    [
-        Velocity(0.1),
-        Velocity(0.2),
-        Velocity(0.3),
-        Velocity(-0.15),
-        Velocity(0.0, 0.1),
-        Velocity(0.0, -0.1),
-        Velocity(0.0, 0.0, 1.0),
-        Velocity(0.15, 0.0, -0.6),
-    ],
+    [Velocity(0.2), Velocity(0.0, -0.1), Velocity(0.0, 0.0, 1.0), Velocity(0.15, 0.0, -0.6)],
 )
 def test_trot_goes_as_commanded(velocity: Velocity) -> None:
-    """Ten seconds of trot, 35 periods, keep speed and direction, and the body upright."""
+    """Ten seconds of trot, 35 periods, keep speed and direction, and the body upright.
+
+    The test of servos of any stiffness has other velocities.
+    """
     rig = PhysicsRig()
     rig.mode('walk')
     rig.run(1.0, velocity)
@@ -123,8 +117,7 @@ def test_other_builds_of_the_robot_walk_too(preset: str, arm: bool) -> None:
 
 
 @pytest.mark.parametrize(
-    'velocity',
-    [Velocity(1.0), Velocity(0.5), Velocity(-0.5), Velocity(0.0, 0.3), Velocity(0.0, 0.0, 1.0)],
+    'velocity', [Velocity(1.0), Velocity(-0.5), Velocity(0.0, 0.3), Velocity(0.0, 0.0, 1.0)]
 )
 def test_a_robot_of_another_size_trots_by_its_own_urdf(velocity: Velocity) -> None:
     """Three times the legs of the XGO: the gait's times grow with them, limits are the URDF's."""
