@@ -7,6 +7,7 @@ is imported yet, it registers the folder as an empty namespace. A colcon package
 name of the Python package inside it, which would then be hidden; so the real ones come first.
 """
 
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
 import importlib
@@ -26,6 +27,7 @@ SCENARIOS = Path(__file__).parent / 'tests'
 CORES = len(os.sched_getaffinity(0))
 NICENESS = os.getpriority(os.PRIO_PROCESS, 0)
 OF_ROBOTS = -5  # beside it
+TOGETHER = 10  # tests of a file that one worker gets: giving out each by itself takes time
 
 _ROOT = Path(__file__).parent
 for _setup in [*_ROOT.glob('*/setup.py'), *_ROOT.glob('libraries/*/setup.py')]:
@@ -60,12 +62,18 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep the scenarios of a file together, in one worker."""
+    """Keep the scenarios of a file together, in one worker, and some tests of each other file."""
+    counts = Counter[Path]()
     for item in items:
-        if item.path.parent == SCENARIOS and not item.get_closest_marker('xdist_group'):
+        if item.get_closest_marker('xdist_group'):
+            continue
+        if item.path.parent == SCENARIOS:
             pages = hasattr(getattr(item, 'module', None), 'chromium')
-            kind = 'pages' if pages else 'robots'
-            item.add_marker(pytest.mark.xdist_group(f'{kind} {item.path.stem}'))
+            group = f'{"pages" if pages else "robots"} {item.path.stem}'
+        else:
+            group = f'{item.path.relative_to(_ROOT)} {counts[item.path] // TOGETHER}'
+            counts[item.path] += 1
+        item.add_marker(pytest.mark.xdist_group(group))
 
 
 @pytest.hookimpl(tryfirst=True)
