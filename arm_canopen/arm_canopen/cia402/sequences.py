@@ -18,6 +18,7 @@ from ..master.scheduler import Promise, Scheduler, Task
 from .axis import Axis
 from .modes import Homing
 from .motion import Refusal, RefusalCause
+from .state import POWERED
 from .steps import AxisSteps
 from .stop import STOP_TIMEOUT
 
@@ -155,7 +156,7 @@ class StopCommands:
         await axis.stop.ended()
         await steps.settle()
         await steps.until(
-            lambda: axis.view.state is not DriveState.OPERATION_ENABLED,
+            lambda: axis.view.state not in POWERED,
             steps.quirks.state_timeout,
             DriveState.SWITCH_ON_DISABLED.title,
         )
@@ -245,8 +246,9 @@ async def _run(steps: AxisSteps, homing: Homing, what: str) -> None:
         return bool(word & Statusword.HOMING_ERROR) or word & done == done
 
     # without a falling edge of bit 4 before, the drive would miss the start, and the bits of the
-    # last homing would pass for those of this one
+    # last homing would pass for those of this one; in motion, 35 and 37 would set another place
     await steps.pause(EDGE_CYCLES * axis.period)
+    await steps.until(lambda: view.stands, STOP_TIMEOUT + axis.stop.ramp_time(), 'standstill')
     homing.started = True
     try:
         await steps.pause(max(HOMING_START, START_CYCLES * axis.period))

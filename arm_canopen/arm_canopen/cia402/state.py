@@ -374,21 +374,6 @@ class AxisState:
         before = self.state.title
         return f'{statusword_text(self.undecoded)}, no state of CiA 402 (before: {before})'
 
-    async def read_torque(self) -> int | None:
-        """Return 0x6077 in device units by SDO, 0 where a TPDO brings it; None without it.
-
-        Raises:
-            SdoError: The drive did not answer, or aborted.
-            CodecError: The answer does not fit the type.
-        """
-        index = self.at(Index.TORQUE_ACTUAL)
-        if self._torque is not None:
-            return 0
-        if (index, 0) not in self.node.config.dictionary:
-            return None
-        value = await self.node.objects.read_object(index)
-        return value if isinstance(value, int) else None
-
     async def read_error_code(self) -> None:
         """Read 0x603F, so that the answer can name the error."""
         index = self.at(Index.ERROR_CODE)

@@ -215,21 +215,26 @@ class AxisSteps:
 
     async def _holding_torque(self, mode: Mode) -> int:
         """Return 0x6077 where only an SDO brings it; a mode that begins without drops a load."""
-        place = object_address(self.axis.view.at(Index.TORQUE_ACTUAL))
+        axis, index = self.axis, self.axis.view.at(Index.TORQUE_ACTUAL)
+        if axis.view.shows_torque:
+            return 0
+        torque: object = None
         try:
-            torque = await self.axis.view.read_torque()
+            if (index, 0) in axis.node.config.dictionary:
+                torque = await axis.node.objects.read_object(index)
         except (SdoError, CodecError) as error:
             raise self.refused(
                 'is not switched: it would drop its load, as the torque that holds it cannot be '
-                f'read ({error}); map {place} into a TPDO, or disable it, select mode '
-                f'{mode.number.title}, and enable it again'
+                f'read ({error}); map {object_address(index)} into a TPDO, or disable it, select '
+                f'mode {mode.number.title}, and enable it again'
             ) from error
-        if torque is None:
-            self.axis.warn(
-                f'begins mode {mode.number.title} without torque, and drops what it holds: its '
-                f'EDS has no number at {place}'
-            )
-        return torque or 0
+        if isinstance(torque, int):
+            return torque
+        axis.warn(
+            f'begins mode {mode.number.title} without torque, and drops what it holds: its EDS '
+            f'has no number at {object_address(index)}'
+        )
+        return 0
 
     async def come_to_rest(self) -> None:
         """Halt what moves before another mode ends it with a jerk; the drive stays halted.
@@ -285,7 +290,7 @@ class AxisSteps:
             DriveError: 0x6061 does not show the mode in time; the one before is selected again.
         """
         axis = self.axis
-        before = axis.mode
+        before, shown = axis.mode, axis.shown_mode
         enabled = axis.view.state is DriveState.OPERATION_ENABLED
         switching_state = axis.config.switching_state
         leave = enabled and switching_state is not DriveState.OPERATION_ENABLED
@@ -305,7 +310,8 @@ class AxisSteps:
             raise
         finally:
             axis.view.held_torque = 0
-        axis.halt.release()
+        if shown is not mode:  # else a move that was halted in it would go on
+            axis.halt.release()
         if leave:
             await self.reach(DriveState.OPERATION_ENABLED)
 

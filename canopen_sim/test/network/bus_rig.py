@@ -530,6 +530,9 @@ class SetPointKind(Enum):
     WORD_AFTER_HALT = auto()  # so is one in the word that ends the halt
 
 
+STATUSWORD_READ = b'\x4b\x41\x60\x00'  # answer with 0x6041 by SDO
+
+
 class SetPoints:
     """Makes another kind of drive, in mode 1, of the first one, which takes set-points always."""
 
@@ -537,15 +540,20 @@ class SetPoints:
         self._kind = kind
         node_id = net.network.config.nodes[0].node_id
         self._status, self._command = 0x180 + node_id, 0x200 + node_id
+        self._answer = 0x580 + node_id
         self._offered = self._lost = self._halted = False
         self._full = True
         net.wire.alters = self
 
     def __call__(self, sender: str, frame: Frame) -> Frame:
         """Take out bit 4 where it is not seen, or bit 12."""
+        data = bytearray(frame.data)
+        if frame.can_id == self._answer and data[:4] == STATUSWORD_READ:
+            if self._kind is SetPointKind.NEVER_ACKNOWLEDGES:
+                data[5] &= ~(Statusword.SET_POINT_ACKNOWLEDGE >> 8)
+            return frame._replace(data=bytes(data))
         if frame.can_id not in (self._status, self._command):
             return frame
-        data = bytearray(frame.data)
         positions = data[2:3] == bytes((OperationMode.PROFILE_POSITION,))
         if frame.can_id == self._status:
             self._full = bool(data[1] & Statusword.SET_POINT_ACKNOWLEDGE >> 8)

@@ -305,7 +305,7 @@ class Run:
         self._commands = net.commands[JOINT]
         self._promises: list[tuple[str, Any, Promise[Any], float]] = []
         self._may_move, self._why = False, 'the start'
-        self._place = 0.0
+        self._place = self._still_from = 0.0
         self._crept = self._rested = 0.0
         self._stream_speed = self._published = 0.0
         self._stream_ended = False
@@ -534,7 +534,8 @@ class Run:
                 self._judge_success(what, argument, str(promise.result()))
 
     def _judge_error(self, what: str, begun: float, error: Exception) -> None:
-        fault = self.net.drives[JOINT].view.state in (DriveState.FAULT, DriveState.UNKNOWN)
+        recent = {state for _, state in self._states} | {self.net.drives[JOINT].view.state}
+        fault = recent & {DriveState.FAULT, DriveState.UNKNOWN}
         reachable = begun > self._trouble_until and not self._broken and not fault
         if self._kind.slow and 'is not seen to come to rest' in str(error):
             return
@@ -588,16 +589,28 @@ class Run:
     def _rest(self, why: str) -> None:
         self._rest_by = NEVER
         self._may_move, self._why, self._crept = False, why, 0.0
+        self._place = self._true_place  # how it moved before does not count
+        self._still_from = self.net.now + (LATE if self._frames_late else 0.0)
+
+    @property
+    def _true_place(self) -> float:
+        drive = self.net.simulated()
+        return (drive.position - drive.origin) / SCALE
+
+    @property
+    def _frames_late(self) -> bool:
+        return self.net.now < self._late_until
 
     @property
     def _is_late(self) -> bool:
-        return self.net.now < self._late_until or self._broken
+        return self._frames_late or self._broken
 
     def _judge_motion(self) -> None:
-        drive = self.net.simulated()
-        before, self._place = self._place, (drive.position - drive.origin) / SCALE
+        before, self._place = self._place, self._true_place
         speed = (self._place - before) / CYCLE
         self._rested = self._rested + CYCLE if abs(speed) < STANDING / 2 else 0.0
+        if not self._may_move and self.net.now < self._still_from:
+            return  # it moves as it was seen to stand: the master cannot know that yet
         if not self._may_move:
             self._crept += speed * CYCLE
             assert abs(speed) < STANDING, f'it moves at {speed:.3f} rad/s after {self._why}'
@@ -822,6 +835,38 @@ FOUND: tuple[Scenario, ...] = (
             ('recover', 0.0),
         ),
         OperationMode.INTERPOLATED_POSITION,
+    ),
+    Scenario(  # a move is halted in the mode that init could not end, and stays so
+        Kind((Fault.MODE_HELD_UNDER_HALT,)),
+        (
+            ('enable', None),
+            ('mode', OperationMode.PROFILE_POSITION, None),
+            ('target', -0.8, 0.2),
+            ('init', None),
+            ('mode', OperationMode.PROFILE_POSITION, None),
+        ),
+        OperationMode.PROFILE_POSITION,
+    ),
+    Scenario(  # home is not where a motor passes
+        Kind(),
+        (
+            ('enable', None),
+            ('mode', OperationMode.CYCLIC_TORQUE, None),
+            ('target', -7.0, 0.4),
+            ('home', 37, None),
+        ),
+        OperationMode.CYCLIC_POSITION,
+    ),
+    Scenario(  # a command that enables the drive may be on its way when it is disabled
+        Kind(options=((0x605A, 6),)),
+        (
+            ('enable', None),
+            ('fault', Fault.RPDO_DELAY, 2.0, None),
+            ('quick_stop', None),
+            ('home', 17, 0.06),
+            ('disable', 0.2),
+        ),
+        OperationMode.CYCLIC_TORQUE,
     ),
 )
 """Scenarios that have failed."""
