@@ -18,7 +18,7 @@ from ..config.model.drive import ACCELERATION_ADDRESSES, DriveConfig, FACTOR_ADD
 from ..config.model.drive_units import is_coarse
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Promise, Scheduler, Task
-from .units import Units
+from .units import INT32_MAX, Units
 
 RETRY_PERIOD = 1.0  # [s] after which what a drive did not answer is read again
 READ_TIMEOUT = 0.5  # [s] nothing waits for these answers, so a slow device has its time
@@ -54,8 +54,8 @@ ADDRESSES: tuple[tuple[int, int], ...] = (
     (Index.SUPPORTED_MODES, 0),
     (Index.HOMING_METHOD, 0),
     (Index.HOME_OFFSET, 0),
-    (Index.SOFTWARE_POSITION_LIMIT, 1),
-    (Index.SOFTWARE_POSITION_LIMIT, 2),
+    *((Index.POSITION_RANGE_LIMIT, subindex) for subindex in (1, 2)),
+    *((Index.SOFTWARE_POSITION_LIMIT, subindex) for subindex in (1, 2)),
     (Index.MAX_PROFILE_VELOCITY, 0),
     (Index.FOLLOWING_ERROR_WINDOW, 0),
     (Index.POSITION_WINDOW, 0),
@@ -78,7 +78,8 @@ class DriveParameters:
 
     supported_modes: int | None = None  # bits of 0x6502
     homing_method: int = 0  # 0x6098
-    # software limits 0x607D less the home offset 0x607C in user units, lower first
+    # software limits 0x607D less the home offset 0x607C in user units, lower first; not beyond
+    # where positions wrap (0x607B), as an axis would not be seen where it was sent
     position_limits: tuple[float, float] | None = None
     speed_limit: float | None = None  # 0x607F in user units per second
     effort_limit: float | None = None  # 0x6072 in user units
@@ -214,6 +215,11 @@ class ParameterCache:
             offset = value(Index.HOME_OFFSET)
             low, high = sorted(units.position.commanded(end - offset) for end in (lower, upper))
             position_limits, velocity = (low, high), (high - low) / RANGE_TIME
+        lower, upper = (value(Index.POSITION_RANGE_LIMIT, subindex) for subindex in (1, 2))
+        if -INT32_MAX < lower < upper < INT32_MAX:  # with 0 and 0, or all that 0x6064 holds, none
+            ends = sorted(units.position.commanded(end) for end in (lower, upper))
+            low, high = position_limits or ends
+            position_limits = max(low, ends[0]), min(high, ends[1])
         if speed := value(Index.MAX_PROFILE_VELOCITY):
             speed_limit = abs(units.velocity.commanded(speed))
             velocity = SPEED_SHARE * speed_limit

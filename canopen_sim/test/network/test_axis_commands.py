@@ -28,7 +28,13 @@ from arm_canopen.cia402.modes.profile_position import Move, QUEUE_MAX
 from arm_canopen.cia402.sequences import HomingProgress
 from arm_canopen.config import DriveConfig, RecoveryPolicy
 from canopen_core.can import Frame
-from canopen_core.standard import NmtCommand, ObjectDictionary, TORQUE_MODES
+from canopen_core.standard import (
+    DataType,
+    NmtCommand,
+    ObjectDictionary,
+    ObjectEntry,
+    TORQUE_MODES,
+)
 from canopen_sim import Fault, FaultInjection, ServoModel
 
 pytestmark = pytest.mark.slow
@@ -137,6 +143,28 @@ def test_limits_count_from_home() -> None:
     net.run(0.5)
     with pytest.raises(DriveError, match=r'software limits -0\.3 to 0\.7'):
         drive.move_to(0.8)
+
+
+@pytest.mark.parametrize(
+    ('ends', 'limits'),
+    [((-3_000, 3_000), 0.3), ((-9_000, 9_000), 0.5), ((0, 0), 0.5), ((-(2**31), 2**31 - 1), 0.5)],
+)
+def test_no_target_leads_beyond_where_positions_wrap(ends: tuple[int, int], limits: float) -> None:
+    """The range 0x607B, where there is one: behind its ends an axis is not seen where it is."""
+    config = drive_config(JOINT, NODE_ID)
+    added = [
+        ObjectEntry(0x607B, number, 'Position range limit', DataType.INTEGER32, default=end)
+        for number, end in enumerate(ends, 1)
+    ]
+    software = (*MOTION_WRITES, sdo_write(0x607D, 1, -5_000), sdo_write(0x607D, 2, 5_000))
+    dictionary = ObjectDictionary([*config.dictionary, *added])
+    net = booted(replace(config, dictionary=dictionary, sdo_writes=software))
+    net.enable(OperationMode.CYCLIC_POSITION)
+    with pytest.raises(DriveError, match=f'software limits -{limits} to {limits} '):
+        net.target(limits + 0.1)
+    net.target(limits)
+    net.run(2.0)
+    assert net.motor() == pytest.approx(limits)
 
 
 def test_home_is_a_command_of_its_own() -> None:

@@ -224,7 +224,7 @@ def _check_position(
         return
     raise DriveError(
         f'{name}: target {target:g} is beyond the software limits '
-        f'{limits[0]:g} to {limits[1]:g} (0x607D less 0x607C)'
+        f'{limits[0]:g} to {limits[1]:g} (0x607D less 0x607C, in 0x607B)'
     )
 
 
