@@ -130,7 +130,7 @@ class EmergencyLog:
         # the last EMCYs, the newest at the end, with the steady time of each in [s]; of a flood
         # each one once
         self.history: deque[tuple[float, Emergency]] = deque(maxlen=HISTORY)
-        # last one that was no reset, None when the device reported its end
+        # last one that was no reset, None when the device reported that all have ended
         self.last: Emergency | None = None
         self._report = report
         self._came: dict[str, float] = {}
@@ -142,7 +142,7 @@ class EmergencyLog:
 
     def since(self, begin: float) -> Emergency | None:
         """Return the last EMCY, when it came after a steady time in [s] and was no reset."""
-        if self.last is None or not self.history or self.history[-1][0] < begin:
+        if self.last is None or self.history[-1][0] < begin or self.history[-1][1].is_reset:
             return None
         return self.last
 
@@ -165,7 +165,10 @@ class EmergencyLog:
             if entry[1] == emergency and now - entry[0] < REPEAT_PERIOD:
                 self.history.remove(entry)
         self.history.append((now, emergency))
-        self.last = None if emergency.is_reset else emergency
+        if not emergency.is_reset:
+            self.last = emergency
+        else:  # the error register has those that remain
+            self.last = self.last or emergency if emergency.register else None
         severity = Severity.INFO if emergency.is_reset else Severity.ERROR
         code = error_code_text(emergency.code)
         self._report_or_count(severity, f'EMCY: {emergency}', code, now)

@@ -354,6 +354,8 @@ class Network:
     def _set_state(self, command: NmtCommand) -> None:
         before = self.state
         self.state = COMMANDED_STATES.get(command, NmtState.OPERATIONAL)
+        if before is NmtState.STOPPED:
+            self._sync_count = 0  # CiA 301, 7.2.5.2.2: it begins with 1 again
         if self.state is not before:
             sends = 'sends' if self.state is NmtState.OPERATIONAL else 'sends no'
             text = f'the master is in NMT state {self.state.name}: it {sends} SYNC and RPDOs'

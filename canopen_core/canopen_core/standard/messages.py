@@ -371,7 +371,7 @@ class Emergency:
 
     @property
     def is_reset(self) -> bool:
-        """The message reports that the error is gone (CiA 301, 7.2.7.1)."""
+        """The message reports that an error is gone (CiA 301, 7.2.7.1); others may remain."""
         return self.code >> 8 == 0
 
     def encode(self) -> bytes:
@@ -393,4 +393,5 @@ class Emergency:
         """Describe it."""
         vendor = f', vendor {self.vendor.hex()}' if any(self.vendor) else ''
         register = error_register_text(self.register)
-        return f'{error_code_text(self.code)} (register: {register}{vendor})'
+        remain = '; others remain' if self.is_reset and self.register else ''
+        return f'{error_code_text(self.code)}{remain} (register: {register}{vendor})'

@@ -148,6 +148,10 @@ def test_emergencies_are_reported_in_words_until_they_end() -> None:
     assert 'odd EMCY' in events(net, EventKind.EMERGENCY, 'a')[2]
     assert node.emergencies.last is not None
     assert node.emergencies.last.code == 0x4320
+    net.send_as('a', Frame(EMCY + 2, bytes.fromhex('00 00 11 00 00 00 00 00')))
+    net.run(0.01)
+    assert 'others remain' in events(net, EventKind.EMERGENCY, 'a')[3]
+    assert node.emergencies.last.code == 0x4320
     net.send_as('a', Frame(EMCY + 2, bytes(8)))
     net.run(0.01)
     assert node.emergencies.last is None
@@ -208,11 +212,22 @@ def test_a_state_that_somebody_commanded_is_left_alone(command: NmtCommand, ours
     [(0, [b''] * 8), (5, [b'\1', b'\2', b'\3', b'\4', b'\5', b'\1', b'\2', b'\3'])],
 )
 def test_sync_counts_as_the_standard_says(overflow: int, counters: list[bytes]) -> None:
-    """With an overflow value from 1 to it, without one no data (CiA 301, 7.2.5)."""
+    """With an overflow value from 1 to it, without one no data (CiA 301, 7.2.5).
+
+    It begins anew where its producer leaves Stopped, and nowhere else.
+    """
     net = network(sync_overflow=overflow)
     net.start()
     net.run(7.5 * PERIOD)
     assert net.frames(SYNC) == counters
+    for command in (NmtCommand.STOP, NmtCommand.START):
+        net.network.send_nmt(command, net.network.config.master.node_id)
+    net.run(2 * PERIOD)
+    assert net.frames(SYNC) == counters + counters[:2]
+    for command in (NmtCommand.ENTER_PRE_OPERATIONAL, NmtCommand.START):
+        net.network.send_nmt(command, net.network.config.master.node_id)
+    net.run(2 * PERIOD)
+    assert net.frames(SYNC) == counters + counters[:4]
 
 
 def test_without_sync_the_cycle_goes_on() -> None:
@@ -669,6 +684,8 @@ def test_an_error_that_is_over_or_old_is_not_of_now() -> None:
     log.receive(Frame(0x81, Emergency(0x2310, 1).encode(), timestamp=5.0))
     assert log.since(4.9) == Emergency(0x2310, 1)
     assert log.since(5.1) is None
+    log.receive(Frame(0x81, Emergency(0, 1).encode(), timestamp=5.5))
+    assert log.since(5.4) is None
     log.receive(Frame(0x81, Emergency(0, 0).encode(), timestamp=6.0))
     assert log.since(4.9) is None
 
