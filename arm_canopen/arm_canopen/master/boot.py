@@ -233,6 +233,8 @@ class BootProcess:
 
     def _go_online(self, text: str, *, taken_over: bool = False) -> None:
         self._node.go_online(self._scheduler.now, taken_over=taken_over)
+        if not self._node.config.is_drive:
+            self._scheduler.background(self._node.objects.read_digital_inputs())
         self._reported = self._failure = ''
         self._enter(BootPhase.OPERATIONAL)
         self._node.report(EventKind.BOOT, Severity.INFO, text)

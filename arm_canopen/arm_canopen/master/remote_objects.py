@@ -6,14 +6,17 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 import math
 from typing import NamedTuple, TypeAlias
 
 from canopen_core import CodecError, DriveError, SdoError, SdoTimeoutError
+from canopen_core.can import Frame
 from canopen_core.standard import (
     DataType,
     decode,
+    DIGITAL_INPUTS,
     encode,
     find_object,
     integer_range,
@@ -34,6 +37,7 @@ from .process_image import InputReader, Limits, limits_of, ProcessImage, SyncRou
 from .scheduler import Promise, Scheduler
 from .sdo_client import SdoClient
 
+INPUTS_TIME = 0.5  # [s] in which a device that was started has sent its inputs, if it does
 WRITE_PAUSE = 0.05  # [s] between two writes of a value of which the newest counts
 REFUSED_PAUSE = 1.0  # [s] before a value that was refused is written again, doubled each time
 DOUBLED_MAX = 5  # times
@@ -316,6 +320,20 @@ class RemoteObjects:
         """Return the smallest and largest value that an object holds, by its type in the EDS."""
         entry = self.config.dictionary.get(index, subindex)
         return (-math.inf, math.inf) if entry is None else limits_of(entry.data_type)
+
+    async def read_digital_inputs(self) -> None:
+        """Read those by SDO whose TPDO may be silent, as it comes when one changes (CiA 401)."""
+        await self._scheduler.timer(INPUTS_TIME)
+        for entry in self.image.tpdos:
+            mapping = entry.config.mapping
+            on_change = entry.values is None and entry.stale_after == math.inf
+            if not on_change or any(m.index not in DIGITAL_INPUTS.indices for m in mapping):
+                continue
+            with suppress(SdoError, CodecError):
+                read = [await self.read_object(each.index, each.subindex) for each in mapping]
+                data = entry.codec.pack([each for each in read if isinstance(each, (int, float))])
+                if entry.values is None and self.online:
+                    entry.receive(Frame(entry.config.cob_id, data, self._scheduler.now))
 
     async def read_object(
         self, index: int, subindex: int = 0, *, timeout: float | None = None

@@ -233,6 +233,9 @@ class IoGroup:
         return next(carried, widths[0] if widths else [])
 
 
+DIGITAL_INPUTS = IoGroup(
+    'digital_inputs', (0x6000, 0x6100, 0x6120), is_output=False, is_digital=True
+)
 DIGITAL_OUTPUTS = IoGroup(
     'digital_outputs', (0x6200, 0x6300, 0x6320), is_output=True, is_digital=True
 )
@@ -240,7 +243,7 @@ ANALOG_INPUTS = IoGroup(
     'analog_inputs', (0x6400, 0x6401, 0x6402, 0x6403), is_output=False, is_digital=False
 )
 IO_GROUPS = (
-    IoGroup('digital_inputs', (0x6000, 0x6100, 0x6120), is_output=False, is_digital=True),
+    DIGITAL_INPUTS,
     DIGITAL_OUTPUTS,
     ANALOG_INPUTS,
     IoGroup('analog_outputs', (0x6410, 0x6411, 0x6412, 0x6413), is_output=True, is_digital=False),

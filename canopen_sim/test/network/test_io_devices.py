@@ -84,6 +84,19 @@ def test_inputs_are_subscribed_by_name(net: VirtualNetwork, io: CanopenDevice) -
     assert received == [1, 2]
 
 
+def test_digital_inputs_that_do_not_change_are_read() -> None:
+    """Their TPDO comes on change; analogue ones are not, as 0x6423 may keep them silent."""
+    net = VirtualNetwork(load_bus(BUS_YML))
+    net.lose(0x18A, 0x28A)
+    net.boot()
+    net.master.device('io').write(OUTPUT, 5)
+    received: dict[str, list[float]] = {INPUT: [], 'Analogue input 1': []}
+    for name, values in received.items():
+        net.master.device('io').subscribe(name, values.append)
+    net.run(1.0)
+    assert received == {INPUT: [5], 'Analogue input 1': []}
+
+
 @pytest.mark.parametrize(
     ('name', 'value', 'error', 'word'),
     [
