@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -27,7 +28,11 @@ def action(monkeypatch: pytest.MonkeyPatch, drives: Drives, follow: Any) -> Goal
     """Return the node of an action whose goals have trajectories for requests."""
     node: Any = GoalNode(monkeypatch)
     TrajectoryAction(
-        node, drives.gateway, 20.0, lambda request, number: follow(request.goal, number=number)
+        node,
+        drives.gateway,
+        20.0,
+        lambda request, number: follow(request.goal, number=number),
+        0.01,
     )
     return cast('GoalNode', node)
 
@@ -64,7 +69,7 @@ def test_an_unexpected_error_is_the_result_of_a_goal(
     goal = node.send(message(TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(5.0, there)])))
     if when == 'at the end':
         drives.run(600)
-        monkeypatch.setattr(Outcome, 'canceled', property(lambda _: 1 // 0))
+        monkeypatch.setattr(Outcome, 'code', property(lambda _: 1 // 0))
     else:
         drives.run(100)
         monkeypatch.setattr(goal, 'publish_feedback', lambda _: 1 // 0)
@@ -98,6 +103,33 @@ def test_the_answer_to_a_goal_whose_arm_moves_on_says_so(monkeypatch: pytest.Mon
     node.watch()
     assert goal.ending == 'aborted'
     assert 'not seen at rest for 10 s and may still move' in goal.result.error_string
+
+
+@pytest.mark.parametrize('rests', [True, False])
+def test_a_canceled_goal_is_answered_when_rest_was_seen(
+    monkeypatch: pytest.MonkeyPatch, rests: bool
+) -> None:
+    """Drives come to rest later than their set-points; where they do not, the answer says so."""
+    drives = Drives().following()
+    clock = SimpleNamespace(monotonic=lambda: drives.now)
+    monkeypatch.setattr(motion_goals, 'time', clock)
+    node = action(monkeypatch, drives, drives.gateway.request)
+    there = [axis.setpoint + 0.5 for axis in drives.axes]
+    goal = node.send(message(TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(5.0, there)])))
+    drives.run(100)
+    node.cancel(goal)
+    drives.run(300)
+    drives.axes = [replace(axis, velocity=0.1) for axis in drives.axes]
+    drives.run()
+    node.watch()
+    assert goal.ending == ''
+    if rests:
+        drives.run()
+    else:
+        drives.now += 11.0
+    node.watch()
+    assert goal.ending == 'canceled'
+    assert ('not seen at rest for 10 s' in goal.result.error_string) is not rests
 
 
 def test_an_unexpected_error_of_the_planning_is_its_result(

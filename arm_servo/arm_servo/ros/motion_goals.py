@@ -63,7 +63,7 @@ class MotionGoals(GoalServer[GoalT]):
         canceled: str,  # reason of an outcome that a client has asked for
         conclude: Callable[[GoalT], tuple[Ending, Any]],
         fail: Callable[[GoalT, Exception], Any],
-        rest_speed: float = math.inf,  # speed above which a joint moves in [rad/s] or [m/s]
+        rest_speed: float,  # speed above which a joint moves in [rad/s] or [m/s]
     ) -> None:
         self._gateway, self._rest_speed = gateway, rest_speed
         self._request, self._canceled = request, canceled

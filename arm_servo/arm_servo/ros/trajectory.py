@@ -57,6 +57,7 @@ class TrajectoryAction:
         rate: float,  # rate of the feedback in [Hz]
         # requests the trajectory of a goal message with its number; raises an ArmError
         follow: Callable[[Any, int], MotionCommand],
+        rest_speed: float,  # above which a joint moves in [rad/s] or [m/s]
     ) -> None:
         self._node, self._gateway = node, gateway
         self._goals = MotionGoals(
@@ -69,6 +70,7 @@ class TrajectoryAction:
             canceled='canceled: at rest on the path',
             conclude=self._conclude,
             fail=self._fail,
+            rest_speed=rest_speed,
         )
         node.create_timer(1.0 / rate, lambda: self._goals.watch(self._look))
 
@@ -77,7 +79,8 @@ class TrajectoryAction:
         timeout = START_TIMEOUT + START_TIMEOUT_PER_POINT * count
         goal.outcome = self._goals.outcome(goal, timeout)
         if goal.outcome is not None:
-            self._goals.end(goal)
+            if not goal.outcome.canceled or self._goals.has_stopped(goal):
+                self._goals.end(goal)
         elif goal.command is not None and goal.command.execution is not None:
             self._publish_feedback(goal.handle, goal.command.execution)
 
@@ -102,7 +105,7 @@ class TrajectoryAction:
             code = code if goal.handle.is_cancel_requested else GoalCode.INVALID_GOAL
         else:
             ending = Ending.SUCCEEDED if code is GoalCode.SUCCESSFUL else Ending.ABORTED
-        return ending, self._result(code, outcome.reason)
+        return ending, self._result(code, outcome.reason + goal.unrest)
 
     def _fail(self, goal: MotionGoal, error: Exception) -> FollowJointTrajectory.Result:
         if goal.failure is not None:
@@ -206,7 +209,9 @@ class TrajectoryController:
         node.create_service(QueryTrajectoryState, '~/query_state', self._query)
         TrajectoryPause(node, gateway)
         node.create_timer(1.0 / parameters.state_rate, self._publish_state)
-        self._action = TrajectoryAction(node, gateway, parameters.monitor_rate, self._follow)
+        self._action = TrajectoryAction(
+            node, gateway, parameters.monitor_rate, self._follow, parameters.rest_speed
+        )
         if parameters.speed != 1.0:
             self._override(parameters.speed)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+import math
 from typing import Any
 
 from rclpy.node import Node
@@ -49,6 +50,7 @@ class TrajectoryParameters:
     state_rate: float  # rate of ~/controller_state in [Hz]
     speed: float  # speed scaling at the start, 0 to 1
     check: bool  # whether motions on whose way links meet are refused
+    rest_speed: float  # above which a joint moves in [rad/s] or [m/s]
 
 
 def declare_trajectory(
@@ -73,7 +75,7 @@ def declare_trajectory(
         'constraints.stopped_velocity_tolerance',
         0.01,
         (0.0, 100.0),
-        'greatest speed of a joint at the goal [rad/s]; 0 is none',
+        'greatest speed of a joint at the goal, and at rest [rad/s]; 0 is none',
     )
     path = {name: JointTolerance(_constraint(read, name, 'trajectory', 0.0)) for name in joints}
     goal = {
@@ -104,6 +106,7 @@ def declare_trajectory(
             'speed_scaling.initial_scaling_factor', 1.0, (0.0, 1.0), 'speed at the start, 0 to 1'
         ),
         declare_check(read, default=checks),
+        stopped or math.inf,
     )
 
 
