@@ -197,9 +197,13 @@ class AxisSteps:
         return self._configured_mode() or axis.mode
 
     async def return_to(self, mode: Mode) -> None:
-        """Select the mode of before homing again, unless the drive refuses that one."""
-        if mode is not self.axis.mode and (mode.number or not self.needs_mode):
+        """Select the mode of before homing again; 0, which a drive may refuse, need not come."""
+        if mode.number and mode is not self.axis.mode:
             await self.switch(mode)
+        elif not (mode.number or self.needs_mode):
+            self.axis.select(mode)
+            with contextlib.suppress(DriveError):
+                await self.until(lambda: self.axis.shows_mode, self.quirks.mode_timeout, 'mode 0')
 
     async def _preload(self, mode: Mode | None, consequence: str) -> None:
         """Write the holding value of a mode whose target goes by SDO, whatever the drive has."""

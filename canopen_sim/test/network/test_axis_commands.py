@@ -554,6 +554,13 @@ def test_homing_does_not_leave_a_drive_without_mode_zero_in_mode_6(
     assert net.motor() > 0.02
 
 
+def test_a_homing_succeeds_though_the_drive_refuses_mode_zero() -> None:
+    """No quirk names it: mode 0, that of before, is selected and need not come."""
+    net = deviating(Fault.MODE_ZERO_REFUSED)
+    net.do(JOINT, 'enable')
+    assert 'homed by method 37' in net.result(net.home(37))
+
+
 @pytest.mark.parametrize('mode', TORQUE_MODES, ids=by_name)
 def test_a_halted_torque_is_not_let_go_to_switch_the_mode(mode: OperationMode) -> None:
     """Such a drive stays halted in its mode, and the message says what helps."""
