@@ -586,6 +586,7 @@ def test_a_robot_that_stops_late(seen: Seen) -> None:
         threads.submit(show)
         try:
             page = chromium.open_page(seen.browser, served.url, robot='')
+            other = chromium.open_page(seen.browser, served.url, robot='')
             words_of_stop(page, 'Space').wait_for()
             silent.set()
             words_of_stop(page, 'does NOT reach the robot').wait_for()
@@ -599,6 +600,7 @@ def test_a_robot_that_stops_late(seen: Seen) -> None:
             for _ in range(9):  # more than a browser sends at once
                 page.keyboard.press('Space')
             words_of_stop(page, 'NOT confirmed: use the emergency stop').wait_for()
+            words_of_stop(other, 'NOT confirmed: use the emergency stop').wait_for()
             count = len(answers)
             page.keyboard.press('Space')
             seen.wait(lambda: len(answers) > count, 'a STOP behind those that are not answered')
@@ -607,7 +609,9 @@ def test_a_robot_that_stops_late(seen: Seen) -> None:
                 if not each.done():
                     each.set_result(answer)
             words_of_stop(page, '^stopped$').wait_for()
+            words_of_stop(other, '^stopped$').wait_for()
             page.close()
+            other.close()
         finally:
             over.set()
 

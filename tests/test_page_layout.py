@@ -356,6 +356,25 @@ def test_the_log_is_copied_as_text(browser: Browser, shown: Shown) -> None:
     assert copied[1:4:2] == ['<second>', 'first']
 
 
+@pytest.mark.parametrize('size', SIZES)
+def test_control_is_taken_by_a_button_that_is_seen_whole(
+    browser: Browser, shown: Shown, size: str
+) -> None:
+    """Where another page has it."""
+    see(page := opened(browser, shown, size), shown, READY)
+    other = chromium.open_page(browser, shown.page.url)
+    chromium.hold(other, '1 +')
+    page.locator('#rv-who').filter(has_text='another page').wait_for()
+    other.mouse.up()
+    page.locator('#rv-take').wait_for()
+    ((x, y, wide, high),) = boxes(page, '#rv-take').values()
+    assert min(wide, high) >= 43.5
+    for corner in ([x + 4, y + 4], [x + wide - 4, y + high - 4]):
+        assert page.evaluate('([x, y]) => document.elementFromPoint(x, y).id', corner) == 'rv-take'
+    page.locator('#rv-take').click(force=True)
+    page.locator('#rv-who').filter(has_text='you').wait_for()
+
+
 @pytest.mark.parametrize('size', ['desk', 'phone'])
 def test_a_press_of_a_button_that_does_nothing_says_why(
     browser: Browser, shown: Shown, size: str
@@ -380,12 +399,18 @@ def test_a_press_of_a_button_that_does_nothing_says_why(
     why.wait_for(state='hidden')
 
 
-def test_the_card_has_the_commands_of_the_readme(browser: Browser, shown: Shown) -> None:
+@pytest.mark.parametrize('size', ['desk', 'phone', 'short'])
+def test_the_card_has_the_commands_of_the_readme(
+    browser: Browser, shown: Shown, size: str
+) -> None:
     """Where there is no robot, it says what to type, and goes by itself."""
-    page = opened(browser, shown, 'desk')
+    page = opened(browser, shown, size)
     see(page, shown, RobotState('NO ROBOT', Level.UNKNOWN, 'No robot is here yet.'))
     card = page.locator('#rv-first')
     card.wait_for()
+    whole = 'all => all.every(code => code.scrollWidth <= code.clientWidth)'
+    assert card.locator('code').evaluate_all(whole), 'a command is cut off'
+    assert not overlapping([*map(tuple, boxes(page, '#rv-first, #rv-who, #robot-stop').values())])
     commands = card.locator('code').all_inner_texts()
     assert len(commands) == 4
     readmes = ''.join(path.read_text() for path in CHECKOUT.glob('*/README.md'))

@@ -384,4 +384,4 @@ def test_a_pause_of_the_arm_is_reported(paused: bool) -> None:
 def test_a_joint_at_its_limit_has_nothing_left() -> None:
     """What rounding leaves beyond the limit is no negative zero."""
     at_limit = Limiter(Cause.JOINT_POSITION, 'elbow', -1e-9, 0.0)
-    assert str(at_limit) == 'joint limit: elbow, 0.000 left, 0.00x'
+    assert str(at_limit) == 'joint limit: elbow, 0.000 left, halted'

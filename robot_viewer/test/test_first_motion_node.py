@@ -500,8 +500,8 @@ def test_stop_ends_a_motion_and_keeps_what_was_measured(robot: Robot) -> None:
     ('answer', 'words'),
     [
         ({'success': True}, 'the drive is disabled'),
-        ({'success': False, 'message': 'lost'}, 'use the emergency stop (lost)'),
-        (None, 'use the emergency stop (no answer within 5 s)'),
+        ({'success': False, 'message': 'lost'}, 'use the emergency stop (shutdown: lost)'),
+        (None, 'use the emergency stop (shutdown: no answer within 5 s; does its master run?)'),
     ],
 )
 def test_that_a_drive_is_disabled_is_said_when_it_is(
@@ -523,34 +523,3 @@ def test_that_a_drive_is_disabled_is_said_when_it_is(
         robot.answer('shutdown', **answer)
     assert robot.shown[-1].endswith(words)
     assert robot.preparable
-
-
-@pytest.mark.parametrize(
-    ('answer', 'words'),
-    [
-        ({'success': True}, 'the drive is disabled, it answered late'),
-        ({'success': False, 'message': 'lost'}, 'use the emergency stop (lost)'),
-    ],
-)
-def test_a_late_answer_corrects_what_is_shown(
-    robot: Robot, answer: dict[str, Any], words: str
-) -> None:
-    """Where nothing else has come in its place on the page."""
-    robot.prepare()
-    robot.hold(5.0, factor=-1.0)
-    robot.look(DISABLE_TIMEOUT + 2 * PERIOD)
-    assert robot.shown[-1].endswith('(no answer within 5 s)')
-    robot.answer('shutdown', **answer)
-    assert robot.shown[-1].endswith(words)
-
-
-def test_a_late_answer_hides_nothing_newer(robot: Robot) -> None:
-    """A motion that is prepared anew stays as it is."""
-    robot.prepare()
-    robot.hold(5.0, factor=-1.0)
-    robot.look(DISABLE_TIMEOUT + 2 * PERIOD)
-    late = robot.calls[-1][1]
-    robot.prepare()
-    shown = list(robot.shown)
-    late.answer()
-    assert robot.shown == shown

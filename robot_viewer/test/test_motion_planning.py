@@ -105,23 +105,16 @@ def test_links_are_where_tf_has_them(urdf: str, position: float) -> None:
 
 
 def test_a_joint_that_follows_moves_what_hangs_on_it() -> None:
-    """By its factor and offset, and its link belongs to what the other joint moves."""
-    pose = link_poses(TREE, POSITIONS)['thumb']
-    expected = pose_in_root('thumb', 'base', published(TREE, POSITIONS))
-    assert np.allclose(pose.translation, expected[:3, 3], atol=1e-9)
-    assert links_beyond(TREE, frozenset({'finger_joint'})) == {'finger', 'thumb'}
-    assert links_beyond(TREE, frozenset({'roll'})) == {'wheel', 'finger', 'thumb'}
-
-
-def test_a_joint_that_follows_has_one_position() -> None:
     """Where it was measured, for the page as for tf; it goes along with a goal of its source."""
     followers = {joint.name: 0.3 for joint in TREE.movable() if joint.mimic}
-    measured = POSITIONS | followers
-    expected = pose_in_root('thumb', 'base', published(TREE, measured))
-    assert np.allclose(link_poses(TREE, measured)['thumb'].translation, expected[:3, 3], atol=1e-9)
-    goal = moved(TREE, measured, {'finger_joint': 0.1})
-    expected = pose_in_root('thumb', 'base', published(TREE, POSITIONS | {'finger_joint': 0.1}))
-    assert np.allclose(link_poses(TREE, goal)['thumb'].translation, expected[:3, 3], atol=1e-9)
+    goal = moved(TREE, POSITIONS | followers, {'finger_joint': 0.1})
+    for positions in (POSITIONS, POSITIONS | followers, goal):
+        expected = pose_in_root('thumb', 'base', published(TREE, positions))
+        pose = link_poses(TREE, positions)['thumb']
+        assert np.allclose(pose.translation, expected[:3, 3], atol=1e-9)
+    assert not goal.keys() & followers.keys()
+    assert links_beyond(TREE, frozenset({'finger_joint'})) == {'finger', 'thumb'}
+    assert links_beyond(TREE, frozenset({'roll'})) == {'wheel', 'finger', 'thumb'}
 
 
 def test_groups_with_their_states_arms_first() -> None:

@@ -24,7 +24,7 @@ from ros_client import RosClient
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
-from urdf_reader import joint_transform, KinematicTree, read_urdf
+from urdf_reader import KinematicTree, read_urdf
 from urdf_robots import ARM, POSITIONS, random_urdfs
 
 from robot_viewer import FrameTransform, MessageProblem, Settings, StatePublisher
@@ -204,16 +204,6 @@ def test_every_link_is_where_pinocchio_has_it(urdf: str, values: list[float]) ->
         np.testing.assert_allclose(
             pose_in_root(link, model.root, frames), expected, atol=1e-9, err_msg=link
         )
-
-
-def test_a_fixed_joint_is_at_its_origin_whatever_its_position() -> None:
-    """A message may name it; it does not move."""
-    urdf = (
-        '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="fixed">'
-        '<parent link="a"/><child link="b"/><origin xyz="1 2 3"/></joint></robot>'
-    )
-    joint = read_urdf(urdf).joints[0]
-    assert joint_transform(joint, 1.0) == joint.origin
 
 
 MS = 1_000_000

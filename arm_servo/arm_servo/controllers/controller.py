@@ -17,6 +17,8 @@ import numpy as np
 from arm_model import ArmError, Array, frozen, RobotState
 from arm_trajectory import GoalCode, GoalError, OnlineTrajectoryGenerator, Plan
 
+HALTED = 0.005  # share of the asked speed below which a limit counts as none left
+
 
 class Cause(Enum):
     """Why a motion is slower than asked."""
@@ -42,14 +44,15 @@ class Limiter:
 
     def __str__(self) -> str:
         """Describe it in a few words."""
+        share = f'at {100.0 * self.factor:.0f} %' if self.factor >= HALTED else 'halted'
         if self.cause is Cause.COLLISION:
-            return f'collision: {self.name} at {1e3 * self.amount:.0f} mm, {self.factor:.2f}x'
+            return f'collision: {self.name} at {1e3 * self.amount:.0f} mm, {share}'
         if self.cause is Cause.JOINT_POSITION:
             left = round(self.amount, 3) + 0.0  # never -0.000
-            return f'joint limit: {self.name}, {left:.3f} left, {self.factor:.2f}x'
+            return f'joint limit: {self.name}, {left:.3f} left, {share}'
         if self.cause is Cause.JOINT_VELOCITY:
-            return f'joint speed: {self.name} would need {self.amount:.2f}, {self.factor:.2f}x'
-        return f'{self.cause.value}: {self.name}, {self.factor:.2f}x'
+            return f'joint speed: {self.name} would need {self.amount:.2f}, {share}'
+        return f'{self.cause.value}: {self.name}, {share}'
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 import math
@@ -72,15 +71,6 @@ class _FailedError(Exception):
     """Why no motion can be made, in words."""
 
 
-@dataclass(frozen=True, slots=True)
-class Disabling:
-    """A drive that has to be without power, and is not confirmed to be."""
-
-    joint: str
-    why: str  # what its motion did
-    deadline: float  # time until which it has to be confirmed in [s]
-
-
 class FirstMotion:
     """One joint after another; everything in the thread of the node, and nothing waits.
 
@@ -107,8 +97,7 @@ class FirstMotion:
         self._request = MotionRequest('', 0.0, 0.0)
         self._axis: Axis | None = None
         self._run: Iterator[None] | None = None  # what goes on at each look
-        self._disabling: Disabling | None = None
-        self._unconfirmed: Disabling | None = None  # what the page shows of one that was late
+        self._disabling = False  # a drive that moved without a command
         self._seen_at = -math.inf  # when a position of the joint came
         self._targets: GuardedTargets | None = None
         self._commanded = 0.0
@@ -209,7 +198,7 @@ class FirstMotion:
     def _begin(self, text: str, *, failed: bool = False, waits: bool = False) -> None:
         """Show that nothing is prepared, and why, or what is waited for."""
         # what becomes of a drive that has to be disabled is not hidden by anything else
-        if self._offered and self._disabling is None:
+        if self._offered and not self._disabling:
             self._prepare.disabled = waits
             self._state.content = line(text, BAD if failed else PLAIN) if text else ''
             self._show()
@@ -259,27 +248,29 @@ class FirstMotion:
 
     def stop(self) -> None:
         """Command nothing any more: the robot was stopped."""
-        if self.busy:  # else what was measured is kept
+        if self.busy and not self._disabling:  # else what was measured is kept
             self._end()
             self._begin('ended by a stop; prepare it anew')
 
     def _end(self) -> None:
         """Forget what was prepared and measured."""
-        self._run = self._targets = self._reported = self._unconfirmed = None
+        self._run = self._targets = self._reported = None
+        self._disabling = False
 
     def forget(self) -> None:
         """Another joint was chosen: what was prepared counts no more."""
-        self._end()
-        self._begin('')
+        if not self._disabling:
+            self._end()
+            self._begin('')
 
-    def _fail(self, why: str, *, waits: bool = False) -> None:
+    def _fail(self, why: str) -> None:
         self._end()
-        self._begin(f'{self._request.joint}: {why}', failed=True, waits=waits)
+        self._begin(f'{self._request.joint}: {why}', failed=True)
         self._node.get_logger().warning(f'first motion of {self._request.joint}: {why}')
 
     def prepare(self, request: MotionRequest) -> None:
         """Enable the drive, and say what will happen."""
-        if request.joint not in self._drives or self._disabling is not None:
+        if request.joint not in self._drives or self._disabling:
             return
         self._end()
         self._request, self._seen_at = request, -math.inf
@@ -332,41 +323,37 @@ class FirstMotion:
             self._end()
             self._begin('the button was not held: prepare it anew')
         else:
-            self._disable(targets.guard.detail)
+            yield from self._disable(targets.guard.detail)
 
-    def _ask_drive(self, kind: Any, name: str) -> Generator[None, None, Any]:  # noqa: ANN401
+    def _ask_drive(
+        self,
+        kind: Any,  # noqa: ANN401  # service types have no type
+        name: str,
+        timeout: float = ANSWER_TIMEOUT,
+    ) -> Generator[None, None, Any]:
         """Call a service of the drive, and wait for its answer."""
-        answers: list[tuple[Any, str]] = []
-        until = time.monotonic() + ANSWER_TIMEOUT
+        client = self._node.create_client(kind, f'{self._drives[self._request.joint]}/{name}')
+        answers: list[Future] = []
+        until = time.monotonic() + timeout
 
-        def answered(response: Any, refusal: str) -> None:  # noqa: ANN401
-            answers.append((response, refusal))
+        def answered(future: Future) -> None:
+            self._node.destroy_client(client)
+            answers.append(future)
             self.advance()
 
-        self._call(kind, name, answered)
+        client.call_async(kind.Request()).add_done_callback(answered)
         while not answers:
             if time.monotonic() > until:
-                why = f'no answer within {ANSWER_TIMEOUT:g} s; does its master run?'
+                why = f'no answer within {timeout:g} s; does its master run?'
                 raise _FailedError(f'{name}: {why}')
             yield
-        response, refusal = answers[0]
-        if refusal:
-            raise _FailedError(f'{name}: {refusal}')
+        (future,) = answers
+        if future.exception() is not None:
+            raise _FailedError(f'{name}: no answer ({future.exception()})')
+        response: Any = future.result()
+        if not response.success:
+            raise _FailedError(f'{name}: {response.message or "refused"}')
         return response
-
-    def _call(self, kind: Any, name: str, answered: Callable[[Any, str], None]) -> None:  # noqa: ANN401
-        """Call a service of the drive."""
-        client = self._node.create_client(kind, f'{self._drives[self._request.joint]}/{name}')
-
-        def done(future: Future) -> None:
-            self._node.destroy_client(client)
-            if future.exception() is not None or future.result() is None:
-                answered(None, f'no answer ({future.exception()})')
-                return
-            response = future.result()
-            answered(response, '' if response.success else response.message or 'refused')
-
-        client.call_async(kind.Request()).add_done_callback(done)
 
     def _status(self) -> Status | None:
         return self._statuses.get(f'{self._request.joint}{DRIVE}')
@@ -407,9 +394,6 @@ class FirstMotion:
 
     def advance(self) -> None:
         """Go on; called 30 times a second."""
-        if self._disabling is not None and time.monotonic() > self._disabling.deadline:
-            refusal = f'no answer within {DISABLE_TIMEOUT:g} s'
-            self._report_disabling(self._disabling, refusal)
         run = self._run
         if run is None:
             return
@@ -432,33 +416,21 @@ class FirstMotion:
             if not guard.detail:
                 yield
 
-    def _disable(self, why: str) -> None:
-        """Disable a joint that moves without a command, as at the terminal."""
-        joint = self._request.joint
-        self._fail(f'{why}; the drive is being disabled ...', waits=True)
-        disabling = Disabling(joint, why, time.monotonic() + DISABLE_TIMEOUT)
-        self._disabling = disabling
-
-        def answered(_response: Any, refusal: str) -> None:  # noqa: ANN401
-            self._report_disabling(disabling, refusal)
-
-        self._call(Trigger, 'shutdown', answered)
-
-    def _report_disabling(self, disabling: Disabling, refusal: str) -> None:
-        """Report what became of it; an answer that comes late corrects what is shown."""
-        late = self._disabling is not disabling
-        what = 'the drive is disabled' + (', it answered late' if late else '')
-        if refusal:
-            what = f'NOT confirmed that it is disabled: use the emergency stop ({refusal})'
-        if not late:
-            self._disabling, self._unconfirmed = None, disabling
-        if self._unconfirmed is disabling:  # else the page shows what came after it
-            self._begin(f'{disabling.joint}: {disabling.why}; {what}', failed=True)
-        text = f'first motion of {disabling.joint}: {what}'
-        if refusal:
-            self._node.get_logger().error(text)
-        else:
-            self._node.get_logger().warning(text)
+    def _disable(self, why: str) -> Iterator[None]:
+        """Disable a joint that moves without a command; nothing ends that before its answer."""
+        told = f'{self._request.joint}: {why}'
+        self._node.get_logger().warning(f'first motion of {told}')
+        self._targets = None
+        self._begin(f'{told}; the drive is being disabled ...', failed=True, waits=True)
+        self._disabling = True
+        try:
+            yield from self._ask_drive(Trigger, 'shutdown', DISABLE_TIMEOUT)
+            what = 'the drive is disabled'
+        except _FailedError as error:
+            what = f'NOT confirmed that it is disabled: use the emergency stop ({error})'
+        self._node.get_logger().warning(f'first motion of {self._request.joint}: {what}')
+        self._end()
+        self._begin(f'{told}; {what}', failed=True)
 
     def _publisher(self) -> Publisher:
         topic = f'{self._drives[self._request.joint]}/target'

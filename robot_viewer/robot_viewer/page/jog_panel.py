@@ -315,7 +315,8 @@ class TargetPanel:
         gui.add_html(pad([html], 'rv-one'))
         for joint in joints:
             low, high = travel(joint)
-            slider = gui.add_slider(joint.name, low, high, (high - low) / 1000.0, low)
+            step = 10.0 ** math.floor(math.log10((high - low) / 1000.0))  # few digits beside it
+            slider = gui.add_slider(joint.name, low, high, step, low)
             slider.on_update(partial(self._moved, joint.name))
             self._sliders[joint.name] = slider
         add_button(gui, 'Put the target where the robot is', self._targets.clear)
