@@ -230,7 +230,7 @@ def _cancels_and_stops(arm: MovingArm) -> None:
 
 
 def _back_to_ready(arm: MovingArm) -> None:
-    arm.reach(READY, 2.0)
+    arm.reach(READY, 3.0)
 
 
 def _sequence(arm: MovingArm, *radii: float) -> MotionSequenceRequest:
@@ -382,7 +382,7 @@ def _plans_anew_around_what_appears(arm: MovingArm) -> None:
     """With replan, a move that is blocked on its way goes around."""
     visitor, observer = _visitor(arm, -0.65, size=0.06), Observer(arm)
     goal = move_goal([-1.2, *READY[1:]])
-    goal.request.max_velocity_scaling_factor = 0.08  # a busy machine is late with the box
+    goal.request.max_velocity_scaling_factor = 0.05  # a busy machine is late with the box
     goal.planning_options.replan = True
     goal.planning_options.replan_delay = 0.1
     run = move(arm, goal)
