@@ -138,10 +138,10 @@ def test_arms_that_move_towards_each_other_stop_and_may_part(robot: Robot) -> No
         lambda: bool(states) and not any(states[-1].reference.velocities), 60.0, 'rest'
     )
     turn = states[-1].reference.positions[0]
-    up = robot.follow('right', 2, [turn, 0.1])  # away, wherever either stands
+    up = robot.follow('right', 4, [turn, 0.1])  # away, wherever either stands
     assert robot.results([up])[0].status == SUCCEEDED, up.result()
     for arm in ('left', 'right'):
-        (back,) = robot.results([robot.follow(arm, 3)])
+        (back,) = robot.results([robot.follow(arm, 4)])
         assert back.status == SUCCEEDED, back.result
 
 
