@@ -418,10 +418,10 @@ class FirstMotion:
 
     def _disable(self, why: str) -> Iterator[None]:
         """Disable a joint that moves without a command; nothing ends that before its answer."""
-        told = f'{self._request.joint}: {why}'
-        self._node.get_logger().warning(f'first motion of {told}')
+        problem = f'{self._request.joint}: {why}'
+        self._node.get_logger().warning(f'first motion of {problem}')
         self._targets = None
-        self._begin(f'{told}; the drive is being disabled ...', failed=True, waits=True)
+        self._begin(f'{problem}; the drive is being disabled ...', failed=True, waits=True)
         self._disabling = True
         try:
             yield from self._ask_drive(Trigger, 'shutdown', DISABLE_TIMEOUT)
@@ -430,7 +430,7 @@ class FirstMotion:
             what = f'NOT confirmed that it is disabled: use the emergency stop ({error})'
         self._node.get_logger().warning(f'first motion of {self._request.joint}: {what}')
         self._end()
-        self._begin(f'{told}; {what}', failed=True)
+        self._begin(f'{problem}; {what}', failed=True)
 
     def _publisher(self) -> Publisher:
         topic = f'{self._drives[self._request.joint]}/target'
