@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""How often the mode `get_up` brings a robot to its feet, by the side on which it lies.
+"""Success rate of the mode `get_up`, by the side on which the robot lies.
 
 The robot is dropped with random attitude, joints and friction; its legs are held until it rests.
-Few come to rest on a side: more are dropped with each side below.
+Few come to rest on a side, so more are dropped with each side down.
 
     python bench_get_up.py --drops 1000 --each 1000     # for figures that are steadier
 """
@@ -40,7 +40,7 @@ MODEL = quadruped(URDF)
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of a drop."""
+    """Result of one drop."""
 
     lay: Lying  # where it came to rest
     stood: bool  # whether it stood in the end
@@ -49,7 +49,7 @@ class Outcome:
 
 
 def attitude(random: np.random.Generator, side: Lying | None) -> Quaternion:
-    """Return any attitude, or any with a side below."""
+    """Return a random attitude, or a random one with a given side down."""
     while True:
         x, y, z, w = random.standard_normal(4).tolist()
         rotation = normalized((x, y, z, w))
@@ -58,7 +58,7 @@ def attitude(random: np.random.Generator, side: Lying | None) -> Quaternion:
 
 
 def fallen(seed: int, side: Lying | None, servo: str) -> PhysicsBackend:
-    """Return a robot that was dropped, with a side or anything below, and came to rest."""
+    """Drop a robot with a random or given side down; return it at rest."""
     random = np.random.default_rng(seed)
     robot = Robot(URDF, parse_servo(servo))
     pose = tuple(random.uniform(limits.lower, limits.upper) for limits in MODEL.limits)
@@ -77,7 +77,7 @@ def fallen(seed: int, side: Lying | None, servo: str) -> PhysicsBackend:
 def get_up(
     seed: int, side: Lying | None = None, only: bool = False, servo: str = 'nominal'
 ) -> Outcome:
-    """Drop a robot, and let it get up; `only` if it came to rest on that side."""
+    """Drop a robot and let it get up; `only`: skip it unless it rests on that side."""
     backend = fallen(seed, side, servo)
     state = backend.observe()
     if state.imu is None:
@@ -107,7 +107,7 @@ def get_up(
 
 
 def report(title: str, outcomes: list[Outcome]) -> None:
-    """Print how many stood, how long it took, and what became of the others."""
+    """Print success rate, duration, and the outcome of the failures."""
     stood = sorted(outcome.time for outcome in outcomes if outcome.stood)
     times = f'{stood[len(stood) // 2]:.1f} s, at most {stood[-1]:.1f} s' if stood else ''
     share = len(stood) / max(len(outcomes), 1)

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Processor time of a step of the training: plant, servos, bytes, estimator, rough ground.
+"""CPU time of a training step: plant, servos, protocol bytes, estimator, rough ground.
 
-The learning comes on top; `make train` prints the steps a second of both.
+Learning is not included; `make train` prints the steps per second with it.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""How the gait and the example walk: on servos of any kind, and on several grounds.
+"""Benchmarks the gait and the example policy on varied servos and grounds.
 
-Servos and grounds are tried in virtual time on all cores. None of the figures is judged here:
-`check_policy` does that, and it walks the course over a serial line in real time (`--chain`).
+Runs in virtual time on all cores. It judges none of the figures: `check_policy` does that, and
+also walks the course over a serial line in real time (`--chain`).
 
     python bench_walking.py --duration 30     # for figures that are steadier
 """
@@ -43,7 +43,7 @@ HEADINGS = (
 
 
 def row(who: str, ground: str, figures: CourseFigures) -> tuple[str, ...]:
-    """Return the figures of a walker on a ground; success: commands that had no fall."""
+    """Return the results of a candidate on a ground; success: commands without a fall."""
     upright = sum(not each.falls for each in figures.passages) / len(figures.passages)
     return (
         who,
@@ -57,7 +57,7 @@ def row(who: str, ground: str, figures: CourseFigures) -> tuple[str, ...]:
 
 
 def servo(stiffness: float, delay: float) -> str:
-    """Return the nominal servos with another stiffness and delay, as fake_xgo takes them."""
+    """Return the nominal servos with another stiffness and delay, in fake_xgo's syntax."""
     nominal = ServoModel.NOMINAL.parameters
     return (
         f'kp={stiffness},kv={nominal.velocity_gain * stiffness / nominal.stiffness:.4g},'
@@ -67,7 +67,7 @@ def servo(stiffness: float, delay: float) -> str:
 
 
 def servos(walkers: dict[str, Candidate], duration: float) -> None:
-    """Print how servos decide: speed error, falls, cost of transport."""
+    """Print the influence of servos: speed error, falls, cost of transport."""
     trials = {
         (name, kp, delay): Trial(
             replace(who, robot=RobotChoice(servo=servo(kp, delay))), SERVO_COMMANDS, duration
@@ -92,7 +92,7 @@ def servos(walkers: dict[str, Candidate], duration: float) -> None:
 
 
 def held_out(walkers: dict[str, Candidate], duration: float) -> None:
-    """Print speed errors and falls on the servos that judge a policy, on each ground."""
+    """Print speed errors and falls with the held-out servos, on each ground."""
     table: Table = [('', *GROUNDS)]
     for name, who in walkers.items():
         robots = [replace(who, robot=RobotChoice(servo=servo(*each))) for each in HELD_OUT]

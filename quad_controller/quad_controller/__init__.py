@@ -18,9 +18,9 @@ The pure core, without ROS::
             controller.set_velocity(Velocity(0.2))
 
 Conventions: positions and targets of joints are in the order of ``Quadruped.names`` in [rad];
-``last`` are the last targets of all joints, ``stand`` those of a robot that stands. ``dt`` is the
-time since the step before, ``period`` the nominal time between two steps, both in [s]. Frames are
-those of REP 103, quaternions x, y, z, w.
+``last`` are the last targets of all joints, ``stand`` those of the standing robot. ``dt`` is the
+time since the previous step, ``period`` the nominal time between two steps, both in [s]. Frames
+are those of REP 103, quaternions x, y, z, w.
 """
 
 from .exceptions import ParameterError, PolicyError, QuadControllerError

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run quad_controller attach_contract``: writes the contract of a policy into its file."""
+"""``ros2 run quad_controller attach_contract``: embeds a policy's contract in its ONNX file."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .policy.options import table_text
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Write a contract; return 0 when nothing of it is open."""
+    """Embed a contract; return 0 if it is complete."""
     options = _parser().parse_args(arguments)
     try:
         model = find_policy(options.model)
@@ -52,7 +52,7 @@ def main() -> None:
 
 
 def _document(model: Path, files: Sequence[Path], settings: Sequence[str]) -> ContractDocument:
-    """Lay what was set over the files, those over each other, and all over the model's own."""
+    """Merge the sources; settings override files, later files earlier ones, files the model."""
     document = read_metadata(OnnxNetwork(model, new_weights=True).metadata)
     top = ContractDocument({})
     for text in settings:
@@ -66,7 +66,7 @@ def _document(model: Path, files: Sequence[Path], settings: Sequence[str]) -> Co
 
 
 def _write(model: Path, target: Path, document: ContractDocument) -> None:
-    """Write the model with its contract, whole or not at all."""
+    """Write the model with its contract, atomically."""
     read = read_model(model)
     data = with_metadata(read.data, CONTRACT_KEY, document.to_yaml())
     if read.sides:

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings of steps (quad_msgs/msg/ControllerStep), and what a policy answers to one; no ROS.
+"""Reads recorded steps (quad_msgs/msg/ControllerStep) and replays them to a policy; no ROS.
 
-``ros2 run quad_controller replay_policy`` feeds a policy by a recording, without a robot.
+``ros2 run quad_controller replay_policy`` feeds a recording to a policy, without a robot.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def read_recording(path: Path) -> list[Step]:
     """Return the steps of a recording.
 
     Raises:
-        PolicyError: It has none, or cannot be read.
+        PolicyError: The recording is empty or cannot be read.
     """
     try:
         reader = BagReader(path)
@@ -75,13 +75,13 @@ def read_recording(path: Path) -> list[Step]:
 
 
 def unpack(definition: str, data: bytes) -> Step:
-    """Return the values of a message.
+    """Decode a recorded message.
 
     Args:
-        definition: That of the recording: one of before lacks the fields that came later.
+        definition: Message definition in the recording; older ones lack newer fields.
 
     Raises:
-        ValueError: The bytes are of something else.
+        ValueError: The bytes are not such a message.
     """
     if data[:4] != ENCAPSULATION:
         raise ValueError('the message is not little-endian CDR')
@@ -100,7 +100,7 @@ def unpack(definition: str, data: bytes) -> Step:
 
 
 def inputs_of(step: Step) -> Situation | None:
-    """Return what a policy may see of a step; None when joints or attitude were not known."""
+    """Return the policy inputs of a step; None if joints or attitude were unknown."""
 
     def vector(name: str) -> Any:  # noqa: ANN401  # as long as the field is
         return tuple(step[name].tolist()) if name in step and len(step[name]) else None
@@ -119,7 +119,7 @@ def inputs_of(step: Step) -> Situation | None:
 
 
 def _read(kind: str, view: memoryview, place: int) -> tuple[str | float | Floats, int]:
-    """Return a value of a message and where the next one begins."""
+    """Decode one value of a message; return it and the offset of the next."""
     if form := NUMBERS.get(kind):
         size = struct.calcsize(form)
         place += -place % size
@@ -135,7 +135,7 @@ def _read(kind: str, view: memoryview, place: int) -> tuple[str | float | Floats
 
 @dataclass(frozen=True, slots=True)
 class PolicyRun:
-    """What the steps do not say, and the answers depend on."""
+    """Settings that the answers depend on and the steps do not contain."""
 
     # as it was named; empty for the gait, None where a recording does not say, as one that goes on
     policy: str | None
@@ -144,7 +144,7 @@ class PolicyRun:
 
     @property
     def about(self) -> Mapping[str, str]:
-        """What is written down with the recording."""
+        """The metadata to store with the recording."""
         return {
             'policy': self.policy or '',
             'policy_options': self.options.to_json(),
@@ -152,7 +152,7 @@ class PolicyRun:
         }
 
     def keep_contract(self, folder: Path) -> str:
-        """Copy a contract of the options into the folder of the recording; return why not."""
+        """Copy the contract file of the options into the recording's folder; return why not."""
         if self.options.contract is not None:
             try:
                 shutil.copyfile(self.options.contract, folder / CONTRACT_FILE)
@@ -162,10 +162,10 @@ class PolicyRun:
 
     @classmethod
     def of(cls, recording: Path) -> PolicyRun:
-        """Return that of a recording; what an older one does not say has its default.
+        """Read the settings of a recording; fields that older ones lack have defaults.
 
         Raises:
-            PolicyError: It cannot be read.
+            PolicyError: The settings cannot be read.
         """
         folder = recording if recording.is_dir() else recording.parent
         about: Mapping[str, str] = {}
@@ -188,7 +188,7 @@ MAX_DIFFERENCE = 1e-3  # of actions and observations: single precision, and a li
 
 @dataclass(frozen=True, slots=True)
 class Answered:
-    """What a policy saw and answered in a step of a recording."""
+    """Input and answer of a policy in one recorded step."""
 
     step: Step  # as it was recorded
     observation: Floats  # what it saw
@@ -197,9 +197,9 @@ class Answered:
 
 
 def feed(runner: PolicyRunner, steps: Iterable[Step]) -> Iterator[Answered]:
-    """Feed a policy what was recorded; yield its answers.
+    """Feed recorded steps to a policy; yield its answers.
 
-    It begins anew where it did in the recording. One that was not asked there sees all steps.
+    It is reset where the recording has a reset. A policy that did not run there gets all steps.
     """
     steps = list(steps)
     recorded = any(step['policy_digest'] == runner.digest for step in steps)
@@ -230,10 +230,10 @@ def _off(a: Floats, b: Floats) -> float:
 
 
 def report(loaded: LoadedPolicy, steps: list[Step]) -> tuple[str, bool]:
-    """Feed a policy by a recording; return what was found, and whether no answer differs.
+    """Replay a recording to a policy; return the findings, and whether all answers agree.
 
     Raises:
-        PolicyError: The recording has nothing that the policy could see.
+        PolicyError: The recording contains no input for the policy.
     """
     runner = loaded.runner
     answers = list(feed(runner, steps))
@@ -265,7 +265,7 @@ def report(loaded: LoadedPolicy, steps: list[Step]) -> tuple[str, bool]:
 
 
 def _model_of(recorded: PolicyRun, recording: Path) -> str:
-    """Return the policy that a recording was begun with."""
+    """Return the policy that was active at the start of a recording."""
     if recorded.policy is None:
         raise PolicyError(
             f'recording {recording} does not say which policy ran (it goes on, its recorder was '
@@ -277,7 +277,7 @@ def _model_of(recorded: PolicyRun, recording: Path) -> str:
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Replay; return 0 when the answers are the recorded ones."""
+    """Replay a recording; return 0 if the answers equal the recorded ones."""
     options = _parser().parse_args(arguments)
     try:
         steps, recorded = read_recording(options.recording), PolicyRun.of(options.recording)

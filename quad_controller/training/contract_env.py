@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The environment as a policy with a contract sees it: what is trained is what runs later.
+"""Environment that applies a policy contract, so that training matches deployment.
 
-Observations and targets are made by the runner that the controller has, and the targets pass its
-limiter of speeds.
+The controller's runner builds observations and targets; its speed limiter limits the targets.
 """
 
 from __future__ import annotations
@@ -58,7 +57,7 @@ PLANT = Randomization(
 
 
 def contract_of(path: Path, kind: str) -> ContractDocument:
-    """Return the contract of an ONNX file, for a policy that is trained on the plant from there.
+    """Return the contract of an ONNX file, for training on the simulated plant.
 
     Raises:
         PolicyError: The file cannot be read.
@@ -79,23 +78,23 @@ def contract_of(path: Path, kind: str) -> ContractDocument:
 
 
 def v1_velocity_error() -> float:
-    """Return the error of joint velocities that are estimated of the bytes of v1 [rad/s rms]."""
+    """Return the rms error of joint velocities estimated from v1 positions [rad/s]."""
     rest = [0.0] * len(quadruped(robot_urdf()).names)
     return JointBytes(robot_urdf()).read(rest, 0.0).velocity_error
 
 
 class NoNetwork(OnnxNetwork):
-    """Stands where the network will be: the trainer answers instead of it."""
+    """Placeholder for the network: the trainer supplies the actions."""
 
     def __init__(self) -> None:
         self.name, self.digest = 'training', ''
 
     def reset(self) -> None:
-        """Have no past."""
+        """Do nothing: there is no recurrent state."""
 
 
 class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
-    """Walking with the observations and actions of a contract."""
+    """Walking environment with the observations and actions of a contract."""
 
     def __init__(self, env: WalkingEnv, contract: PolicyContract) -> None:
         """Wrap an environment."""
@@ -116,7 +115,7 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Floats, dict[str, Any]]:
-        """Begin an episode where the set-points are, somewhere in the cycle of a gait."""
+        """Begin an episode at the present set-points, at a random gait phase."""
         _, info = self.simulation.reset(seed=seed, options=options)
         start = tuple(self.simulation.robot.joint_targets.tolist())
         self._runner.reset(start)
@@ -130,7 +129,7 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
         return self._observe(), info
 
     def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
-        """Do what an answer of the network means, and let a period pass."""
+        """Apply an action of the network and advance by one period."""
         wanted = self._runner.act(np.asarray(action, np.float32), PERIOD)
         sent = self._limiter.step(wanted, PERIOD)
         targets = np.array(self._bytes.rounded(sent) if self._by_v1 else sent, np.float32)
@@ -142,7 +141,7 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
         return self._observe(), float(reward), fallen, over, info
 
     def _sense(self) -> None:
-        """Take a report, as the bridge reads it from the bytes of a protocol."""
+        """Estimate the state from a report, as the bridge does from protocol bytes."""
         state = self.simulation.state
         joints, imu = state.joints, state.imu
         if joints is None or imu is None:
@@ -164,7 +163,7 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
 
 
 def walking_env(contract: PolicyContract, randomization: Randomization) -> ContractEnv:
-    """Make an environment on the plant of the training, on rough ground, through the estimator."""
+    """Create the training environment: simulated plant, rough ground, state estimator."""
     env = WalkingEnv(
         servo=SERVO,
         randomization=randomization,

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The networks that learn: what acts, and what judges; models of skrl on JAX."""
+"""Actor and critic networks: skrl models on JAX."""
 
 from __future__ import annotations
 
@@ -40,19 +40,19 @@ SEEN_MIRROR = np.asarray(block_diag(*MIRROR.values()), np.float32)
 
 
 def check_terms(contract: PolicyContract) -> None:
-    """Check that the observation has the terms of :data:`MIRROR`, in their order.
+    """Check that the observation has the terms of :data:`MIRROR`, in that order.
 
     Raises:
-        PolicyError: It has others.
+        PolicyError: The terms differ.
     """
     if [term.source for term in contract.terms] != list(MIRROR):
         raise PolicyError(f'this training needs the terms {[each.value for each in MIRROR]}')
 
 
 class Actor(GaussianMixin, Model):  # type: ignore[misc]
-    """Answers observations with the mean of the actions to try.
+    """Maps observations to the mean of the action distribution.
 
-    Seen in a mirror it answers the mirror image: it drifts to no side by itself.
+    It is mirror-symmetric, so it does not drift to one side.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class Actor(GaussianMixin, Model):  # type: ignore[misc]
         action_space: gymnasium.Space[Any],
         **keywords: Any,  # noqa: ANN401
     ) -> None:
-        """Make it for some spaces; the keywords are Flax's, which copies it."""
+        """Create the actor for some spaces; Flax copies it, hence the extra keywords."""
         Model.__init__(
             self, observation_space=observation_space, action_space=action_space, **keywords
         )
@@ -69,7 +69,7 @@ class Actor(GaussianMixin, Model):  # type: ignore[misc]
 
     @linen.compact  # type: ignore[untyped-decorator]
     def __call__(self, inputs: dict[str, Any], role: str) -> tuple[jax.Array, dict[str, Any]]:
-        """Return the mean actions, and the logarithm of the deviation."""
+        """Return the mean actions and the logarithm of their standard deviation."""
         seen = inputs['observations'][:, :-UNSEEN]
         layers = _layers(self.num_actions, last=0.1)
         mean = 0.5 * (_through(layers, seen) + _through(layers, seen @ SEEN_MIRROR) @ JOINTS)
@@ -78,7 +78,7 @@ class Actor(GaussianMixin, Model):  # type: ignore[misc]
 
 
 class Judge(DeterministicMixin, Model):  # type: ignore[misc]
-    """Says what is still to be got from a state on."""
+    """Critic: estimates the value of a state."""
 
     def __init__(
         self,
@@ -86,7 +86,7 @@ class Judge(DeterministicMixin, Model):  # type: ignore[misc]
         action_space: gymnasium.Space[Any],
         **keywords: Any,  # noqa: ANN401
     ) -> None:
-        """Make it for some spaces; the keywords are Flax's, which copies it."""
+        """Create the critic for some spaces; Flax copies it, hence the extra keywords."""
         Model.__init__(
             self, observation_space=observation_space, action_space=action_space, **keywords
         )
@@ -94,7 +94,7 @@ class Judge(DeterministicMixin, Model):  # type: ignore[misc]
 
     @linen.compact  # type: ignore[untyped-decorator]
     def __call__(self, inputs: dict[str, Any], role: str) -> tuple[jax.Array, dict[str, Any]]:
-        """Return one number for each state."""
+        """Return the value of each state."""
         return _through(_layers(1, last=1.0), inputs['observations']), {}
 
 
@@ -110,10 +110,10 @@ def _through(layers: list[linen.Dense], values: jax.Array) -> jax.Array:
 
 
 class Normaliser:
-    """Subtracts a mean and divides by a deviation that stay as they are: skrl's preprocessor."""
+    """skrl preprocessor: normalises with a fixed mean and standard deviation."""
 
     def __init__(self, mean: Floats, deviation: Floats) -> None:
-        """Take both."""
+        """Store mean and standard deviation."""
         self.mean, self.deviation = mean, deviation
 
     def __call__(self, values: Any, *, train: bool = False, inverse: bool = False) -> Any:  # noqa: ANN401
@@ -122,7 +122,7 @@ class Normaliser:
 
 
 def explore(actor: Actor, deviation: float) -> None:
-    """Sample actions of an actor with this deviation from its mean."""
+    """Sample actions around the actor's mean with this standard deviation."""
     params = actor.state_dict.params
     tried = jnp.full((actor.num_actions,), math.log(deviation))
     actor.state_dict = actor.state_dict.replace(
@@ -131,10 +131,10 @@ def explore(actor: Actor, deviation: float) -> None:
 
 
 def learned_in(path: Path, actor: Actor) -> Normaliser:
-    """Give an actor the layers that an export wrote; return the normalisation of observations.
+    """Load exported layers into an actor; return the normalisation of observations.
 
     Raises:
-        PolicyError: It has other layers.
+        PolicyError: The layers do not match.
     """
     found = {each.name: numpy_helper.to_array(each) for each in onnx.load(path).graph.initializer}
     params = actor.state_dict.params
@@ -165,7 +165,7 @@ def learned_in(path: Path, actor: Actor) -> Normaliser:
 
 
 def layers_of(actor: Actor, normaliser: Normaliser) -> Layers:
-    """Return what an actor has learned, without the trainer."""
+    """Return the trained layers of an actor, without the trainer."""
     params = jax.device_get(actor.state_dict.params)['params']
     dense = [params[f'Dense_{place}'] for place in range(len(HIDDEN) + 1)]
     return Layers(

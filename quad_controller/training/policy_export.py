@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Writes layers as an ONNX file, with the normalisation of observations inside, and metadata."""
+"""Exports layers as an ONNX file that includes observation normalisation and metadata."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ IR_VERSION = 8  # what ONNX Runtime 1.14 reads, and everything newer
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layers:
-    """Fully connected layers with ELU between them; inputs are normalised."""
+    """Fully connected layers with ELU activations and normalised inputs."""
 
     mean: Floats  # subtracted from the inputs
     deviation: Floats  # the inputs are divided by it
@@ -33,7 +33,7 @@ class Layers:
 
 
 def export(layers: Layers, path: Path, metadata: Mapping[str, str]) -> None:
-    """Write a network."""
+    """Write a network as an ONNX file."""
     tensors: dict[str, Floats] = {'mean': layers.mean, 'deviation': layers.deviation}
     last = len(layers.weights) - 1
     answers = ['actions'] if layers.mirror is None else ['here', 'mirrored']

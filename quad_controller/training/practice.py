@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Practice by PPO, with robots and ground that differ more and more."""
+"""PPO training with increasing randomization of robot and ground."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ STEPS_UNKNOWN = 1_000_000_000  # skrl wants to know how many; here the clock end
 
 
 class Rollouts(RandomMemory):  # type: ignore[misc]
-    """Takes samples by NumPy: JAX's indexing costs as much as the learning."""
+    """Samples mini-batches with NumPy: indexing in JAX costs as much as the learning."""
 
     def sample_by_index(
         self, names: list[str], *, indexes: npt.NDArray[np.intp], mini_batches: int = 1
     ) -> list[list[Any]]:
-        """Return rows of what is remembered by these names, in so many parts."""
+        """Return the named tensors at these rows, split into mini-batches."""
         there = self.get_tensor_names()
         whole = [np.asarray(self.get_tensor_by_name(n)) if n in there else None for n in names]
         rows = [None if each is None else each.reshape(-1, each.shape[-1]) for each in whole]
@@ -51,7 +51,7 @@ class Rollouts(RandomMemory):  # type: ignore[misc]
 
 
 class Practice:
-    """Goes on with a policy that walks already."""
+    """Continues to train a policy that already walks."""
 
     def __init__(
         self,
@@ -65,11 +65,11 @@ class Practice:
         seed: int,
         share: float,
     ) -> None:
-        """Prepare it.
+        """Set up the trainer.
 
         Args:
             curves: Folder for the files that TensorBoard reads.
-            share: Of the randomization at the beginning.
+            share: Initial share of the randomization.
         """
         self._first = share
         self._envs, self._wrapped = envs, wrap_env(envs, wrapper='gymnasium', verbose=False)
@@ -91,7 +91,7 @@ class Practice:
         self._observed, _ = self._wrapped.reset()
 
     def until(self, progress: Callable[[], float]) -> Iterator[str]:
-        """Practise, at least once, until progress is 1; yield the figures of each update."""
+        """Train until progress is 1 (at least one update); yield the figures of each update."""
         passed = 0.0
         while passed < 1.0:
             self._vary(passed)
@@ -105,7 +105,7 @@ class Practice:
             passed = progress()
 
     def close(self) -> None:
-        """Write the curves out."""
+        """Flush and close the TensorBoard files."""
         self._agent.writer.close()
 
     def _vary(self, passed: float) -> None:
@@ -160,7 +160,7 @@ class Practice:
 
 
 def _terms(infos: Mapping[str, Any]) -> list[Mapping[str, float]]:
-    """Return the sums of the reward's terms of the episodes that ended."""
+    """Return the summed reward terms of the episodes that ended."""
     terms, there = infos.get('final_info', {}).get('reward_terms', {}), '_reward_terms'
     if not terms:
         return []
@@ -204,7 +204,7 @@ DEVIATION = 0.12  # of the actions that are tried when practice begins: 0.03 rad
 def train(
     start: Path, target: Path, progress: Progress, *, seed: int, environments: int, share: float
 ) -> None:
-    """Train the policy of an ONNX file, and write another, until the time of `progress` is over.
+    """Train the policy of an ONNX file until `progress` is over; write the result as ONNX.
 
     Raises:
         PolicyError: The layers of the start cannot be trained.

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Trains a policy that walks, checks it and compares it: ``make train`` calls it.
+"""Trains, checks and benchmarks a walking policy: ``make train`` runs it.
 
-It goes on with a policy by PPO, on servos, grounds and sensors that differ. The folder that it
-prints has the policy with its contract as walk.onnx, curves for TensorBoard, and figures.
+It fine-tunes a policy with PPO on randomized servos, ground and sensors. The folder that it
+prints contains the policy with its contract (walk.onnx), TensorBoard curves and figures.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ WALKS = ((0.2, 0.0, 0.3), (0.0, 0.1, 0.0), (-0.15, 0.0, -0.5))
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Train; return 0 when what came of it is accepted."""
+    """Train; return 0 if the new policy passes the check."""
     options = _parser().parse_args(arguments)
     # a library for a graphics card would only warn that there is none
     os.environ.setdefault('JAX_PLATFORMS', 'cpu')
@@ -55,7 +55,7 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _judge(path: Path, progress: Progress, duration: float) -> int:
-    """Check a policy against the gait, so long [s] for each command; return its exit code."""
+    """Compare a policy with the gait, this long [s] per command; return its exit code."""
     code = max(_check(path, progress, walk) for walk in WALKS)
     figures = ['--duration', f'{duration:g}', '--report', str(path.with_name('figures.csv'))]
     check_policy([str(path), '--servo', SERVO, '--compare', *figures])

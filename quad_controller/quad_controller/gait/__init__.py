@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The geometric gait: from a velocity to the positions of four feet to joint positions."""
+"""The geometric gait: body velocity to foot positions to joint positions."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The whole gait: a velocity and a body pose in, joint targets out."""
+"""The gait generator: body velocity and pose in, joint targets out."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ MAX_CORRECTION = 0.4  # [rad/s]
 
 
 class HeadingHold:
-    """Keeps the course: the robot turns as far as it was commanded to, and no further.
+    """Corrects the turning rate so that the robot holds its commanded heading.
 
-    A gait drifts to a side and turns a few per cent too fast. The heading that the commands add up
-    to is compared with the measured one, and the turning is corrected in proportion.
+    A gait drifts and turns a few per cent too fast. A proportional controller corrects the
+    turning rate by the difference between the commanded heading and the measured one.
     """
 
     def __init__(self, gain: float) -> None:
-        """Start without a course; the gain is the correction per error in [1/s], 0 for none."""
+        """Start without a heading; the gain is in [1/s], 0 disables the correction."""
         self._gain = gain
         self._course: float | None = None
 
     def step(self, velocity: Velocity, heading: float | None, dt: float) -> Velocity:
-        """Return the velocity to walk with by the measured yaw [rad]; rest forgets the course."""
+        """Correct a velocity by the measured yaw [rad]; at rest, discard the heading."""
         if heading is None or velocity.at_rest or self._gain == 0.0:
             self._course = None
             return velocity
@@ -50,7 +50,7 @@ CLAMP_YAW = 0.02  # [rad/s]
 
 @dataclass(frozen=True, slots=True)
 class GaitStep:
-    """What one step gives."""
+    """Result of one gait step."""
 
     targets: Targets  # positions of all joints in [rad]
     contacts: tuple[bool, ...]  # which legs stand, in the order of :data:`quad_description.LEGS`
@@ -58,7 +58,7 @@ class GaitStep:
 
 
 class GaitGenerator:
-    """Walks: gives targets of all joints, step after step."""
+    """Generates targets for all joints, step by step, from velocity and body pose."""
 
     def __init__(
         self, robot: Quadruped, parameters: GaitParameters, others: Sequence[float] | None = None
@@ -67,8 +67,8 @@ class GaitGenerator:
 
         Raises:
             DescriptionError: The legs do not reach the nominal height.
-            ParameterError: They do not reach as far outwards or ahead, or the servos that are
-                compensated cannot carry it.
+            ParameterError: The legs do not reach the outward or forward offset, or the compensated
+                servos are too soft to carry the robot.
         """
         self._robot = robot
         self._parameters = parameters
@@ -101,21 +101,21 @@ class GaitGenerator:
 
     @property
     def standing(self) -> bool:
-        """Whether all feet are at their places and the robot is at rest."""
+        """Whether the robot is at rest with all feet at their neutral positions."""
         return not self._stepper.walking and self.velocity.at_rest and not self._unsettled
 
     @property
     def stand_targets(self) -> Targets:
-        """Set-points of all joints when the robot stands upright [rad]."""
+        """Set-points of all joints when the robot stands [rad]."""
         targets = self._robot.place(self._robot.solve(self._neutral), self.others)
         return targets if self._compensation is None else self._compensation.at_rest(targets)
 
     def choose(self, gait: Gait) -> None:
-        """Change the gait; the robot stops for it when it walks."""
+        """Select a gait; a walking robot stops before the change."""
         self.wanted_gait = gait
 
     def reset(self) -> None:
-        """Stand, at once; for when something else has moved the joints."""
+        """Reset to standing at once, after something else has moved the joints."""
         self._stepper.reset()
         self.velocity, self.pose, self._unsettled = REST, UPRIGHT, 0
         if self._compensation is not None:
@@ -128,12 +128,12 @@ class GaitGenerator:
         attitude: Vector | None,
         dt: float,
     ) -> GaitStep:
-        """Advance.
+        """Advance by one step and return the joint targets.
 
         Args:
-            velocity: Velocity that is requested; clamped and approached.
-            pose: Pose of the body that is requested; clamped and approached.
-            attitude: Measured roll, pitch and yaw in [rad], None when they are not known.
+            velocity: Requested velocity; clamped and rate-limited.
+            pose: Requested pose of the body; clamped and rate-limited.
+            attitude: Measured roll, pitch and yaw in [rad], None when unknown.
         """
         self._advance_velocity(velocity, dt)
         limits = self._parameters.body
@@ -168,7 +168,7 @@ class GaitGenerator:
         self.velocity = self.limits.approach(self.velocity, goal, dt)
 
     def _within_schedule(self, velocity: Velocity) -> Velocity:
-        """Slow down to where the gait keeps its balance; no foot is faster over the body."""
+        """Limit the velocity to what keeps balance and the speed of every foot in range."""
         fastest = max(
             math.hypot(velocity.x - velocity.yaw * place[1], velocity.y + velocity.yaw * place[0])
             for place in self._neutral

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What can be tuned of the gait, in CHAMP's words where CHAMP has one; its schedules."""
+"""Gait parameters, named as in CHAMP where it has an equivalent, and the gait schedules."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .velocity import BodyLimits, VelocityLimits
 
 
 class Gait(Enum):
-    """The gaits; the value is their name in ``set_mode``."""
+    """The gaits; each value is the name that ``set_mode`` accepts."""
 
     TROT = 'trot'
     CRAWL = 'crawl'
@@ -29,9 +29,9 @@ LEG_LENGTH = 0.1349  # [m] thigh and calf of the XGO
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """A gait; phases are shares of a period.
+    """Timing of a gait; phases are fractions of its period.
 
-    A leg stands while its own phase (the gait's plus its offset) is below the duty.
+    A leg is in stance while its phase (gait phase plus offset) is below the duty factor.
     """
 
     # lead of each leg's phase, front left, front right, back left, back right
@@ -43,9 +43,9 @@ class Schedule:
     speed: float
 
     def scaled(self, leg_length: float) -> Schedule:
-        """Return the gait of a robot with other legs [m].
+        """Return the schedule scaled to another leg length [m].
 
-        At equal Froude numbers (v^2 / g l) times and speeds grow with the root of the legs.
+        At equal Froude number (v^2 / g l), times and speeds grow with the root of the leg length.
         """
         size = leg_length / LEG_LENGTH
         if abs(size - 1.0) < 0.01:
@@ -65,12 +65,12 @@ class Schedule:
 
     @property
     def swing_duration(self) -> float:
-        """How long a foot is in the air in [s]."""
+        """Duration of a swing in [s]."""
         return self.period - self.stance_duration
 
     @property
     def sway_phase(self) -> float:
-        """Phase at which the middle of the left legs' swings lies; the body is right then.
+        """Phase at the middle of the left legs' swings, when the body sways furthest right.
 
         It is the phase of the first harmonic of "left legs in the air minus right legs".
         """
@@ -97,10 +97,10 @@ STEP_LOAD = 1.25  # of its share of the weight: what each of two legs carries; f
 
 @dataclass(frozen=True, slots=True)
 class ServoModel:
-    """A servo as a spring with a damper.
+    """A servo modelled as spring and damper.
 
-    The stiffness is what the vendor published. Damping and inertia are those with which the gait
-    keeps its speed in physics, at every stiffness from 1.1 to 10 N m/rad.
+    The vendor published the stiffness. Damping and inertia are tuned so that the gait keeps its
+    speed in simulation at every stiffness from 1.1 to 10 N m/rad.
     """
 
     kp: float = setting(2.45, 0.01, 1000.0, 'stiffness of a servo [N m/rad]')
@@ -110,7 +110,7 @@ class ServoModel:
 
 
 class ServoCompensation:
-    """Changes joint targets, so that soft servos are where firm ones would be.
+    """Adjusts joint set-points so that soft servos reach the intended positions.
 
     A position servo is a spring: it lags behind a moving set-point and sags under the robot's
     weight. The set-point is moved ahead by what the spring needs, from the motion of the next step
@@ -118,25 +118,25 @@ class ServoCompensation:
 
         command = q + (damping / kp) q' + (inertia / kp) q'' - J^T f / kp,  f = m g / standing legs
 
-    It costs one step of delay, since it looks one step ahead.
+    It adds one step of delay, because it looks one step ahead.
     """
 
     def __init__(self, robot: Quadruped, servo: ServoModel) -> None:
-        """Start without a past."""
+        """Start without motion history."""
         self._robot = robot
         self._servo = servo
         self._weight = GRAVITY * (servo.mass or robot.mass)
         self._window: list[tuple[Targets, tuple[bool, ...]]] = []
 
     def reset(self) -> None:
-        """Forget the motion so far."""
+        """Clear the motion history."""
         self._window.clear()
 
     def at_rest(self, targets: Targets) -> Targets:
-        """Return the set-points for standing still on all legs at some targets [rad].
+        """Return the set-points that hold some targets [rad] while all legs stand.
 
         Raises:
-            ParameterError: Servos that are so soft cannot carry the robot.
+            ParameterError: The servos are too soft to carry the robot.
         """
         moved = list(targets)
         self._carry(moved, targets, (True,) * len(self._robot.legs))
@@ -150,7 +150,7 @@ class ServoCompensation:
         return self._robot.clamp(moved)
 
     def step(self, targets: Targets, contacts: tuple[bool, ...], dt: float) -> Targets:
-        """Return the set-points for the targets of one step ago [rad]."""
+        """Return the set-points for the targets of the previous step [rad]."""
         window = self._window
         window.append((targets, contacts))
         while len(window) <= LOOK:
@@ -185,7 +185,7 @@ MIN_DUTY = 0.5  # below it there are moments without a foot on the ground
 
 @dataclass(frozen=True, slots=True)
 class GaitParameters:
-    """Tuning of the gait; the defaults are those that walk with the XGO's dimensions."""
+    """Gait parameters; the defaults suit the dimensions of the XGO."""
 
     # the servos are at their speed there
     max_linear_velocity_x: float = setting(0.3, 0.01, 2.0, 'forward and backward [m/s]')
@@ -223,10 +223,10 @@ class GaitParameters:
     body: BodyLimits = field(default_factory=BodyLimits)
 
     def __post_init__(self) -> None:
-        """Refuse what makes no sense.
+        """Reject values outside of their ranges.
 
         Raises:
-            ParameterError: A value is outside of its range; the message has name and range.
+            ParameterError: A value is out of range; the message gives name and range.
         """
         check_settings(self)
         if self.duty and not self.duty >= MIN_DUTY:
@@ -238,7 +238,7 @@ class GaitParameters:
 
     @property
     def velocity_limits(self) -> VelocityLimits:
-        """How fast the robot may go."""
+        """Velocity limits of the robot."""
         return VelocityLimits(
             self.max_linear_velocity_x,
             self.max_linear_velocity_y,
@@ -248,18 +248,18 @@ class GaitParameters:
         )
 
     def top_speed(self, gait: Gait) -> float:
-        """Return how fast a gait goes straight ahead at most [m/s]."""
+        """Return the highest forward speed of a gait [m/s]."""
         return min(self.max_linear_velocity_x, self.schedule(gait).speed)
 
     def stance(self, robot: Quadruped, others: Sequence[float]) -> Feet:
-        """Return where the feet of a robot at rest are, in base_link in [m].
+        """Return the foot positions of the robot at rest, in base_link in [m].
 
         Args:
-            others: Positions of all joints, for those that are no legs' in [rad].
+            others: Positions of all joints in [rad], used for the non-leg joints.
 
         Raises:
             DescriptionError: The legs do not reach the nominal height.
-            ParameterError: They do not reach as far outwards or ahead.
+            ParameterError: The legs do not reach the outward or forward offset.
         """
         shift, widening = self.com_x_translation, self.stance_widening
         one, two, three, four = (
@@ -275,7 +275,7 @@ class GaitParameters:
         return feet
 
     def schedule(self, gait: Gait, leg_length: float = LEG_LENGTH) -> Schedule:
-        """Return a gait for legs of a length [m], with what was tuned of it."""
+        """Return the schedule of a gait for a leg length [m], with the tuned values applied."""
         schedule = SCHEDULES[gait].scaled(leg_length)
         return replace(
             schedule,

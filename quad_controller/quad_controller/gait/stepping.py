@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where the feet go: they stay on the ground while they stand, and swing to their next place.
+"""Foot trajectories: stance feet stay on the ground, swing feet move to their next foothold.
 
-A standing foot moves through the body's frame with minus the body's velocity at that foot, the
-turning included, so that it does not slip whatever the velocity does. A swinging foot follows a
-cubic Hermite curve that leaves and meets the ground with the ground's velocity, so that it does
-not scuff. It lands half a stroke ahead of its neutral place (Raibert's neutral point).
+In the body frame, a stance foot moves with the negative body velocity at that foot, turning
+included, so it never slips. A swing foot follows a cubic Hermite curve that lifts off and touches
+down at ground velocity, so it does not scuff. It lands half a stroke ahead of its neutral place
+(Raibert's neutral point).
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ MIN_RATIO = 0.7  # of the height on the spot: a foot that scuffs is worse than a
 
 
 class SwingLift:
-    """Height of a swing by the velocity of its foot, so that no joint needs more than its speed.
+    """Swing height as a function of foot velocity, so that no joint exceeds its speed limit.
 
-    A swing carries a foot a whole stroke ahead in less time than the stroke took, and lifts it on
-    the way. Where both together are too much for the servos, as in a fast trot or the short swing
-    of a pace, they would cut the curve wherever they fall behind; it is better to lift the foot
-    less. But not much less: in physics a trot of 0.3 m/s that lifts its feet by half stumbles.
+    A swing moves a foot a whole stroke ahead in less time than the stroke took, and lifts it.
+    Where the servos are too slow for both, as in a fast trot or the short swing of a pace, they
+    would fall behind the curve anywhere; a lower lift avoids that. It must not be much lower: in
+    simulation, a trot at 0.3 m/s with half the lift stumbles.
     """
 
     def __init__(
         self, robot: Quadruped, neutral: Feet, schedule: Schedule, swing_height: float
     ) -> None:
-        """Search for the height [m] at some speeds, ahead and to the side, about neutral feet."""
+        """Tabulate the height [m] over forward and sideways speeds, around neutral feet."""
         self._robot, self._neutral, self._schedule = robot, neutral, schedule
         step = schedule.speed / (SPEEDS - 1)
         self._speeds = [step * index for index in range(SPEEDS)]
@@ -88,7 +88,7 @@ class SwingLift:
         )
 
     def _swing(self, x: float, y: float, height: float) -> Iterator[Feet]:
-        """Yield the feet along a swing, all at once."""
+        """Yield the positions of all feet along a swing."""
         for sample in range(SAMPLES + 1):
             part = sample / SAMPLES
             way_x, way_y = (swing_way(over, part, self._schedule) for over in (x, y))
@@ -98,18 +98,18 @@ class SwingLift:
 
 
 def arc(part: float) -> float:
-    """Return the height of a swing as a share of its greatest; part runs from 0 to 1."""
+    """Return the normalized height of a swing, 0 to 1; part runs from 0 to 1."""
     return 0.5 * (1.0 - math.cos(math.tau * part))
 
 
 def swing_way(velocity: float, part: float, schedule: Schedule) -> float:
-    """Return how far a swing at a steady velocity [m/s] is from the neutral place [m]."""
+    """Return the offset from the neutral position [m] in a swing at constant velocity [m/s]."""
     half, slope = 0.5 * schedule.stance_duration * velocity, -velocity * schedule.swing_duration
     return hermite((-half, slope), (half, slope), part)
 
 
 def hermite(start: tuple[float, float], end: tuple[float, float], part: float) -> float:
-    """Return a cubic between two values with their changes per part; the part is 0 to 1."""
+    """Interpolate two values with given slopes by a cubic; part runs from 0 to 1."""
     rest = 1.0 - part
     rise = part * part * (3.0 - 2.0 * part)
     bend = part * rest * (start[1] * rest - end[1] * part)
@@ -123,7 +123,7 @@ AT_PLACE = 1e-6  # [m] as near to its neutral place as a foot needs to be
 
 @dataclass(slots=True)
 class _Foot:
-    """Where a foot is from its neutral place in [m], and where it left the ground."""
+    """Offset of a foot from its neutral position and from its lift-off point, in [m]."""
 
     x: float = 0.0
     y: float = 0.0
@@ -134,7 +134,7 @@ class _Foot:
 
 
 class Stepper:
-    """Moves four feet through a gait."""
+    """Computes the trajectories of four feet through a gait."""
 
     def __init__(
         self,
@@ -143,10 +143,10 @@ class Stepper:
         lift: Callable[[float, float], float],
         depth: float,
     ) -> None:
-        """Start with all feet at their neutral places.
+        """Start with all feet at their neutral positions.
 
         Args:
-            neutral: Where the feet are without motion, in the body's frame in [m].
+            neutral: Foot positions at rest, in the body's frame in [m].
             depth: How far a standing foot is pushed below the ground in [m].
         """
         self.schedule = schedule  # the gait; may be exchanged while the feet stand
@@ -161,24 +161,24 @@ class Stepper:
 
     @property
     def contacts(self) -> tuple[bool, ...]:
-        """Which feet stand."""
+        """Whether each foot is in stance."""
         return tuple(not foot.swings for foot in self._feet)
 
     @property
     def sway(self) -> float:
-        """How far the body shall be to the left in [m]."""
+        """Required offset of the body to the left in [m]."""
         schedule = self.schedule
         angle = math.tau * (self._phase - schedule.sway_phase)
         return -schedule.sway * self._engaged * math.cos(angle)
 
     def reset(self) -> None:
-        """Put all feet back to their neutral places, at once."""
+        """Put all feet back to their neutral positions at once."""
         self._feet = [_Foot() for _ in self._neutral]
         self._phase = self._engaged = 0.0
         self.walking = False
 
     def step(self, velocity: Velocity, dt: float) -> list[Vector]:
-        """Advance and return the feet in the frame of a level body in [m]."""
+        """Advance; return the feet in the frame of a level body in [m]."""
         if not self.walking and not velocity.at_rest:
             self.walking = True
             self._phase = 0.0
@@ -214,7 +214,7 @@ class Stepper:
             foot.y -= (hip_y + turn_y) * min(stood, dt)
 
     def _land(self, foot: _Foot, phase: float, hip_x: float, hip_y: float) -> float:
-        """End a swing that ended within this step; return how long the foot has stood in [s]."""
+        """End a swing that finished within this step; return the stance time since then in [s]."""
         foot.swings = False
         half = 0.5 * self.schedule.stance_duration
         foot.x, foot.y = half * hip_x, half * hip_y

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Velocity of the body and its pose over the feet: clamped, and changed no faster than it can."""
+"""Velocity and pose of the body, with their range and rate limits."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ class Velocity(NamedTuple):
     yaw: float = 0.0  # turning to the left in [rad/s]
 
     def __str__(self) -> str:
-        """Return it for people."""
+        """Return a readable text."""
         return f'{self.x:.2f} {self.y:.2f} m/s {self.yaw:.2f} rad/s'
 
     @property
     def finite(self) -> bool:
-        """Whether all parts are numbers."""
+        """Whether all components are finite."""
         return all(map(math.isfinite, self))
 
     @property
@@ -34,7 +34,7 @@ class Velocity(NamedTuple):
         return self.x == self.y == self.yaw == 0.0
 
     def scaled(self, factor: float) -> Velocity:
-        """Return the same direction, faster or slower."""
+        """Return the velocity multiplied by a factor."""
         return Velocity(self.x * factor, self.y * factor, self.yaw * factor)
 
 
@@ -43,7 +43,7 @@ REST = Velocity()
 
 @dataclass(frozen=True, slots=True)
 class VelocityLimits:
-    """What the robot can do."""
+    """Velocity and acceleration limits of the robot."""
 
     x: float  # forward and backward in [m/s]
     y: float  # to a side in [m/s]
@@ -54,7 +54,7 @@ class VelocityLimits:
     dead_yaw: float = 0.01  # slower than this is no turning in [rad/s]
 
     def clamp(self, velocity: Velocity) -> Velocity:
-        """Return the velocity within the ellipse of x and y, with the same direction."""
+        """Clamp x and y to the limit ellipse and keep their direction; clamp the turning rate."""
         over = math.hypot(velocity.x / self.x, velocity.y / self.y)
         scale = 1.0 / over if over > 1.0 else 1.0
         yaw = min(max(velocity.yaw, -self.yaw), self.yaw)
@@ -66,12 +66,12 @@ class VelocityLimits:
         )
 
     def bound(self, velocity: Velocity) -> Velocity:
-        """Return a velocity that was clamped before, with its turning within the limits again."""
+        """Clamp only the turning rate, for a velocity that was clamped before."""
         yaw = min(max(velocity.yaw, -self.yaw), self.yaw)
         return Velocity(velocity.x, velocity.y, yaw)
 
     def approach(self, velocity: Velocity, target: Velocity, dt: float) -> Velocity:
-        """Return the velocity after a step of ``dt`` [s] of acceleration towards a target."""
+        """Move the velocity towards a target by ``dt`` [s] of limited acceleration."""
         change_x, change_y = target.x - velocity.x, target.y - velocity.y
         change, most = math.hypot(change_x, change_y), self.acceleration * dt
         yaw = approach(velocity.yaw, target.yaw, self.yaw_acceleration * dt)
@@ -82,12 +82,12 @@ class VelocityLimits:
 
 
 def approach(value: float, target: float, most: float) -> float:
-    """Return a value that has moved towards a target by no more than a step."""
+    """Move a value towards a target by at most one step."""
     return target if abs(target - value) <= most else value + math.copysign(most, target - value)
 
 
 class BodyPose(NamedTuple):
-    """A pose of the body relative to its normal one over the feet."""
+    """Pose of the body relative to its normal pose over the feet."""
 
     x: float = 0.0  # forward in [m]
     y: float = 0.0  # to the left in [m]
@@ -98,7 +98,7 @@ class BodyPose(NamedTuple):
 
     @property
     def finite(self) -> bool:
-        """Whether all parts are numbers."""
+        """Whether all components are finite."""
         return all(map(math.isfinite, self))
 
 
@@ -107,7 +107,7 @@ UPRIGHT = BodyPose()
 
 @dataclass(frozen=True, slots=True)
 class BodyLimits:
-    """How far and how fast the body may be moved over the feet."""
+    """Range and speed limits of the body pose."""
 
     shift: float = 0.025  # along x and y in [m]
     height: float = 0.03  # along z, up and down, in [m]
@@ -125,7 +125,7 @@ class BodyLimits:
         )
 
     def approach(self, pose: BodyPose, target: BodyPose, dt: float) -> BodyPose:
-        """Return the pose after a step of motion towards a target."""
+        """Move the pose towards a target by one step of limited speed."""
         if pose == target:
             return pose
         most = (*[self.speed * dt] * 3, *[self.turn_speed * dt] * 3)
@@ -133,7 +133,7 @@ class BodyLimits:
 
 
 def feet_in_body(feet: Sequence[Vector], pose: BodyPose, centre: Vector) -> list[Vector]:
-    """Return feet [m] that stay in the frame of a body that moves and turns about a centre."""
+    """Return the positions of fixed feet [m] in a body that is moved and turned about a centre."""
     axes = axes_from_rpy(pose.roll, pose.pitch, pose.yaw)
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = axes
     cx, cy, cz = centre
@@ -152,15 +152,15 @@ def feet_in_body(feet: Sequence[Vector], pose: BodyPose, centre: Vector) -> list
 
 
 class Leveller:
-    """Turns the body against the tilt that was measured: proportional, filtered, bounded."""
+    """Levels the body against the measured tilt: proportional, filtered, bounded."""
 
     def __init__(self, gain: float, most: float = 0.2, cut_off: float = 4.0) -> None:
         """Start level.
 
         Args:
-            gain: Correction per tilt; 0 switches it off.
+            gain: Correction per tilt; 0 disables levelling.
             most: Largest correction in [rad].
-            cut_off: Of the low-pass filter in [Hz].
+            cut_off: Cut-off frequency of the low-pass filter in [Hz].
         """
         self._gain = gain
         self._most = most
@@ -171,7 +171,7 @@ class Leveller:
     def step(
         self, attitude: tuple[float, float, float] | None, pose: BodyPose, dt: float
     ) -> BodyPose:
-        """Return the requested pose with the correction added; it fades without an attitude."""
+        """Add the correction to the requested pose; without an attitude it fades out."""
         roll = pitch = 0.0
         if attitude is not None:
             roll, pitch = attitude[0] - pose.roll, attitude[1] - pose.pitch

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The thread that steps the controller, on the arrival of feedback or else on its deadline.
+"""The thread that steps the controller when feedback arrives, or at the deadline.
 
-The schedule is one of absolute times. As long as feedback comes, a step waits for it a little
-beyond its time, and the schedule is drawn towards the arrivals: so the newest feedback is used
-within a moment. Without feedback the steps are where the schedule has them. Either way the rate
-stays the nominal one, within a few per cent of a feedback that is faster or slower.
+Steps are scheduled at absolute times. While feedback arrives, a step waits for it slightly beyond
+its due time, and the schedule is phase-locked to the arrivals, so each step uses fresh feedback.
+Without feedback, steps run on schedule. The rate stays nominal; a faster or slower feedback shifts
+it by a few per cent at most.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ to the command, None without one, in [s]."""
 
 
 class Pacer:
-    """Says when the next step is due; times are those of a monotonic clock in [s]."""
+    """Schedules the steps; times are on a monotonic clock in [s]."""
 
     def __init__(self, period: float, now: float) -> None:
-        """Make the first step due now."""
+        """Schedule the first step at once."""
         self._period = period
         self._window = WINDOW * period
         self._due = now
@@ -44,17 +44,17 @@ class Pacer:
         self.overruns = 0  # steps that were left out because the one before came too late
 
     def deadline(self, fresh: bool) -> float:
-        """Return when a step is due at the latest; fresh is feedback that no step has used."""
+        """Return the latest start of the next step; fresh means unused feedback exists."""
         if fresh:
             return self._due
         return self._due + self._window if self._locked else self._due
 
     def takes(self, now: float) -> bool:
-        """Return whether feedback that arrives now makes a step at once."""
+        """Return whether feedback that arrives now triggers a step."""
         return now >= self._due - self._window
 
     def stepped(self, now: float, arrival: float | None) -> None:
-        """Schedule the next step after one that used feedback of that arrival, or none."""
+        """Schedule the next step; arrival is that of the feedback used, None without any."""
         error = 0.0 if arrival is None else arrival - self._due
         error = min(max(error, -self._window), self._window)
         self._due += self._period + GAIN * error
@@ -67,10 +67,10 @@ class Pacer:
 
 
 def loop_figures(recorded: Collection[StepTimes], period: float) -> dict[str, float]:
-    """Return how well the last steps kept their time: rate in [1/s], else in [s].
+    """Return timing statistics of the last steps: rate in [1/s], all others in [s].
 
-    Jitter is the distance of an interval from the period, a step what it takes until its command
-    is published.
+    Jitter is the deviation of an interval from the period; a step is the time until its command is
+    published.
     """
     intervals = [interval for interval, _, _ in recorded]
     jitter = sorted(abs(interval - period) for interval in intervals)
@@ -93,7 +93,7 @@ def _percentile(ordered: list[float], share: float) -> float:
 
 
 class ControlLoop:
-    """Owns the thread; everything else of the controller is used under :attr:`lock`."""
+    """Owns the control thread; access the controller only under :attr:`lock`."""
 
     def __init__(
         self,
@@ -103,12 +103,12 @@ class ControlLoop:
         fail: Callable[[Exception], None],
         record: Callable[[Output, float, float, float | None], None] | None = None,
     ) -> None:
-        """Prepare; the thread starts with :meth:`start`.
+        """Set up the loop; :meth:`start` starts its thread.
 
         Args:
-            fail: Takes what ended the thread, in the thread.
-            record: Takes every output after it was published, in the thread, with the time since
-                the step before, that of the step, and from feedback to command in [s].
+            fail: Called in the thread with the exception that ended it.
+            record: Called in the thread with each published output, the time since the previous
+                step, the duration of the step, and the latency from feedback to command in [s].
         """
         self.lock = threading.Lock()  # hold it to call the controller between two steps
         self._controller, self._period = controller, period
@@ -124,13 +124,13 @@ class ControlLoop:
         self._thread = threading.Thread(target=self._guarded, name='control', daemon=True)
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:
-        """Begin to step; ``begin`` is called first in the thread, which may want a priority."""
+        """Start the thread; it calls ``begin`` first, for example to set its priority."""
         self._begin = begin
         self._pacer = Pacer(self._period, time.monotonic())
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread; the last targets stay."""
+        """Stop the thread; the last targets stay."""
         with self._arrived:
             self._stopping = True
             self._arrived.notify()
@@ -138,7 +138,7 @@ class ControlLoop:
             self._thread.join()
 
     def offer(self, **values: Any) -> None:  # noqa: ANN401
-        """Hand in fields of a RobotState for the next step; joints may make one at once."""
+        """Update fields of the RobotState for the next step; joints may trigger one at once."""
         with self._arrived:
             self._measurement = replace(self._measurement, **values)
             if 'joints' in values:
@@ -149,7 +149,7 @@ class ControlLoop:
                 self._arrived.notify()
 
     def figures(self) -> dict[str, float]:
-        """Return how well the time is kept: counts since the start, and :func:`loop_figures`."""
+        """Return timing statistics: counts since the start, and :func:`loop_figures`."""
         with self._arrived:
             counts = {'steps': self._steps, 'overruns': self._pacer.overruns}
             recorded = list(self._recorded)
@@ -187,7 +187,7 @@ class ControlLoop:
             last = now
 
     def _wait(self) -> None:
-        """Wait until a step is due, or feedback makes one."""
+        """Wait until a step is due, or feedback triggers one."""
         while not self._stopping:
             now = time.monotonic()
             left = self._pacer.deadline(self._arrival is not None) - now

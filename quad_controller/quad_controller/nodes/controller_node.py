@@ -74,17 +74,17 @@ Reply = TypeVar('Reply', SetMode.Response, Trigger.Response)
 
 
 class ControllerNode(Node):
-    """Subscribes the robot's state and what is asked of it, and publishes joint commands."""
+    """Subscribes to the robot's state and to commands, and publishes joint commands."""
 
     @destroyed_when_refused
     def __init__(self, stop: threading.Event) -> None:
         """Declare parameters, topics and services; :meth:`begin` starts the loop.
 
         Args:
-            stop: Set when the loop has ended by a defect.
+            stop: Set when the loop has ended with an unexpected error.
 
         Raises:
-            ParameterError: A parameter is misspelt or of the wrong kind.
+            ParameterError: A parameter is misspelt or of the wrong type.
             QuadControllerError: Parameters or the robot description do not fit.
         """
         super().__init__('controller_node')
@@ -165,7 +165,7 @@ class ControllerNode(Node):
         self._loop.start(lambda: raise_thread_priority(self, priority, 'the control loop'))
 
     def end(self) -> None:
-        """Stop sending; the servos hold their last targets."""
+        """Stop sending commands; the servos hold their last targets."""
         self._loader.shutdown(cancel_futures=True)
         if self._stamped is not None:
             self._stamped.close()
@@ -192,7 +192,7 @@ class ControllerNode(Node):
             self._recorder.offer(output, stamp, dt, computing, latency)
 
     def _load_first_policy(self) -> tuple[PolicyRunner | None, str]:
-        """Return the policy, or None and why there is none; the gait does not need it."""
+        """Load the initial policy; on failure, return None and the reason."""
         if not self._settings.policy:
             return None, NO_POLICY
         try:
@@ -204,7 +204,7 @@ class ControllerNode(Node):
         return loaded.runner, ''
 
     def _load_policy(self, text: str) -> LoadedPolicy:
-        """Load and check a policy by its path or name; the log has the table in either case."""
+        """Load and check a policy by path or name; log the table in either case."""
         settings = self._settings
         gait = GaitGenerator(settings.robot, settings.tuning)
         try:
@@ -222,7 +222,7 @@ class ControllerNode(Node):
         return loaded
 
     def _wait_for_estimates(self, policy: PolicyRunner) -> None:
-        """Wait for what a policy needs, in another thread; without it, the refusal says so."""
+        """Subscribe to a policy's inputs and wait; not in the executor thread."""
         topics = [t for t in _estimates_for(policy) if not self._arrived[t].is_set()]
         if self.executor is None or not topics:
             return
@@ -231,7 +231,7 @@ class ControllerNode(Node):
             time.sleep(2.0 * self._settings.states.period)  # the controller takes it with a step
 
     def _see_estimates(self, topics: Sequence[str]) -> None:
-        """Subscribe to estimates: each message costs time, and only some policies need them."""
+        """Subscribe to estimates, only if a policy needs them: messages cost time."""
         sensor = qos_profile_sensor_data
         takers = {'odom': self._take_odometry, 'foot_contacts': self._take_contacts}
         for topic in set(topics) - self._seen:
@@ -281,7 +281,7 @@ class ControllerNode(Node):
             self._refuse(Fault.IMU, str(error))
 
     def _age(self, topic: str, data: bytes) -> float:
-        """Return how old a measurement is [s], by its stamp where that can be, else 0."""
+        """Return the age of a measurement [s] by its stamp; 0 if that is unusable."""
         stamp = stamp_of(data)
         age = (self.get_clock().now().nanoseconds - stamp) / messages.NS
         if -MAX_AHEAD <= age <= MAX_AGE:
@@ -331,7 +331,7 @@ class ControllerNode(Node):
         self._take_twist(message.twist)
 
     def _check_for_stamped(self) -> None:
-        """Receive TwistStamped on cmd_vel, too, as soon as something publishes it."""
+        """Subscribe to TwistStamped on cmd_vel as soon as it has a publisher."""
         topic = self.resolve_topic_name('cmd_vel')
         kinds = {info.topic_type for info in self.get_publishers_info_by_topic(topic)}
         if STAMPED in kinds:
@@ -339,7 +339,7 @@ class ControllerNode(Node):
             self._loader.submit(self._receive_stamped, topic)
 
     def _receive_stamped(self, topic: str) -> None:
-        """Subscribe to TwistStamped, in the thread of the loader: a new participant takes time."""
+        """Subscribe to TwistStamped in the loader thread: a participant starts slowly."""
         try:
             self._stamped = OtherTypeSubscription(
                 self, TwistStamped, topic, self._take_stamped_twist, REQUEST_QOS
@@ -374,7 +374,7 @@ class ControllerNode(Node):
         return response
 
     def _take_load_request(self, request: LoadPolicy.Request) -> LoadPolicy.Response:
-        """Load a policy and follow it; in the thread of the loader."""
+        """Load a policy and follow it; runs in the loader thread."""
         answer = self._follow(request.path)
         self.get_logger().info(f'load_policy {request.path!r}: {answer.message}')
         return LoadPolicy.Response(success=answer.accepted, message=answer.message)
@@ -403,7 +403,7 @@ class ControllerNode(Node):
         return Answer(True, f'{answer.message}; sha256 {loaded.digest}')
 
     def _tune(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Apply another tuning of the gait, or return why it is refused."""
+        """Apply new gait parameters; return why they are rejected, if they are."""
         values = {parameter.name: parameter.value for parameter in parameters}
         try:
             gait = changed_gait(self._gait, values)
@@ -464,14 +464,14 @@ class ControllerNode(Node):
         self._diagnostics.publish(array)
 
     def _give_up(self, error: Exception) -> None:
-        """Log why the loop ended; the servos hold, and the process ends."""
+        """Log why the loop ended and end the process; the servos hold."""
         self.failure = f'{type(error).__name__}: {error}'
         self.get_logger().fatal(f'the control loop ended by a defect: {self.failure}')
         self._stop.set()
 
 
 def _estimates_for(policy: PolicyRunner) -> list[str]:
-    """Return the topics of estimates that a policy needs."""
+    """Return the estimate topics that a policy needs."""
     needs = {'odom': Source.LINEAR_VELOCITY, 'foot_contacts': Source.FOOT_CONTACTS}
     return [topic for topic, source in needs.items() if policy.contract.needs(source)]
 

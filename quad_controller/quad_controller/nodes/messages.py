@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""ROS messages to and from the controller's values, and a recorder of steps that holds up none."""
+"""Converts ROS messages to and from controller values; records steps without blocking."""
 
 from __future__ import annotations
 
@@ -65,15 +65,15 @@ IMU_NUMBERS = tuple(
 def imu_sample(
     message: Imu, numbers: Sequence[float], rotation_of: Callable[[str], Quaternion]
 ) -> ImuSample:
-    """Return what a message says of base_link.
+    """Convert an IMU message to a sample in base_link.
 
     Args:
-        message: What was measured, but for its numbers.
+        message: The message; its numbers are passed separately.
         numbers: As :data:`IMU_NUMBERS` names them.
-        rotation_of: Gives the rotation of a frame in base_link.
+        rotation_of: Returns the rotation of a frame in base_link.
 
     Raises:
-        ValueError: The orientation is not measured, or a variance of it is none.
+        ValueError: The orientation is not measured, or one of its variances is invalid.
     """
     covariance = message.orientation_covariance
     if covariance[0] == UNMEASURED:
@@ -99,7 +99,7 @@ def imu_sample(
 
 
 def foot_contacts(message: FootContacts) -> tuple[bool, ...]:
-    """Return which feet are on the ground, in the order of :data:`quad_description.FEET`.
+    """Return whether each foot is on the ground, in the order of :data:`quad_description.FEET`.
 
     Raises:
         ValueError: A foot is missing.
@@ -111,7 +111,7 @@ def foot_contacts(message: FootContacts) -> tuple[bool, ...]:
 
 
 def body_pose(message: Pose) -> BodyPose:
-    """Return the pose of the body relative to its normal one; all zeros are no rotation."""
+    """Return the pose of the body relative to its normal one; a zero quaternion means none."""
     place, turn = message.position, message.orientation
     rotation = turn.x, turn.y, turn.z, turn.w
     if not any(rotation):
@@ -120,12 +120,12 @@ def body_pose(message: Pose) -> BodyPose:
 
 
 class JointReader:
-    """Puts the joints of a message into the robot's order.
+    """Reorders the joints of a message into the robot's order.
 
     The legs must be measured. An arm's servo need not be: protocol v1 of the XGO does not report
-    one of them. Such a joint counts as being where it is sent, and is not sent anywhere before it
-    is to move, because its jump would be of unknown size. The order of a message seldom changes,
-    so the permutation is kept until it does.
+    one of them. Such a joint is assumed to be at its target. It receives no target before it has
+    to move, because the size of its jump is unknown. The permutation is cached until the order of
+    the message changes.
     """
 
     def __init__(self, robot: Quadruped) -> None:
@@ -143,13 +143,13 @@ class JointReader:
         """Return the joints of a message.
 
         Args:
-            message: What was measured, but for its numbers.
+            message: The message; its numbers are passed separately.
             numbers: Positions [rad], and velocities [rad/s] behind them.
-            sent: Where all joints were sent [rad], for those that are never reported.
+            sent: Last targets of all joints [rad], used for joints that are never reported.
 
         Raises:
-            ValueError: A joint of a leg, or one that was there before, is missing, or there are
-                not as many positions as names.
+            ValueError: A leg joint or a previously reported joint is missing, or the numbers of
+                positions and names differ.
         """
         if len(message.position) != len(message.name):
             raise ValueError(
@@ -186,10 +186,10 @@ class JointReader:
 
 
 class CommandFilter:
-    """Decides how many joints a command is for: all, or the first ones, which are the legs."""
+    """Selects the joints of a command: all, or only the legs, which come first."""
 
     def __init__(self, robot: Quadruped, *, others_move: bool) -> None:
-        """Begin with a robot that has not moved."""
+        """Start with a robot that has not moved."""
         legs = len(robot.names) - len(robot.others)
         legs_first = all(index >= legs for index in robot.others)
         self._count = legs if legs_first else len(robot.names)
@@ -198,7 +198,7 @@ class CommandFilter:
         self._moved = False
 
     def select(self, targets: Targets, title: str, unreported: Sequence[str]) -> Targets:
-        """Return the targets to send, of those of all joints [rad]."""
+        """Select the targets to send from those of all joints [rad]."""
         self._moved = self._moved or title not in STILL_TITLES
         if unreported and not (self.others_move and self._moved):
             return targets[: self._count]
@@ -206,12 +206,12 @@ class CommandFilter:
 
 
 def joint_command(stamp: Time, targets: Sequence[float]) -> JointCommand:
-    """Return the message of targets [rad]."""
+    """Build the message for joint targets [rad]."""
     return JointCommand(header=Header(stamp=stamp), position=targets)
 
 
 def state_diagnostic(node: str, status: Status) -> DiagnosticStatus:
-    """Describe what the robot does."""
+    """Build the diagnostic of the controller's state."""
     level, message = DiagnosticStatus.OK, status.title
     if status.faults:
         level, message = DiagnosticStatus.ERROR, '; '.join(status.faults)
@@ -244,7 +244,7 @@ def state_diagnostic(node: str, status: Status) -> DiagnosticStatus:
 
 
 def loop_diagnostic(node: str, figures: Mapping[str, float]) -> DiagnosticStatus:
-    """Describe how well the loop keeps its time."""
+    """Build the diagnostic of the loop timing."""
     digits = {'steps': 0, 'overruns': 0, 'rate': 2}
     return DiagnosticStatus(
         level=DiagnosticStatus.OK,
@@ -255,7 +255,7 @@ def loop_diagnostic(node: str, figures: Mapping[str, float]) -> DiagnosticStatus
 
 
 def recorder_diagnostic(node: str, recorder: Recorder) -> DiagnosticStatus:
-    """Describe how the recording goes."""
+    """Build the diagnostic of the recording."""
     trouble = recorder.failure or (f'{recorder.lost} steps lost' if recorder.lost else '')
     return DiagnosticStatus(
         level=DiagnosticStatus.WARN if trouble else DiagnosticStatus.OK,
@@ -276,13 +276,13 @@ FLUSH_PERIOD = 1.0  # [s] after which what was written outlives the process
 
 
 class Recorder:
-    """One recording, until :meth:`close`."""
+    """Records steps until :meth:`close`."""
 
     def __init__(self, folder: Path, about: Mapping[str, str], backlog: int = BACKLOG) -> None:
-        """Make the folder; at most ``backlog`` steps wait.
+        """Create the folder; the queue holds at most ``backlog`` steps.
 
         Raises:
-            ParameterError: It cannot be made.
+            ParameterError: The folder cannot be created.
         """
         self.folder = folder
         self.lost = 0  # steps that were not written: the disk was too slow or full
@@ -300,12 +300,12 @@ class Recorder:
     def offer(
         self, output: Output, stamp: int, dt: float, computing: float, latency: float | None
     ) -> None:
-        """Hand in a step; one that finds no place is lost, and counted. Never waits.
+        """Queue a step without blocking; if the queue is full, drop and count it.
 
         Args:
-            stamp: When it was sent in [ns since 1970].
-            dt: Time since the step before in [s].
-            computing: Time from its begin to the command in [s].
+            stamp: Time of sending in [ns since 1970].
+            dt: Time since the previous step in [s].
+            computing: Time from the start of the step to the command in [s].
             latency: Time from the joint states to the command in [s]; None without.
         """
         if not self._places.acquire(blocking=False):
@@ -315,7 +315,7 @@ class Recorder:
         self._writing.submit(self._write, output, stamp, dt, computing, latency)
 
     def close(self) -> None:
-        """Write what waits, and finish the recording."""
+        """Write the queued steps and finish the recording."""
         self._writing.shutdown()
         try:
             self._writer.close()
@@ -342,7 +342,7 @@ class Recorder:
 def _message(
     output: Output, stamp: int, dt: float, computing: float, latency: float
 ) -> ControllerStep:
-    """Return a step as it is recorded."""
+    """Build the recorded message of a step."""
     sec, nanosec = divmod(stamp, NS)
     seen, asked = output.situation, output.asked
     joints, imu = (seen.joints, seen.imu) if seen is not None else (None, None)
@@ -378,12 +378,12 @@ def _numbers(values: Any) -> array[float]:  # noqa: ANN401  # a sequence, an arr
 
 
 class OtherTypeSubscription:
-    """Calls back in a thread of its own until it is closed."""
+    """Subscription that calls back in its own thread until it is closed."""
 
     def __init__(
         self, node: Node, kind: type, topic: str, take: Callable[[Any], None], qos: int
     ) -> None:
-        """Subscribe to an absolute topic; what DDS raises leaves nothing behind."""
+        """Subscribe to an absolute topic; if DDS raises, clean up."""
         self._context = Context()
         init_ros([], self._context)
         try:
@@ -405,7 +405,7 @@ class OtherTypeSubscription:
         self._thread.start()
 
     def close(self) -> None:
-        """End it."""
+        """Close the subscription."""
         rclpy.shutdown(context=self._context)
         self._thread.join()
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The parameters of ``controller_node``: what they mean, their ranges, and what they make."""
+"""Parameters of ``controller_node``: meaning, ranges, and the settings made from them."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ def declare_parameters(node: Node) -> NodeSettings:
     """Declare all parameters of the node and read them.
 
     Raises:
-        node_runner.ParameterError: One is misspelt, of another kind or out of its range.
-        ParameterError: They do not make sense together; the message names the remedy.
-        DescriptionError: The robot description is no quadruped's.
+        node_runner.ParameterError: A parameter is misspelt, of the wrong type or out of range.
+        ParameterError: Parameters contradict each other; the message names the remedy.
+        DescriptionError: The robot description is not that of a quadruped.
     """
     read = ParameterReader(node)
     settings = read.settings(
@@ -67,13 +67,13 @@ def declare_parameters(node: Node) -> NodeSettings:
 
 
 def changed_gait(gait: GaitParameters, values: Mapping[str, object]) -> GaitParameters | None:
-    """Return a tuning with the parameters that concern it; None when there are none.
+    """Apply the gait parameters among some values; None if there are none.
 
     Args:
         values: Values of some parameters by their names.
 
     Raises:
-        ParameterError: A value does not make sense.
+        ParameterError: A value is invalid.
     """
     changes: dict[str, Any] = {
         name: values[name] for name, *_ in settings_of(gait) if name in values

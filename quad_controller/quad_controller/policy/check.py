@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The check of a policy before it may move anything: one row for each thing that must agree."""
+"""Checks a policy before it may move the robot: one row per property that must match."""
 
 from __future__ import annotations
 
@@ -45,13 +45,13 @@ def check_contract(
     period: float,
     servo: ServoResponse | None = None,
 ) -> Iterator[Row]:
-    """Compare what a policy declares with the robot; yields a row for each.
+    """Compare the contract of a policy with the robot; yield one row per property.
 
     Args:
-        document: Where the values of the contract come from.
-        hold_missing: Joints that the robot lacks count as being at their default.
+        document: Origins of the contract's values.
+        hold_missing: Treat joints that the robot lacks as being at their defaults.
         period: Time between two steps of the control loop in [s].
-        servo: How the servos of the robot follow; None when they are unknown.
+        servo: Response of the robot's servos; None if unknown.
     """
     count = len(contract.joint_names)
     inputs, outputs = observation_ports(network, contract.recurrence, contract.action.output)
@@ -100,11 +100,11 @@ def check_answers(
     stand: Floats,
     period: float,
 ) -> Iterator[Row]:
-    """Request actions of a policy as the controller will, and check them.
+    """Run a policy as the controller will, and check its actions.
 
     Args:
-        standing: The observation of a robot that stands.
-        stand: Where the robot stands, in the order of the policy [rad].
+        standing: Observation of a standing robot.
+        stand: Joint positions of the standing robot, in the policy's order [rad].
     """
 
     def run(observation: Floats) -> Floats:
@@ -149,7 +149,7 @@ def check_answers(
 def _history(
     run: Callable[[Floats], Floats], standing: Floats, contract: PolicyContract
 ) -> Iterator[Row]:
-    """Compare what the newest and the oldest step of a history do to the action."""
+    """Compare the influence of the newest and the oldest history step on the action."""
     ages = observed_places(contract) // sum(term.width for term in contract.terms)
     if not ages.any():
         return
@@ -174,7 +174,7 @@ def _shape(
     expected: int,
     meaning: str,
 ) -> Row:
-    """Compare the one input or output with its width."""
+    """Compare the shape of an input or output with the expected width."""
     found = ', '.join(f'{name} {kind} {list(shape)}' for name, kind, shape in ports)
     fits = (
         len(ports) == 1
@@ -187,7 +187,7 @@ def _shape(
 
 
 def _sizes_of(port: Port) -> tuple[int | None, ...]:
-    """Return the shape without the names of sizes that are open."""
+    """Return the shape with dynamic dimensions left unnamed."""
     return tuple(size if isinstance(size, int) else None for size in port[2])
 
 
@@ -197,7 +197,7 @@ def _sizes(what: str, sizes: Mapping[str, float], expected: int) -> Iterator[Row
 
 
 def _recurrent(network: OnnxNetwork, contract: PolicyContract) -> Iterator[Row]:
-    """Compare each recurrent input with its output: type, and sizes that are fixed."""
+    """Compare type and fixed sizes of each recurrent input and its output."""
     inputs = {name: (kind, shape) for name, kind, shape in network.inputs}
     outputs = {name: (kind, shape) for name, kind, shape in network.outputs}
     for state in contract.recurrence:
@@ -218,7 +218,7 @@ def _rates(
     document: ContractDocument,
     period: float,
 ) -> Iterator[Row]:
-    """Compare the rate that the policy was trained for with that of the loop."""
+    """Compare the policy's training rate with the rate of the control loop."""
     origin = document.origins.get('period', '')
     for key, step in (periods or {origin: contract.period}).items():
         fits = abs(step - contract.period) <= MAX_PERIOD_ERROR * contract.period
@@ -231,7 +231,7 @@ def _rates(
 
 
 def scale_rows(contract: PolicyContract, document: ContractDocument) -> Iterator[Row]:
-    """Refuse a scale of 0, and warn of those that three decimals have rounded."""
+    """Reject scales of 0; warn about scales rounded to three decimals."""
     scales = {f'observation.terms.{term.name}.scale': term.scale for term in contract.terms}
     for name, scale in {**scales, 'action.scale': contract.action.scale}.items():
         least = min(map(abs, scale), default=1.0)
@@ -244,7 +244,7 @@ def scale_rows(contract: PolicyContract, document: ContractDocument) -> Iterator
 
 
 def _commands(contract: PolicyContract) -> Iterator[Row]:
-    """Yield what the policy was commanded in training, for people to compare."""
+    """Yield the command ranges of the training, for the reader to compare."""
     commands = contract.commands
     if commands is not None:
         found = ', '.join(

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""From a file to a policy that may be followed, or to a table that says why not."""
+"""Loads a policy file and checks it; the result is a runnable policy or a table of reasons."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ UPRIGHT = ImuSample((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81))
 
 
 def read_contract_file(path: Path, joints: Sequence[str] = ()) -> ContractDocument:
-    """Read a file: our own YAML, or that of a training tool.
+    """Read a contract from our own YAML or from a training tool's file.
 
     Args:
-        joints: Names of the joints in the policy's order, where they are known already.
+        joints: Joint names in the policy's order, if already known.
 
     Raises:
-        PolicyError: It cannot be read, or is none of them.
+        PolicyError: The file cannot be read, or has an unknown format.
     """
     try:
         text = path.read_text(encoding='utf-8')
@@ -72,7 +72,7 @@ def _read(values: Values, path: Path, joints: Sequence[str]) -> ContractDocument
 
 @dataclass(frozen=True, slots=True)
 class LoadedPolicy:
-    """A policy that has passed."""
+    """A policy that passed all checks."""
 
     runner: PolicyRunner  # what runs it
     contract: PolicyContract  # what it expects
@@ -82,7 +82,7 @@ class LoadedPolicy:
     metadata: dict[str, str]  # what its file has, as it stands there
 
     def __str__(self) -> str:
-        """Return everything for people."""
+        """Return a readable summary."""
         lines = [f'policy {self.runner.name}', f'sha256 {self.digest}', str(self.report)]
         lines += [f'{path}: {value}  ({origin})' for path, value, origin in self.document.rows()]
         lines += [
@@ -94,10 +94,10 @@ class LoadedPolicy:
 
 
 def document_for(network: OnnxNetwork, options: PolicyOptions) -> ContractDocument:
-    """Return all that is known of a policy's contract; what counts most lies on top.
+    """Return all known contract values of a policy; merge sources by precedence.
 
     Raises:
-        PolicyError: A file cannot be read, or a value of it.
+        PolicyError: A file or a value in it cannot be read.
     """
     document = read_metadata(network.metadata)
     if options.contract is not None:
@@ -107,7 +107,7 @@ def document_for(network: OnnxNetwork, options: PolicyOptions) -> ContractDocume
 
 
 def _settings(document: ContractDocument, options: PolicyOptions) -> ContractDocument:
-    """Return what parameters set of terms."""
+    """Return the contract values that parameters set."""
     terms = document.values.get('observation', {}).get('terms', {})
     values: dict[str, dict[str, object]] = {}
     if options.imu_frame is not ImuFrame.AUTO:
@@ -157,7 +157,7 @@ def load_policy(
 
 
 def _accepted(rows: tuple[Row, ...], verdict: str) -> Report:
-    """Return the rows of a check as a report."""
+    """Collect the rows of a check into a report."""
     report = Report(rows)
     if report.refused:
         raise PolicyError(f'{verdict}:\n{report}', report.reason)
@@ -165,7 +165,7 @@ def _accepted(rows: tuple[Row, ...], verdict: str) -> Report:
 
 
 def _observed(runner: PolicyRunner, stand: Targets) -> Floats:
-    """Return what a policy observes of a robot that stands."""
+    """Return the policy's observation of a standing robot."""
     runner.reset(stand)
     still = JointSample(stand, (0.0,) * len(stand))
     contacts = (True,) * len(FEET)
@@ -174,15 +174,15 @@ def _observed(runner: PolicyRunner, stand: Targets) -> Floats:
 
 
 def shipped_policies() -> dict[str, Path]:
-    """Return the files of all shipped policies by their names."""
+    """Return the files of all shipped policies by name."""
     return {path.stem: path for path in sorted(SHIPPED.glob('*.onnx'))}
 
 
 def find_policy(text: str) -> Path:
-    """Return the file of a path, or of a shipped policy's name.
+    """Return the file for a path, or for the name of a shipped policy.
 
     Raises:
-        PolicyError: It is neither.
+        PolicyError: The text is neither.
     """
     path = Path(text).expanduser()
     if path.is_file():

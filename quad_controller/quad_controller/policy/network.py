@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The network behind a policy: numbers in, numbers out; its ONNX file with weights and metadata.
+"""Runs a policy's network, and reads weights and metadata of its ONNX file.
 
 An ONNX file is a message of protocol buffers (onnx.proto), which ONNX Runtime brings: weights may
 lie in other files beside it (``external_data``), and metadata are entries of a repeated field. The
@@ -30,16 +30,16 @@ SIDES_KEY = 'weights_sha256'
 
 
 class OnnxNetwork:
-    """A network in an ONNX file, run by ONNX Runtime on one thread."""
+    """A network from an ONNX file, run by ONNX Runtime on one thread."""
 
     def __init__(self, path: Path, *, new_weights: bool = False) -> None:
-        """Load it.
+        """Load the network.
 
         Args:
-            new_weights: Accept side files other than those that its contract was written for.
+            new_weights: Accept external weight files that differ from those of the contract.
 
         Raises:
-            PolicyError: There is no such file, no ONNX Runtime, or it cannot be loaded.
+            PolicyError: The file or ONNX Runtime is missing, or the model cannot be loaded.
         """
         model = read_model(path)
         # SHA-256 of the file and of the side files that its weights lie in
@@ -57,7 +57,7 @@ class OnnxNetwork:
         self._output = [self.outputs[0][0]] if self.outputs else []
 
     def recur(self, states: tuple[RecurrentState, ...], actions: str = '') -> None:
-        """Feed outputs to inputs in the step after; `actions` names the output of the actions."""
+        """Feed outputs back to inputs in the next step; `actions` names the action output."""
         self._states = states
         inputs, outputs = observation_ports(self, states, actions)
         self._input = inputs[0][0] if inputs else ''
@@ -65,7 +65,7 @@ class OnnxNetwork:
         self.reset()
 
     def reset(self) -> None:
-        """Begin anew: recurrent states are zero."""
+        """Set recurrent states to zero."""
         shapes = {name: shape for name, _, shape in self.inputs}
         self._memory = {
             state.input: np.zeros(
@@ -75,7 +75,7 @@ class OnnxNetwork:
         }
 
     def run(self, observation: Floats) -> Floats:
-        """Return the action for an observation; both have one row."""
+        """Return the action for an observation; both are arrays with one row."""
         answers = self._session.run(self._output, {self._input: observation, **self._memory})
         for state, answer in zip(self._states, answers[1:], strict=True):
             self._memory[state.input] = answer
@@ -86,10 +86,10 @@ class OnnxNetwork:
 def observation_ports(
     network: OnnxNetwork, states: tuple[RecurrentState, ...], actions: str
 ) -> tuple[list[Port], list[Port]]:
-    """Return the inputs and outputs that are not recurrent: one each in a network that fits.
+    """Return the non-recurrent inputs and outputs; a valid network has one of each.
 
     Args:
-        actions: Name of the output that holds the actions; empty where there is one only.
+        actions: Name of the output that holds the actions; empty if there is only one.
     """
     fed, kept = {state.input for state in states}, {state.output for state in states}
     outputs = [port for port in network.outputs if port[0] not in kept]
@@ -104,9 +104,9 @@ def _ports(nodes: Any) -> tuple[Port, ...]:  # noqa: ANN401  # ONNX Runtime has 
 
 
 def _check_weights(path: Path, model: OnnxModel, metadata: Mapping[str, str]) -> tuple[str, ...]:
-    """Refuse weights that are not numbers, or not those of the model; return warnings.
+    """Reject weights that are not finite or not the expected ones; return warnings.
 
-    Recurrent cells of ONNX Runtime turn NaN into ordinary numbers, so answers do not show it.
+    Recurrent cells of ONNX Runtime turn NaN into ordinary numbers, so outputs do not reveal it.
     """
     damaged = model.not_finite()
     if damaged:
@@ -179,7 +179,7 @@ FLOATS = {1: '<f4', 10: '<f2', 11: '<f8'}  # types of tensors
 
 @functools.cache
 def _model_class() -> Any:  # noqa: ANN401  # made of the table
-    """Return the class of a model; it keeps what the table does not have."""
+    """Return the protobuf class of a model; it keeps unknown fields."""
     from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
     file = descriptor_pb2.FileDescriptorProto(name='onnx.proto', package='onnx')
@@ -201,7 +201,7 @@ def _model_class() -> Any:  # noqa: ANN401  # made of the table
 
 
 def _parsed(data: bytes) -> Any:  # noqa: ANN401  # made of the table
-    """Return a model; an empty one for what is no ONNX, as ONNX Runtime says so better."""
+    """Parse a model; invalid data give an empty one, since ONNX Runtime reports that better."""
     from google.protobuf.message import DecodeError
 
     try:
@@ -212,7 +212,7 @@ def _parsed(data: bytes) -> Any:  # noqa: ANN401  # made of the table
 
 @dataclass(frozen=True, slots=True)
 class OnnxModel:
-    """A model as it was read once: what happens to its files later does not count."""
+    """A model held in memory: later changes to its files have no effect."""
 
     data: bytes  # its file
     # files that its weights lie in, by the names that the model has for them
@@ -220,7 +220,7 @@ class OnnxModel:
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the file, with that of each side file."""
+        """SHA-256 of the model file and of each external weight file."""
         if not self.sides:
             return hashlib.sha256(self.data).hexdigest()
         whole = hashlib.sha256(hashlib.sha256(self.data).digest())
@@ -231,12 +231,12 @@ class OnnxModel:
 
     @property
     def sides_digest(self) -> str:
-        """SHA-256 of the side files alone; empty where there is none."""
+        """SHA-256 of the external weight files alone; empty if there are none."""
         whole = hashlib.sha256(b''.join(self.sides.values()))
         return whole.hexdigest() if self.sides else ''
 
     def not_finite(self) -> list[str]:
-        """Name the tensors with a weight that is not finite."""
+        """Return the names of tensors that contain a non-finite weight."""
         tensors = _tensors(_parsed(self.data).graph)
         return [each.name for each in tensors if not np.isfinite(self._weights(each)).all()]
 
@@ -254,10 +254,10 @@ class OnnxModel:
 
 
 def read_model(path: Path) -> OnnxModel:
-    """Read a model and the files that its weights lie in.
+    """Read a model and its external weight files.
 
     Raises:
-        PolicyError: A file cannot be read, or lies outside of the folder of the first one.
+        PolicyError: A file cannot be read, or lies outside of the model's folder.
     """
     data = _read(path)
     lack = f'; weights of {path.name} lie there: copy that file along'
@@ -266,10 +266,10 @@ def read_model(path: Path) -> OnnxModel:
 
 
 def side_files(path: Path, data: bytes) -> dict[str, Path]:
-    """Return the files that the weights of a model lie in, by their names in the model.
+    """Return the external weight files of a model, by their names in the model.
 
     Raises:
-        PolicyError: A name leads out of the folder of the model.
+        PolicyError: A name points outside of the model's folder.
     """
     entries = (entry for each in _tensors(_parsed(data).graph) for entry in each.external_data)
     names = sorted({entry.value for entry in entries if entry.key == 'location'})
@@ -283,7 +283,7 @@ def side_files(path: Path, data: bytes) -> dict[str, Path]:
 
 
 def with_metadata(data: bytes, key: str, value: str) -> bytes:
-    """Return a model with one entry of its metadata set; all else stays."""
+    """Return a copy of a model with one metadata entry set."""
     model = _parsed(data)
     kept = {entry.key: entry.value for entry in model.metadata_props}
     del model.metadata_props[:]

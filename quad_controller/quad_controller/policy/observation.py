@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Makes the observation of a policy, as its contract says: terms, scales, clips, history."""
+"""Builds a policy's observation from its contract: terms, scales, clips, history."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ BLEND_WEIGHT = 0.1
 
 
 def gravity(imu: ImuSample, source: GravitySource) -> Vector:
-    """Return the direction of gravity in the body's frame, (0, 0, -1) upright.
+    """Return the unit vector of gravity in the body frame, (0, 0, -1) when upright.
 
     An accelerometer at rest reads +g upward (REP 145).
     """
@@ -57,7 +57,7 @@ def gravity(imu: ImuSample, source: GravitySource) -> Vector:
 
 @dataclass(frozen=True, slots=True)
 class Situation(RobotState):
-    """What a motion, by the gait or by a policy, may know in one step: nothing that is too old."""
+    """Inputs of a motion (gait or policy) in one step; outdated measurements are left out."""
 
     velocity: Velocity = REST  # that is requested
     pose: BodyPose = UPRIGHT  # of the body that is requested
@@ -85,10 +85,10 @@ ROUNDING = 1e-6  # [m/s] of a velocity in a recording
 
 
 class ObservationBuilder:
-    """Fills one buffer, step after step."""
+    """Fills one observation buffer, step after step."""
 
     def __init__(self, contract: PolicyContract, source: GravitySource) -> None:
-        """Prepare it."""
+        """Allocate the buffer."""
         self._defaults: Floats = np.array(contract.default_positions, np.float32)
         # of the joints in the order of the policy, in [rad] and [rad/s], and the last action
         self.positions, self.previous = self._defaults.copy(), np.zeros_like(self._defaults)
@@ -119,7 +119,7 @@ class ObservationBuilder:
         self._time = 0.0
 
     def reset(self) -> None:
-        """Begin anew: no history, all clocks at zero."""
+        """Clear the history and set all clocks to zero."""
         self._history[:] = 0.0
         self._begun = False
         self._time = 0.0
@@ -129,7 +129,7 @@ class ObservationBuilder:
         self._time += dt
 
     def build(self, seen: Situation, imu: ImuSample) -> Floats:
-        """Return the observation; the history goes on by one step."""
+        """Return the observation and advance the history by one step."""
         past, frame = self._history[1:], self._history[0]
         if len(past):
             past[:] = self._history[:-1]
@@ -155,7 +155,7 @@ class ObservationBuilder:
         return row
 
     def _reader(self, term: ObservationTerm, source: GravitySource) -> Reader:
-        """Return what gives one step of a term, before clip and scale."""
+        """Return the function that reads one term, before clip and scale."""
         if term.source is Source.JOINT_POSITIONS and term.relative:
             return lambda *_: self.positions - self._defaults
         readers: Mapping[Source, Reader] = {
@@ -181,10 +181,10 @@ class ObservationBuilder:
 
 
 def observed_places(contract: PolicyContract) -> npt.NDArray[np.intp]:
-    """Return where each number of the observation is found in the history.
+    """Return the history index of each number in the observation.
 
     The history is a table: a row for each step, the newest first; a column for each number of
-    one step. The places count its cells row by row.
+    one step. The indices count its cells row by row.
     """
     columns = sum(term.width for term in contract.terms)
     newest_first = contract.newest is Newest.FIRST

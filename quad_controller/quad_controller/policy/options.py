@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-r"""How a policy is run, where its file leaves that open, and the table of what a check found.
+r"""Options for running a policy, and the report of its check.
 
-Gains of the training are held against the servos of the robot. A position servo with stiffness
+Training gains are compared with the servos of the robot. A position servo with stiffness
 :math:`k`, damping :math:`d` and an inertia :math:`J` at its joint is a low-pass of second order
 with :math:`\omega = \sqrt{k / J}` and :math:`\zeta = d / (2 \sqrt{k J})`; its bandwidth is
-where it has lost 3 dB.
+the -3 dB frequency.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .contract.model import Gains
 
 
 class Verdict(Enum):
-    """What follows from a row."""
+    """Result of one check."""
 
     OK = 'ok'
     WARN = 'warn'
@@ -34,7 +34,7 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One thing that was looked at."""
+    """One check and its result."""
 
     subject: str  # what
     expected: str  # what it should be
@@ -44,18 +44,18 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """All rows."""
+    """All rows of a check."""
 
     rows: tuple[Row, ...]
 
     @property
     def refused(self) -> bool:
-        """Whether the policy must not be followed."""
+        """Whether the policy was rejected."""
         return any(row.verdict is Verdict.REFUSE for row in self.rows)
 
     @property
     def reason(self) -> str:
-        """What the policy is refused for, in one line."""
+        """Why the policy was rejected, in one line."""
         return '; '.join(
             f'{row.subject}: {row.found} instead of {row.expected}'
             for row in self.rows
@@ -63,19 +63,19 @@ class Report:
         )
 
     def __str__(self) -> str:
-        """Return a table for people."""
+        """Return the report as a text table."""
         rows = [('check', 'expected', 'found', '')]
         rows += [(row.subject, row.expected, row.found, row.verdict.value) for row in self.rows]
         return table_text(rows)
 
 
 def table_text(rows: Sequence[Sequence[str]], *, numbers: bool = False, widest: int = 1000) -> str:
-    """Return a table for people: columns stand under each other.
+    """Format rows as a text table with aligned columns.
 
     Args:
         rows: Their cells; the first row has the headings.
-        numbers: All columns but the first are aligned at the right.
-        widest: A cell with more characters runs over, and moves no other line.
+        numbers: Right-align all columns but the first.
+        widest: Longer cells overflow and do not widen their column.
     """
     widths = [min(max(map(len, column)), widest) for column in zip(*rows, strict=True)]
     return '\n'.join(
@@ -93,7 +93,7 @@ STATED = 'gains of the training'
 
 @dataclass(frozen=True, slots=True)
 class ServoResponse:
-    """How a servo follows its target."""
+    """Response of a servo to its target."""
 
     stiffness: float  # torque per position error in [N m/rad]
     damping: float  # torque per speed in [N m s/rad], of motor and control together
@@ -102,7 +102,7 @@ class ServoResponse:
 
     @property
     def bandwidth(self) -> float:
-        """Frequency at which it has lost 3 dB in [Hz]."""
+        """-3 dB bandwidth in [Hz]."""
         natural = math.sqrt(self.stiffness / self.inertia)
         ratio = self.damping / (2.0 * math.sqrt(self.stiffness * self.inertia))
         bend = 1.0 - 2.0 * ratio**2
@@ -110,7 +110,7 @@ class ServoResponse:
 
 
 def gain_rows(gains: Gains | None, servo: ServoResponse | None, period: float) -> Iterator[Row]:
-    """Compare the gains of a training with the servos, each None where unknown."""
+    """Compare the training gains with those of the servos; None means unknown."""
     if gains is None:
         if servo is not None:
             here = f'{servo.stiffness:g} N m/rad, {servo.bandwidth:.1f} Hz'
@@ -151,7 +151,7 @@ def gain_rows(gains: Gains | None, servo: ServoResponse | None, period: float) -
 
 
 def _row(subject: str, expected: str, found: str, ratio: float, does: tuple[str, str]) -> Row:
-    """Warn where the servos have much more or much less than the training."""
+    """Warn if the servos differ much from the training."""
     if 1.0 / MAX_RATIO <= ratio <= MAX_RATIO:
         return Row(subject, expected, found, Verdict.OK)
     text = does[0].format(ratio) if ratio > 1.0 else does[1].format(1.0 / ratio)
@@ -159,7 +159,7 @@ def _row(subject: str, expected: str, found: str, ratio: float, does: tuple[str,
 
 
 def _farthest(values: Sequence[float], from_value: float) -> float:
-    """Return the value whose ratio to another one is the farthest from one."""
+    """Return the value whose ratio to the reference is farthest from one."""
     return max(values, key=lambda value: abs(math.log(value / from_value)))
 
 
@@ -169,9 +169,9 @@ def _span(values: Sequence[float], form: str = 'g') -> str:
 
 
 class GravitySource(Enum):
-    """Where the direction of gravity is taken from.
+    """Source of the gravity direction.
 
-    ``BLEND`` is the orientation, drawn a little to the accelerometer while that feels about 1 g.
+    ``BLEND`` mixes a little of the accelerometer into the orientation while it reads about 1 g.
     """
 
     ACCEL = 'accel'
@@ -180,7 +180,7 @@ class GravitySource(Enum):
 
 
 class ImuFrame(Enum):
-    """Frame in which the policy expects the angular velocity; ``AUTO`` is that of its contract."""
+    """Frame of the angular velocity that the policy expects; ``AUTO`` reads the contract."""
 
     AUTO = 'auto'
     BASE = 'base'
@@ -189,7 +189,7 @@ class ImuFrame(Enum):
 
 @dataclass(frozen=True, slots=True)
 class PolicyOptions:
-    """Options of the runner."""
+    """Options of the policy runner."""
 
     # file whose values count before those in the policy's own; None for none
     contract: Path | None = None
@@ -213,24 +213,24 @@ class PolicyOptions:
     servo: ServoResponse | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what makes no sense.
+        """Reject values outside of their ranges.
 
         Raises:
-            ParameterError: A value is outside of its range.
+            ParameterError: A value is out of range.
         """
         check_settings(self, 'policy_')
 
     def to_json(self) -> str:
-        """Return all that decides about observations and targets, but the contract's file."""
+        """Return all options that affect observations and targets, except the contract file."""
         values = {name: getattr(self, name) for name, *_ in settings_of(self)}
         return json.dumps(values, default=lambda choice: choice.value)
 
     @classmethod
     def from_json(cls, text: str, contract: Path | None = None) -> PolicyOptions:
-        """Return what :meth:`to_json` wrote, with a file of the contract.
+        """Read the result of :meth:`to_json`, with a contract file added.
 
         Raises:
-            ParameterError: It is something else.
+            ParameterError: The text has another format.
         """
         try:
             values: dict[str, Any] = json.loads(text)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Runs a policy that fits: observation in, protected joint targets out."""
+"""Runs a validated policy: observation in, limited joint targets out."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TOLERANCE = 1.1  # share of its noise that velocities may have: the period of re
 
 @dataclass(frozen=True, slots=True)
 class PolicyStep:
-    """What a policy answers in one step."""
+    """Result of one policy step."""
 
     # positions of all joints in [rad]; None when the answer cannot be used
     targets: Targets | None
@@ -33,7 +33,7 @@ class PolicyStep:
 
 
 class PolicyRunner:
-    """A trained policy that fits the robot."""
+    """A trained policy that matches the robot."""
 
     def __init__(
         self,
@@ -44,14 +44,14 @@ class PolicyRunner:
         options: PolicyOptions,
         period: float,
     ) -> None:
-        """Prepare it.
+        """Set up the policy.
 
         Args:
-            contract: What it expects; checked before.
-            period: Of the control loop in [s]; that of the policy is one or several of them.
+            contract: Contract of the policy, already checked.
+            period: Period of the control loop in [s]; the policy's period is a multiple of it.
 
         Raises:
-            PolicyError: Targets are clipped to where a joint may not be.
+            PolicyError: The clip range of a target lies outside of the joint limits.
         """
         self.name, self.digest, self.contract = network.name, network.digest, contract
         self._network = network
@@ -77,7 +77,7 @@ class PolicyRunner:
         self._filtered: Floats | None = None
 
     def missing(self, inputs: Situation) -> str:
-        """Return which measurement it lacks; nothing when all is there."""
+        """Return which measurement the policy lacks; empty if none."""
         needs, joints, imu = self.contract.needs, inputs.joints, inputs.imu
         if joints is None or imu is None:
             return 'a policy needs joint states and an attitude; there are none yet'
@@ -92,9 +92,9 @@ class PolicyRunner:
         return ''
 
     def inexact(self, joints: JointSample | None, *, stated: bool = False) -> str:
-        """Return why joint velocities may be too inexact for it; nothing where they are not.
+        """Return why joint velocities may be too noisy for the policy; empty if they are not.
 
-        ``stated``: only if the contract states what it was trained with.
+        ``stated``: check only if the contract states the noise in training.
         """
         noise = self.contract.velocity_noise
         error = 0.0 if joints is None else joints.velocity_error
@@ -110,10 +110,10 @@ class PolicyRunner:
         )
 
     def reset(self, others: Targets) -> None:
-        """Begin anew: no previous action, no history, phase zero.
+        """Reset the previous action, the history and the phase.
 
         Args:
-            others: Positions of all joints, for those that the policy does not move [rad].
+            others: Positions of all joints [rad], used for those that the policy does not move.
         """
         self._others = others
         self._builder.previous[:] = 0.0
@@ -123,13 +123,13 @@ class PolicyRunner:
         self._network.reset()
 
     def in_its_order(self, positions: Targets) -> Floats:
-        """Return positions in the policy's order, defaults of joints that it alone has."""
+        """Return positions in the policy's order; joints that the robot lacks have defaults."""
         ordered: Floats = self._defaults.copy()
         ordered[self._policy_places] = np.array(positions)[self._robot_places]
         return ordered
 
     def observe(self, inputs: Situation) -> Floats:
-        """Return the observation; its history goes on by one step."""
+        """Return the observation and advance its history by one step."""
         joints, imu = inputs.joints, inputs.imu
         if joints is None or imu is None:
             raise ValueError('a policy observes joints and attitude')
@@ -144,7 +144,7 @@ class PolicyRunner:
         return builder.build(inputs, imu)
 
     def step(self, inputs: Situation, dt: float) -> PolicyStep:
-        """Advance by some [s]; a slower policy is asked in one of several steps."""
+        """Advance by a time [s]; a slower policy runs only once in several steps."""
         self.advance(dt)
         if missing := self.missing(inputs):
             return PolicyStep(None, missing)
@@ -163,11 +163,11 @@ class PolicyRunner:
         return PolicyStep(self.act(action, dt), observation=observation, action=action)
 
     def advance(self, dt: float) -> None:
-        """Advance the clock of the phase by a duration in [s]."""
+        """Advance the phase clock by a duration in [s]."""
         self._builder.advance(dt)
 
     def act(self, action: Floats, dt: float) -> Targets:
-        """Return the protected targets that an action means; it is the last one now."""
+        """Convert an action to limited targets, and store it as the previous action."""
         if self._clip is not None:
             action = np.clip(action, *self._clip)
         self._builder.previous[:] = action
@@ -177,7 +177,7 @@ class PolicyRunner:
         return self._targets(self._wanted, dt)
 
     def _command(self, velocity: Velocity) -> Velocity:
-        """Return a velocity within what the policy was trained for."""
+        """Clamp a velocity to the command ranges of the training."""
         if self.contract.commands is None:
             return velocity
         axes = zip(velocity, self.contract.commands, strict=True)
@@ -195,7 +195,7 @@ class PolicyRunner:
         return tuple(targets)
 
     def _limits(self, robot: Quadruped, share: float) -> tuple[Floats, Floats]:
-        """Return the range of each target in the policy's order; the default pose is in it."""
+        """Return the target ranges in the policy's order, extended to the default pose."""
         lower, upper = self._defaults.copy(), self._defaults.copy()
         for policy, place in self._places:
             limits = robot.limits[place]

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where a robot walks: in physics at once, or behind its serial line with clocks that do not wait.
+"""Test arenas: physics in virtual time, or a simulated robot on a serial line in real time.
 
-The only part of this package that knows the simulator.
+Only this module of the package depends on the simulator.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ FRESH = 3  # reports after which what was observed before the robot was put down
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
-    """How robot and ground differ."""
+    """Variations of robot and ground."""
 
     trunk_mass: float = 1.0  # factor of the mass of the trunk
     push: float = 0.0  # change of the velocity at once, to any side, every two seconds, in [m/s]
@@ -47,7 +47,7 @@ TIPPING_PUSH = 1.3
 
 @dataclass(frozen=True, slots=True)
 class RobotChoice:
-    """Which simulated robot walks."""
+    """Selects the simulated robot."""
 
     preset: str = 'lite'  # of its description
     arm: bool = False  # it has its arm
@@ -55,17 +55,17 @@ class RobotChoice:
 
     @property
     def urdf(self) -> str:
-        """What it is made of."""
+        """URDF of the robot."""
         return robot_urdf(self.preset, arm=self.arm)
 
     def tuned(self, gait: GaitParameters) -> GaitParameters:
-        """Return a gait that knows how stiff the servos are."""
+        """Return gait parameters adapted to the stiffness of the servos."""
         model = gait.servo or ServoModel()
         return replace(gait, servo=replace(model, kp=parse_servo(self.servo).stiffness))
 
 
 def servo_response(servo: str) -> ServoResponse:
-    """Return how the servos of a model follow their targets."""
+    """Return the response of a model's servos to their targets."""
     parameters = parse_servo(servo)
     return ServoResponse(
         parameters.stiffness,
@@ -76,23 +76,23 @@ def servo_response(servo: str) -> ServoResponse:
 
 
 class BytesBackend(PhysicsBackend):
-    """A robot in physics behind the bytes of protocol v1, in virtual time."""
+    """A robot in physics behind protocol v1 encoding, in virtual time."""
 
     def __init__(self, robot: Robot, choice: RobotChoice, watch: Callable[[], None]) -> None:
         super().__init__(robot, watch=watch)
         self._bytes = JointBytes(choice.urdf, Model(choice.preset))
 
     def reset(self) -> RobotState:
-        """Stand on the ground again."""
+        """Reset the robot to standing."""
         self._bytes.reset()
         return super().reset()
 
     def step(self, targets: Sequence[float] | None) -> RobotState:
-        """Send targets, and let a period pass."""
+        """Send targets and advance by one period."""
         return super().step(targets and self._bytes.rounded(targets))
 
     def observe(self) -> RobotState:
-        """Return the state as far as the bytes carry it."""
+        """Return the state that the protocol can carry."""
         state = super().observe()
         positions = () if state.joints is None else state.joints.positions
         return replace(state, joints=self._bytes.read(positions, state.time))
@@ -104,7 +104,7 @@ class PhysicsArena:
     interruption = ''  # virtual time waits
 
     def __init__(self, choice: RobotChoice, conditions: Conditions = AS_MADE) -> None:
-        """Make robot and ground."""
+        """Create robot and ground."""
         urdf = choice.urdf
         ground = Terrain(roughness=conditions.roughness, seed=1)
         robot = Robot(urdf, parse_servo(choice.servo), ground)
@@ -123,13 +123,13 @@ class PhysicsArena:
 
 
 class SerialArena(Backend):
-    """A robot in physics behind its serial line, in another process and in real time.
+    """A robot in physics behind a serial line, in another process and in real time.
 
-    Its machine may be busy: the robot is waited for, and that is noted.
+    On a busy machine, it waits for the robot and records the interruption.
     """
 
     def __init__(self, served: ServedRobot, driver: Backend) -> None:
-        """Watch a robot by the driver of its serial port."""
+        """Observe a robot through the driver of its serial port."""
         self.robot, self._driver = served, driver
         self.names, self.period = driver.names, driver.period
         self.backend: Backend = self
@@ -142,10 +142,10 @@ class SerialArena(Backend):
         return self._driver.reset()
 
     def step(self, targets: Sequence[float] | None) -> RobotState:
-        """Send targets, and wait for the next report.
+        """Send targets and wait for the next report.
 
         Raises:
-            NoAnswerError: There is none for a long time.
+            NoAnswerError: No report arrives for a long time.
         """
         now, before = time.monotonic(), self._stepped_at
         if before is not None and now - before > MAX_PAUSE:
@@ -159,14 +159,14 @@ class SerialArena(Backend):
         return state
 
     def observe(self) -> RobotState:
-        """Return what the newest report has."""
+        """Return the state of the newest report."""
         return self._driver.observe()
 
     def close(self) -> None:
-        """Leave the robot to :func:`serial_arena`."""
+        """Do nothing: :func:`serial_arena` owns the robot."""
 
     def _wait(self, deadline: float) -> RobotState:
-        """Return the next report; a time-out of the driver is no end before the deadline."""
+        """Return the next report; retry after driver time-outs until the deadline."""
         while time.monotonic() < deadline:
             with suppress(NoAnswerError):
                 return self._driver.step(None)
@@ -183,7 +183,7 @@ class SerialArena(Backend):
 
 @contextmanager
 def serial_arena(choice: RobotChoice, *, noise: bool = True) -> Iterator[SerialArena]:
-    """Simulate a robot, by default as noisy as a board, behind a serial port, and open the port.
+    """Simulate a robot behind a serial port, by default with a board's noise; open the port.
 
     Raises:
         CheckError: The simulation or the line failed.

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A course of commanded velocities, and the figures of who walked it: a policy or the gait.
+"""A test course of commanded velocities, and its results for a policy or the gait.
 
-Both walk through the same controller that runs on the robot.
+Both run in the same controller as on the robot.
 """
 
 from __future__ import annotations
@@ -47,14 +47,14 @@ SPEEDS = 3
 
 
 def axis_of(command: Velocity) -> str:
-    """Return the main axis of a command: a key of :data:`AXES`."""
+    """Return the main axis of a command, a key of :data:`AXES`."""
     shares = [abs(part) / top for part, top in zip(command, TOP, strict=True)]
     return list(AXES)[shares.index(max(shares))]
 
 
 @dataclass(frozen=True, slots=True)
 class Passage:
-    """What came of one command."""
+    """Results for one command."""
 
     commanded: Velocity
     went: Velocity  # mean velocity, in the robot's own frame
@@ -70,39 +70,39 @@ class Passage:
 
     @property
     def axis(self) -> str:
-        """Along which axis it goes mainly: a key of :data:`AXES`."""
+        """Main axis of the command, a key of :data:`AXES`."""
         return axis_of(self.commanded)
 
     @property
     def error(self) -> float:
-        """Distance of the velocity over the ground from the command in [m/s]."""
+        """Velocity error over the ground in [m/s]."""
         return math.hypot(self.went.x - self.commanded.x, self.went.y - self.commanded.y)
 
     @property
     def turning_error(self) -> float:
-        """The same of the turning in [rad/s]."""
+        """Turning rate error in [rad/s]."""
         return abs(self.went.yaw - self.commanded.yaw)
 
 
 @dataclass(frozen=True, slots=True)
 class CourseFigures:
-    """What came of a course."""
+    """Results for a course."""
 
     passages: tuple[Passage, ...]  # of each command
 
     @property
     def falls(self) -> int:
-        """How often it fell."""
+        """Number of falls."""
         return sum(each.falls for each in self.passages)
 
     @property
     def falls_per_minute(self) -> float:
-        """Falls in a minute of walking."""
+        """Falls per minute of walking."""
         time = sum(each.time for each in self.passages)
         return 60.0 * self.falls / time if time > 0.0 else math.inf
 
     def mean(self, name: str, axis: str | None = None) -> float:
-        """Return the mean of an attribute of the passages of an axis, or all; NaN without any."""
+        """Return the mean of an attribute over the passages of an axis, or all; NaN if none."""
         values = [
             getattr(each, name) for each in self.passages if axis is None or each.axis == axis
         ]
@@ -111,13 +111,13 @@ class CourseFigures:
 
     @property
     def timing(self) -> CommandTiming | None:
-        """When commands came on the wire; None without real clocks."""
+        """Timing of the commands on the wire; None in virtual time."""
         there = [each.timing for each in self.passages if each.timing is not None]
         return functools.reduce(operator.add, there) if there else None
 
 
 def course_for(ranges: CommandRanges | None) -> tuple[Velocity, ...]:
-    """Return three speeds of each axis that a policy was trained for, and one backward."""
+    """Return three speeds per axis within the policy's command ranges, and one backward."""
     commands = []
     limits = ranges or [(-math.inf, math.inf)] * len(AXES)
     for axis, (least, most) in zip(AXES.values(), limits, strict=True):
@@ -140,7 +140,7 @@ class CourseWalker:
         policy: PolicyRunner | None,
         gait: GaitParameters = AS_TUNED,
     ) -> None:
-        """Put the robot on its feet, walked by a policy or the gait."""
+        """Put the robot on its feet, driven by a policy or the gait."""
         self._arena, self._backend = arena, arena.backend
         self._robot, self._policy, self._gait = robot, policy, gait
         self._mode = State.WALK if policy is None else State.POLICY
@@ -156,26 +156,26 @@ class CourseWalker:
         self.forget()
 
     def forget(self) -> None:
-        """Count targets and observations from now on."""
+        """Reset the statistics of targets and observations."""
         self.observed: list[Floats] = []  # what the policy saw so far
         self._targets: list[np.ndarray] = []
         self._bends, self._bend_count = 0.0, 0
 
     @property
     def smoothness(self) -> float:
-        """How much targets bend: root mean square of their second difference in [rad]."""
+        """Root mean square of the targets' second difference in [rad]."""
         return math.sqrt(self._bends / self._bend_count) if self._bend_count else 0.0
 
     @property
     def is_down(self) -> bool:
-        """Whether it fell, or does not walk any more."""
+        """Whether the robot fell or stopped walking."""
         imu = self._state.imu
         fallen = imu is not None and imu.tilt > FALLEN
         return fallen or self.controller.status.state is not self._mode
 
     @property
     def trouble(self) -> str:
-        """Why it does not walk; empty when it does."""
+        """Why the robot does not walk; empty if it does."""
         status = self.controller.status
         if status.faults:
             return '; '.join(status.faults)
@@ -184,10 +184,10 @@ class CourseWalker:
         return ''
 
     def stand_up(self) -> None:
-        """Stand, ready to walk.
+        """Stand up, ready to walk.
 
         Raises:
-            QuadControllerError: It does not come to that; the message has the reason.
+            QuadControllerError: The robot does not stand up; the message has the reason.
         """
         self.step(REST)  # modes are refused before the robot is known
         answer = self.controller.set_mode(self._mode.value)
@@ -200,12 +200,12 @@ class CourseWalker:
             raise QuadControllerError(self.trouble if answer.accepted else answer.message)
 
     def run(self, duration: float, velocity: Velocity) -> None:
-        """Pass some time [s] with a velocity that is commanded."""
+        """Command a velocity for some time [s]."""
         for _ in range(round(duration / self._backend.period)):
             self.step(velocity)
 
     def step(self, velocity: Velocity) -> None:
-        """Pass one period with a velocity that is commanded."""
+        """Command a velocity for one period."""
         self.controller.set_velocity(velocity)
         output = self.controller.step(self._state, self._dt)
         before, self._state = self._state, self._backend.step(output.targets)
@@ -232,7 +232,7 @@ class CourseWalker:
         seed: int = 1,
         max_falls: int = MAX_FALLS,
     ) -> CourseFigures:
-        """Walk as commanded, pushed to any side every two seconds by so much [m/s]."""
+        """Walk as commanded; every two seconds, push in a random direction by [m/s]."""
         random = np.random.default_rng(seed)
         self.failure = ''
         passages = [
@@ -282,7 +282,7 @@ class CourseWalker:
         return _passage_of(command, parts, falls, bends)
 
     def _settle(self, command: Velocity) -> bool:
-        """Accelerate; return whether it did not fall."""
+        """Accelerate; return whether the robot did not fall."""
         for _ in range(round(SETTLE_TIME / self._backend.period)):
             self.step(command)
             if self.is_down:
@@ -290,7 +290,7 @@ class CourseWalker:
         return True
 
     def _excused(self) -> bool:
-        """Return whether a fall is that of the machine, which paused controller or robot."""
+        """Return whether the machine caused the fall by pausing controller or robot."""
         if not self._arena.interruption:
             return False
         self.interruptions += 1
@@ -302,7 +302,7 @@ class CourseWalker:
         return True
 
     def _stand_again(self) -> bool:
-        """Return whether it is ready to walk again."""
+        """Stand up again; return whether the robot is ready to walk."""
         self.restart()
         try:
             self.stand_up()
@@ -315,7 +315,7 @@ class CourseWalker:
 def _passage_of(
     command: Velocity, parts: Sequence[Watched], falls: int, smoothness: float
 ) -> Passage:
-    """Return what came of the parts of a way between two falls."""
+    """Combine the parts between falls into the results of one command."""
     nothing = math.nan
     if not parts:
         lost = Velocity(nothing, nothing, nothing)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What was found of a policy: whether it stands up, tables for people, a file of figures."""
+"""Findings of a policy check: the verdict, text tables, a CSV file."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ LATENCY_GOAL, JITTER_GOAL = 0.003, 0.002
 
 
 def astray(went: Velocity, commanded: Velocity) -> Iterator[str]:
-    """Yield along which axes it went otherwise than commanded, and what that hints at."""
+    """Yield the axes with a large velocity error, each with a hint at the cause."""
     for axis in ('x', 'y', 'yaw'):
         got, want, drift = (getattr(each, axis) for each in (went, commanded, MAX_DRIFT))
         most = MAX_EXCESS if got * want > want**2 else MAX_LACK
@@ -52,9 +52,9 @@ def astray(went: Velocity, commanded: Velocity) -> Iterator[str]:
 def unseen_terms(
     network: OnnxNetwork, contract: PolicyContract, observed: Floats
 ) -> Iterator[str]:
-    """Yield which terms count so little that a walk does not show whether they are right.
+    """Yield observation terms with too little influence for a walk to verify them.
 
-    The network has no memory; ``observed`` has an observation of the walk in each row.
+    The network must not be recurrent; each row of ``observed`` is an observation of the walk.
     """
     plain = _answers(network, observed)
     # what varies is mirrored about its mean: all of gravity turned round is another robot
@@ -82,7 +82,7 @@ def _answers(network: OnnxNetwork, observed: Floats) -> Floats:
 
 
 def against_gait(policy: CourseFigures, gait: CourseFigures) -> Iterator[str]:
-    """Yield why a policy does not stand up on a course that the gait walked, too."""
+    """Yield why a policy fails on a course that the gait also walked."""
     if not any(each.time for each in policy.passages):
         yield 'it never came to walk'
         return
@@ -104,7 +104,7 @@ def against_gait(policy: CourseFigures, gait: CourseFigures) -> Iterator[str]:
 
 
 def timing_notes(figures: CourseFigures) -> Iterator[str]:
-    """Yield where commands were later on the wire than they shall be; no fault of a policy."""
+    """Yield notes on late commands on the wire, which are no fault of the policy."""
     timing = figures.timing
     if timing is None:
         return
@@ -122,12 +122,12 @@ def timing_notes(figures: CourseFigures) -> Iterator[str]:
 
 
 def is_too_late(figures: CourseFigures, period: float) -> bool:
-    """Return whether commands came so late that a walk says nothing of who walked."""
+    """Return whether commands were too late for the walk to be judged."""
     return figures.timing is not None and figures.timing.jitter(0.99) > period
 
 
 def velocity_text(velocity: Velocity) -> str:
-    """Return a velocity for people."""
+    """Return a velocity as readable text."""
     return f'{velocity.x:+.3f} {velocity.y:+.3f} m/s {velocity.yaw:+.2f} rad/s'
 
 
@@ -136,7 +136,7 @@ POLICY, GAIT = 'policy', 'gait'
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """What two came to on the same course."""
+    """Results of policy and gait on the same course."""
 
     title: str  # where that was
     policy: CourseFigures  # what the policy came to
@@ -145,7 +145,7 @@ class Compared:
 
 @dataclass(slots=True)
 class Findings:
-    """All that was found of a policy."""
+    """All findings of a policy check."""
 
     courses: list[Compared] = field(default_factory=list)  # courses that policy and gait walked
     walks: list[CourseFigures] = field(default_factory=list)  # those of a policy alone
@@ -158,7 +158,7 @@ Table = list[tuple[str, ...]]
 
 
 def tracking_table(compared: Compared) -> Table:
-    """Return what was commanded and what both came to."""
+    """Return the table of commanded velocities and those that policy and gait reached."""
     table: Table = [('axis', 'commanded', POLICY, 'off by', GAIT, 'off by')]
     for mine, other in zip(compared.policy.passages, compared.gait.passages, strict=True):
         axis = mine.axis
@@ -172,7 +172,7 @@ def tracking_table(compared: Compared) -> Table:
 
 
 def figures_table(compared: Compared) -> Table:
-    """Return figures of the whole course, a row for each."""
+    """Return the table of results for whole courses."""
     pair = compared.policy, compared.gait
     rows: Table = [('', POLICY, GAIT)]
     for axis in AXES:
@@ -213,7 +213,7 @@ CSV_COLUMNS = (
 
 
 def write_csv(file: TextIO, findings: Findings) -> None:
-    """Write a row for each command that policy or gait walked; what was not measured is empty."""
+    """Write one row for each command that policy or gait walked; unmeasured cells are empty."""
     writer = csv.writer(file, lineterminator='\n')
     writer.writerow(CSV_COLUMNS)
     courses = [('walk', POLICY, figures) for figures in findings.walks]

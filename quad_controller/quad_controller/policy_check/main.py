@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``check_policy``: compares an ONNX policy with the robot, and lets it walk in physics."""
+"""``check_policy``: compares an ONNX policy with the robot and tests it in simulation."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ MINUTES, MIN_MINUTES, MAX_MINUTES = 2.0, 0.8, 120.0
 
 
 class ExitCode(IntEnum):
-    """What the command ends with."""
+    """Exit codes of the command."""
 
     STANDS_UP = 0
     DOES_NOT = 1
@@ -65,7 +65,7 @@ class ExitCode(IntEnum):
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Check a policy and print what was found; return an :class:`ExitCode`."""
+    """Check a policy and print the findings; return an :class:`ExitCode`."""
     parser = _parser()
     options = parser.parse_args(arguments)
     if options.v1 and (options.chain or not (options.walk or options.compare or options.report)):
@@ -121,7 +121,7 @@ def _policy_options(options: argparse.Namespace) -> PolicyOptions:
 
 
 def _try_out(options: argparse.Namespace, loaded: LoadedPolicy, found: Findings) -> None:
-    """Make a policy walk in all ways that the command line names."""
+    """Test a policy in all ways that the command line requests."""
     compare = options.compare or (options.report and not (options.walk or options.chain))
     if not (options.walk or compare or options.chain):
         return
@@ -255,7 +255,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _report_file(text: str) -> Path:
-    """Return a path that can be written; checked before a walk takes its time."""
+    """Return the path of a writable file; check before the test takes its time."""
     path = Path(text)
     try:
         with path.open('a', encoding='utf-8'):
@@ -265,7 +265,7 @@ def _report_file(text: str) -> Path:
 
 
 def _servo(text: str) -> str:
-    """Refuse servos that the simulation does not have; without it, none are needed."""
+    """Reject servos unknown to quad_sim, if that is installed."""
     try:
         from quad_sim import parse_servo, SetupError
     except ImportError:
@@ -278,7 +278,7 @@ def _servo(text: str) -> str:
 
 
 def number(what: str, low: float = -math.inf, high: float = math.inf) -> Callable[[str], float]:
-    """Return a reader of a number in a range, for argparse."""
+    """Return an argparse type for a number within a range."""
     limits = f': it must be {low:g} {"or more" if high == math.inf else f"to {high:g}"}'
 
     def read(text: str) -> float:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Trials of policies beside the gait: on all cores at once, or through the whole chain."""
+"""Compares policies with the gait: in parallel on all cores, or in real time on a serial line."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from .course import CourseFigures, CourseWalker, REST_TIME, SETTLE_TIME, STAND_T
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """Who walks."""
+    """A policy or the gait, as a test candidate."""
 
     path: Path | None = None  # an ONNX file; None for the gait
     options: PolicyOptions = field(default_factory=PolicyOptions)  # how the policy is run
@@ -35,10 +35,10 @@ class Candidate:
     gait: GaitParameters = AS_TUNED  # tuning of the gait
 
     def placed_in(self, arena: PhysicsArena | SerialArena) -> CourseWalker:
-        """Put it on its feet in an arena, by a gait that knows how stiff its servos are.
+        """Put the robot on its feet in an arena, with a gait adapted to its servos.
 
         Raises:
-            PolicyError: The policy does not fit the robot.
+            PolicyError: The policy does not match the robot.
         """
         robot, gait, policy = quadruped(self.robot.urdf), self.robot.tuned(self.gait), None
         if self.path is not None:
@@ -48,13 +48,13 @@ class Candidate:
 
 
 def shipped_walkers() -> dict[str, Candidate]:
-    """Return the shipped policies by their names."""
+    """Return the shipped policies by name, as candidates."""
     return {name: Candidate(path) for name, path in shipped_policies().items()}
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """A course that a robot walks."""
+    """One candidate on one course."""
 
     who: Candidate
     commands: tuple[Velocity, ...]  # one after the other
@@ -63,7 +63,7 @@ class Trial:
     seed: int = 1  # of the pushes
 
     def run(self) -> CourseFigures:
-        """Walk it in physics, in virtual time.
+        """Walk the course in physics, in virtual time.
 
         Raises:
             CheckError: The physics failed.
@@ -78,7 +78,7 @@ class Trial:
 
 
 def run_trials(trials: Sequence[Trial]) -> list[CourseFigures]:
-    """Run trials on all cores; return their figures in their order.
+    """Run trials on all cores; return their results in order.
 
     Raises:
         CheckError: The physics failed.
@@ -94,7 +94,7 @@ def run_trials(trials: Sequence[Trial]) -> list[CourseFigures]:
 def run_chain(
     walkers: Sequence[Candidate], commands: Sequence[Velocity], duration: float
 ) -> list[CourseFigures]:
-    """Walk a course with several in real time, one after the other, each on a line of its own.
+    """Walk a course with each candidate in real time, one after another, each on its own line.
 
     Raises:
         CheckError: The simulation or the line failed.
@@ -108,6 +108,6 @@ def run_chain(
 
 
 def chain_duration(minutes: float, walkers: int, commands: int) -> float:
-    """Return how long each command may take when a chain shall take some minutes [s]."""
+    """Return the time per command [s] so that a whole run takes some minutes."""
     each = 60.0 * minutes / walkers - STAND_TIME - REST_TIME
     return each / commands - SETTLE_TIME

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The whole controller as a pure function of time: measurements in, joint targets out."""
+"""The controller core, without clock or ROS: measurements in, joint targets out."""
 
 from __future__ import annotations
 
@@ -51,11 +51,11 @@ MAX_STEP = 0.05  # [s] after a longer pause the gait goes on where it was instea
 
 
 class Controller:
-    """Brings a quadruped from lying to walking and back, whatever happens on the way.
+    """Moves a quadruped between lying, standing and walking, and handles all faults.
 
-    Give it what arrived and how much time has passed with :meth:`step`; everything else can be
-    called between two steps. Nothing moves before it was commanded to, the step between two
-    consecutive targets is bounded by the joints' speed, and faults stay until they are cleared.
+    Pass new measurements and the elapsed time to :meth:`step`; call all other methods between two
+    steps. Nothing moves without a command, joint speeds limit the step between two consecutive
+    targets, and faults stay latched until they are cleared.
     """
 
     def __init__(
@@ -70,18 +70,18 @@ class Controller:
         arm_pose: Sequence[float] = (),
         first_gait: Gait = Gait.TROT,
     ) -> None:
-        """Start relaxed.
+        """Start in the state RELAX.
 
         Args:
-            policy: What the mode ``policy`` follows.
-            dry_run: Whether the policy is only asked, and never followed.
-            arm_pose: Positions of the joints that belong to no leg when the robot stands, in
-                [rad]; empty leaves them where they are.
+            policy: Policy for the mode ``policy``.
+            dry_run: Run the policy, but never send its targets.
+            arm_pose: Positions of the non-leg joints when the robot stands, in [rad]; empty leaves
+                them where they are.
 
         Raises:
             DescriptionError: The legs do not reach the heights of the parameters, or a joint has
-                no speed.
-            ParameterError: ``arm_pose`` does not fit the robot.
+                no speed limit.
+            ParameterError: ``arm_pose`` does not match the robot.
         """
         for name, limits in zip(robot.names, robot.limits, strict=True):
             if not limits.velocity > 0.0:
@@ -110,7 +110,7 @@ class Controller:
         self._tolerated: frozenset[Fault] = frozenset()  # present when the way down was requested
 
     def set_mode(self, text: str) -> Answer:
-        """Request one of :data:`.modes.MODES`, or an alias."""
+        """Request one of :data:`.modes.MODES`, or an alias; return whether it is accepted."""
         request = parse_mode(text)
         if request is None:
             return Answer(False, f'unknown mode {text!r}; choose one of {", ".join(MODES)}')
@@ -137,9 +137,9 @@ class Controller:
         return {machine.state, machine.goal} <= ON_FEET and stands(self._health.attitude)
 
     def stop(self) -> Answer:
-        """End gait, policy or getting up, whatever follows; a robot that does not walk stays so.
+        """Reset the velocity command; end gait, policy or getting up if one is active.
 
-        Another change of posture goes on to its end: half-way a leg may be in the air.
+        Other posture changes run to their end, because a leg may be in the air half-way.
         """
         machine = self._machine
         self._commands.set_velocity(REST)  # or the next mode would begin with the one of before
@@ -151,15 +151,15 @@ class Controller:
         return Answer(True, f'stopped: {was}; the mode is {machine.goal.value}')
 
     def set_velocity(self, velocity: Velocity) -> Answer:
-        """Request a velocity; it counts until the next one or the time-out."""
+        """Request a velocity; it applies until the next one or the time-out."""
         return self._commands.set_velocity(velocity)
 
     def set_body_pose(self, pose: BodyPose) -> Answer:
-        """Request a pose of the body over its feet; it stays until the next one."""
+        """Request a pose of the body over its feet; it applies until the next one."""
         return self._commands.set_pose(pose)
 
     def clear_fault(self) -> Answer:
-        """Forget the latched faults whose reasons are gone; nothing moves by this."""
+        """Clear the latched faults whose causes are gone; this moves nothing."""
         machine = self._machine
         if not self._latch.texts:
             return Answer(True, f'no fault; the mode is {machine.state.value}')
@@ -174,11 +174,11 @@ class Controller:
 
     @property
     def policy(self) -> PolicyRunner | None:
-        """What the mode ``policy`` follows."""
+        """Policy for the mode ``policy``."""
         return self._policies.policy
 
     def swap_refusal(self) -> str:
-        """Return why no other policy can be taken now, whichever it is; nothing when one can."""
+        """Return why the policy cannot be changed now; empty if it can."""
         if self._latch.texts:
             return f'{"; ".join(self._latch.texts)}; call ~/clear_fault when that is corrected'
         machine = self._machine
@@ -187,10 +187,10 @@ class Controller:
         return ''
 
     def follow(self, policy: PolicyRunner | None) -> Answer:
-        """Follow another policy, which fits the robot, from now on, or the gait for None.
+        """Switch to another policy that matches the robot; None means the gait.
 
-        A robot that walks comes to stand first, as on every other way between two modes; then
-        the policy, or the gait instead of a policy, moves it. Lying or relaxed, nothing moves.
+        A walking robot stops and stands first, as in every mode change, before the new policy or
+        the gait takes over. If the robot lies or is relaxed, nothing moves.
         """
         machine, policies = self._machine, self._policies
         moves = machine.can_swap and not policies.dry_run
@@ -206,10 +206,10 @@ class Controller:
         return Answer(True, f'stands, then follows {policy.name if policy else "the gait"}')
 
     def retune(self, gait: GaitParameters) -> Answer:
-        """Walk with another tuning from now on; only while the robot is not on its legs.
+        """Apply other gait parameters; only while the robot is not on its legs.
 
         Raises:
-            DescriptionError: The legs do not reach its height.
+            DescriptionError: The legs do not reach the height.
         """
         state = self._machine.state
         if state not in {State.RELAX, State.LIE} or self._machine.goal is not state:
@@ -222,7 +222,7 @@ class Controller:
 
     @property
     def status(self) -> Status:
-        """What can be reported of it."""
+        """Snapshot of the controller's state."""
         health, machine = self._health, self._machine
         more = (self._commands.warning(machine.state), self._tracking.text)
         return Status(
@@ -243,11 +243,11 @@ class Controller:
         )
 
     def refuse(self, what: Fault, reason: str) -> None:
-        """Count joint states or attitudes that are received and cannot be used."""
+        """Record a received joint state or attitude that cannot be used."""
         self._health.refuse(what, reason)
 
     def step(self, state: RobotState, dt: float) -> Output:
-        """Advance; return the targets to send, and what happened."""
+        """Advance by one step; return the targets to send, and events."""
         refused = self._health.take(state, dt)
         events = [Event(EventKind.REPEATED, text) for text in refused]
         self._commands.pass_time(dt)
@@ -277,7 +277,7 @@ class Controller:
         )
 
     def _last_targets(self, dt: float, events: list[Event]) -> Targets | None:
-        """Return what was sent last; where the joints are, at the start and after a pause."""
+        """Return the last targets; at the start and after a pause, the joint positions."""
         if dt > STREAM_TIMEOUT and self._limiter.last:
             events += self._wake(dt, self._limiter.last)
             self._unseen.lose()
@@ -288,7 +288,7 @@ class Controller:
         return self._limiter.last
 
     def _moved_unseen(self) -> bool:
-        """Whether joints that are held were moved by something else while unmeasured."""
+        """Whether something moved the held joints while they were not measured."""
         joints, last = self._health.newest.joints, self._limiter.last
         if joints is None or self._health.held:
             self._unseen.lose()
@@ -299,7 +299,7 @@ class Controller:
         return self._unseen.moved(joints, last)
 
     def _advance_state(self, last: Targets, events: list[Event]) -> None:
-        """Change the state when it is time."""
+        """Change the state when it is due."""
         before = self._machine.state
         if failure := self._machine.advance(last):
             events.append(Event(EventKind.TROUBLE, f'the policy was given up: {failure}'))
@@ -309,13 +309,13 @@ class Controller:
 
     @property
     def _held(self) -> bool:
-        """Whether nothing moves on, because the places of the joints are no longer known."""
+        """Whether motion is paused because joint positions are outdated."""
         return self._health.held and Fault.JOINTS not in self._tolerated
 
     def _wake(self, pause: float, last: Targets) -> list[Event]:
-        """Begin anew after a pause [s] in which the hardware node may have laid the robot down.
+        """Reset after a pause [s] in which the hardware node may have laid the robot down.
 
-        It does so by the last targets that it got; in motion those may be others than the last.
+        The hardware node judges by the last targets it received; in motion, ours may be newer.
         """
         raised = raised_feet(self._robot.feet(last))
         if self._machine.at_rest and not raised:
@@ -331,7 +331,7 @@ class Controller:
         return events
 
     def _latch_faults(self, last: Targets, events: list[Event]) -> None:
-        """Latch faults of a robot that is on its legs, or on its way down."""
+        """Latch faults while the robot is on its legs, or lying down."""
         machine = self._machine
         if machine.getting_up is not None and machine.getting_up.failure:
             events += self._latch_fault(Fault.FALLEN, machine.getting_up.failure, last)
@@ -346,7 +346,7 @@ class Controller:
                 events += self._latch_fault(fault, reason, last)
 
     def _conditions(self) -> dict[str, str]:
-        """Return what stops the robot without being a fault, by a name for each."""
+        """Return conditions that stop the robot without being a fault, by name."""
         state, conditions = self._machine.state, {}
         if stale := self._commands.warning(state):
             conditions['command'] = stale
@@ -371,7 +371,7 @@ class Controller:
         return conditions
 
     def _ended_conditions(self) -> dict[str, str]:
-        """Return what to report when one of these is over, where the robot may move again."""
+        """Return reports for conditions that ended, if the robot may move again."""
         over = {} if self._machine.state is State.FAULT else {'held': 'joint states'}
         if self._machine.state in MOVING_STATES:
             over['command'] = 'velocities'
@@ -389,7 +389,7 @@ class Controller:
     def _move(
         self, situation: Situation, dt: float, last: Targets, events: list[Event]
     ) -> Targets:
-        """Return where the motion of the state leads; the last targets while nothing is known."""
+        """Return the next targets of the state's motion; without measurements, the last ones."""
         if self._held:
             return last
         wanted = self._machine.motion.step(situation, dt)
@@ -401,7 +401,7 @@ class Controller:
         return last
 
     def _situation(self, dt: float) -> Situation:
-        """Collect what a motion may know; a way to another state goes through rest."""
+        """Return the inputs of a motion; on a state change, the velocity is zero."""
         machine = self._machine
         state = machine.state if machine.state is machine.goal else State.STAND
         velocity = self._commands.velocity(state)
@@ -412,7 +412,7 @@ class Controller:
         return self._health.situation(velocity, self._commands.pose)
 
     def _refusal(self, request: ModeRequest) -> str:
-        """Return why a mode cannot be entered, nothing when it can."""
+        """Return why a mode cannot be entered; empty if it can."""
         if request.state in WAYS_DOWN and self._limiter.last is not None:
             return ''
         if request.state is State.GET_UP:
@@ -433,6 +433,6 @@ class Controller:
         return self._health.unmeasured(policy)
 
     def _health_refusal(self) -> str:
-        """Return what keeps the robot from moving its legs."""
+        """Return why the robot must not move its legs; empty if it may."""
         present = next(self._health.faults(), None)
         return f'{present[0].value}: {present[1]}' if present else ''

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Getting up after a fall: from whatever side the robot lies on to its feet.
+"""Gets the robot up after a fall, whichever side it lies on.
 
 ::
 
@@ -8,15 +8,15 @@
     REST -> (belly: FOLD -> STAND) -> finished
     REST -> (too many tries) -> failure
 
-Where it lies is measured whenever the body has come to rest, so that a stage that did something
-else than it was made for leads to the tries of where it lies now. Swings follow each other without
-rest: the legs throw the body over.
+The side is measured whenever the body has come to rest, so a stage with an unexpected result is
+followed by the tries for the new side. Swings follow each other without rest: the legs throw the
+body over.
 
-The poses are data, for the XGO of quad_description, found by the cross-entropy method in physics,
-less what lets legs touch each other or the trunk; those of the sides were found by looking at the
-outline: which points touch the ground, and on what side of them the centre of mass is. The swings
-off the back lift it by 7 cm, over the tail. ``bench/bench_get_up.py`` measures what they are
-worth. Another robot needs its own.
+The poses are data for the XGO of quad_description. The cross-entropy method found them in
+simulation, excluding collisions of legs and trunk; those for the sides come from the outline: the
+contact points, and on which side of them the centre of mass lies. The swings off the back lift it
+by 7 cm, over the tail. ``bench/bench_get_up.py`` measures their success. Other robots need their
+own.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from .motion import Blend, Hold, Motion, Swing
 
 
 class Lying(Enum):
-    """What is below; the value is for people, behind "it lies"."""
+    """Lowest side of the robot; the value completes the phrase "it lies"."""
 
     BELLY = 'on its belly or legs'
     LEFT = 'on its left side'
@@ -48,7 +48,7 @@ class Lying(Enum):
 
     @property
     def mirrored(self) -> Lying:
-        """What is below a robot that is this one's mirror image, left for right."""
+        """The same side of the left-right mirrored robot."""
         return _MIRRORED.get(self, self)
 
 
@@ -56,7 +56,7 @@ _MIRRORED = {Lying.LEFT: Lying.RIGHT, Lying.RIGHT: Lying.LEFT}
 
 
 def lying_on(down: Vector) -> Lying:
-    """Return which side is nearest to the ground, by the direction of gravity in the body."""
+    """Return the side nearest to the ground, from the gravity direction in the body."""
     x, y, z = down
     sides = {
         Lying.BELLY: -z,
@@ -86,24 +86,24 @@ class Stage:
 
     @property
     def mirrored(self) -> Stage:
-        """The same for a robot that is this one's mirror image, left for right."""
+        """The stage for the left-right mirrored robot."""
         front_left, front_right, back_left, back_right = self.legs
         legs = front_right, front_left, back_right, back_left
         return Stage(legs, self.speed, self.duration)
 
 
 def _on_left(lower: Vector, upper: Vector) -> Stage:
-    """Return a stage of a robot that lies on its left side."""
+    """Return a stage for a robot that lies on its left side."""
     return Stage((lower, upper, lower, upper), _SPEED)
 
 
 def _ends(front: Vector, back: Vector, speed: float = _SPEED) -> Stage:
-    """Return a stage in which left and right do the same."""
+    """Return a left-right symmetric stage."""
     return Stage((front, front, back, back), speed)
 
 
 def _swing(duration: float, front: Vector, back: Vector) -> Stage:
-    """Return a swing in which left and right do the same."""
+    """Return a left-right symmetric swing."""
     return Stage((front, front, back, back), _SWING_SPEED, duration)
 
 
@@ -187,14 +187,14 @@ WITH_AN_ARM = (
 
 
 def stands(imu: ImuSample | None) -> bool:
-    """Return whether the body of a robot is upright; also when that is unknown."""
+    """Return whether the body is upright, or its attitude unknown."""
     return imu is None or imu.is_uncertain or imu.tilt < LEVEL
 
 
 def get_up_refusal(health: Health, latch: FaultLatch, *, swings: bool, arm: bool) -> str:
-    """Return why a robot cannot get up now, nothing when it may try; a fall is no reason.
+    """Return why a robot cannot get up now; empty if it may try. A fall is no reason.
 
-    ``swings``: it may throw itself off its back; ``arm``: it has one.
+    ``swings``: it may swing itself off its back; ``arm``: it has an arm.
     """
     if others := latch.texts_without(Fault.FALLEN):
         return f'{"; ".join(others)}; call ~/clear_fault when that is corrected'
@@ -214,7 +214,7 @@ def get_up_refusal(health: Health, latch: FaultLatch, *, swings: bool, arm: bool
 
 
 class GetUp(Motion):
-    """Brings a robot to its feet by poses."""
+    """Gets a robot on its feet by a sequence of poses."""
 
     def __init__(
         self,
@@ -225,9 +225,9 @@ class GetUp(Motion):
         standing: Targets,
         swings: bool,
     ) -> None:
-        """Wait for rest; then lead to targets folded, feet under hips, and standing [rad].
+        """Wait for rest; targets [rad]: legs folded, feet under the hips, standing.
 
-        ``swings``: it may throw itself off its back.
+        ``swings``: it may swing itself off its back.
         """
         self._robot, self._last = robot, last
         self._folded, self._standing = folded, standing
@@ -246,7 +246,7 @@ class GetUp(Motion):
         next(self._stages)
 
     def step(self, situation: Situation, dt: float) -> Targets:
-        """Return the next targets; the last ones while the attitude is not known."""
+        """Return the next targets; while the attitude is unknown, the last ones."""
         imu = situation.imu
         if self.finished or self.failure:
             return self._last
@@ -269,7 +269,7 @@ class GetUp(Motion):
         return self._last
 
     def _is_over(self) -> bool:
-        """Whether a stage has come to its end, or takes too long."""
+        """Whether a stage has finished or timed out."""
         if self._time >= self._deadline:
             return True
         if isinstance(self._motion, Swing):
@@ -277,7 +277,7 @@ class GetUp(Motion):
         return self._motion.finished and self._still_time >= STILL_TIME
 
     def _script(self) -> Iterator[None]:
-        """Begin one stage after another, each when the one before is over."""
+        """Start the stages one after another, each when the previous one ends."""
         yield
         while self._tries.total() < MAX_TRIES:
             lying = self._lying
@@ -297,7 +297,7 @@ class GetUp(Motion):
         )
 
     def _turn_over(self, lying: Lying) -> Iterator[None]:
-        """Try one of the recoveries from a side, the next one when that was tried before."""
+        """Try the next recovery for a side."""
         if lying is Lying.BACK and self._robot.others:
             self.failure = WITH_AN_ARM
             return
@@ -321,7 +321,7 @@ class GetUp(Motion):
                 return
 
     def _stand_up(self) -> Iterator[None]:
-        """Gather the legs, and stand on them."""
+        """Fold the legs, then stand."""
         self.text = f'lies {Lying.BELLY.value}; folds its legs, try {self._tries[Lying.BELLY]}'
         self._start_stage(self._folded, FOLD_SPEED)
         yield
@@ -336,7 +336,7 @@ class GetUp(Motion):
     def _start_stage(
         self, targets: Targets, speed: float, swing_time: float | None = None
     ) -> None:
-        """Begin a stage that leads to a pose, softly or by a swing that takes a time [s]."""
+        """Start a stage towards a pose: softly, or by a swing of a given time [s]."""
         if swing_time is not None:
             self._motion = Swing(self._last, targets, speed, swing_time)
             self._time, self._deadline = 0.0, math.inf

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Watches what is measured and requested: ages, attitude, battery, joints that stand still.
+"""Monitors measurements and commands: age, attitude, battery, joints that do not move.
 
-Messages that keep coming with the same values have no age that would show it: joints that stand
-still while their targets move have frozen sensors, or servos without power.
+The age of messages does not reveal frozen values: joints that stand still while their targets move
+have frozen sensors, or servos without power.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ SUBJECTS = {'joints': Fault.JOINTS, 'imu': Fault.IMU}
 
 
 class Health:
-    """The newest measurements, how old they are, and what is wrong."""
+    """Holds the newest measurements with their ages, and evaluates faults and warnings."""
 
     def __init__(self, count: int, parameters: StateParameters) -> None:
         """Start without a measurement."""
@@ -45,7 +45,7 @@ class Health:
         self._low_for: float | None = None
 
     def take(self, measurement: RobotState, dt: float) -> list[str]:
-        """Record new values; return what was refused and why."""
+        """Store new measurements; return which ones were rejected and why."""
         waited = self._waited(dt, received=measurement.joints is not None)
         self._refusals = {
             what: (reason, age + waited)
@@ -72,22 +72,22 @@ class Health:
         return problems
 
     def refuse(self, what: Fault, reason: str) -> None:
-        """Remember for a while, or until something usable comes, why what comes is not."""
+        """Record why received data are unusable, for a while or until usable data arrive."""
         self._refusals[what] = reason, 0.0
 
     def forget_joints(self) -> None:
-        """Wait for the next joint states: something else has moved the joints meanwhile."""
+        """Discard the joint states, because something else has moved the joints."""
         self.newest = replace(self.newest, joints=None)
         self.ages['joints'] = math.inf
 
     def situation(self, velocity: Velocity = REST, pose: BodyPose = UPRIGHT) -> Situation:
-        """Return what is new enough to act upon, and what is requested."""
+        """Return the measurements that are recent enough, with the commands."""
         fresh = {name: getattr(self.newest, name) for name in AGED if self._is_fresh(name)}
         return Situation(**fresh, velocity=velocity, pose=pose)
 
     @property
     def attitude(self) -> ImuSample | None:
-        """The newest attitude, None when it is too old to act upon."""
+        """The newest attitude; None if it is too old."""
         return self.newest.imu if self._is_fresh('imu') else None
 
     def _is_fresh(self, name: str) -> bool:
@@ -95,25 +95,25 @@ class Health:
 
     @property
     def spins(self) -> bool:
-        """Whether the body turns faster than a robot at rest does, or the gyro is wrong."""
+        """Whether the body turns faster than a robot at rest, or the gyro is faulty."""
         imu = self.attitude
         return imu is not None and _turn_rate(imu) > self._parameters.max_turn_rate
 
     @property
     def complete(self) -> bool:
-        """Whether everything has been received that a robot on its legs needs."""
+        """Whether all data that a robot on its legs needs have been received."""
         return self.newest.joints is not None and (
             self.newest.imu is not None or not self._parameters.require_imu
         )
 
     @property
     def held(self) -> bool:
-        """Whether the joint states are too old to move on."""
+        """Whether joint states are too old to continue a motion."""
         return not self._is_fresh('joints')
 
     @property
     def uncertainty(self) -> str:
-        """Why the attitude is not acted upon, nothing when it is."""
+        """Why the attitude is not used; empty if it is."""
         imu = self.newest.imu
         if imu is None or not imu.is_uncertain:
             return ''
@@ -125,7 +125,7 @@ class Health:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is not right, but no fault yet."""
+        """Conditions that are not a fault yet."""
         late = self._parameters.warn_age
         imu = self.newest.imu
         texts = [
@@ -140,7 +140,7 @@ class Health:
         return (*texts, *(reason for reason, _ in self._refusals.values()))
 
     def faults(self) -> Iterator[tuple[Fault, str]]:
-        """Yield what keeps the robot from moving its legs, each with its reason and remedy."""
+        """Yield each fault that prevents leg motion, with reason and remedy."""
         parameters = self._parameters
         if self.ages['joints'] > parameters.fault_age:
             yield Fault.JOINTS, self._silence('joints', '/joint_states')
@@ -154,7 +154,7 @@ class Health:
             yield Fault.SERVO, self.newest.servo_problem
 
     def unmeasured(self, policy: PolicyRunner | None) -> str:
-        """Return what a policy needs and no sensor measures; nothing for none."""
+        """Return what a policy needs and no sensor measures; empty if nothing."""
         if policy is None:
             return ''
         if self.uncertainty:
@@ -164,7 +164,7 @@ class Health:
         return policy.missing(seen) or policy.inexact(joints, stated=True)
 
     def _silence(self, name: str, topic: str) -> str:
-        """Return why nothing new was received."""
+        """Return why no new data arrived."""
         age, delay = self.ages[name], self._delays[name]
         if SUBJECTS[name] in self._refusals:
             return self._refusals[SUBJECTS[name]][0]
@@ -178,10 +178,10 @@ class Health:
         return f'none for {age:.1f} s; look at the hardware node and its cable'
 
     def _waited(self, dt: float, *, received: bool) -> float:
-        """Return how much of a step counts [s].
+        """Return how much of a step counts towards message ages [s].
 
-        After one pause of this process itself, what was sent meanwhile is yet to be read; the
-        next one has no such excuse, unless joint states came on time in between.
+        After a pause of this process itself, messages sent meanwhile are still unread, so it does
+        not count. The next pause does, unless joint states arrived on time in between.
         """
         waited = dt if self._late else min(dt, MAX_PAUSE)
         if dt > MAX_PAUSE:
@@ -207,7 +207,7 @@ class Health:
         return f'the body turns at {rates}; when it does not, /imu is wrong: look at the cable'
 
     def _usable(self, what: Fault | None, value: object, problems: list[str]) -> bool:
-        """Whether a value has no problem; one that has is refused."""
+        """Whether a value is valid; an invalid one is recorded as rejected."""
         problem = ''
         if isinstance(value, JointSample):
             problem = value.problem(self._count)
@@ -227,12 +227,12 @@ class Health:
 
 
 def _longer(time: float | None, dt: float) -> float:
-    """Return how long something has been so [s]; it begins with the first time it is seen."""
+    """Return how long a condition has lasted [s], counted from its first detection."""
     return 0.0 if time is None else time + dt
 
 
 def _turn_rate(imu: ImuSample) -> float:
-    """Return the greatest rate of an attitude in [rad/s], 0 when it is not measured."""
+    """Return the largest angular rate of an attitude in [rad/s]; 0 if not measured."""
     return math.hypot(*(imu.angular_velocity or ()))
 
 
@@ -240,17 +240,17 @@ AGREEMENT = 0.05  # [rad] two samples of a robot that is not moved differ by les
 
 
 class UnseenJoints:
-    """Compares joints with their targets when they are known again.
+    """Compares joints with their targets when they are measured again.
 
-    A robot that was started anew lies; one without its cable may be bent by hand. What was held
-    before would move it unasked.
+    A restarted robot lies down, and joints may be moved by hand while the cable is off. Holding
+    the old targets would then move the robot without a command.
 
-    Within a band they are as they were, or gave way to their load. Beyond it they were moved,
-    if a second sample has the same: one may be damaged.
+    Within a band, the joints count as unmoved or sagging under load. Beyond it, they were moved if
+    a second sample confirms it, since one sample may be damaged.
     """
 
     def __init__(self, band: float) -> None:
-        """Begin without having seen them; a joint may be off its target by the band [rad]."""
+        """Start with the joints unseen; one may deviate from its target by the band [rad]."""
         self._band = band
         self._is_unseen = True
         self._first: JointSample | None = None
@@ -258,19 +258,19 @@ class UnseenJoints:
 
     @property
     def is_pending(self) -> bool:
-        """Whether a first sample is beyond the band, and a second one is to agree."""
+        """Whether a first sample is beyond the band and awaits confirmation."""
         return self._first is not None
 
     def lose(self) -> None:
-        """Compare anew with the next samples."""
+        """Mark the joints as unseen; compare them with the next samples."""
         self._is_unseen, self._first = True, None
 
     def see(self) -> None:
-        """Compare nothing until they are lost again."""
+        """Mark the joints as seen; do not compare until they are lost again."""
         self._is_unseen, self._first = False, None
 
     def moved(self, joints: JointSample, targets: Targets) -> bool:
-        """Whether something else has moved them from their targets; once, after they were lost."""
+        """Whether something else has moved the joints; evaluated once after a loss."""
         if joints is self._last:  # nothing new was received
             return False
         self._last = joints
@@ -296,10 +296,10 @@ MIN_RATIO = 0.1  # of that way, that its joint must have gone; soft servos go a 
 
 
 class TrackingMonitor:
-    """Compares how far targets and joints went."""
+    """Compares the travel of targets and joints."""
 
     def __init__(self, names: Sequence[str]) -> None:
-        """Begin with a new window."""
+        """Start with a new window."""
         self._names = tuple(names)
         self._targets: list[Sequence[float]] = []
         self._measured: list[Sequence[float]] = []
@@ -307,7 +307,7 @@ class TrackingMonitor:
         self.text = ''  # which joints did not follow in the last window; empty when all did
 
     def step(self, targets: Sequence[float], measured: Sequence[float], dt: float) -> None:
-        """Record where all joints were sent and are measured in a step [rad]."""
+        """Record targets and measured positions of all joints [rad]."""
         self._targets.append(targets)
         self._measured.append(measured)
         self._time += dt
@@ -337,7 +337,7 @@ class Commands:
     """The newest commands."""
 
     def __init__(self, timeout: float) -> None:
-        """Start at rest; a velocity that is older than the time-out [s] counts as zero."""
+        """Start at rest; a velocity older than the time-out [s] counts as zero."""
         self._timeout = timeout
         self._velocity = REST
         self._age = math.inf
@@ -345,7 +345,7 @@ class Commands:
         self.refused = 0  # how many commands were not finite
 
     def set_velocity(self, velocity: Velocity) -> Answer:
-        """Set the velocity; one that is not finite stops the robot."""
+        """Set the velocity; a non-finite one stops the robot."""
         if not velocity.finite:
             self.refused += 1
             self._velocity = REST
@@ -354,7 +354,7 @@ class Commands:
         return Answer(True, '')
 
     def set_pose(self, pose: BodyPose) -> Answer:
-        """Set the pose of the body; it stays until the next one."""
+        """Set the pose of the body; it applies until the next one."""
         if not pose.finite:
             self.refused += 1
             return Answer(False, f'rejected {pose}: it is not finite; the pose stays')
@@ -366,7 +366,7 @@ class Commands:
         self._age += dt
 
     def velocity(self, state: State) -> Velocity:
-        """Return the velocity that counts in a state."""
+        """Return the velocity that applies in a state."""
         if state not in MOVING_STATES or self._age > self._timeout:
             return REST
         if state is State.TURN:
@@ -374,7 +374,7 @@ class Commands:
         return self._velocity
 
     def warning(self, state: State) -> str:
-        """Return a warning of a stream of velocities that broke off without a zero, or nothing."""
+        """Return a warning if velocities broke off without a final zero; else empty."""
         if state in MOVING_STATES and not self._velocity.at_rest and self._age > self._timeout:
             return f'the last velocity came {self._age:.1f} s ago; it counts as zero'
         return ''

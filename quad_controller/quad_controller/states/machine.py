@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which motion follows which: the way from one state to another.
+"""State machine: the sequence of motions from one state to another.
 
 ::
 
@@ -32,18 +32,18 @@ EASE_TIME = 0.7  # [s] over which a policy takes over
 
 
 class Poses:
-    """The poses that the robot goes to; joints that are no legs' may have one or stay."""
+    """Target poses of the robot; non-leg joints have a configured pose, or stay."""
 
     def __init__(self, robot: Quadruped, lie_height: float, arm_pose: Sequence[float]) -> None:
-        """Prepare them.
+        """Compute the poses.
 
         Args:
-            lie_height: Hip axes above the centres of the feet when it lies in [m].
-            arm_pose: Positions of the joints that are no legs' in [rad]; empty leaves them.
+            lie_height: Height of the hip axes above the foot centres when lying, in [m].
+            arm_pose: Positions of the non-leg joints in [rad]; empty leaves them where they are.
 
         Raises:
             DescriptionError: The legs do not reach the height.
-            ParameterError: There are not as many positions as joints.
+            ParameterError: The numbers of positions and joints differ.
         """
         if arm_pose and len(arm_pose) != len(robot.others):
             names = ', '.join(robot.names[index] for index in robot.others) or 'none'
@@ -57,12 +57,12 @@ class Poses:
         self._lying = robot.solve(robot.footprint(lie_height, self.fallback_positions))
 
     def with_arm(self, targets: Sequence[float]) -> Targets:
-        """Return targets of all joints with those that are no legs' as the parameter says."""
+        """Set the non-leg joints among all targets to the configured pose."""
         moved = [self._arm.get(index, target) for index, target in enumerate(targets)]
         return self.robot.clamp(moved)
 
     def lying(self, targets: Targets) -> Targets:
-        """Return targets of all joints with the legs folded."""
+        """Return the targets of all joints with the legs folded."""
         return self.robot.place(self._lying, targets)
 
 
@@ -73,10 +73,10 @@ WIND_DOWN = 0.5  # [s] without velocity before the gait takes over
 
 
 class PolicyMotion(Motion):
-    """Follows a policy."""
+    """Moves the joints by a policy."""
 
     def __init__(self, policy: PolicyRunner, start: Targets, ease_time: float) -> None:
-        """Begin at the last targets [rad]; the policy's take over within the ease time [s]."""
+        """Start at the last targets [rad]; blend to the policy's in the ease time [s]."""
         policy.reset(start)
         self.policy = policy
         # what it answered last; None when there was nothing to ask it by
@@ -90,11 +90,11 @@ class PolicyMotion(Motion):
 
     @property
     def settled(self) -> bool:
-        """Whether the robot has had time to stop, or the policy is of no use any more."""
+        """Whether the robot has had time to stop, or the policy has failed."""
         return self._rest_time >= WIND_DOWN or bool(self.failure)
 
     def step(self, situation: Situation, dt: float) -> Targets:
-        """Return the next targets; the last ones when there is nothing to go by."""
+        """Return the next targets; the last ones if inputs are missing."""
         self._rest_time = self._rest_time + dt if situation.velocity.at_rest else 0.0
         self.answer = None
         if situation.joints is None or situation.imu is None:
@@ -116,10 +116,10 @@ class PolicyMotion(Motion):
 
 
 class PolicyChoice:
-    """Which policy the mode ``policy`` follows, or which is only watched in a dry run."""
+    """The selected policy: for the mode ``policy``, or only observed in a dry run."""
 
     def __init__(self, policy: PolicyRunner | None, refusal: str, *, dry_run: bool) -> None:
-        """Begin with a policy, or with why there is none."""
+        """Start with a policy, or with the reason for its absence."""
         self.policy, self._refusal = policy, refusal
         self.dry_run = dry_run  # whether it is only asked, and never followed
         self._watched_steps = 0
@@ -127,7 +127,7 @@ class PolicyChoice:
 
     @property
     def mode_refusal(self) -> str:
-        """Why the policy keeps the robot from the mode ``policy``; empty if it does not."""
+        """Why the mode ``policy`` is not available; empty if it is."""
         if self.policy is None:
             return self._refusal
         if self.dry_run:
@@ -135,7 +135,7 @@ class PolicyChoice:
         return ''
 
     def choose(self, policy: PolicyRunner | None) -> str:
-        """Choose another policy; return what becomes of it as long as nothing moves."""
+        """Select another policy; return the response for a robot at rest."""
         self.policy, self._watched_steps, self._asked = policy, 0, None
         if policy is None:
             self._refusal = NO_POLICY
@@ -145,7 +145,7 @@ class PolicyChoice:
         return f'the mode policy follows {policy.name}'
 
     def watch(self, situation: Situation, dt: float, last: Targets) -> Targets | None:
-        """Return what a policy that is only watched would send, None without one."""
+        """Return the targets of a policy in a dry run; None without one."""
         self._asked = None
         unknown = situation.joints is None or situation.imu is None
         if self.policy is None or not self.dry_run or unknown:
@@ -158,14 +158,14 @@ class PolicyChoice:
         return answer.targets
 
     def asked(self, motion: Motion) -> Asked | None:
-        """Return what the policy that is watched, or that moves the robot, was asked last."""
+        """Return the last answer of the policy that is in use or in a dry run."""
         if self._asked is not None or not isinstance(motion, PolicyMotion):
             return self._asked
         return Asked(motion.policy, motion.answer, motion.steps) if motion.answer else None
 
 
 class StateMachine:
-    """Goes from state to state, and knows the motion of each."""
+    """Changes the state, and owns the motion of each."""
 
     def __init__(
         self,
@@ -186,7 +186,7 @@ class StateMachine:
 
     @property
     def title(self) -> str:
-        """Name of the state, with the way to it as long as it stands up, lies down or stops."""
+        """Name of the state, with the transition while it stands up, lies down or stops."""
         if self.state is State.GET_UP:
             return State.GET_UP.value
         there = self.at_rest if self.state is State.STAND else self.motion.finished
@@ -194,40 +194,40 @@ class StateMachine:
 
     @property
     def at_rest(self) -> bool:
-        """Whether no leg is on its way anywhere."""
+        """Whether no leg is moving."""
         return self.motion.settled and self.motion.finished
 
     @property
     def holds(self) -> bool:
-        """Whether all joints stay: relaxed, in a fault that holds, or lying."""
+        """Whether all joints are held: relaxed, in a fault that holds, or lying."""
         lies = isinstance(self.motion, Blend) and self.motion.finished
         return lies or isinstance(self.motion, Hold)
 
     @property
     def reachable(self) -> bool:
-        """Whether the gait's last step was within the legs' reach."""
+        """Whether the gait's last step was within reach of the legs."""
         return self.motion is not self._walk or self._walk.reachable
 
     @property
     def getting_up(self) -> GetUp | None:
-        """What brings the robot to its feet after a fall; None while nothing does."""
+        """The motion that gets the robot up after a fall; None if inactive."""
         return self.motion if isinstance(self.motion, GetUp) else None
 
     def retune(self, generator: GaitGenerator) -> None:
-        """Walk with another generator from now on; for when no leg is walking."""
+        """Use another gait generator; call only while no leg is walking."""
         walk = Walk(generator)
         if self.motion is self._walk:
             self.motion = walk
         self._generator, self._walk = generator, walk
 
     def hold(self, last: Targets) -> None:
-        """Stay at some targets [rad]."""
+        """Hold some targets [rad]."""
         self.motion = Hold(last, self._parameters.hold_band)
 
     def stop(self, last: Targets | None) -> bool:
-        """End what follows velocities, or getting up; return whether there was any of it.
+        """End velocity control or getting up; return whether either was active.
 
-        A robot whose legs bear it already goes on to stand, as from every other posture.
+        If the legs already carry the robot, it continues to stand up, as from every other posture.
         """
         self._after_standing = None
         if self.state is State.GET_UP and last is not None:
@@ -245,23 +245,23 @@ class StateMachine:
         return self.state in MOVING_STATES
 
     def request(self, goal: State) -> None:
-        """Go to a state from now on; out of FAULT only down."""
+        """Set the goal state; out of FAULT, only a way down."""
         self.goal = goal
         self._reaction = self._after_standing = None
 
     @property
     def can_swap(self) -> bool:
-        """Whether gait or policy moves the robot, on no way to anything else."""
+        """Whether gait or policy moves the robot, and no state change is in progress."""
         walks = self.motion is self._walk or isinstance(self.motion, PolicyMotion)
         return walks and self.state is self.goal and self.state is not State.FAULT
 
     def swap(self, goal: State) -> None:
-        """Stand, and go on to a state from there; for when that is possible."""
+        """Stand, then go on to a state; requires :attr:`can_swap`."""
         self.request(State.STAND)
         self._after_standing = goal
 
     def react(self, reaction: Reaction, last: Targets) -> None:
-        """Go into FAULT, or to a stronger reaction there."""
+        """Enter FAULT, or escalate to a stronger reaction there."""
         if self.state is State.GET_UP:
             reaction = Reaction.HOLD  # legs that bear nothing can neither stand nor lie down
         elif self.state is State.FAULT and self._reaction is not None:
@@ -272,7 +272,7 @@ class StateMachine:
             self.hold(last)
 
     def clear(self) -> None:
-        """Leave FAULT for the state that the robot is in anyway; a way down goes on."""
+        """Leave FAULT for the state that fits the posture; a way down continues."""
         if self.state is not State.FAULT:
             return
         if self.goal is not State.FAULT:
@@ -287,7 +287,7 @@ class StateMachine:
         self._reaction = None
 
     def advance(self, last: Targets) -> str:
-        """Change state and motion when it is time; return why the policy was given up."""
+        """Change state and motion when due; return why the policy was given up."""
         failure = self.motion.failure
         if self.state is State.FAULT and self.goal is State.FAULT:
             self._advance_fault(last)
@@ -308,7 +308,7 @@ class StateMachine:
         return failure
 
     def _next(self) -> State | None:
-        """Return the state to enter now on the way to the goal, None to go on as it is."""
+        """Return the next state on the way to the goal; None to stay."""
         state, goal, motion = self.state, self.goal, self.motion
         if state is goal:
             return None
@@ -348,7 +348,7 @@ class StateMachine:
             self._stand_after_blend()
 
     def _stand_after_blend(self) -> None:
-        """Hand over to the gait when the robot has stood up."""
+        """Hand over to the gait once the robot has stood up."""
         up = self.state is State.STAND or self._reaction is Reaction.STAND
         if up and isinstance(self.motion, Blend) and self.motion.finished:
             self._generator.reset()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The states of the controller: the words that request them, what ends them, what is reported."""
+"""States, mode requests, faults, parameters and reports of the controller."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ..policy.runner import PolicyRunner, PolicyStep
 
 
 class Reaction(IntEnum):
-    """What the robot does; the larger one prevails when several faults are there."""
+    """Reaction to a fault; with several faults, the largest value applies."""
 
     STAND = 1
     LIE_DOWN = 2
@@ -28,7 +28,7 @@ class Reaction(IntEnum):
 
 
 class Fault(Enum):
-    """Why; the value says what it is about, for people."""
+    """Kinds of fault; the value is a readable subject."""
 
     JOINTS = 'joint states'
     IMU = 'attitude'
@@ -54,7 +54,7 @@ LYING_FAULTS = frozenset({Fault.JOINTS, Fault.FALLEN})
 
 
 class FaultLatch:
-    """Keeps faults until they are cleared."""
+    """Latches faults until they are cleared."""
 
     def __init__(self) -> None:
         self._faults: dict[Fault, str] = {}
@@ -66,35 +66,35 @@ class FaultLatch:
 
     @property
     def reaction(self) -> Reaction | None:
-        """What to do, None without a fault."""
+        """Required reaction; None without a fault."""
         return max((REACTIONS[fault] for fault in self._faults), default=None)
 
     def latch(self, fault: Fault, reason: str) -> bool:
-        """Keep a fault; return whether it is new."""
+        """Latch a fault; return whether it is new."""
         new = fault not in self._faults
         if new:
             self._faults[fault] = reason
         return new
 
     def texts_without(self, fault: Fault) -> tuple[str, ...]:
-        """Return each of the others with its reason."""
+        """Return all other faults with their reasons."""
         return tuple(
             f'{f.value}: {reason}' for f, reason in self._faults.items() if f is not fault
         )
 
     def clear(self) -> None:
-        """Forget all."""
+        """Clear all faults."""
         self._faults.clear()
 
     def keep(self, faults: Collection[Fault]) -> tuple[str, ...]:
-        """Forget all but these; return what was forgotten, by name."""
+        """Clear all faults but these; return the cleared ones by name."""
         gone = tuple(fault.value for fault in self._faults if fault not in faults)
         self._faults = {f: reason for f, reason in self._faults.items() if f in faults}
         return gone
 
 
 class State(Enum):
-    """What the controller is doing; the value is its name for people."""
+    """State of the controller; the value is its readable name."""
 
     RELAX = 'relax'
     LIE = 'lie'
@@ -141,14 +141,14 @@ MODES = (
 
 @dataclass(frozen=True, slots=True)
 class ModeRequest:
-    """What a word requests."""
+    """State and gait that a mode name requests."""
 
     state: State  # state to go to
     gait: Gait | None = None  # gait to walk with, None for the one that is set
 
 
 def parse_mode(text: str) -> ModeRequest | None:
-    """Return what a word requests, None when it is not a mode."""
+    """Parse a mode name or alias; return None if it is unknown."""
     word = text.strip().lower()
     word = ALIASES.get(word, word)
     if word not in MODES:
@@ -160,7 +160,7 @@ def parse_mode(text: str) -> ModeRequest | None:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What becomes of a request."""
+    """Response to a request."""
 
     accepted: bool  # whether it is followed
     message: str  # what happens now, or why not and what can be done
@@ -168,7 +168,7 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class StateParameters:
-    """Tuning of everything but the gait and the policy."""
+    """All controller parameters except those of gait and policy."""
 
     # 10 set-points a second carry no trot of 0.28 s: it goes 0.08 of 0.2 m/s, and 0.19 with 25
     period: float = setting(0.02, 0.002, 0.04, 'time between two steps [s]')
@@ -205,10 +205,10 @@ class StateParameters:
     )
 
     def __post_init__(self) -> None:
-        """Refuse what makes no sense.
+        """Reject values outside of their ranges.
 
         Raises:
-            ParameterError: A value is outside of its range; the message has name and range.
+            ParameterError: A value is out of range; the message gives name and range.
         """
         check_settings(self)
         if not self.warn_age <= self.hold_age <= self.fault_age:
@@ -220,7 +220,7 @@ class StateParameters:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """The controller at one moment."""
+    """Snapshot of the controller."""
 
     state: State  # what it is doing
     title: str  # its name, with the way to it as long as it stands up or lies down
@@ -239,7 +239,7 @@ class Status:
 
 
 class EventKind(Enum):
-    """How an event is to be reported."""
+    """How to report an event."""
 
     NEWS = 'news'
     WARNING = 'warning'
@@ -249,7 +249,7 @@ class EventKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that people should know."""
+    """An event to report to the user."""
 
     kind: EventKind  # how it is to be reported
     text: str  # what happened, and the remedy if there is one
@@ -257,7 +257,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """A policy that was asked in a step."""
+    """A policy that was run in a step, and its answer."""
 
     policy: PolicyRunner  # which one
     answer: PolicyStep  # what it answered
@@ -266,7 +266,7 @@ class Asked:
 
 @dataclass(frozen=True, slots=True)
 class Output:
-    """What one step gives."""
+    """Result of one step."""
 
     # positions of all joints in [rad]; None as long as no joint state was received
     targets: Targets | None
@@ -279,17 +279,17 @@ class Output:
 
 
 class Notices:
-    """Compares what is the matter now with what was the matter in the step before."""
+    """Reports conditions that begin or end between two steps."""
 
     def __init__(self) -> None:
         self._present: set[str] = set()
 
     def step(self, present: dict[str, str], over: dict[str, str]) -> Iterator[Event]:
-        """Yield what has changed.
+        """Yield an event for each change.
 
         Args:
-            present: What is the matter, by a name for it.
-            over: What to say when it is no longer, by the same names; nothing where there is none.
+            present: Text of each present condition, by name.
+            over: Texts for conditions that end, by the same names; without one, no event.
         """
         for name, text in present.items():
             if name not in self._present:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What can move the joints, one thing at a time: holding, going to a pose, swinging, walking."""
+"""Motions that generate joint targets: hold, blend, swing and walk; and the step limiter."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ MAX_PERIODS = 1.5  # periods; a step that comes late may not be a leap
 
 
 class StepLimiter:
-    """Keeps targets within the joints' ranges, and steps within their speed.
+    """Limits targets to the joints' ranges, and their steps to the joints' speeds.
 
-    The last thing that a target passes. A joint that is found outside of its limits is not pulled
-    into them before something is requested: its range reaches to where it is, and shrinks with it.
+    The last stage for every target. A joint found outside of its limits is not pulled back until a
+    motion is requested: its range extends to its position, and shrinks as it returns.
     """
 
     def __init__(self, limits: Sequence[JointLimits], period: float, speed: float = 1.0) -> None:
-        """Start at no target; ``speed`` is that of a target per speed of its joint."""
+        """Start without targets; ``speed`` scales the joints' speed limits."""
         self._limits = tuple(limits)
         self._longest = MAX_PERIODS * period
         self._speed = speed
@@ -32,16 +32,16 @@ class StepLimiter:
         self.limited = 0  # how many targets of single joints were too fast so far, and were cut
 
     def start(self, positions: Sequence[float]) -> Targets:
-        """Begin where the joints are [rad], even if that is outside of their limits."""
+        """Start at the joint positions [rad], even outside of their limits."""
         self.last = tuple(positions)
         return self.last
 
     def reset(self) -> None:
-        """Forget what was let through: joints were moved by something else."""
+        """Forget the last targets, because something else moved the joints."""
         self.last = None
 
     def step(self, targets: Sequence[float], dt: float) -> Targets:
-        """Return what may be sent instead of some finite targets."""
+        """Limit finite targets to what may be sent."""
         if self.last is None:
             return self.start(targets)
         dt = min(dt, self._longest) * self._speed
@@ -58,10 +58,10 @@ class StepLimiter:
 
 
 class Motion(ABC):
-    """Makes joint targets, step after step.
+    """Generates joint targets, step after step.
 
-    A motion is wound down by a velocity of zero; it may be left for one that begins elsewhere as
-    soon as it is :attr:`settled`.
+    A velocity of zero winds a motion down; once it is :attr:`settled`, another motion may take
+    over.
     """
 
     finished = True  # whether it has come to where it leads
@@ -69,7 +69,7 @@ class Motion(ABC):
 
     @property
     def settled(self) -> bool:
-        """Whether the robot is at rest on its feet, or was not walking in the first place."""
+        """Whether the robot stands at rest, or was not walking in the first place."""
         return True
 
     @abstractmethod
@@ -78,19 +78,18 @@ class Motion(ABC):
 
 
 class Hold(Motion):
-    """Stays; a joint that something else has moved is not pulled back, the set-point follows.
+    """Holds the joints; if something else moves one, its set-point follows.
 
-    So servos that were switched off can be moved by hand and do not leap when they are switched
-    on again.
+    So servos without torque can be moved by hand, and do not jump when torque returns.
     """
 
     def __init__(self, targets: Targets, band: float) -> None:
-        """Hold some targets; a joint may be off by the band [rad]."""
+        """Hold some targets; a joint may deviate by the band [rad]."""
         self._targets = targets
         self._band = band
 
     def step(self, situation: Situation, dt: float) -> Targets:
-        """Return the targets, near to where the joints are."""
+        """Return the targets, kept within the band around the joint positions."""
         if situation.joints is not None:
             self._targets = tuple(
                 min(max(target, position - self._band), position + self._band)
@@ -100,10 +99,10 @@ class Hold(Motion):
 
 
 class Blend(Motion):
-    """Goes from one pose to another, all joints together, with a soft start and end."""
+    """Moves all joints to a pose in the same time, with a soft start and end."""
 
     def __init__(self, start: Targets, end: Targets, speed: float, least: float) -> None:
-        """Plan it: fastest joint at a speed [rad/s], at least so long [s]."""
+        """Plan the motion: maximum joint speed [rad/s], minimum duration [s]."""
         self._start, self._end = start, end
         way = max(abs(b - a) for a, b in zip(start, end, strict=True))
         # a cosine is pi / 2 times as fast in its middle as on average
@@ -121,10 +120,10 @@ class Blend(Motion):
 
 
 class Swing(Motion):
-    """Takes each joint to a pose by itself, as fast as it may: no soft start, no common end."""
+    """Moves each joint to a pose on its own at full speed: no soft start, no common end."""
 
     def __init__(self, start: Targets, end: Targets, speed: float, duration: float) -> None:
-        """Plan it: each joint at a speed [rad/s]; what is not there in time is left short."""
+        """Plan the motion: joint speed [rad/s]; joints that are late stop short."""
         self._targets, self._end, self._speed = start, end, speed
         self._left, self.finished = duration, False
 
@@ -140,7 +139,7 @@ class Swing(Motion):
 
 
 class Walk(Motion):
-    """The geometric gait; stands when the velocity is zero."""
+    """Walks with the geometric gait; stands at zero velocity."""
 
     def __init__(self, generator: GaitGenerator) -> None:
         self._generator = generator
@@ -148,7 +147,7 @@ class Walk(Motion):
 
     @property
     def settled(self) -> bool:
-        """Whether all feet stand at their places."""
+        """Whether all feet stand at their neutral positions."""
         return self._generator.standing
 
     def step(self, situation: Situation, dt: float) -> Targets:

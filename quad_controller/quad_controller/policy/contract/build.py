@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Makes a contract of a document; all that is open, unknown or senseless is named at once."""
+"""Builds a contract from a document; one error lists all missing, unknown and invalid values."""
 
 from __future__ import annotations
 
@@ -61,11 +61,11 @@ MEANINGS = {
 
 
 class _UnfitError(Exception):
-    """A value is not what its key needs; the text says what it should be."""
+    """A value does not suit its key; the text says what is expected."""
 
 
 class _Section:
-    """Takes keys out of a mapping, one by one; all sections of a contract share findings."""
+    """Reads keys from a mapping, one by one; all sections of a contract share their findings."""
 
     def __init__(self, values: object, path: str, above: _Section | None = None) -> None:
         # where a person finds the value of an open key, by its path
@@ -81,11 +81,11 @@ class _Section:
         self.values = {str(key): value for key, value in values.items()}  # what the mapping has
 
     def path(self, key: str) -> str:
-        """Return the whole path of a key."""
+        """Return the full path of a key."""
         return f'{self._path}.{key}' if self._path else key
 
     def missing(self, key: str) -> None:
-        """Note an open key."""
+        """Record a missing key."""
         path = self.path(key)
         meaning = MEANINGS.get(path) or MEANINGS.get(key, '')
         hint = self.hints.get(path)
@@ -94,13 +94,13 @@ class _Section:
         )
 
     def required(self, key: str, convert: Callable[[Any], T], default: T) -> T:
-        """Return a value; an open one is noted, and the default stands for it."""
+        """Return a value; if it is missing, record that and return the default."""
         if self.values.get(key) is None:
             self.missing(key)
         return self.optional(key, convert, default)
 
     def optional(self, key: str, convert: Callable[[Any], T], default: T) -> T:
-        """Return a value, or the default where there is none."""
+        """Return a value, or the default if it is missing."""
         self._known.append(key)
         value = self.values.get(key)
         if value is None:
@@ -112,19 +112,19 @@ class _Section:
             return default
 
     def section(self, key: str) -> _Section:
-        """Return a mapping below a key; an empty one where there is none."""
+        """Return the mapping below a key; empty if it is missing."""
         self._known.append(key)
         value = self.values.get(key)
         return _Section({} if value is None else value, self.path(key), self)
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """All keys; they count as known."""
+        """Return all keys and mark them as known."""
         self._known.extend(self.values)
         return tuple(self.values)
 
     def end(self) -> None:
-        """Note the keys that were not read."""
+        """Record the keys that were not read."""
         for key in self.values:
             if key not in self._known:
                 close = difflib.get_close_matches(key, self._known, n=1)
@@ -133,10 +133,10 @@ class _Section:
 
 
 def build_contract(document: ContractDocument) -> PolicyContract:
-    """Make a contract of values that are all laid over each other.
+    """Build a contract from the merged document.
 
     Raises:
-        PolicyError: Something is open, unknown, senseless, or cannot be run here; all is named.
+        PolicyError: A value is missing, unknown, invalid or unsupported; the message lists all.
     """
     top = _Section(document.values, '')
     top.hints = document.hints

@@ -2,15 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Contracts from rl_sar (``config.yaml``, ``base.yaml``) and MuJoCo Playground (``config.json``).
 
-In rl_sar a policy has a ``config.yaml``, its robot a ``base.yaml``. Each file has one key
-(``go2``, ``go2/himloco``) above all others. Observations are scaled, then clipped as a whole;
-actions are clipped before they are scaled, and remembered so. In ``observations_history`` 0 is the
-newest step. A ``joint_mapping`` of the policy's file counts before that of its robot. Which axes
-an angular velocity has stands in rl_sar's code, not in its files: on a robot those of the body.
+In rl_sar a policy has a ``config.yaml``, its robot a ``base.yaml``. Each file has one top-level
+key (``go2``, ``go2/himloco``). Observations are scaled, then clipped as a whole; actions are
+clipped before they are scaled, and the clipped ones are fed back. In ``observations_history`` 0 is
+the newest step. The policy's ``joint_mapping`` overrides that of its robot. rl_sar's code, not its
+files, defines the frame of the angular velocity: on a robot, the body frame.
 
-The order of the observation in Playground is that of the Go1 joystick's ``state``: it stands in
-their code, not in the file. So do the names of the joints and the default pose (keyframe
-``home``), and the frame of the IMU's site: those are asked for.
+In Playground the observation has the order of the Go1 joystick's ``state``, which is defined in
+their code, not in the file. The file also lacks the joint names, the default pose (keyframe
+``home``) and the frame of the IMU site: the user has to supply those.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ PLAYGROUND_HINTS = {
 
 
 def read_playground(values: Mapping[str, Any], origin: str) -> ContractDocument:
-    """Read ``config.json`` of a training."""
+    """Read the ``config.json`` of a training."""
     stiffness, damping = (
         value if isinstance(value, (int, float)) else None
         for value in (values.get('Kp'), values.get('Kd'))

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A contract as a document: nested keys, and where each value comes from.
+"""Contract documents: nested keys, with the origin of each value.
 
-Readers of other tools' files make such documents, a person writes one in YAML. They are laid over
-each other, later ones count, and what is still open then is asked for by name.
+Readers of other tools' files create documents, and users write them in YAML. Documents are merged,
+later ones override earlier ones, and the error message names each value still missing.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Values = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class ContractDocument:
-    """Values of a contract, as far as they are known."""
+    """The known values of a contract."""
 
     values: Values  # nested keys; terms of the observation are in their order
     # where each value comes from, by its path (``action.scale``)
@@ -34,10 +34,10 @@ class ContractDocument:
     joint_order: Mapping[str, Any] = field(default_factory=dict)
 
     def over(self, base: ContractDocument) -> ContractDocument:
-        """Return this one laid over another: its values count, the other's order stays.
+        """Merge with another document: these values win, the other's order is kept.
 
         Raises:
-            PolicyError: The joint_mapping of one does not fit the joint_names of the other.
+            PolicyError: The joint_mapping of one does not match the joint_names of the other.
         """
         terms = self.values.get('observation', {}).get('terms', {})
         if terms and all(isinstance(t, dict) and 'source' in t for t in terms.values()):
@@ -56,7 +56,7 @@ class ContractDocument:
         )
 
     def without_terms(self) -> ContractDocument:
-        """Return this one without the terms of the observation."""
+        """Return a copy without the observation terms."""
         observation = self.values.get('observation', {})
         kept = {key: value for key, value in observation.items() if key != 'terms'}
         origins = {
@@ -72,7 +72,7 @@ class ContractDocument:
             yield path, _text(value), self.origins.get(path, '')
 
     def to_yaml(self) -> str:
-        """Return it as YAML, with the origin of each value that is not its own."""
+        """Return the document as YAML, with comments for origins in other files."""
         head = ''.join(
             f'# {path}: {origin}\n' for path, origin in sorted(self.origins.items()) if origin
         )
@@ -90,10 +90,10 @@ def flatten(values: Mapping[str, Any], prefix: str = '') -> Iterator[tuple[str, 
 
 
 def permuted(names: Sequence[str], mapping: object) -> list[str]:
-    """Return names in the order of their indices in a ``joint_mapping``.
+    """Return names permuted by the indices of a ``joint_mapping``.
 
     Raises:
-        PolicyError: It is no list of indices from 0 on, each once.
+        PolicyError: The mapping is not a permutation of 0 to n-1.
     """
     indices: list[Any] = mapping if isinstance(mapping, list) else [mapping]
     if sum(indices.count(place) == 1 for place in range(len(names))) < len(indices):
@@ -105,7 +105,7 @@ def permuted(names: Sequence[str], mapping: object) -> list[str]:
 
 
 def known(**values: object) -> Values:
-    """Return the values that a file has: none of them is None or empty."""
+    """Return the values of a file that are neither None nor empty."""
     return {key: value for key, value in values.items() if value not in (None, {})}
 
 
@@ -115,13 +115,13 @@ def document_of(
     hints: Mapping[str, str] | None = None,
     refusals: Iterable[str] = (),
 ) -> ContractDocument:
-    """Make a document whose values all come from one place."""
+    """Create a document whose values all have one origin."""
     origins = {path: origin for path, _ in flatten(values)}
     return ContractDocument(values, origins, hints or {}, tuple(refusals))
 
 
 class _Loader(yaml.SafeLoader):
-    """Reads the tags of Python that Isaac Lab writes as plain values; nothing is executed."""
+    """Loads the Python tags that Isaac Lab writes as plain values; executes nothing."""
 
 
 def _plain(loader: yaml.SafeLoader, _suffix: str, node: yaml.Node) -> object:
@@ -136,10 +136,10 @@ _Loader.add_multi_constructor('tag:yaml.org,2002:python/', _plain)
 
 
 def load_yaml(text: str, origin: str) -> Values:
-    """Read YAML, also with tags of Python in it.
+    """Load YAML that may contain Python tags.
 
     Raises:
-        PolicyError: It is no YAML, or no mapping.
+        PolicyError: The text is not valid YAML, or not a mapping.
     """
     try:
         values = yaml.load(text, _Loader)  # noqa: S506  # a SafeLoader; tags become plain values
@@ -156,10 +156,10 @@ def read_yaml(text: str, origin: str) -> ContractDocument:
 
 
 def setting(text: str) -> ContractDocument:
-    """Read ``path=value`` as a document; the value is YAML.
+    """Parse ``path=value`` into a document; the value is YAML.
 
     Raises:
-        PolicyError: There is no ``=``, or the value is no YAML.
+        PolicyError: The ``=`` is missing, or the value is not valid YAML.
     """
     path, sign, value = text.partition('=')
     if not sign or not path:

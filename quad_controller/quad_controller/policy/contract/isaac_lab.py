@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Contracts from Isaac Lab: ``params/env.yaml`` of a training, ``deploy.yaml`` of unitree_rl_lab.
 
-Velocities are those of the root in its own frame (``isaaclab.envs.mdp``). A history is that of
-each term, oldest first, and begins with its first step repeated (``CircularBuffer``). Neither file
-has the order of the joints: it is the simulator's, and has to be given by name.
+Velocities are those of the root in its own frame (``isaaclab.envs.mdp``). Each term has its own
+history, oldest first, filled with the first step at the start (``CircularBuffer``). Neither file
+has the joint order: it is the simulator's, and the user has to supply it as names.
 """
 
 from __future__ import annotations
@@ -51,11 +51,11 @@ def read_deploy(values: Mapping[str, Any], origin: str) -> ContractDocument:
 
 
 def read_env(values: Mapping[str, Any], origin: str, joints: Sequence[str]) -> ContractDocument:
-    """Read ``params/env.yaml`` of a training with Isaac Lab.
+    """Read the ``params/env.yaml`` of an Isaac Lab training.
 
     Args:
-        joints: Names of the joints in the policy's order; empty while they are unknown. Patterns
-            of the file are matched with them.
+        joints: Joint names in the policy's order, matched with the patterns of the file; empty if
+            unknown.
     """
     group = _mapping(_mapping(values, 'observations'), 'policy')
     length = group.get('history_length')
@@ -119,7 +119,7 @@ def _term(kind: str, term: Mapping[str, Any]) -> Values:
 
 
 def _noise(group: Mapping[str, Any], term: Mapping[str, Any]) -> float | None:
-    """Return the deviation of what is added to a term; None where the file does not say."""
+    """Return the standard deviation of a term's noise; None if the file omits it."""
     noise = term.get('noise')
     if group.get('enable_corruption') is False or ('noise' in term and noise is None):
         return 0.0
@@ -134,7 +134,7 @@ def _noise(group: Mapping[str, Any], term: Mapping[str, Any]) -> float | None:
 def _action(
     values: Mapping[str, Any], joints: Sequence[str], origin: str
 ) -> tuple[Values, list[str]]:
-    """Return the action, and why it is not absolute positions of all joints in their order."""
+    """Return the action, and why it is unsupported: only absolute positions of all joints are."""
     actions = {
         name: each for name, each in _mapping(values, 'actions').items()
         if isinstance(each, Mapping)
@@ -158,7 +158,7 @@ def _action(
 
 
 def _matched(value: object, joints: Sequence[str], default: object) -> object:
-    """Return a value for each joint where the file has patterns; else what it has."""
+    """Resolve patterns to one value per joint; return other values unchanged."""
     if not isinstance(value, Mapping):
         return value
     if not joints:
@@ -174,7 +174,7 @@ def _has_history(terms: Mapping[str, Values]) -> bool:
 
 
 def _uniform(value: object) -> object:
-    """Return the number that a list holds, None where its entries differ."""
+    """Return the common value of all list entries; None if they differ."""
     if not isinstance(value, (list, tuple)):
         return value
     return value[0] if value and all(each == value[0] for each in value) else None

@@ -1,16 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The metadata of an ONNX file, as mjlab's exporter and the vendor's training write them.
+"""Reads ONNX metadata as written by mjlab's exporter and the vendor's training.
 
-All values are texts; lists are joined by commas, numbers and flags have three decimals (mjlab,
-rl/exporter_utils.py). From 1.5.1 on it writes scales, clips and histories of the terms, too; the
-numbers of one term are joined by semicolons, and ``-inf;inf`` is no clip. A joint may have a
+All values are strings; commas separate list items, numbers and flags have three decimals (mjlab,
+rl/exporter_utils.py). Since 1.5.1 it also writes scales, clips and histories of the terms;
+semicolons separate the numbers of one term, and ``-inf;inf`` means no clipping. A joint may have a
 prefix like ``robot/``. No exporter writes the frame of the IMU, the period of the phase, or the
 rate; ``phase_period``, ``phase_command_threshold``, ``imu_frame`` and ``kind`` are ours.
 
 Sizes and rate have keys of several tools (unitree_rl_lab's deploy.yaml, rl_sar, IsaacLab); they
-are compared with the contract. What looks like one of them and is not known is reported, and what
-would change observations or actions is refused.
+are compared with the contract. Unknown keys that look similar are reported; keys that
+would change observations or actions are rejected.
 """
 
 from __future__ import annotations
@@ -66,10 +66,10 @@ NO_CLIP = 100.0  # where observations are clipped anyway, and no action is ever
 
 
 def read_metadata(values: Mapping[str, str]) -> ContractDocument:
-    """Read the metadata of a file.
+    """Read the metadata of an ONNX file.
 
     Raises:
-        PolicyError: A text is not a number, a list, or YAML.
+        PolicyError: A value is not a valid number, list, or YAML.
     """
     document = document_of(_mjlab(values), FILE)
     document = document_of(_assumed(document.values), VENDOR).over(document)
@@ -163,7 +163,7 @@ def _own_keys(values: Mapping[str, str], source: object) -> Values:
 
 
 def _assumed(known: Values) -> Values:
-    """Return what is known of the vendor's task and not said, where a file has its terms."""
+    """Return known facts of the vendor's task that the metadata omit, if the terms match."""
     terms = known.get('observation', {}).get('terms', {})
     sources = [term.get('source') for term in terms.values()]
     if sources != [MJLAB[name]['source'] for name in VENDOR_TERMS]:
@@ -176,7 +176,7 @@ def _assumed(known: Values) -> Values:
 
 
 def _layouts(values: Mapping[str, str]) -> list[str]:
-    """Return what is said of a history that is not flat."""
+    """Return descriptions of histories that are not flattened."""
     key = 'observation_terms_flatten_history_dim'
     text = values.get(key, '')
     flags = [word.strip().lower() in {'false', '0', '0.000'} for word in text.split(',')]
@@ -190,7 +190,7 @@ def _layouts(values: Mapping[str, str]) -> list[str]:
 
 
 def _entries(values: Mapping[str, str], key: str, count: int) -> list[list[float] | None]:
-    """Return the numbers of each term; None where the file has no such key."""
+    """Return the numbers of each term; None if the key is missing."""
     if key not in values:
         return [None] * count
     try:
@@ -226,7 +226,7 @@ def _base_name(name: str) -> str:
 
 
 def changing(values: Mapping[str, str]) -> dict[str, str]:
-    """Return the keys that would change observations or actions, with their texts."""
+    """Return keys, with values, that would change observations or actions."""
     return {
         key: text
         for key, text in values.items()
@@ -235,7 +235,7 @@ def changing(values: Mapping[str, str]) -> dict[str, str]:
 
 
 def not_understood(values: Mapping[str, str]) -> dict[str, str]:
-    """Return the keys that look as if they mattered and are not known, with their texts."""
+    """Return unknown keys, with values, that look relevant."""
     return {
         key: text
         for key, text in values.items()
@@ -244,7 +244,7 @@ def not_understood(values: Mapping[str, str]) -> dict[str, str]:
 
 
 def numbers_of(values: Mapping[str, str], keys: Iterable[str], place: int = 0) -> dict[str, float]:
-    """Return the number at a place in the texts of some keys; NaN where there is none."""
+    """Return one number from the value of each key; NaN if the value has none."""
     return {key: (_numbers_in(values[key]) or [math.nan])[place] for key in keys if key in values}
 
 

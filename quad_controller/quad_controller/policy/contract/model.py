@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 
 class Source(Enum):
-    """What a term of the observation is made of."""
+    """The quantity that an observation term contains."""
 
     LINEAR_VELOCITY = 'linear_velocity'
     """Of the body in [m/s], estimated; 3 numbers."""
@@ -58,9 +58,9 @@ PER_JOINT = frozenset({Source.JOINT_POSITIONS, Source.JOINT_VELOCITIES, Source.L
 
 
 class BodyFrame(Enum):
-    """Frame of a vector; ``YAWED`` is the body's, turned by 180 degrees about z.
+    """Frame of a vector; ``YAWED`` is the body frame turned by 180 degrees about z.
 
-    In the vendor's training environment (luwu_mjlab) the IMU sits so on the body.
+    The vendor's training environment (luwu_mjlab) mounts the IMU that way.
     """
 
     BASE = 'base'
@@ -68,17 +68,17 @@ class BodyFrame(Enum):
 
 
 class QuaternionOrder(Enum):
-    """Order of a quaternion's numbers."""
+    """Order of the components of a quaternion."""
 
     XYZW = 'xyzw'
     WXYZ = 'wxyz'
 
 
 class HistoryLayout(Enum):
-    """How the steps of a history lie in the observation.
+    """Layout of the history steps in the observation.
 
     ``PER_TERM``: all steps of the first term, then all of the second (Isaac Lab, mjlab).
-    ``FRAMES``: one whole observation after the other (legged_gym and its relatives).
+    ``FRAMES``: whole observations one after another (legged_gym and its derivatives).
     """
 
     PER_TERM = 'per_term'
@@ -86,14 +86,14 @@ class HistoryLayout(Enum):
 
 
 class Newest(Enum):
-    """Which step of a history comes where."""
+    """Whether the newest history step comes first or last."""
 
     FIRST = 'first'
     LAST = 'last'
 
 
 class HistoryStart(Enum):
-    """What a history holds before there was one: its first step again, or zeros."""
+    """Initial content of a history: its first step repeated, or zeros."""
 
     REPEAT = 'repeat'
     ZERO = 'zero'
@@ -124,7 +124,7 @@ class ObservationTerm:
 
 @dataclass(frozen=True, slots=True)
 class ActionContract:
-    """What becomes of an answer: ``target = clip(action) * scale + offset``."""
+    """Maps an action to a joint target: ``target = clip(action) * scale + offset``."""
 
     scale: tuple[float, ...]  # in [rad] for each joint
     offset: tuple[float, ...]  # in [rad] for each joint; as a rule the default pose
@@ -138,14 +138,14 @@ class ActionContract:
 
 @dataclass(frozen=True, slots=True)
 class RecurrentState:
-    """An input that gets what an output was a step before; zeros in the first step."""
+    """An input that receives an output of the previous step; zero in the first step."""
 
     input: str
     output: str
 
 
 class CommandRanges(NamedTuple):
-    """Commands that the policy was trained for: lowest and highest, [m/s] and [rad/s]."""
+    """Command ranges of the training: lowest and highest, [m/s] and [rad/s]."""
 
     x: tuple[float, float]
     y: tuple[float, float]
@@ -154,7 +154,7 @@ class CommandRanges(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Gains:
-    """Of the servos in the training, for each joint: [N m/rad] and [N m s/rad]."""
+    """Servo gains in the training, per joint: [N m/rad] and [N m s/rad]."""
 
     stiffness: tuple[float, ...]
     damping: tuple[float, ...]
@@ -162,7 +162,7 @@ class Gains:
 
 @dataclass(frozen=True, slots=True)
 class PolicyContract:
-    """All that has to agree between a policy and the robot that runs it."""
+    """Everything on which a policy and the robot that runs it must agree."""
 
     joint_names: tuple[str, ...]  # joints in the order of observations and actions
     default_positions: tuple[float, ...]  # of the joints in [rad]
@@ -182,16 +182,16 @@ class PolicyContract:
 
     @property
     def width(self) -> int:
-        """Numbers of the whole observation."""
+        """Number of values in the whole observation."""
         return sum(term.width * term.history for term in self.terms)
 
     @property
     def velocity_noise(self) -> float | None:
-        """Least noise of joint velocities in the training, rms [rad/s]; None where unknown."""
+        """Lowest joint velocity noise in the training, rms [rad/s]; None if unknown."""
         return min((term.noise for term in self.terms if term.noise is not None), default=None)
 
     def needs(self, source: Source) -> bool:
-        """Return whether a term is made of this."""
+        """Return whether any observation term uses a source."""
         return any(term.source is source for term in self.terms)
 
 
