@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Motion planning of an arm among obstacles; no ROS.
 
-A :class:`Planner` plans: a :class:`MotionRequest` goes in, a :class:`MotionPlan` comes out, or a
-:class:`PlanningError` with MoveIt's code and the reason in words.
+:meth:`Planner.plan` turns a :class:`MotionRequest` into a :class:`MotionPlan`, or raises a
+:class:`PlanningError` with MoveIt's error code and the reason in words.
 
-Conventions: joint vectors (n) are in the order of the group's joints in [rad], of joints that
-slide in [m]; where all joints of the robot are meant, ``positions`` are by name. Places on a path
-are rows (m, n). Poses are in the root link. Times and durations are in [s], factors of velocity
-and acceleration above 0 and at most 1.
+Conventions: joint vectors (n) are in the order of the group's joints, in [rad] (prismatic joints
+in [m]); ``positions`` of the whole robot are keyed by joint name. Waypoints of a path are rows
+(m, n). Poses are expressed in the root link. Times and durations are in [s]; velocity and
+acceleration scaling factors are above 0 and at most 1.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Lines and arcs of a link, and joints along lines as MoveIt's compute_cartesian_path has them.
+"""Lines and arcs of a link, and joint paths along lines as in MoveIt's compute_cartesian_path.
 
-Joint positions are found at places at most ``max_step`` apart, each next to those before. The path
-ends in front of the first place that has none, that is in contact, or to which joints would jump;
-the fraction says how far it goes.
+IK is solved at points at most ``max_step`` apart, each time next to the previous solution. The
+path ends before the first point without a solution, in contact, or after a joint jump; the
+fraction says how much of it was reached.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ MAX_RADIUS_DIFFERENCE = 1e-2
 """Greatest difference of the radii at start and goal of an arc in [m], as in Pilz' planner."""
 
 COLLINEAR_TOLERANCE = 1e-5
-"""Length of the cross product below which points are on a line, as in Pilz' planner."""
+"""Length of the cross product below which points are collinear, as in Pilz' planner."""
 
 
 class _Turning:
@@ -67,7 +67,7 @@ class Line:
         return Pose(self._turning.at(share), self._start + share * self._way)
 
     def twist(self, share: float) -> Array:
-        """Return the derivative by the share, which is the same everywhere."""
+        """Return the derivative with respect to the share; it is constant."""
         del share
         return self._twist
 
@@ -80,7 +80,7 @@ class Arc:
     """A part of a circle between two poses."""
 
     def __init__(self, start: Pose, end: Pose, center: Array, axis: Array) -> None:
-        """Draw about an axis of any length; :func:`arc_through` finds the circle, as others do."""
+        """Build an arc about an axis of any length; :func:`arc_through` finds the circle."""
         self._turning = _Turning(start.rotation, end.rotation)
         normal = axis / np.linalg.norm(axis)
         self._center = center
@@ -98,7 +98,7 @@ class Arc:
         return Pose(self._turning.at(share), self._center + around)
 
     def twist(self, share: float) -> Array:
-        """Return the derivative by the share."""
+        """Return the derivative with respect to the share."""
         turn = share * self._sweep
         along = math.cos(turn) * self._second - math.sin(turn) * self._first
         return np.concatenate((self._sweep * along, self._turning.vector))
@@ -115,7 +115,7 @@ Curve = Line | Arc  # a way of a link in the root link, by a parameter from 0 to
 
 
 def arc_through(start: Pose, interim: Array, end: Pose) -> Arc:
-    """Return the arc through a point in [m]; refuse one that is on a line with the ends."""
+    """Return the arc through a point in [m]; refuse a point collinear with the ends."""
     first, second = interim - start.position, end.position - start.position
     across = np.cross(first, second)
     size = float(np.linalg.norm(across))
@@ -159,7 +159,7 @@ def _no_circle(reason: str) -> PlanningError:
 
 
 MIN_STEPS_FOR_JUMPS = 10
-"""Steps of a path at least for which a jump is judged by the mean step, as in MoveIt."""
+"""Least number of steps for a joint-jump check against the mean step, as in MoveIt."""
 
 MAX_STEPS = 100_000  # places on a path at most
 ROTATION_STEP = 0.05  # greatest rotation between two places in [rad], where the way says less
@@ -174,7 +174,7 @@ class JumpThresholds:
     prismatic: float = 0.0  # greatest step of a joint that slides in [m]
 
     def __post_init__(self) -> None:
-        """Refuse thresholds that are none."""
+        """Refuse invalid thresholds."""
         for name in ('relative', 'revolute', 'prismatic'):
             value = getattr(self, name)
             if not value >= 0.0:
@@ -186,7 +186,7 @@ class JumpThresholds:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CartesianPath:
-    """Joint positions along way-points."""
+    """Joint positions along waypoints."""
 
     positions: Array  # joint positions in [rad] (k, n), the start among them
     fraction: float  # share of the way that they lead, from 0 to 1
@@ -204,16 +204,16 @@ def cartesian_path(
     scene: PlanningScene | None = None,
     is_valid: Callable[[Array], bool] | None = None,
 ) -> CartesianPath:
-    """Return joint positions along straight lines through way-points.
+    """Return joint positions along straight lines through waypoints.
 
     Args:
         waypoints: Poses of the link in the root link.
-        max_step: Greatest way of the link between two places in [m].
-        is_valid: What else must hold at each place, such as path constraints.
+        max_step: Greatest travel of the link between two points in [m].
+        is_valid: Further check of each point, such as path constraints.
 
     Raises:
-        PlanningError: There is no way-point, no step, or no such link.
-        CommandError: A number is not finite, or there are too few or too many.
+        PlanningError: There is no waypoint, no step, or no such link.
+        CommandError: A number is not finite, or the number of values is wrong.
     """
     here = checked(start, len(model), 'start')
     moved = LinkKinematics(model, link)
@@ -255,7 +255,7 @@ def cartesian_path(
 def _step(
     link: LinkKinematics, limits: JointLimits, pose: Pose, before: Array
 ) -> tuple[Array, str]:
-    """Return positions for a pose next to others, or why there are none."""
+    """Return joint positions for a pose near given ones, or why there are none."""
     end = descend(link, pose, before, limits.lower, limits.upper)
     if end.converged:
         return end.positions, ''

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Constraints of joints, orientations and positions: whether states heed them, and which near do.
+"""Joint, orientation and position constraints: checks states, and projects states onto them.
 
-Each is made of rows: a function of the joint positions that stays between two bounds, with its
-gradient. States are led to them by Newton steps of the rows that are broken (Berenson et al.,
+A constraint consists of rows: functions of the joint positions that must stay between two bounds,
+with their gradients. Newton steps on the violated rows project a state (Berenson et al.,
 "Manipulation planning on constraint manifolds", ICRA 2009).
 """
 
@@ -43,14 +43,14 @@ TOLERANCE = 1e-6  # rounding beyond a constraint that is let pass in [rad] and [
 STEP = 4e-3  # turn of all joints together between two looks at a path in [rad] or [m]
 
 LEAST_ROOMS = 4.0
-"""Width of a constraint that a path can be kept in, in what may happen between two looks."""
+"""Least width of a path constraint, as a multiple of the change between two samples of a path."""
 
 WIDEST = 0.1  # half width beyond which the share of a constraint grows no more, in [rad] or [m]
 COARSE_LOOKS = 2000  # looks at a path by which the others are laid out
 INNER = 0.8  # share of a constraint into which a state is led that broke it
 
 STEEPEST = 0.5 * np.pi - 0.01
-"""Second of three Euler angles up to which the others are distinguished in [rad]."""
+"""Limit of the second Euler angle in [rad]; beyond it the other two are indistinguishable."""
 
 MAX_ITERATIONS = 12  # newton steps at most
 DAMPING = 1e-3  # of the steps, for rows of which the joints can move one with another only
@@ -58,10 +58,10 @@ DAMPING = 1e-3  # of the steps, for rows of which the joints can move one with a
 
 @dataclass(frozen=True, slots=True)
 class ConstraintResult:
-    """What became of one constraint in a state."""
+    """Result of checking one constraint in one state."""
 
-    violation: str  # what is wrong, in words; empty where it is heeded
-    distance: float  # how far the state is beyond it, in [rad] or [m]; 0 where it is heeded
+    violation: str  # what is wrong, in words; empty if satisfied
+    distance: float  # how far the state violates it, in [rad] or [m]; 0 if satisfied
 
 
 HEEDED = ConstraintResult('', 0.0)
@@ -69,7 +69,7 @@ HEEDED = ConstraintResult('', 0.0)
 
 @dataclass(frozen=True, slots=True)
 class _Rows:
-    """Functions of the joint positions, and between what they are to be."""
+    """Functions of the joint positions, with their bounds and gradients."""
 
     values: Array  # in [rad] or [m] (k)
     lower: Array  # least values (k)
@@ -79,25 +79,25 @@ class _Rows:
 
     @property
     def beyond(self) -> float:
-        """How far they are out of their bounds, in [rad] or [m]; 0 or less inside."""
+        """Greatest violation of the bounds, in [rad] or [m]; 0 or less inside."""
         return float(np.maximum(self.lower - self.values, self.values - self.upper).max())
 
     @property
     def half(self) -> Array:
-        """Half the width of the bounds (k); values without a least one are lengths."""
+        """Half the width of the bounds (k); values without a lower bound are lengths."""
         two_sided = np.isfinite(self.lower)
         width = self.upper - np.where(two_sided, self.lower, -self.upper)
         half: Array = 0.5 * width
         return half
 
     def excess(self, share: float, rooms: float) -> Array:
-        """Return by how much each is to change (k), to be in a share of its bounds with rooms."""
+        """Return how far each value (k) exceeds its bounds, shrunk by share and rooms."""
         inset = rooms * self.room + (1.0 - share) * np.minimum(self.half, WIDEST)
         return self.values - np.clip(self.values, self.lower + inset, self.upper - inset)
 
 
 class ConstraintCheck:
-    """Looks at states and paths of one arm; belongs to one thread."""
+    """Checks constraints of states and paths of one arm. Not thread-safe."""
 
     def __init__(self, model: RobotModel, *constraints: PathConstraints) -> None:
         self._joints = tuple(model.joints)
@@ -109,24 +109,24 @@ class ConstraintCheck:
         self._links = {name: LinkKinematics(model, name) for name in names}
 
     def violated(self, positions: Array) -> str:
-        """Return what a state violates first, in words; empty for nothing."""
+        """Describe the first constraint that a state violates; empty if there is none."""
         violations = (each.violation for each in self.results(positions))
         return next(filter(None, violations), '')
 
     def results(self, positions: Array) -> Iterator[ConstraintResult]:
-        """Yield what becomes of each constraint: of joints, orientations, then positions."""
+        """Yield the result of each constraint: joints, orientations, then positions."""
         for rows, words in self._all(positions):
             beyond = rows.beyond
             yield ConstraintResult(words(), beyond) if beyond > TOLERANCE else HEEDED
 
     def heeds(self, positions: Array) -> bool:
-        """Whether all constraints hold, and go on to hold until the next look at a path."""
+        """Whether all constraints hold, with margin up to the next sample of a path."""
         return not any(rows.excess(1.0, 1.0).any() for rows, _ in self._all(positions))
 
     def projected(self, positions: Array, *, rooms: float = 1.0) -> Array | None:
-        """Return a state that heeds the constraints near one that may not; None for none.
+        """Return a nearby state that satisfies the constraints; None if none was found.
 
-        ``rooms`` is 1 for states of a path, 0 for one that nothing follows.
+        ``rooms`` is 1 for states of a path, 0 for a state at which the motion ends.
         """
         state = positions
         for _ in range(MAX_ITERATIONS):
@@ -142,9 +142,9 @@ class ConstraintCheck:
         return None
 
     def path(self, path: Path, *, at_looks: bool = False) -> Violation | None:
-        """Return where a path breaks a constraint first; None for nowhere.
+        """Return where a path first violates a constraint; None if it never does.
 
-        With ``at_looks`` constraints need not hold between two looks, as where a line holds one.
+        With ``at_looks`` the constraints are checked at the samples only, without a margin.
         """
         coarse = np.linspace(0.0, path.duration, COARSE_LOOKS)
         turned = np.abs(np.diff(path.positions(coarse), axis=0)).sum(axis=1)
@@ -157,7 +157,7 @@ class ConstraintCheck:
         return None
 
     def lines(self, places: Array) -> Violation | None:
-        """Return where straight motions break a constraint first; None for nowhere."""
+        """Return where straight motions first violate a constraint; None if they never do."""
         for begin, end in pairwise(places):
             count = int(np.ceil(np.abs(end - begin).sum() / STEP)) + 1
             for positions in np.linspace(begin, end, count + 1):
@@ -166,7 +166,7 @@ class ConstraintCheck:
         return None
 
     def refuse_narrow(self, positions: Array) -> None:
-        """Refuse constraints that are narrower than what happens between two looks at a path."""
+        """Refuse constraints that are too narrow for the sampling of a path."""
         for rows, words in self._all(positions):
             width, least = 2.0 * float(rows.half.min()), LEAST_ROOMS * rows.room
             if width < 0.0:
@@ -181,11 +181,11 @@ class ConstraintCheck:
                 )
 
     def reason(self, positions: Array) -> str:
-        """Return in words why a state does not heed the constraints."""
+        """Describe why a state does not satisfy the constraints."""
         return self.violated(positions) or 'it comes too near to the bounds of a path constraint'
 
     def _all(self, positions: Array) -> Iterator[tuple[_Rows, Callable[[], str]]]:
-        """Yield the rows of each constraint, and what is to be said where they are broken."""
+        """Yield the rows of each constraint, and a function that describes a violation."""
         links = {name: link.pose_and_jacobian(positions) for name, link in self._links.items()}
         for every in self.constraints:
             for name, bounds in every.joints.items():
@@ -244,7 +244,7 @@ def _turned(
 
 
 def _rotation_vector(rotation: Array) -> tuple[Array, Array, float]:
-    """Return the vector, its change by a turn about the wanted axes, and until the next look."""
+    """Return rotation vector, its derivative in the target axes, and change to the next sample."""
     turned: Array = pin.log3(rotation)
     # it changes quicker than the link turns, the quickest at half a turn; of the farthest until
     # the next look
@@ -253,7 +253,7 @@ def _rotation_vector(rotation: Array) -> tuple[Array, Array, float]:
 
 
 def _euler_angles(rotation: Array) -> tuple[Array, Array, float]:
-    """Return the angles about x, y and z one after the other, as :func:`_rotation_vector`."""
+    """Return the same as :func:`_rotation_vector`, for Euler angles about x, y and z."""
     x = np.arctan2(-rotation[1, 2], rotation[2, 2])
     y = np.arcsin(np.clip(rotation[0, 2], -1.0, 1.0))
     z = np.arctan2(-rotation[0, 1], rotation[0, 0])
@@ -272,7 +272,7 @@ def _euler_angles(rotation: Array) -> tuple[Array, Array, float]:
 
 
 def _within(region: PlacedShape, point: Array, moved: Array, room: float) -> _Rows:
-    """Return the rows of a point of the root link in a region; moved is its Jacobian (3, n)."""
+    """Return the rows that keep a point (root link) in a region; moved is its Jacobian (3, n)."""
     place = combined(inverse(region.pose), Pose(ORIGIN.rotation, point)).position
     moved = region.pose.rotation.T @ moved
     aside = float(np.hypot(place[0], place[1]))

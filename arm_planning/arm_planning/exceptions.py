@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What arm_planning raises, beside the errors of arm_model.
+"""Exceptions of arm_planning, besides those of arm_model.
 
 ::
 
@@ -67,7 +67,7 @@ class PlanningError(ArmError):
 
 @contextmanager
 def coded(code: PlanningCode | None = None, place: str = '') -> Iterator[None]:
-    """Raise refusals as a PlanningError; None keeps their code. A place begins the message."""
+    """Convert refusals to a PlanningError; None keeps their code. A place begins the message."""
     try:
         yield
     except ArmError as error:
@@ -77,7 +77,7 @@ def coded(code: PlanningCode | None = None, place: str = '') -> Iterator[None]:
 
 
 class ConfigError(ArmError):
-    """A package of MoveIt's Setup Assistant, or a parameter of its names, is broken.
+    """A MoveIt Setup Assistant package, or a parameter with one of its names, is invalid.
 
-    Scenarios: a file is no YAML, a limit is a text, a group names a planner that is not there.
+    Scenarios: a file is not YAML, a limit is not a number, a group names an unknown planner.
     """

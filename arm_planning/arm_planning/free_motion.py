@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The pipeline of free motion: goal states, search, shorten, measure, time, measure again."""
+"""The free-motion pipeline: sample goals, search, shorten, check, time, check again."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ from .rrt_connect import lengths_along, MotionCheck, rrt_connect, shortened
 from .validity import ValidityCheck
 
 MAX_TURN = 3.0 * np.pi
-"""Where a joint without end is sampled, to either side of the start, in [rad]."""
+"""Sampling range of a continuous joint to either side of the start in [rad]."""
 
 MAX_DETOUR_RATIO = 1.25
-"""Length of a path, over that of the straight motion to the nearest goal, above which another one
-is searched for: shortcuts keep the side of an obstacle on which the search went around it. A
-straight motion to a goal ends the search in any case."""
+"""Ratio of path length to the straight motion to the nearest goal; above it the search is
+repeated, because shortcuts never move a path to the other side of an obstacle. A straight
+motion to a goal always ends the search."""
 
 MAX_SEARCHES = 3
-"""Searches at most, of which the shortest path counts. Constraints make a search so slow
-that the first path counts."""
+"""Greatest number of searches; the shortest path is used. Constraints make a search so slow
+that the first path is used."""
 
 CHEAP = 150  # samples of the search that found a path, below which another one is worth its time
 
 RESTART = 1000
-"""Samples after which a search begins anew, twice as many each time: some trees grow into a dead
-end, and others find a way in a tenth of the time."""
+"""Samples before a search restarts, doubled at each restart: some trees grow into a dead end,
+while others find a path in a tenth of the time."""
 
 
 class FreeMotion:
-    """Plans free motions of one arm in one scene; belongs to one thread."""
+    """Plans free motions of one arm in one scene. Not thread-safe."""
 
     def __init__(
         self,
@@ -64,7 +64,7 @@ class FreeMotion:
         Args:
             start: Joint positions in [rad] (n), valid; constraints hold there.
             goals: Alternatives in [rad] (k, n), valid; constraints hold there.
-            further: Goals that are looked for while the search runs; None where a try found none.
+            further: Goals found while the search runs; None for a try without result.
         """
         motions = MotionCheck(self._check, (start, *goals), self._constraints)
         goals = sorted(goals, key=lambda goal: float(np.linalg.norm(goal - start)))
@@ -104,9 +104,9 @@ class FreeMotion:
         expired: Callable[[], bool],
         further: Iterator[Array | None],
     ) -> Iterator[tuple[Array | None, int]]:
-        """Yield ways that look free, straight ones first, and how many samples were drawn.
+        """Yield paths that look free, straight ones first, with the number of samples drawn.
 
-        A way is None where a search came to its end.
+        The path is None if a search ended without one.
         """
         lower, upper = self._limits.span(start, MAX_TURN)
         drawn, most, known = 0, RESTART, list(goals)
@@ -147,7 +147,7 @@ MIN_DURATION = 0.01  # time for a motion between two places at least in [s]
 
 
 def timed_path(places: Array, limits: JointLimits, check: MotionCheck) -> Path | None:
-    """Return a valid path along straight motions between places; None where none is found."""
+    """Return a valid timed path along straight motions between waypoints, or None."""
     stops: set[int] = set()
     corners = set(range(1, len(places) - 1))
     while True:
@@ -169,7 +169,7 @@ def timed_path(places: Array, limits: JointLimits, check: MotionCheck) -> Path |
 
 
 def _rounded(places: Array, limits: JointLimits) -> Path | None:
-    """Return the path along places with its corners rounded, from rest to rest."""
+    """Return the path along waypoints with rounded corners, from rest to rest."""
     durations = _durations(places, limits)
     velocities = np.diff(places, axis=0) / durations[:, None]
     halves = _half_times(velocities, limits)
@@ -192,7 +192,7 @@ def _rounded(places: Array, limits: JointLimits) -> Path | None:
 
 
 def _durations(places: Array, limits: JointLimits) -> Array:
-    """Return times for the motions (m - 1) in [s] in which there is room to round the corners."""
+    """Return durations of the motions (m - 1) in [s], long enough to round the corners."""
     steps = np.diff(places, axis=0)
     durations: Array = (np.abs(steps) / limits.velocity).max(axis=1) * ROUNDING_ROOM
     durations = np.maximum(durations, MIN_DURATION)
@@ -206,11 +206,11 @@ def _durations(places: Array, limits: JointLimits) -> Array:
 
 
 def _half_times(velocities: Array, limits: JointLimits) -> Array:
-    """Return half the time of the rounding at begin, corners and end (m) in [s].
+    """Return half the duration of the blend at begin, corners and end (m) in [s].
 
-    A rounding is the quartic that meets the straight motions with the acceleration 0 as long
-    before a corner as behind it. Its acceleration is 0.75 of the change of velocity over that
-    time at most, its jerk 1.5 of it over the time squared.
+    A blend is the quartic that joins the straight motions with zero acceleration this time
+    before and after a corner. Its acceleration is at most 0.75 times the change of velocity
+    over that time, its jerk 1.5 times that change over the time squared.
     """
     still = np.zeros((1, velocities.shape[1]))
     jumps = np.abs(np.diff(np.concatenate((still, velocities, still)), axis=0))
@@ -221,7 +221,7 @@ def _half_times(velocities: Array, limits: JointLimits) -> Array:
 
 
 GOAL_SAMPLES = 60
-"""States that are led into the tolerances of a goal which cannot be reached itself, at most."""
+"""Greatest number of states projected into the tolerances of a goal that is itself unreachable."""
 
 IK_SOLUTIONS = 4  # solutions of inverse kinematics that are goals of a free motion at most
 
@@ -231,11 +231,11 @@ _NOT_EXACTLY = (
     PlanningCode.NO_IK_SOLUTION,
     PlanningCode.GOAL_VIOLATES_PATH_CONSTRAINTS,
 )
-"""Codes of goals that may still be reached within their tolerances."""
+"""Error codes after which a goal may still be reached within its tolerances."""
 
 
 class GoalStates:
-    """Finds the states of goals that are valid and heed path constraints, from one start."""
+    """Finds goal states that are valid and satisfy the path constraints, for one start."""
 
     def __init__(
         self,
@@ -251,7 +251,7 @@ class GoalStates:
         self._start, self._check, self._constraints = start, check, constraints
 
     def first(self, goals: Sequence[Goal], left: Callable[[], float]) -> list[Array]:
-        """Return states of all goals, or raise what is wrong with the first; ``left`` in [s]."""
+        """Return states of all goals, or raise the error of the first; ``left`` is in [s]."""
         found: list[Array] = []
         for goal in goals:
             if left() < 0.0:
@@ -272,7 +272,7 @@ class GoalStates:
         raise refused or PlanningError(PlanningCode.INVALID_GOAL_CONSTRAINTS, 'no goal')
 
     def further(self, goals: Sequence[Goal]) -> Iterator[Array | None]:
-        """Yield further states of poses without end, None where a try found none."""
+        """Yield further states of pose goals endlessly; None for a try without result."""
         sources = [
             source(goal)
             for goal in goals
@@ -296,7 +296,7 @@ class GoalStates:
             return states
 
     def _exact(self, goal: Goal, timeout: float) -> list[Array]:
-        """Return the states at a goal itself, which are valid."""
+        """Return the valid states exactly at a goal."""
         if isinstance(goal, JointGoal):
             with coded(PlanningCode.INVALID_GOAL_CONSTRAINTS):
                 state = checked(goal.positions, len(self._model), 'goal')
@@ -322,7 +322,7 @@ class GoalStates:
         return valid
 
     def _heeding(self, goals: list[Array]) -> list[Array]:
-        """Return the goals that heed path constraints, or raise why none does."""
+        """Return the goals that satisfy the path constraints, or raise why none does."""
         constraints = self._constraints
         found = [goal for goal in goals if constraints is None or constraints.heeds(goal)]
         if constraints is not None and not found:
@@ -333,15 +333,15 @@ class GoalStates:
         return found
 
     def _solutions(self, goal: PoseGoal) -> Iterator[Array | None]:
-        """Yield further solutions of a pose without end, None where a start led to none."""
+        """Yield further solutions of a pose endlessly; None for a start without result."""
         solver = self._solver(goal.link)
         while solver.closed_form is None:  # else all are known
             yield self._valid(solver.another(goal.pose, self._start))
 
     def _tolerated(self, goal: Goal) -> Iterator[Array | None]:
-        """Yield states within the tolerances of a goal without end, None where a try found none.
+        """Yield states within the tolerances of a goal endlessly; None for a try without result.
 
-        The first are near to the start, the others anywhere.
+        The first ones are near the start, the others anywhere.
         """
         limits, start = self._model.limits, self._start
         lower, upper = limits.span(start)
@@ -369,7 +369,7 @@ class GoalStates:
             yield self._valid(None if state is None else frozen(state))
 
     def _valid(self, state: Array | None) -> Array | None:
-        """Return a state that is valid and heeds constraints, else None."""
+        """Return the state if it is valid and satisfies the constraints, else None."""
         if state is None or self._check.state(state) is not None:
             return None
         constraints = self._constraints

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-r"""Joint positions for a pose: all of them in closed form, or those that starts lead to.
+r"""Inverse kinematics: all solutions in closed form, or numeric solutions from several starts.
 
 A numeric step solves :math:`\Delta q = J^T (J J^T + \lambda I)^{-1} e` with the pose error
 :math:`e` and a damping :math:`\lambda` that vanishes with it (Sugihara, "Solvability-unconcerned
@@ -40,7 +40,7 @@ MAX_STARTS = 200  # starts of numeric inverse kinematics at most, however much t
 SAME_TOLERANCE = 1e-3  # solutions of which no joint differs by more count as one in [rad]
 
 RANGE_TOLERANCE = 1e-9
-"""How far a solution may be beyond a limit for rounding in [rad]; it is put on the limit."""
+"""Rounding tolerance of position limits in [rad]; such solutions are clamped to the limit."""
 
 POLISH_TOLERANCE = 1e-10
 """Pose error of a closed form in [m] and [rad] beyond which Newton steps follow.
@@ -51,13 +51,13 @@ Descriptions whose axes are not quite parallel need them, and solutions that are
 ORTHOGONAL_TOLERANCE = 1e-6  # how far a rotation matrix may be from one
 
 AT_PLACE = 1e-3
-"""A link that comes as near in [m] is not out of reach: what is missed is its orientation."""
+"""Position error in [m] up to which a pose counts as reachable but for its orientation."""
 
 TURN = 2.0 * math.pi  # a whole turn in [rad]
 
 
 class IkSolver:
-    """Inverse kinematics of one link; for one thread."""
+    """Inverse kinematics of one link. Not thread-safe."""
 
     def __init__(
         self,
@@ -84,13 +84,13 @@ class IkSolver:
     ) -> list[Array]:
         """Return joint positions for a pose in the root link, the nearest to the seed first.
 
-        An arm with a spherical wrist has all solutions, each in the turn that is nearest to the
-        seed. Others have those that random starts lead to within the time.
+        An arm with a spherical wrist gets all solutions, each in the turn nearest to the seed.
+        Other arms get the solutions that random starts find before the time-out.
 
         Args:
-            scene: Where solutions must be free of contact; None does not check.
+            scene: Solutions must be free of contact in this scene; None skips the check.
             timeout: Time in [s] after which no further start is made.
-            count: How many solutions end the search of an arm without closed form.
+            count: Number of solutions after which a numeric search ends.
 
         Raises:
             PlanningError: There is no solution: the pose is out of reach, joints would be beyond
@@ -129,7 +129,7 @@ class IkSolver:
         return _nearest_first([self._polished(pose, each) for each in solutions], seed)
 
     def _polished(self, pose: Pose, positions: Array) -> Array:
-        """Return a solution whose pose is met exactly."""
+        """Refine a solution until it meets the pose exactly."""
         error = np.abs(pose_error(pose, self.link.pose(positions))).max()
         if error < POLISH_TOLERANCE:
             return positions
@@ -139,7 +139,7 @@ class IkSolver:
     def _searched(
         self, pose: Pose, seed: Array, clearances: Clearances | None, timeout: float, count: int
     ) -> list[Array]:
-        """Return the solutions that the seed and random starts lead to."""
+        """Return the numeric solutions found from the seed and from random starts."""
         limits = self._limits
         deadline = self._clock() + timeout
         best = end = descend(self.link, pose, seed, limits.lower, limits.upper)
@@ -166,7 +166,7 @@ class IkSolver:
         raise self._refused(self._why_none(pose, best, starts))
 
     def another(self, pose: Pose, seed: Array) -> Array | None:
-        """Return a solution that one more random start leads to, next to a seed; None for none."""
+        """Try one more random start near a seed; return its solution, or None."""
         end = self._descent(pose, seed)
         return frozen(self._in_nearest_turn(end.positions, seed)) if end.converged else None
 
@@ -175,7 +175,7 @@ class IkSolver:
         return descend(self.link, pose, start, self._limits.lower, self._limits.upper)
 
     def _in_nearest_turn(self, positions: Array, seed: Array) -> Array:
-        """Return positions whose joints are in the turns within limits nearest to a seed."""
+        """Return the positions with each joint in the turn within limits nearest to a seed."""
         limits, turn = self._limits, TURN * self._turns
         turned = positions + turn * np.round((seed - positions) / TURN)
         turned -= turn * (turned > limits.upper + RANGE_TOLERANCE)
@@ -192,7 +192,7 @@ class IkSolver:
         return f'every solution is beyond the limits; of the nearest {words}'
 
     def _why_none(self, pose: Pose, best: Descent, starts: int) -> str:
-        """Return why no start led to the pose: without limits one may."""
+        """Return why no start reached the pose; this retries without limits."""
         none = np.full(len(self._limits), np.inf)
         unlimited = descend(self.link, pose, best.positions, -none, none)
         if unlimited.converged:
@@ -217,7 +217,7 @@ class IkSolver:
 
 
 def check_pose(pose: Pose) -> None:
-    """Refuse a pose that is none."""
+    """Refuse an invalid pose."""
     with coded(PlanningCode.INVALID_GOAL_CONSTRAINTS):
         checked(pose.position, 3, 'position of the pose')
         checked(np.ravel(pose.rotation), 9, 'rotation of the pose')
@@ -232,9 +232,9 @@ def check_pose(pose: Pose) -> None:
 
 
 def _turning(link: LinkKinematics) -> Mask:
-    """Return a mask of the joints whose whole turns leave the link where it is.
+    """Return a mask of the joints that a whole turn brings back to the same link pose.
 
-    Others slide, or are followed by joints that may not make whole turns.
+    Excluded are prismatic joints, and joints with mimic joints, which may not make whole turns.
     """
     kinematics = link.kinematics
     columns = kinematics.projected(link.axes(np.zeros(len(kinematics.joints))))
@@ -273,14 +273,14 @@ DAMPING = 1e-2  # damping over the square of the pose error
 MIN_DAMPING = 1e-13  # least damping, so that a singular arm has a step as well
 
 MIN_PROGRESS = 0.999
-"""A start is given up when so many parts of the error are left after :data:`STALL` steps."""
+"""A start is given up if more than this share of the error is left after :data:`STALL` steps."""
 
 STALL = 8  # steps without progress after which a start is given up
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Descent:
-    """Where steps led."""
+    """Result of a descent."""
 
     positions: Array  # joint positions in [rad] (n)
     error: Array  # way in [m] and rotation vector in [rad] that are left (6)

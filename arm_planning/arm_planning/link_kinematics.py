@@ -1,16 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-r"""Where a link is and how the joints move it; of a spherical wrist, all solutions of a pose.
+r"""Forward kinematics and Jacobian of a link; closed-form IK for arms with a spherical wrist.
 
 The closed form: six joints turn about axes :math:`z_1 \dots z_6`. Those of the elbow are parallel
 (:math:`z_2 \parallel z_3`), those of the wrist meet in a point :math:`w` at right angles
 (:math:`z_4 \perp z_5 \perp z_6`). Everything else is free: offsets of shoulder and elbow, senses
 and zeros of the joints. The axes are those of the model where all positions are zero.
 
-1. The pose says where :math:`w` is: at :math:`c`. Turned back by :math:`q_1`, it has the height
-   along :math:`z_2` that it has at zero, :math:`A \cos q_1 + B \sin q_1 = K`: two solutions.
-2. In the plane across :math:`z_2` the two links of the arm lead to it: two solutions each.
-3. What is left of the rotation is :math:`R_z(q_4) R_y(q_5) R_z(q_6)`: two solutions each.
+1. The pose puts :math:`w` at :math:`c`. Turned back by :math:`q_1`, its height along :math:`z_2`
+   is that at zero, :math:`A \cos q_1 + B \sin q_1 = K`: two solutions.
+2. In the plane normal to :math:`z_2` the two links of the arm reach it: two solutions each.
+3. The remaining rotation is :math:`R_z(q_4) R_y(q_5) R_z(q_6)`: two solutions each.
 
 The method of subproblems: Paden, "Kinematics and Control of Robot Manipulators", 1986.
 """
@@ -29,10 +29,10 @@ from .exceptions import PlanningCode, PlanningError
 
 
 class LinkKinematics:
-    """Where a link is and how the joints move it; for one thread."""
+    """Forward kinematics and Jacobian of one link. Not thread-safe."""
 
     def __init__(self, model: RobotModel, link: str = '') -> None:
-        """Prepare; the link is the tip for an empty name. Refuse one that no joint moves."""
+        """Select the link; an empty name is the tip. Refuse a link that no joint moves."""
         self.link = link or model.tip
         self.kinematics = model.kinematics
         if self.link not in self.kinematics.frames:
@@ -76,7 +76,7 @@ class LinkKinematics:
 
 
 def pose_error(target: Pose, actual: Pose) -> Array:
-    """Return the way and the rotation vector (6) from a pose to another, in its frame."""
+    """Return translation and rotation vector (6) to another pose, in the frame of the first."""
     error = np.empty(6)
     error[:3] = target.position - actual.position
     error[3:] = pin.log3(target.rotation @ actual.rotation.T)
@@ -84,18 +84,18 @@ def pose_error(target: Pose, actual: Pose) -> Array:
 
 
 AXES_TOLERANCE = 1e-6
-"""How far axes may miss a point in [m], or their angle a right or no angle in [rad].
+"""Tolerance of axes that meet in [m], and of parallel or perpendicular axes in [rad].
 
-Descriptions round angles of a quarter turn to seven places.
+URDF files round quarter turns to seven decimal places.
 """
 
 FREE_TOLERANCE = 1e-10
-"""Distance in [m], or sine, below which a joint is free, and stays where the seed has it."""
+"""Distance in [m], or sine, below which a joint is free and keeps its seed position."""
 
 DOUBLE_TOLERANCE = 1e-13
-"""Distance of two solutions, squared, below which they are one.
+"""Squared distance below which two solutions are one.
 
-Rounding parts a double solution by the root of it, which would hide that the wrist is straight.
+Rounding separates a double solution by its square root, which would hide a straight wrist.
 """
 
 JOINTS = 6  # joints of such an arm
@@ -112,10 +112,10 @@ class WristMiss:
 
 
 class ClosedForm:
-    """Geometry of an arm with a spherical wrist; immutable, for any thread."""
+    """Geometry of an arm with a spherical wrist. Immutable and thread-safe."""
 
     def __init__(self, points: Array, axes: Array, wrist: Array, tip: Pose) -> None:
-        """Prepare; :meth:`of` finds the geometry.
+        """Compute the constants; :meth:`of` finds the geometry.
 
         Args:
             points: A point of each axis in the root link in [m] (6, 3), all joints at zero.
@@ -156,7 +156,7 @@ class ClosedForm:
 
     @classmethod
     def of(cls, link: LinkKinematics) -> ClosedForm | None:
-        """Return the closed form of a link; None for an arm of another build."""
+        """Return the closed form of a link; None if the arm has another geometry."""
         kinematics = link.kinematics
         native = kinematics.native
         last = kinematics.parent_joint(link.link)
@@ -184,8 +184,8 @@ class ClosedForm:
     def solutions(self, pose: Pose, seed: Array) -> list[list[float]] | WristMiss:
         """Return all solutions (up to 8) of a pose in the root link, or why there is none.
 
-        They are in no order, in the turn that the arc tangents give; limits do not count. Joints
-        that are free stay at the seed.
+        Solutions are unordered, not shifted by whole turns, and ignore limits. Free joints stay
+        at the seed.
         """
         rotation = self._base @ pose.rotation
         cx, cy, cz = (rotation @ self._wrist + self._base @ pose.position - self._origin).tolist()
@@ -228,7 +228,7 @@ class ClosedForm:
         return [middle + half, middle - half] if half else [middle]
 
     def _off_axis(self, cx: float, cy: float, cz: float) -> float:
-        """Return how much nearer to the first axis the wrist is than it can be in [m]."""
+        """Return how much too near the wrist is to the first axis in [m]."""
         ux, uy, uz = self._across
         radius = abs(self._height - uz * cz) / math.hypot(ux, uy)
         return radius - math.hypot(cx, cy)
@@ -291,7 +291,7 @@ class ClosedForm:
 
 
 def _basis(axis: Array, toward: Array) -> Array:
-    """Return a rotation whose z is an axis (3, 3), its x near a direction where that is across."""
+    """Return a rotation (3, 3) whose z is an axis, and whose x is near a direction if possible."""
     first = toward - (toward @ axis) * axis
     if np.linalg.norm(first) < AXES_TOLERANCE:
         first = np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
@@ -309,7 +309,7 @@ def _parallel(first: Array, second: Array) -> bool:
 
 
 def _meeting_point(points: Array, axes: Array) -> Array | None:
-    """Return the point in which three axes meet; None where they do not."""
+    """Return the point where three axes meet; None if they do not."""
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     wanted = np.einsum('kij,kj->i', across, points)
     meeting: Array = np.linalg.solve(across.sum(axis=0), wanted)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Packages as the MoveIt Setup Assistant writes them, as parameters of move_group.
+"""Reads packages of the MoveIt Setup Assistant into parameters of move_group.
 
 ::
 
@@ -12,8 +12,8 @@
     config/<pipeline>_planning.yaml              <pipeline>
     config/moveit_controllers.yaml, sensors_3d.yaml, moveit_cpp.yaml
 
-MoveIt's launch files make the same parameters of them. Files of others (ros2_controllers.yaml,
-initial_positions.yaml, launch/) are for other programs. Each parameter keeps its file and line.
+MoveIt's launch files pass the same parameters. Other files (ros2_controllers.yaml,
+initial_positions.yaml, launch/) are ignored. Each parameter keeps its file and line.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .exceptions import ConfigError
 PLANNING = 'robot_description_planning.'  # before the names of limits and scaling factors
 
 EXPONENT = re.compile(r'[-+]?\d+(\.\d*)?[eE][-+]?\d+')
-"""Numbers that YAML 1.1 takes for text, and ROS does not."""
+"""Numbers that YAML 1.1 reads as text, but ROS reads as numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class Place:
     line: int  # its line, from 1 on
 
     def __str__(self) -> str:
-        """Return it as compilers write it."""
+        """Return ``file:line``, as compilers write it."""
         return f'{self.file}:{self.line}'
 
 
@@ -55,7 +55,7 @@ class FlatYaml:
 
 
 def read_flat(path: Path, prefix: str = '') -> FlatYaml:
-    """Read a file, with a prefix before each name; refuse a key that is there twice."""
+    """Read a file, with a prefix before each name; refuse duplicate keys."""
     try:
         loader = yaml.SafeLoader(path.read_text(encoding='utf-8'))
         root = loader.get_single_node()
@@ -78,7 +78,7 @@ def read_flat(path: Path, prefix: str = '') -> FlatYaml:
 
 
 class _Table:
-    """Stands for a table, whose entries follow."""
+    """Placeholder for a table, whose entries follow."""
 
 
 def _walk(
@@ -114,17 +114,17 @@ FILES: Sequence[tuple[Sequence[str], str]] = (
     (('sensors_3d.yaml',), ''),
     (('moveit_cpp.yaml',), ''),
 )
-"""Names of files, of which the first that is there counts, and what is before their keys."""
+"""Alternative file names, of which the first existing one is read, and the prefix of its keys."""
 
 OTHERS_CONTROLLERS = frozenset({'ros2_controllers.yaml', 'ros_controllers.yaml'})
-"""Controllers of ros2_control, which its controller_manager reads."""
+"""File of ros2_control controllers, read by the controller_manager."""
 
 ASSISTANT = 'moveit_setup_assistant_config'
 
 
 @dataclass(frozen=True, slots=True)
 class MoveItPackage:
-    """What a package says."""
+    """Content of a MoveIt configuration package."""
 
     folder: Path  # its folder
     # parameters of move_group by name, the descriptions of the robot too
@@ -133,14 +133,14 @@ class MoveItPackage:
 
 
 def read_package(folder: Path, xacro_args: Mapping[str, str] | None = None) -> MoveItPackage:
-    """Read a package; its folder, or the folder config in it.
+    """Read a package from its folder, or from the folder ``config`` in it.
 
     Args:
-        xacro_args: Values for xacro arguments, beside those of the package.
+        xacro_args: Values for xacro arguments, in addition to those of the package.
 
     Raises:
-        ConfigError: It is no such package, or a file of it is broken; the message names file,
-            line and key.
+        ConfigError: The folder is no such package, or a file in it is invalid; the message
+            names file, line and key.
     """
     if not folder.is_dir():
         raise ConfigError(f'{folder}: no folder; give that of a package of the Setup Assistant')
@@ -177,7 +177,7 @@ def _files(config: Path) -> list[FlatYaml]:
 
 
 def _controllers(config: Path) -> Path | None:
-    """Return the file of MoveIt's controllers, as MoveIt chooses it."""
+    """Return the file of MoveIt's controllers that MoveIt would choose."""
     path = config / 'moveit_controllers.yaml'
     if path.is_file():
         return path
@@ -200,7 +200,7 @@ def _assistant(root: Path) -> FlatYaml:
 
 
 def _entry(values: Mapping[str, object], table: str, key: str) -> str:
-    """Return an entry of .setup_assistant, whose tables were in capitals."""
+    """Return an entry of .setup_assistant; older files have tables in capitals."""
     for name in (table, table.upper()):
         value = values.get(f'{ASSISTANT}.{name}.{key}')
         if value is not None:
@@ -262,7 +262,7 @@ def _only(config: Path, found: Sequence[Path], wanted: str) -> Path:
 
 
 def _expanded(path: Path, arguments: Mapping[str, str]) -> str:
-    """Return a file as XML text, xacro expanded."""
+    """Return a file as XML text, with xacro expanded."""
     if path.suffix == '.xacro':
         try:
             return expand_xacro(path, arguments)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of MoveIt's move_group that have an effect here, and what their values say."""
+"""Parameters of MoveIt's move_group that have an effect here, and the settings they make."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Kind(NamedTuple):
 
 
 def _in(least: float, most: float = math.inf, *, beyond: bool = False) -> Callable[[Any], bool]:
-    """Return whether a value is a number within bounds, or beyond the least one only."""
+    """Return a check that a value is a number within bounds; ``beyond`` excludes the lower."""
 
     def fits(value: object) -> bool:
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
@@ -88,7 +88,7 @@ KNOWN: Mapping[str, Kind] = {
     f'{EXECUTION}.execution_duration_monitoring': FLAG,
     'allow_trajectory_execution': FLAG,
 }
-"""Names, in which ``*`` is one key; the first that matches counts."""
+"""Patterns of parameter names; ``*`` matches one key, and the first match applies."""
 
 WITHOUT_EFFECT = frozenset(
     {
@@ -97,12 +97,12 @@ WITHOUT_EFFECT = frozenset(
         *('publish_robot_description', 'publish_robot_description_semantic'),
     }
 )
-"""Keys of MoveIt that have no effect here and look like some that have."""
+"""MoveIt keys without effect here that resemble keys with effect."""
 
 ALIKE = 0.8  # how much a key that is misspelt resembles the right one, of 1
 
 CLOSED = (f'{LIMITS}.', f'{CARTESIAN}.')
-"""Tables whose keys are all known: another one is misspelt."""
+"""Tables whose keys are all known: any other key is misspelt."""
 
 
 @cache
@@ -111,20 +111,20 @@ def _pattern(name: str) -> re.Pattern[str]:
 
 
 def known_of(name: str) -> Kind | None:
-    """Return what the value of a parameter must be; None for a name that has no effect."""
+    """Return the kind of value that a parameter takes; None for a name without effect."""
     found = (kind for known, kind in KNOWN.items() if _pattern(known).fullmatch(name))
     return next(found, None)
 
 
 def at(name: str, places: Mapping[str, Place]) -> str:
-    """Return a name with its place, for the beginning of a message."""
+    """Return a name with its place, to begin a message."""
     return f'{places[name]}: {name}' if name in places else name
 
 
 def check(values: Mapping[str, object], places: Mapping[str, Place]) -> None:
-    """Refuse a value of the wrong kind, and misspelt names of limits, with place and name.
+    """Refuse a value of the wrong kind, and misspelt limit names, with place and name.
 
-    Parameters of other names than MoveIt's are passed over.
+    Parameters that MoveIt does not know are ignored.
     """
     for name, value in values.items():
         kind = known_of(name)
@@ -140,20 +140,20 @@ def check(values: Mapping[str, object], places: Mapping[str, Place]) -> None:
 
 
 def _keys(table: str) -> list[str]:
-    """Return the keys that are known in a table."""
+    """Return the known keys of a table."""
     keys = [name.rpartition('.') for name in KNOWN]
     return [key for above, _, key in keys if above and _pattern(above).fullmatch(table)]
 
 
 def _meant(name: str) -> str:
-    """Return the key of its table that an unknown name resembles; empty for none."""
+    """Return the known key of the table that an unknown name resembles; empty for none."""
     table, _, key = name.rpartition('.')
     close = difflib.get_close_matches(key, _keys(table), 1, ALIKE)
     return close[0] if close and key not in WITHOUT_EFFECT else ''
 
 
 def misspelt(names: Sequence[str], places: Mapping[str, Place]) -> list[str]:
-    """Return a line for each parameter without effect that resembles one that has some."""
+    """Return a warning for each parameter without effect that resembles one with effect."""
     meant = {name: _meant(name) for name in names if known_of(name) is None}
     return [
         f'{at(name, places)}: without effect; did you mean {key!r}?'
@@ -169,7 +169,7 @@ PIPELINES = ('ompl', 'pilz_industrial_motion_planner')  # planning pipelines tha
 
 @dataclass(frozen=True, slots=True)
 class PlannerConfigs:
-    """Names under which clients ask for planners, as ompl_planning.yaml has them."""
+    """Planner names that clients may request, from ompl_planning.yaml."""
 
     # entries of each configuration, by its name
     configs: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
@@ -180,7 +180,7 @@ class PlannerConfigs:
 
     @property
     def ids(self) -> Sequence[str]:
-        """Names as MoveIt lists them: the group, and the group with each configuration."""
+        """Planner ids as MoveIt lists them: the group, and the group with each configuration."""
         return [
             name
             for group, configs in self.groups.items()
@@ -188,12 +188,12 @@ class PlannerConfigs:
         ]
 
     def name(self, planner_id: str, group: str) -> str:
-        """Return the name of a configuration: by itself, ``group[name]``, the group, nothing."""
+        """Return the configuration that a client names: ``x``, ``group[x]``, group or nothing."""
         name = planner_id.removeprefix(f'{group}[').removesuffix(']')
         return self.defaults.get(group, '') if name in {'', group} else name
 
     def search(self, name: str) -> str:
-        """Return what searches by a configuration, by OMPL's name; empty where it is unknown."""
+        """Return the OMPL name of the planner of a configuration; empty if it is unknown."""
         listed = {each for names in self.groups.values() for each in names}
         if not self.configs and name in listed:  # by the names of MoveIt's own configurations
             return f'geometric::{name.removesuffix("ConfigDefault").removesuffix("k")}'
@@ -202,7 +202,7 @@ class PlannerConfigs:
 
 @dataclass(frozen=True, slots=True)
 class MoveItSettings:
-    """What was set; the defaults are what holds without."""
+    """Settings from MoveIt's parameters; the defaults apply where none is set."""
 
     # tables of limits by joint; None where no parameter has any
     joint_limits: Mapping[str, Mapping[str, object]] | None = None
@@ -220,7 +220,7 @@ class MoveItSettings:
 def read_settings(
     values: Mapping[str, object], places: Mapping[str, Place] | None = None
 ) -> MoveItSettings:
-    """Return what parameters say; refuse a value, or what names something unknown."""
+    """Read settings from parameters; refuse invalid values and unknown names."""
     places = places or {}
     check(values, places)
     defaults = _below(values, PLANNING.rstrip('.'))
@@ -251,9 +251,9 @@ def of_nothing(
     joints: Sequence[str],
     controllers: Sequence[str],
 ) -> list[str]:
-    """Return a line for each table of an unknown group, joint or controller.
+    """Return a warning for each table of an unknown group, joint or controller.
 
-    MoveIt reads none of them, and does not say so.
+    MoveIt ignores such tables silently.
     """
     lines = []
     for above, kind, known in (
@@ -275,7 +275,7 @@ def of_nothing(
 
 
 def _below(values: Mapping[str, object], table: str) -> dict[str, object]:
-    """Return the entries of a table, without those of tables in it."""
+    """Return the entries of a table, without nested tables."""
     names = {
         name: name.removeprefix(f'{table}.') for name in values if name.startswith(f'{table}.')
     }

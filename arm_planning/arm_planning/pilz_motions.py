@@ -2,21 +2,21 @@
 # SPDX-License-Identifier: Apache-2.0
 r"""PTP, LIN and CIRC at full speed, as in Pilz' planner.
 
-PTP: all joints go straight to the goal, in phase. Each keeps its own limits: the profile is that
-of the joint that needs longest, and the others have shares of it. Pilz' planner gives every joint
-the strictest limits of all, which is never quicker, and keeps no limit better.
+PTP: all joints move straight to the goal, synchronized. Each keeps its own limits: the slowest
+joint determines the profile, and the others follow it in proportion. Pilz' planner applies the
+strictest limits to every joint, which is never quicker, and keeps no limit better.
 
-LIN and CIRC: a link goes along a line or an arc, and turns about one axis. One profile leads along
-the curve; translation and rotation begin and end together, and neither is faster than its limit.
-Where a joint would be too fast, it gets slower there, which Pilz' planner refuses.
+LIN and CIRC: a link moves along a line or an arc, and turns about one axis. One profile runs along
+the curve; translation and rotation begin and end together, and neither exceeds its limit. Where
+a joint would be too fast, the motion slows down; Pilz' planner refuses such motions.
 
 Joints follow the curve with :math:`q' = J^+ \nu`, where :math:`\nu` is the derivative of the
 curve. The parameter of the result is time at the full speed along the curve, scaled where a
 joint would be too fast: by :math:`(1 + \sum_i |q'_i / v_i|^p)^{1/p}`, a smooth maximum.
 
-From place to place a polynomial of fifth degree in this time meets positions and two derivatives
-of the joints. How far it leads the link off the curve depends on the scaling too: what is measured
-is the polynomial of the result, and the places are so dense that the link stays at the curve.
+Quintic polynomials in this time interpolate joint positions and two derivatives between points of
+the curve. Their deviation from the curve depends on the scaling too, so the final polynomials are
+measured, and the points are dense enough to keep the link on the curve.
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ from .retime import FullSpeedPath, NEGLIGIBLE_SLOWDOWN, standstill
 MIN_SCALING = 1e-4  # least factor of velocity and acceleration, as in Pilz' planner
 
 JERK_RATIO = 10.0
-"""Jerk over acceleration along a path in [1/s]: Pilz' planner has no limit of jerk."""
+"""Ratio of jerk to acceleration limit along a path in [1/s]; Pilz' planner has no jerk limit."""
 
 
 @dataclass(frozen=True, slots=True)
 class CartesianLimits:
     """Limits of a link's motion; the defaults are those of the Panda and the PRBT in MoveIt.
 
-    The names are those of pilz_cartesian_limits.yaml. One profile leads along a path, with
-    ``max_trans_acc`` at both ends; ``max_trans_dec`` is read and checked, and not used. Rotations
-    have the acceleration that takes as long to their full speed.
+    The names are those of pilz_cartesian_limits.yaml. One profile runs along a path, with
+    ``max_trans_acc`` at both ends; ``max_trans_dec`` is read and checked, but not used. Rotations
+    accelerate so that they reach full speed in the same time.
     """
 
     max_trans_vel: float = 1.0  # greatest speed in [m/s]
@@ -57,7 +57,7 @@ class CartesianLimits:
     max_rot_vel: float = 1.57  # greatest speed of rotation in [rad/s]
 
     def __post_init__(self) -> None:
-        """Refuse limits that are none."""
+        """Refuse invalid limits."""
         for field in fields(self):
             value = getattr(self, field.name)
             sign, word = (-1.0, 'negative') if field.name == 'max_trans_dec' else (1.0, 'positive')
@@ -69,7 +69,7 @@ class CartesianLimits:
 
     @classmethod
     def of_table(cls, table: Mapping[str, Any]) -> CartesianLimits:
-        """Return the limits of a table ``cartesian_limits``; other keys are left to others."""
+        """Return the limits of a table ``cartesian_limits``; other keys are ignored."""
         try:
             values = {
                 each.name: float(table[each.name]) for each in fields(cls) if each.name in table
@@ -80,7 +80,7 @@ class CartesianLimits:
 
     @property
     def radius(self) -> float:
-        """Way in [m] that takes as long as a rotation of 1 rad."""
+        """Distance in [m] that takes as long as a rotation of 1 rad."""
         return self.max_trans_vel / self.max_rot_vel
 
 
@@ -119,7 +119,7 @@ def curve_path(
     factors: tuple[float, float],
     name: str,
 ) -> FullSpeedPath:
-    """Return the path of the joints at full speed along a curve that begins where the link is."""
+    """Return the joint path at full speed along a curve that starts at the link's pose."""
     length = max(curve.length, curve.angle * limits.radius)
     if length < MIN_LENGTH:
         return standstill(start)
@@ -140,12 +140,12 @@ def curve_path(
 
 
 POSITION_TOLERANCE = 2e-5
-"""Greatest way off the curve between two places in [m]; a fifth of what is promised."""
+"""Greatest deviation from the curve between two points in [m]; a fifth of the documented one."""
 
 ROTATION_TOLERANCE = 1e-4  # greatest angle off the curve in [rad]
 
 FIRST_STEP, MIN_STEP, MAX_STEP = 1 / 16, 1e-5, 1 / 6
-"""Shares of a curve from one place to the next."""
+"""Step between two points, as a share of the curve."""
 
 EASY = 1 / 60  # share of the tolerance below which the next step is twice as long
 ON_CURVE = 1e-11  # pose error that counts as none in [m] and [rad]
@@ -153,7 +153,7 @@ ON_SINGULAR_CURVE = 1e-8  # the same where the arm is singular
 MAX_NEWTON = 6  # newton steps to a place at most; from a good guess two suffice
 
 MAX_CORRECTION = 0.3
-"""Greatest motion of a joint in a Newton step in [rad]: more leads to another configuration."""
+"""Greatest joint motion of a Newton step in [rad]; more may switch the arm configuration."""
 
 DIFFERENCE = 1e-6  # share of a curve between the places of a difference quotient
 SINGULAR = 1e-7  # share of the largest singular value below which one counts as none
@@ -161,7 +161,7 @@ NEARLY_SINGULAR = 1e-8  # determinant below which singular values are looked at
 SHARPNESS = 16  # exponent of the smooth maximum
 
 MAX_SLOWDOWN = 200.0
-"""How many times slower than the full speed a curve is followed before it counts as singular."""
+"""Slow-down factor from the full speed beyond which a curve counts as singular."""
 
 RANGE_TOLERANCE = 1e-9  # rounding beyond a limit that is let pass in [rad]
 POSE = 6  # numbers that a pose has: with more joints, an arm is redundant
@@ -169,7 +169,7 @@ POSE = 6  # numbers that a pose has: with more joints, an arm is redundant
 _FIELDS = ('positions', 'first', 'second')
 
 BETWEEN = frozen([0.5, 0.3, 0.7, 0.15, 0.85])
-"""Where between two places the link is looked for, as shares of the time.
+"""Where the deviation is measured between two points, as shares of the time.
 
 The error has a factor :math:`t^3 (1 - t)^3`; it is greatest near 0.5, or near 0.3 and 0.7 where
 its sign changes in the middle.
@@ -187,7 +187,7 @@ class _Trace:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Place:
-    """Joints at a share of the curve, and their derivatives by it."""
+    """Joint positions at a share of the curve, and their derivatives with respect to it."""
 
     share: float
     positions: Array
@@ -196,7 +196,7 @@ class _Place:
 
 
 class _Tracer:
-    """Follows a curve that begins where the link is."""
+    """Follows a curve that starts at the link's pose."""
 
     def __init__(
         self,
@@ -212,7 +212,7 @@ class _Tracer:
         self._speed = limits.velocity * duration  # by the share
 
     def places(self, start: Array) -> list[_Place]:
-        """Return places that are dense enough."""
+        """Return points of the curve that are dense enough."""
         place = self._place(0.0, start)
         places, step = [place], FIRST_STEP
         while place.share < 1.0:
@@ -233,16 +233,16 @@ class _Tracer:
         return places
 
     def timed(self, places: Sequence[_Place]) -> _Trace:
-        """Return the path through places, its time scaled where joints would be too fast."""
+        """Return the path through the points, slowed down where joints would be too fast."""
         durations, pieces = self._pieces(places)
         ratio = np.abs([each.first for each in places]) / self._speed
         joint = int(ratio.max(axis=0).argmax())
         return _Trace(Path(durations, pieces[:, :, :-1]), float(ratio.max()), joint)
 
     def _pieces(self, places: Sequence[_Place]) -> tuple[Array, Array]:
-        """Return the polynomials from place to place: of the joints and, last, of the share.
+        """Return the polynomials between points: of the joints and, last, of the share.
 
-        They are how long each lasts in [s] (k), and their coefficients (k, 6, n + 1).
+        Returns durations in [s] (k) and coefficients (k, 6, n + 1).
         """
         q, first, second = (np.array([getattr(each, name) for each in places]) for name in _FIELDS)
         shares = np.array([each.share for each in places])
@@ -273,7 +273,7 @@ class _Tracer:
         return _Place(share, positions, first, (after - first) / DIFFERENCE)
 
     def _field(self, share: float, positions: Array) -> Array:
-        """Return how joints follow the curve: derivatives by the share."""
+        """Return the derivatives of the joints with respect to the share."""
         _, jacobian = self._link.pose_and_jacobian(positions)
         twist = self._curve.twist(share)
         solved, is_singular = _solved(jacobian, twist)
@@ -284,7 +284,7 @@ class _Tracer:
         return solved
 
     def _next(self, place: _Place, step: float) -> _Place | None:
-        """Return the place a step on; None where Newton's method does not lead there."""
+        """Return the point one step further; None if Newton's method does not converge."""
         share = place.share + step
         guess = place.positions + step * place.first + 0.5 * step**2 * place.second
         positions = self._on_curve(share, guess)
@@ -318,7 +318,7 @@ class _Tracer:
         return None
 
     def _error(self, place: _Place, following: _Place) -> float:
-        """Return how far the link leaves the curve between two places, over the tolerance."""
+        """Return the deviation from the curve between two points, divided by the tolerance."""
         durations, pieces = self._pieces((place, following))
         powers = np.vander(BETWEEN * durations, pieces.shape[1], increasing=True)
         worst = 0.0
@@ -355,7 +355,7 @@ class _Tracer:
         )
 
     def _refuse_place(self, place: _Place) -> NoReturn:
-        """Refuse a curve that cannot be followed beyond a place."""
+        """Refuse a curve that cannot be followed beyond a point."""
         _, jacobian = self._link.pose_and_jacobian(place.positions)
         values = np.linalg.svd(jacobian, compute_uv=False)
         x, y, z = self._curve.at(place.share).position
@@ -374,8 +374,8 @@ class _Tracer:
 def _solved(jacobian: Array, twist: Array) -> tuple[Array, bool]:
     """Return the least joint rates for a twist, and whether the arm is singular.
 
-    A singular arm, such as one with a straight wrist, may lead its link along what it has left;
-    the rates are those of least squares then.
+    A singular arm, such as one with a straight wrist, may still move along its remaining
+    directions; the rates are then a least-squares solution.
     """
     count = jacobian.shape[1]
     if count < POSE:

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plans PTP, LIN, CIRC and sequences of them, with or without a stop between two motions.
 
-A blend leaves one motion where the link enters a sphere about the point between them, and joins
-the next where it leaves the sphere. Between the two a polynomial of fifth degree leads the joints,
-on which position, velocity and acceleration do not jump; that the link stays in the sphere is
-measured.
+A blend leaves one motion where the link enters a sphere about their common point, and joins the
+next where the link leaves the sphere. In between, the joints follow a quintic polynomial with
+continuous position, velocity and acceleration; a check confirms that the link stays in the
+sphere.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ PTP, LIN, CIRC = 'PTP', 'LIN', 'CIRC'
 PLANNER_IDS = (PTP, LIN, CIRC)  # names of the planners, as Pilz' planner has them
 
 GOAL_TOLERANCE = 1e-3
-"""How far from the goal's joint positions a line may end in [rad], as in Pilz' planner."""
+"""Greatest difference between the end of a line and a joint goal in [rad], as in Pilz' planner."""
 
 POSE = 6  # joints that a pose needs: with more of them it does not say where each is
 
 
 class PilzPlanner:
-    """Plans PTP, LIN and CIRC of one arm; for one thread."""
+    """Plans PTP, LIN and CIRC of one arm. Not thread-safe."""
 
     def __init__(
         self,
@@ -61,7 +61,7 @@ class PilzPlanner:
         self._limits = CartesianLimits() if limits is None else limits
 
     def plan(self, request: MotionRequest, check: ValidityCheck) -> MotionPlan:
-        """Return the motion of a request to the first of its goals that can be reached."""
+        """Plan a motion to the first reachable goal of a request."""
         start = check.start(request.start)
         problems: list[PlanningError] = []
         for goal in request.goals:
@@ -78,11 +78,11 @@ class PilzPlanner:
     def plan_sequence(
         self, items: Sequence[SequenceItem], check: ValidityCheck, first: int = 0
     ) -> MotionPlan:
-        """Return one motion through a sequence, with stops where a blend radius is 0.
+        """Plan one motion through a sequence, with stops where a blend radius is 0.
 
-        In a blended group the least factors of velocity and acceleration limit all joints, and
-        the path constraints of each motion hold in all of them. Each item has one goal; ``first``
-        is the number of the first one, for messages.
+        In a blended group the lowest scaling factors apply to all motions, and the path
+        constraints of each motion apply to all of them. Each item has one goal; ``first`` is the
+        number of the first item, for messages.
         """
         check_radii([item.blend_radius for item in items])
         start: Array | None = None
@@ -114,7 +114,7 @@ class PilzPlanner:
         first: int,
         check: ValidityCheck,
     ) -> MotionPlan:
-        """Return the motion of items without a stop between them."""
+        """Plan the motion of items without a stop between them."""
         requests, parts, links, radii = zip(*group, strict=True)
         link = links[0]
         if any(each.link != link.link for each in links):
@@ -132,7 +132,7 @@ class PilzPlanner:
     def _full(
         self, request: MotionRequest, start: Array, goal: Goal, check: ValidityCheck
     ) -> tuple[FullSpeedPath, LinkKinematics]:
-        """Return the path at full speed to a goal, and the link that it moves."""
+        """Return the full-speed path to a goal, and the link that it moves."""
         name = request.planner_id
         if name not in PLANNER_IDS:
             raise PlanningError(
@@ -168,7 +168,7 @@ class PilzPlanner:
         return full, link
 
     def _checked(self, positions: Array, start: Array, check: ValidityCheck) -> Array:
-        """Return the positions of a goal in the turns that are nearest to the start."""
+        """Return the positions of a goal, with each joint in the turn nearest to the start."""
         with coded(PlanningCode.INVALID_GOAL_CONSTRAINTS):
             found = checked(positions, len(self._model), 'goal')
         if (beyond := check.beyond(found)) is not None:
@@ -176,7 +176,7 @@ class PilzPlanner:
         return frozen(self._model.limits.in_nearest_turn(found, start))
 
     def _ends_at(self, full: FullSpeedPath, goal: JointGoal, name: str) -> FullSpeedPath:
-        """Compare the end of a line with the joints of its goal: only the pose leads there."""
+        """Compare the end of a line with its joint goal: a line is planned to the pose only."""
         names = self._model.limits.names
         off = np.abs(self._model.limits.error(full.path.end.position, goal.positions))
         worst = int(off.argmax())
@@ -200,7 +200,7 @@ class PilzPlanner:
         link: LinkKinematics,
         check: ValidityCheck,
     ) -> MotionPlan:
-        """Return the motion with its times, checked."""
+        """Time the motion, check it and return it."""
         limits = self._model.limits.scaled(
             min(each.velocity_scaling for each in requests),
             min(each.acceleration_scaling for each in requests),
@@ -262,7 +262,7 @@ SHRINK = 0.8  # factor of the sphere when a blend has left it
 MAX_SHRINKS = 10  # how often it is tried smaller
 
 BLEND_MARGIN = 0.95
-"""Share of acceleration and jerk of the profile in a blended group: joints bend besides."""
+"""Share of acceleration and jerk for the profile of a blended group; curved motion adds some."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -276,14 +276,14 @@ class SequenceItem:
     blend_radius: float = 0.0
 
     def at(self, start: Array | None) -> MotionRequest:
-        """Return the motion that begins somewhere in [rad] (n); None for the first one."""
+        """Return the request that begins at ``start`` in [rad] (n); the first item gets None."""
         if isinstance(self.request, MotionRequest):
             return self.request
         return self.request(start)
 
 
 def check_radii(radii: Sequence[float]) -> None:
-    """Refuse what are no blend radii of a sequence, by the rules of Pilz' planner."""
+    """Refuse invalid blend radii of a sequence, by the rules of Pilz' planner."""
     if not radii:
         raise _refused('no items')
     for number, radius in enumerate(radii):
@@ -296,7 +296,7 @@ def check_radii(radii: Sequence[float]) -> None:
 
 
 def check_overlap(radii: Sequence[float], corners: Sequence[Array], first: int) -> None:
-    """Refuse blends of which the spheres of two neighbours overlap."""
+    """Refuse neighbouring blends whose spheres overlap."""
     pairs = zip(pairwise(radii), pairwise(corners), strict=True)
     for number, ((radius, following), (corner, other)) in enumerate(pairs, first):
         distance = float(np.linalg.norm(other - corner))
@@ -310,7 +310,7 @@ def check_overlap(radii: Sequence[float], corners: Sequence[Array], first: int) 
 def joined(
     parts: Sequence[FullSpeedPath], radii: Sequence[float], link: LinkKinematics, first: int
 ) -> FullSpeedPath:
-    """Return one path at full speed of two or more motions that follow without a stop."""
+    """Join two or more motions into one full-speed path without stops."""
     blends = [
         _Blend.between(before.path, after.path, radius, link, first + number)
         for number, ((before, after), radius) in enumerate(
@@ -340,7 +340,7 @@ def joined(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Blend:
-    """How a motion leads into the next."""
+    """Transition from one motion to the next."""
 
     leave: float  # when the first is left, in its time in [s]
     join: float  # when the second is joined, in its time in [s]
@@ -350,7 +350,7 @@ class _Blend:
     def between(
         cls, before: Path, after: Path, radius: float, link: LinkKinematics, number: int
     ) -> _Blend:
-        """Return the blend in a sphere about the end of the first."""
+        """Return the blend in a sphere about the end of the first motion."""
         corner = link.pose(before.end.position).position
         smaller = radius
         for _ in range(MAX_SHRINKS):
@@ -376,7 +376,7 @@ class _Blend:
         )
 
     def farthest(self, corner: Array, link: LinkKinematics) -> float:
-        """Return the greatest distance of the link from the corner on it in [m]."""
+        """Return the greatest distance of the link from the corner on the blend in [m]."""
         rows = self.path.positions(np.linspace(0.0, self.path.duration, SAMPLES))
         return max(float(np.linalg.norm(link.pose(row).position - corner)) for row in rows)
 
@@ -384,7 +384,7 @@ class _Blend:
 def _last_crossing(
     path: Path, corner: Array, radius: float, link: LinkKinematics, *, backward: bool
 ) -> float | None:
-    """Return when a path crosses a sphere next to its end, or its begin; None for never."""
+    """Return the time of the crossing of a sphere nearest a path's end, or begin; None if none."""
 
     def outside(time: float) -> bool:
         positions = path.positions(np.array([time]))[0]

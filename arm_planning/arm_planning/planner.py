@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The way in: a request becomes a plan, by the pipeline that its planner_id names."""
+"""The entry point: plans each request with the pipeline that its planner_id selects."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from .retime import speed_limited
 from .validity import ValidityCheck, Violation
 
 FREE_MOTION = ('RRTConnectkConfigDefault', 'RRTConnect', 'geometric::RRTConnect')
-"""Names of MoveIt and OMPL for the planner of free motion."""
+"""MoveIt and OMPL planner ids that select the free-motion planner."""
 CANCELED = 'canceled while it was planned'  # why a plan was not found
 DEFAULT_PLANNER = FREE_MOTION[0]  # what plans a request without a planner_id
 
 
 class Planner:
-    """Plans motions of one arm; belongs to one thread."""
+    """Motion planner of one arm. Not thread-safe: use each instance from one thread."""
 
     def __init__(
         self,
@@ -43,9 +43,9 @@ class Planner:
         """Prepare.
 
         Args:
-            model: The arm; its scene counts where a call has none.
-            clock: Steady time in [s], for time-outs.
-            seed: Of the random numbers: with the same seed and time enough, the same plans.
+            model: The arm; calls without a scene use the scene of the model.
+            clock: Returns the steady time in [s], for time-outs.
+            seed: Random seed: the same seed gives the same plans if no search times out.
         """
         self._model, self._clock = model, clock
         self._draw = np.random.default_rng(seed)
@@ -59,11 +59,11 @@ class Planner:
         scene: PlanningScene | None = None,
         is_canceled: Callable[[], bool] = lambda: False,
     ) -> MotionPlan:
-        """Return a motion that is valid everywhere.
+        """Plan a motion that is valid along its whole path.
 
         Args:
-            scene: What may collide; by default that of the model.
-            is_canceled: Whether the plan is canceled, which ends a search at once.
+            scene: Planning scene; by default that of the model.
+            is_canceled: Returns whether the request is canceled; if so, the search ends at once.
 
         Raises:
             PlanningError: The request is refused, or no motion was found in time.
@@ -84,15 +84,15 @@ class Planner:
     def plan_sequence(
         self, items: Sequence[SequenceItem], scene: PlanningScene | None = None, first: int = 0
     ) -> MotionPlan:
-        """Return one motion through several of PTP, LIN and CIRC, blended where they say so.
+        """Plan one motion through a sequence of PTP, LIN and CIRC, with blends where requested.
 
         Args:
-            items: The motions; each begins where the one before ends.
-            scene: What may collide; by default that of the model.
+            items: The motions; each begins where the previous one ends.
+            scene: Planning scene; by default that of the model.
             first: Number of the first item, for messages.
 
         Raises:
-            PlanningError: A motion is refused, or a blend; the message names the item.
+            PlanningError: A motion or a blend is refused; the message names the item.
         """
         began = self._clock()
         scene = self._model.scene if scene is None else scene
@@ -109,18 +109,18 @@ class Planner:
         timeout: float = DEFAULT_TIMEOUT,
         count: int = 1,
     ) -> list[Array]:
-        """Return joint positions for a pose that are free of contact, nearest to the seed first.
+        """Return collision-free IK solutions for a pose, the nearest to the seed first.
 
         Args:
-            pose: Where the link is wanted, in the root link.
-            seed: Joint positions in [rad] (n), of which solutions are wanted near.
+            pose: Target pose of the link, in the root link.
+            seed: Joint positions in [rad] (n) near which to search.
             link: The link; empty for the tip.
-            scene: What may collide; by default that of the model.
-            timeout: Time for the search of an arm without closed form in [s].
-            count: How many solutions end that search.
+            scene: Planning scene; by default that of the model.
+            timeout: Time limit in [s] of the numeric search, for arms without a closed form.
+            count: Number of solutions after which the numeric search ends.
 
         Raises:
-            PlanningError: There is no solution, and why; or a number is not finite.
+            PlanningError: No solution (the message says why), or a number is not finite.
         """
         scene = self._model.scene if scene is None else scene
         return self._solver(link).solve(pose, seed, scene, timeout, count)
@@ -128,13 +128,13 @@ class Planner:
     def is_valid(
         self, positions: Sequence[float] | Array, scene: PlanningScene | None = None
     ) -> Violation | None:
-        """Return why the arm may not be somewhere; None where it may.
+        """Return why a joint state is not valid; None if it is valid.
 
         Args:
-            scene: What may collide; by default that of the model.
+            scene: Planning scene; by default that of the model.
 
         Raises:
-            PlanningError: They are not finite numbers, one for each joint.
+            PlanningError: The positions are not one finite number for each joint.
         """
         check = self._checked_in(self._model.scene if scene is None else scene)
         return check.state(self._numbers(positions))
@@ -146,7 +146,7 @@ class Planner:
             link: The link; empty for the tip.
 
         Raises:
-            PlanningError: There is no such link, or the positions are not finite numbers.
+            PlanningError: The link is unknown, or the positions are not finite numbers.
         """
         state = self._numbers(positions)
         with coded(PlanningCode.INVALID_LINK_NAME):
@@ -160,9 +160,9 @@ class Planner:
         deadline: float,
         is_canceled: Callable[[], bool],
     ) -> MotionPlan:
-        """Return the quickest of the free motions that are found in as many attempts.
+        """Plan as many free motions as the request has attempts; return the quickest.
 
-        Constraints make a search so slow that the first one counts.
+        With path constraints, searches are so slow that the first motion is returned.
         """
 
         def left() -> float:
@@ -216,7 +216,7 @@ class Planner:
 
 
 def unknown_planner(planner_id: str, planner_ids: Sequence[str]) -> PlanningError:
-    """Return the refusal of an unknown planner."""
+    """Return the error for an unknown planner."""
     known = ', '.join((*planner_ids, *PLANNER_IDS))
     return PlanningError(
         PlanningCode.FAILURE, f'unknown planner_id {planner_id!r}; choose one of {known}'

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is asked of a planner, and what it answers; all immutable.
+"""Requests to a planner and the plans it returns; all immutable.
 
 Joint vectors are in the order of the model's joints, in [rad] or [m]; poses are those of a link in
 the root link.
@@ -27,12 +27,12 @@ class JointGoal:
     """A goal in joint space."""
 
     positions: Array  # joint positions in [rad] (n)
-    # how far each may be off in [rad] (n); empty for exactly there
+    # tolerance of each joint in [rad] (n); empty for none
     tolerance: Array = field(default_factory=lambda: frozen(np.zeros(0)))
 
 
 class Parameterization(IntEnum):
-    """Angles of a turn; numbers of moveit_msgs/OrientationConstraint."""
+    """Parameterization of a rotation error; values as in moveit_msgs/OrientationConstraint."""
 
     XYZ_EULER_ANGLES = 0
     ROTATION_VECTOR = 1
@@ -40,20 +40,20 @@ class Parameterization(IntEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OrientationConstraint:
-    """How a link is to be turned."""
+    """Required orientation of a link."""
 
     link: str  # the link; empty for the tip
     rotation: Array  # rotation matrix (3, 3) from the link that is wanted to the root link
-    # greatest angles about the wanted axes in [rad] (3); pi and more is any angle
+    # greatest angle about each axis in [rad] (3); pi or more allows any angle
     tolerance: Array
-    parameterization: Parameterization = Parameterization.ROTATION_VECTOR  # which angles these are
+    parameterization: Parameterization = Parameterization.ROTATION_VECTOR  # meaning of tolerance
     # rotation matrix (3, 3) to the link of the body or subframe that is turned so
     in_link: Array = field(default_factory=lambda: frozen(np.eye(3)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PositionConstraint:
-    """Where a point of a link is to be."""
+    """Regions in one of which a point of a link must lie."""
 
     link: str  # the link; empty for the tip
     offset: Array  # the point in the link in [m] (3)
@@ -63,7 +63,7 @@ class PositionConstraint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathConstraints:
-    """What holds everywhere on a path."""
+    """Constraints that hold along a whole path."""
 
     # least and greatest position in [rad], by joint
     joints: Mapping[str, tuple[float, float]] = field(default_factory=dict)
@@ -73,11 +73,11 @@ class PathConstraints:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseGoal:
-    """A goal for a link."""
+    """A goal pose of a link."""
 
     pose: Pose  # where the link is to be, in the root link
     link: str = ''  # the link; empty for the tip
-    # what is enough where that cannot be reached; None for the pose alone
+    # accepted if the exact pose cannot be reached; None accepts the exact pose only
     tolerances: PathConstraints | None = None
 
 
@@ -85,7 +85,7 @@ Goal = JointGoal | PoseGoal  # what a motion is to reach
 
 
 class CircPointKind(str, Enum):
-    """What the point of a circle is, in the words of Pilz' planner."""
+    """Meaning of the auxiliary point of CIRC, named as in the Pilz planner."""
 
     INTERIM = 'interim'
     CENTER = 'center'
@@ -93,7 +93,7 @@ class CircPointKind(str, Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CircPoint:
-    """The point that makes a circle of a start and a goal."""
+    """The auxiliary point that defines the circle between a start and a goal."""
 
     kind: CircPointKind  # a point on the arc, or its center
     position: Array  # the point in the root link in [m] (3)
@@ -101,7 +101,7 @@ class CircPoint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionRequest:
-    """A motion that is asked for, from rest to rest."""
+    """Request for a motion from rest to rest."""
 
     start: Array  # joint positions at which it begins in [rad] (n)
     goals: Sequence[Goal]  # alternatives, of which one is reached
@@ -109,25 +109,25 @@ class MotionRequest:
     velocity_scaling: float = 1.0  # factor of the velocity limits, above 0 and up to 1
     acceleration_scaling: float = 1.0  # factor of the acceleration limits, above 0 and up to 1
     timeout: float = DEFAULT_TIMEOUT  # time for planning in [s]
-    attempts: int = 1  # how many paths are planned, of which the shortest counts
-    constraints: PathConstraints | None = None  # what holds everywhere on the path
-    via: CircPoint | None = None  # the point of a circle, for CIRC
+    attempts: int = 1  # how many paths are planned; the shortest is returned
+    constraints: PathConstraints | None = None  # hold along the whole path
+    via: CircPoint | None = None  # auxiliary point, for CIRC
     max_cartesian_speed: float = 0.0  # of the link below in [m/s]; 0 for no limit
     cartesian_speed_link: str = ''  # the link whose speed is limited; empty for the tip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionPlan:
-    """A motion that was found."""
+    """A planned motion."""
 
     path: Path  # the path with its times, jerk-limited, from rest to rest
     planner_id: str  # the planner that found it
-    notes: Sequence[str] = ()  # what a person should know, such as where it is slower than asked
+    notes: Sequence[str] = ()  # for the user, such as why the motion is slower than requested
     planning_time: float = 0.0  # how long it took in [s]; 0 where that was not measured
 
 
 def check_scaling(request: MotionRequest, least: float = 0.0) -> None:
-    """Refuse factors of velocity and acceleration that are below a least one, or above 1."""
+    """Refuse velocity and acceleration scaling factors below ``least`` or above 1."""
     for name in ('velocity_scaling', 'acceleration_scaling'):
         value = getattr(request, name)
         if not (0.0 < value <= 1.0 and value >= least):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Times of paths: from rest to rest within the limits of joints, and of the speed of a link."""
+"""Time parameterization of paths: rest to rest, within joint limits and a link's speed limit."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from .link_kinematics import LinkKinematics
 MAX_SPACING = 0.05  # greatest length of a segment of a path that is not straight in [s]
 
 MAX_SEGMENTS = 400
-"""Segments of that length at most: a slow path bends as little from one to the next."""
+"""Greatest number of segments; a slow path bends little from one longer segment to the next."""
 
 MIN_SPACING = 1e-4  # places that are nearer than this in time count as one in [s]
 
 SPEEDS = (0.75, 0.55, 0.4, 0.3, 0.2)
-"""Shares of the full speed that are tried one after the other, while they make a path quicker.
+"""Shares of the full speed, tried in this order as long as they make a path quicker.
 
-A path that slows down at many places is quicker at an even speed.
+A path that slows down at many points is quicker at an even speed.
 """
 
 SLOW = 1.5  # how much longer a path may take for its joints before an even speed is tried
@@ -42,7 +42,7 @@ NEGLIGIBLE_SLOWDOWN = 1.01  # factor by which a path may take longer without a n
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FullSpeedPath:
-    """A path by the time that it takes at full speed, and how it begins and ends."""
+    """A path parameterized by its time at full speed, and how it begins and ends."""
 
     path: Path  # the joints by time at full speed; its velocity and acceleration do not jump
     acceleration: float  # greatest change of the speed, as a share of the full one, in [1/s]
@@ -61,7 +61,7 @@ def standstill(positions: Array) -> FullSpeedPath:
 
 
 def timed(full: FullSpeedPath, limits: JointLimits) -> tuple[Path, tuple[str, ...]]:
-    """Return a path from rest to rest within the limits, and where it is slower for them."""
+    """Return a path from rest to rest within the limits, and notes on what slows it down."""
     if not full.path.coefficients[:, 1:].any():  # it stands still
         return full.path, full.notes
     path = _from_rest_to_rest(full)
@@ -91,7 +91,7 @@ def timed(full: FullSpeedPath, limits: JointLimits) -> tuple[Path, tuple[str, ..
 
 
 def _within(path: Path, limits: JointLimits) -> tuple[Path, Demand]:
-    """Return a path as quick as its time scaling makes it, and what asked most of it."""
+    """Return a path with its time scaling applied, and the strictest limit."""
     timing = Timing(path, limits)
     scaled = timing.time_scaled()
     if scaled is None:
@@ -128,9 +128,9 @@ def _from_rest_to_rest(full: FullSpeedPath) -> Path:
 
 
 def _straight(line: Path, profile: tuple[Array, Array, Array, Array], lasts: Array) -> Path:
-    """Return one straight segment as a profile leads along it: a cubic for each phase, exactly.
+    """Return one straight segment that follows a profile exactly: one cubic for each phase.
 
-    A phase may be as short as rounding, so that no polynomial could be fitted to its ends.
+    A phase may be as short as rounding errors, so a polynomial cannot be fitted to its ends.
     """
     base, slope = line.coefficients[0, :2]
     place, rate, bend, jerk = profile
@@ -144,7 +144,7 @@ def _straight(line: Path, profile: tuple[Array, Array, Array, Array], lasts: Arr
 def _profile(
     length: float, full: FullSpeedPath
 ) -> tuple[tuple[Array, Array, Array, Array], Array]:
-    """Return the phases of the profile: place, speed, acceleration and jerk at their begin."""
+    """Return the phases of the profile: position, speed, acceleration and jerk at each begin."""
     one, endless = frozen([1.0]), frozen([np.inf])
     bounds = JointLimits(
         ('path',), -endless, endless, one, frozen([full.acceleration]), frozen([full.jerk])
@@ -168,7 +168,7 @@ def _profile(
 def _evaluated(
     profile: tuple[Array, Array, Array, Array], begins: Array, times: Array
 ) -> tuple[Array, Array, Array]:
-    """Return place, speed and acceleration of the profile at times."""
+    """Return position, speed and acceleration of the profile at some times."""
     number = np.maximum(np.searchsorted(begins, times, side='right') - 1, 0)
     place, rate, bend, jerk = (each[number] for each in profile)
     t = times - begins[number]
@@ -182,7 +182,7 @@ def _evaluated(
 def timed_rows(rows: Array, limits: JointLimits) -> Path:
     """Return a jerk-limited path from rest to rest through joint positions in [rad] (k, n).
 
-    It is smooth, so that it leaves the lines at their corners, by a quarter of a step at most.
+    The path is smooth: it cuts the corners by at most a quarter of a step.
     """
     steps = np.diff(rows, axis=0)
     lasts = (np.abs(steps) / limits.velocity).max(axis=1)
@@ -207,9 +207,9 @@ def timed_rows(rows: Array, limits: JointLimits) -> Path:
 def speed_limited(
     path: Path, most: float, link_name: str, solver: Callable[[str], IkSolver]
 ) -> tuple[Path, tuple[str, ...]]:
-    """Return a path whose link is not too fast, and a note if that makes it slower.
+    """Limit the speed of a link; return the path, and a note if it became slower.
 
-    The places of the path stay the same. ``most`` is in [m/s]; 0 for no limit.
+    The geometry of the path stays the same. ``most`` is in [m/s]; 0 for no limit.
     """
     if not most:
         return path, ()
@@ -231,7 +231,7 @@ def speed_limited(
 
 
 def slower(path: Path, factor: float) -> Path:
-    """Return the same path with more time everywhere."""
+    """Return the same path with its duration multiplied by a factor."""
     powers = (factor ** -np.arange(6.0))[:, None]
     return Path(path.durations * factor, path.coefficients * powers)
 

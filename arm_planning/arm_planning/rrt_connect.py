@@ -1,15 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""RRT-Connect: two trees, from start and goals, grow towards each other; then shortcuts.
+"""RRT-Connect: grows two trees, from start and goals, towards each other; then shortcuts.
 
 Kuffner, LaValle, "RRT-Connect: An efficient approach to single-query path planning", ICRA 2000;
-with the balancing of the trees that OMPL has. Under constraints the trees grow by short edges
-whose ends are led back to them: Berenson et al., "Manipulation planning on constraint manifolds"
-(CBiRRT), ICRA 2009. One is ours because the collision check decides over its speed, and that of
-the scene is quicker here than a library's that calls back for each state; the bench has the
-comparison. Without constraints the compiled search of arm_model takes its place where there is
-one. Straight motions between places on a path replace what lies between them. Which motions are
-free, and heed what holds on the path, a :class:`MotionCheck` says.
+with OMPL's balancing of the trees. Under constraints the trees grow by short edges whose ends
+are projected onto the constraints: Berenson et al., "Manipulation planning on constraint
+manifolds" (CBiRRT), ICRA 2009. This is an implementation of our own because collision checks
+dominate the time, and a library would call back for each state; the bench compares both. Without
+constraints the compiled search of arm_model is used if it is available. Shortcuts replace parts
+of a path by straight motions. A :class:`MotionCheck` decides which motions are free of contact
+and satisfy the path constraints.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ LOOK = 0.03  # turn of all joints together between two looks at constraints in [
 
 
 class MotionCheck:
-    """Checks of one search: contact, and path constraints; belongs to one thread."""
+    """Contact and path-constraint checks of one search. Not thread-safe."""
 
     def __init__(
         self,
@@ -44,11 +44,11 @@ class MotionCheck:
         self.required, self.compiled = check.required(*ends), check.compiled
 
     def admits(self, goal: Array) -> bool:
-        """Whether a valid state that was no end when the search began may be one."""
+        """Whether a valid state may become a further goal after the search began."""
         return bool((self._check.required(goal) >= self.required).all())
 
     def clear(self, begin: Array, end: Array) -> bool:
-        """Whether a straight motion from a free state is free everywhere."""
+        """Whether a straight motion from a free state is free along its whole length."""
         way = end - begin
         if self.constraints is not None:  # as far as a quick look shows
             shares = _coarse_first(math.ceil(float(np.abs(way).sum()) / LOOK) + 1)
@@ -57,21 +57,21 @@ class MotionCheck:
         return self._check.near(begin, end, self.required) is None
 
     def waypoints(self, places: Array) -> Violation | None:
-        """Return what is wrong with the straight lines between places; None for nothing."""
+        """Return where straight motions between waypoints are not valid, or None."""
         violation = self._check.waypoints(places)
         if violation is None and self.constraints is not None:
             return self.constraints.lines(places)
         return violation
 
     def path(self, path: Path) -> Violation | None:
-        """Return what is wrong with a path; None for nothing."""
+        """Return where a path is not valid; None if it is valid."""
         violation = self._check.path(path)
         if violation is None and self.constraints is not None:
             return self.constraints.path(path)
         return violation
 
     def towards(self, begin: Array, target: Array) -> Array | None:
-        """Return the next state on a motion that heeds the constraints; None where it ends."""
+        """Return the next state towards a target under the constraints; None if there is none."""
         way = target - begin
         length = float(np.linalg.norm(way))
         wanted = target if length <= STRIDE else begin + way * (STRIDE / length)
@@ -84,7 +84,7 @@ class MotionCheck:
 
 @lru_cache(maxsize=1024)
 def _coarse_first(count: int) -> Array:
-    """Return the shares 1/count .. 1, of which early ones are far apart."""
+    """Return the shares 1/count .. 1 in an order whose early ones are far apart."""
     bits = max(count - 1, 1).bit_length()
     numbers = np.arange(1 << bits)
     reversed_bits = np.zeros_like(numbers)
@@ -99,7 +99,7 @@ MAX_EXTENSION = 1.2  # greatest length of an edge in [rad]
 FIRST_NODES = 256  # nodes that a tree has room for at first
 
 BLOCK = 25
-"""Samples between two looks at the time and for a further goal, which takes as long as several."""
+"""Samples between two checks of the time and for a further goal, which costs several samples."""
 
 SAME = 1e-9  # distance of states that are one in [rad]
 MAX_TRIALS = 30  # shortcuts that are tried at most
@@ -108,7 +108,7 @@ MIN_GAIN = 0.05  # length that a shortcut saves at least in [rad]
 
 
 class _Tree:
-    """States, and the state from which each was reached."""
+    """States, and the parent of each."""
 
     def __init__(self, joints: int) -> None:
         self.count = 0
@@ -144,7 +144,7 @@ class _Tree:
 
 
 class Search:
-    """Two trees, from the start and from goals; the reference of the compiled one."""
+    """Two trees, from the start and from goals; reference of the compiled search."""
 
     def __init__(self, start: Array, check: MotionCheck) -> None:
         self._check, self._goals = check, _Tree(len(start))
@@ -153,11 +153,11 @@ class Search:
         self._other = self._goals
 
     def add_goal(self, goal: Array) -> None:
-        """Grow from a goal, too."""
+        """Add a root of the goal tree."""
         self._goals.add(goal, -1)
 
     def grow(self, targets: Array) -> Array | None:
-        """Grow towards samples (m, n); return the places of a path (k, n) where the trees met."""
+        """Grow towards samples (m, n); return the waypoints (k, n) if the trees meet, or None."""
         for target in targets:
             if self._growing.count > self._other.count:
                 self._growing, self._other = self._other, self._growing
@@ -184,13 +184,13 @@ def rrt_connect(
     further: Iterator[Array | None],
     most: int,
 ) -> Array | None:
-    """Return the places of a path that looks free (m, n); None where none was found.
+    """Return the waypoints of a path that looks free (m, n); None if none was found.
 
     Args:
-        goals: Joint positions in [rad] (n), free; one of them is reached. Further ones join them.
+        goals: Joint positions in [rad] (n), free of contact; the path ends at one of them.
         sample: Draws a number of states (m, n).
-        further: Goals that are looked for meanwhile: each is one, or a try that found none.
-        most: Samples after which the search ends.
+        further: Yields goals found during the search; None for a try without result.
+        most: Number of samples after which the search ends.
     """
     search: Search | CompiledSearch
     if check.compiled is None or check.constraints is not None:
@@ -213,7 +213,7 @@ def rrt_connect(
 
 
 def _extend(tree: _Tree, target: Array, check: MotionCheck) -> int | None:
-    """Grow a tree by an edge towards a target, and return its end; None where it is blocked."""
+    """Grow a tree by an edge towards a target, and return its end node; None if blocked."""
     near = tree.nearest(target)
     if check.constraints is not None:
         return _crawl(tree, near, target, check)
@@ -227,7 +227,7 @@ def _extend(tree: _Tree, target: Array, check: MotionCheck) -> int | None:
 
 
 def _crawl(tree: _Tree, near: int, target: Array, check: MotionCheck) -> int | None:
-    """Grow a tree by several edges that heed the constraints, as CBiRRT does."""
+    """Grow a tree by several edges that satisfy the constraints, as in CBiRRT."""
     node, begin = near, tree.state(near).copy()
     while float(np.linalg.norm(target - begin)) >= SAME:
         end = check.towards(begin, target)
@@ -238,7 +238,7 @@ def _crawl(tree: _Tree, near: int, target: Array, check: MotionCheck) -> int | N
 
 
 def _connect(tree: _Tree, target: Array, check: MotionCheck) -> int | None:
-    """Grow a tree until it reaches a target, and return the node there; None where blocked."""
+    """Grow a tree until it reaches a target, and return that node; None if blocked."""
     while True:
         end = _extend(tree, target, check)
         if end is None:
@@ -250,7 +250,7 @@ def _connect(tree: _Tree, target: Array, check: MotionCheck) -> int | None:
 def shortened(
     places: Array, draw: np.random.Generator, check: MotionCheck, expired: Callable[[], bool]
 ) -> Array:
-    """Return straight motions of the same ends that are no longer, as far as the check can see."""
+    """Shorten a path of straight motions, as far as the check allows; the ends stay."""
     places = _without_needless(places, check, expired)
     failures = 0
     for _ in range(MAX_TRIALS):
@@ -270,13 +270,13 @@ def shortened(
 
 
 def lengths_along(places: Array) -> Array:
-    """Return the length from the first place to each in [rad] (m)."""
+    """Return the path length from the first waypoint to each in [rad] (m)."""
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     return np.concatenate(((0.0,), np.cumsum(steps)))
 
 
 def _at(places: Array, along: Array, length: float) -> Array:
-    """Return the place at a length of the path."""
+    """Return the state at a length along the path."""
     after = min(max(int(np.searchsorted(along, length)), 1), len(places) - 1)
     whole = along[after] - along[after - 1]
     share = (length - along[after - 1]) / whole if whole > 0.0 else 0.0
@@ -285,7 +285,7 @@ def _at(places: Array, along: Array, length: float) -> Array:
 
 
 def _without_needless(places: Array, check: MotionCheck, expired: Callable[[], bool]) -> Array:
-    """Return places without those whose neighbours are joined by a free straight motion."""
+    """Remove waypoints whose neighbours a free straight motion connects."""
     kept = [0]
     while kept[-1] < len(places) - 1:
         here = kept[-1]

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Makes the SRDF of a robot from its URDF, as MoveIt's setup assistant does.
 
-Groups come from the chains of the description, end effectors from what branches off at their ends,
-pairs of links from sampling, and ``ready`` from a search for a pose that is free and not singular.
-What a person wrote into an existing SRDF stays: all but the pairs, and of those what
-has a reason that begins with ``User``.
+Groups come from the chains of the URDF, end effectors from the branches at their ends, disabled
+link pairs from sampling, and ``ready`` from a search for a pose without contact or singularity.
+An existing SRDF is kept, except for its pairs of links; of those, only pairs whose
+reason begins with ``User`` are kept.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from arm_model import (
 SAMPLES = 20_000  # poses that are drawn
 MARGIN = 0.005  # distance in [m] that links keep which count as never in contact
 MIN_ARM_JOINTS = 3
-"""Joints of a branch of the description that is an arm; one with fewer is a tool."""
+"""Least number of joints of an arm; a branch with fewer joints is a tool."""
 MISS = 1e-4  # probability with which the share that the report names would have been missed
 READY = 'ready'
 USER = 'User'  # how the reason of a pair begins that a person decided on
@@ -71,8 +71,8 @@ def make_srdf(
     """Make an SRDF, or refresh one.
 
     Args:
-        previous: The SRDF that is there already; empty when there is none.
-        limits: The table ``joint_limits`` of a limits file; what it lacks is taken from the URDF.
+        previous: The existing SRDF; empty if there is none.
+        limits: The table ``joint_limits`` of a limits file; missing entries come from the URDF.
 
     Raises:
         ModelError: The description or the SRDF cannot be used, or there is no good pose.
@@ -122,7 +122,7 @@ def _reasons(pairs: LinkPairs) -> dict[Pair, str]:
 
 
 def _by_user(previous: str) -> dict[Pair, str]:
-    """Return the pairs of an SRDF that a person decided on, with the reasons."""
+    """Return the pairs of an SRDF whose reason begins with ``User``, with the reasons."""
     if not previous:
         return {}
     return {
@@ -157,7 +157,7 @@ def _groups(tree: KinematicTree) -> list[str]:
 
 
 class _Branches:
-    """What hangs on each link of a description."""
+    """Tree of the links of a description."""
 
     def __init__(self, tree: KinematicTree) -> None:
         self._tree = tree
@@ -199,7 +199,7 @@ class _Branches:
         return (joint.name in names) + sum(self._moving(each, names) for each in onward)
 
     def _outermost(self, link: str) -> str:
-        """Follow fixed joints out to a flange or tool frame, as far as there is one way."""
+        """Follow fixed joints out to a flange or tool frame, up to the first fork."""
         while len(self._joints.get(link, ())) == 1:
             link = self._joints[link][0].child
         return link
@@ -208,7 +208,7 @@ class _Branches:
 def _ready_poses(
     urdf: str, srdf: str, limits: Mapping[str, Any], folder: Path | None
 ) -> tuple[str, list[str]]:
-    """Return ``ready`` of each arm that lacks it as XML, and how good those are that are there."""
+    """Return XML for each missing ``ready`` pose, and the quality of the existing ones."""
     semantic = parse_srdf(srdf)
     text, notes = '', []
     for group in semantic.arms:

@@ -1,16 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Whether an arm may be somewhere, or follow a path: limits of position, and contact.
+"""Checks states and paths of an arm: position limits and collisions.
 
-In the middle of a part of a path the pairs are measured that are not yet known to stay apart in
-it. By the scene's distance rate bounds a distance also proves how far on either side of the middle
-nothing touches; the rest is two parts, measured again. Each pair must have :data:`MARGIN` left
-where it is measured. So nothing touches between two places that were measured either, and pairs
-that are far apart are measured a few times. Where there is a compiled core
-(:func:`arm_model.compiled_scene`) it does all that; what stands here is its reference.
+The check bisects a path. In the middle of each part it measures the pairs not yet proven clear
+there. Distance rate bounds turn a distance into an interval around the middle that is free of
+contact; what is left on either side is measured again. Each pair must keep :data:`MARGIN`
+wherever it is measured. So motions between measurements are free of contact as well, and distant
+pairs need few measurements. The compiled core (:func:`arm_model.compiled_scene`) does this if it
+is available; the Python code is its reference.
 
-Where start or goal are nearer to contact than that, the pair may be as near on the way as it is
-there, and it is measured more densely; a contact of less than :data:`MIN_MARGIN` can then remain.
+A pair nearer than the margin at start or goal may stay as near along the path, and is
+measured more densely; a contact of less than :data:`MIN_MARGIN` can then remain.
 """
 
 from __future__ import annotations
@@ -49,15 +49,15 @@ FIRST_PART = 1.0  # motion of a shape within the parts of a path that are looked
 class Violation:
     """Why a state or a path is not valid."""
 
-    reason: str  # in words: the joint and its limit, or the bodies, how deep and where
+    reason: str  # in words: the joint and its limit, or the bodies with depth and place
     positions: Array  # joint positions there in [rad]
-    # the deepest contact; None where a limit is the matter or bodies are only near
+    # the deepest contact; None for a violated limit, or bodies that are only near
     contact: Contact | None = None
     time: float = 0.0  # when on the path in [s]; 0 for a state
 
 
 class ValidityCheck:
-    """Checks states and paths in one scene; belongs to one thread."""
+    """Checks states and paths in one scene. Not thread-safe."""
 
     def __init__(self, limits: JointLimits, scene: PlanningScene) -> None:
         self._limits, self.scene = limits, scene
@@ -68,20 +68,20 @@ class ValidityCheck:
         return Clearances(self.scene)
 
     def state(self, positions: Array) -> Violation | None:
-        """Return why the arm may not be somewhere; None where it may."""
+        """Return why a state is not valid; None if it is valid."""
         return self.beyond(positions) or self._touching(positions, 0.0)
 
     def required(self, *ends: Array) -> Array:
-        """Return the distance that each pair keeps on motions between some states in [m] (k)."""
+        """Return the distance that each pair must keep on motions between states in [m] (k)."""
         measured = self.compiled or self._clearances
         least = [measured.least(each, MARGIN).copy() for each in ends]
         required: Array = np.clip(np.min(least, axis=0), 0.0, MARGIN) - LIMIT_TOLERANCE
         return required
 
     def near(self, begin: Array, end: Array, required: Array) -> Array | None:
-        """Return a place of a straight motion at which a pair is nearer than required, or None.
+        """Return a state of a straight motion at which a pair is too near, or None.
 
-        ``required`` is the distance that each pair keeps in [m] (k).
+        ``required`` is the distance in [m] that each pair must keep (k).
         """
         way = end - begin
         if self.compiled is not None:
@@ -105,7 +105,7 @@ class ValidityCheck:
         return None
 
     def waypoints(self, places: Array) -> Violation | None:
-        """Return what is wrong with the straight lines between places in [rad] (m, n), if any."""
+        """Return where straight motions between waypoints (m, n) are not valid, or None."""
         lower, upper = places.min(axis=0), places.max(axis=0)
         if (beyond := self._beyond(lower, upper)) is not None:
             return beyond
@@ -126,12 +126,12 @@ class ValidityCheck:
         return self.contact(path)
 
     def contact(self, path: Path) -> Violation | None:
-        """Return where a pair comes nearer on a path than it may; None for nowhere."""
+        """Return where a pair comes too near on a path; None if no pair does."""
         found = self._near_time(path, path.control_values)
         return None if found is None else self._near(path.at(found).position, found)
 
     def start(self, positions: Sequence[float] | Array) -> Array:
-        """Return where a motion may begin, or raise a PlanningError with reason and remedy."""
+        """Return a valid start state, or raise a PlanningError with reason and remedy."""
         with coded(PlanningCode.INVALID_ROBOT_STATE):
             start = checked(positions, len(self._limits), 'start')
         violation = self.state(start)
@@ -146,11 +146,11 @@ class ValidityCheck:
         )
 
     def beyond(self, positions: Array) -> Violation | None:
-        """Return which joint is beyond its limits, if one is."""
+        """Return the violation if a joint is beyond its limits, or None."""
         return self._beyond(positions, positions)
 
     def _near_time(self, path: Path, control: Array) -> float | None:
-        """Return a time at which a pair is nearer than it may be; None where none is."""
+        """Return a time at which a pair is too near; None if no pair ever is."""
         times, turned = _cells(path, control)
         rates, cells = self.scene.distance_rate_bounds, np.arange(float(len(times)))
         required = self.required(path.at(0.0).position, path.end.position)
@@ -191,9 +191,9 @@ class ValidityCheck:
         motions: Sequence[float],
         share: float,
     ) -> dict[int, float] | None:
-        """Return the pairs that may come near within a part, and their distances there in [m].
+        """Return the pairs that may come too near within a part, and their distances in [m].
 
-        It is None where one is too near already.
+        Return None if a pair is too near already.
         """
         left, found = {}, self._clearances.measure(place, pairs)
         for pair in pairs:
@@ -206,7 +206,7 @@ class ValidityCheck:
         return left
 
     def _beyond(self, lower: Array, upper: Array) -> Violation | None:
-        """Return which joint is beyond its limits between two bounds, if one is."""
+        """Return the violation if a joint is beyond its limits between two bounds, or None."""
         if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
             return Violation('joint positions must be finite numbers', lower)
         found = ((self._limits.beyond(each, LIMIT_TOLERANCE), each) for each in (lower, upper))
@@ -238,10 +238,10 @@ class ValidityCheck:
 
 
 def _cells(path: Path, control: Array) -> tuple[Array, Array]:
-    """Return the times (c) that cut a path into cells, and how far the joints turned until then.
+    """Return the times (c) that cut a path into cells, and an upper bound of the joint travel.
 
-    Within a cell the latter grows evenly, and nowhere less than a joint turns: it is bounded by
-    the velocity at the ends of the cell and how much it changes between them.
+    The bound grows linearly within a cell. It follows from the velocity at both ends of the
+    cell and the change of velocity between them.
     """
     count = len(path.durations)
     segments = np.repeat(np.arange(count), CELLS)
@@ -256,7 +256,7 @@ def _cells(path: Path, control: Array) -> tuple[Array, Array]:
 
 
 def _interpolated(rows: Array, places: Array) -> Array:
-    """Return rows (m, n) at places between their numbers."""
+    """Return rows interpolated linearly at fractional indices (m, n)."""
     before = np.minimum(places.astype(int), len(rows) - 2)
     share = (places - before)[..., None]
     found: Array = rows[before] + share * (rows[before + 1] - rows[before])

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """``ros2 run arm_planning move_group``: MoveIt's move_group for its clients.
 
-:class:`PathWatch` looks at trajectories on their way when the scene changes.
+:class:`PathWatch` rechecks running trajectories when the scene changes.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class MoveGroup(Node):
 
     @destroyed_when_refused
     def __init__(self, package: MoveItPackage | None = None) -> None:
-        """Read the robot and offer everything; a package gives what the parameters leave out."""
+        """Read the robot and offer all services; a package supplies missing parameters."""
         super().__init__(NAME)
         given = declare_parameters(self, package)
         description, settings = given.description, given.settings
@@ -152,14 +152,14 @@ class MoveGroup(Node):
 LOOKS = 400  # places on a trajectory at which the arm is looked for
 
 AMBIGUOUS = 0.02
-"""Places that are this much farther away than the nearest may be where the arm is, in [rad]."""
+"""Points of the path this much farther away than the nearest may still be the arm's, in [rad]."""
 
 LATENCY = 0.1
-"""How far before that place the trajectory is looked at, in [s]: joint states come late."""
+"""Margin before that point from which the trajectory is checked in [s]: joint states are late."""
 
 
 class PathWatch:
-    """Stops executions whose way is not clear any more; belongs to the node's executor."""
+    """Stops executions whose path is no longer clear; runs in the node's executor."""
 
     def __init__(
         self, monitor: SceneMonitor, execution: TrajectoryExecution, background: Background
@@ -184,7 +184,7 @@ class PathWatch:
         self._background.submit(lambda: contact_ahead(failed.way, here, scene), found)
 
     def _look(self) -> None:
-        """Check all executions in the present scene; once more where a check is under way."""
+        """Check all executions in the present scene; again after a check that is under way."""
         self._looks_again = self._is_looking
         if self._is_looking or not (running := self._execution.running):
             return
@@ -212,7 +212,7 @@ def _words(contact: str) -> str:
 
 
 def _contact(trajectory: Any, here: Array, scene: PlanningScene) -> str:  # noqa: ANN401
-    """Return the contact ahead; what cannot be looked at is not known to be clear."""
+    """Return the contact ahead; a path that cannot be checked counts as not clear."""
     try:
         return contact_ahead(trajectory, here, scene)
     except Exception as error:  # noqa: BLE001  # one trajectory must not stop the others
@@ -224,9 +224,9 @@ def contact_ahead(
     here: Array,
     scene: PlanningScene,
 ) -> str:
-    """Return what the rest of a trajectory would touch, in words; empty for nothing.
+    """Describe the contact on the rest of a trajectory; empty if it is clear.
 
-    The trajectory was checked, and has the way to its first point; all joints move in the scene.
+    The trajectory was checked and includes the motion to its first point. All joints may move.
     """
     joints = list(scene.kinematics.joints)
     moved = [name for name in trajectory.joint_names if name in joints]
@@ -249,7 +249,7 @@ def contact_ahead(
 
 
 def passed_time(path: Path, positions: Array) -> float:
-    """Return a time of a path that is not behind the arm in [s]."""
+    """Return a time of the path in [s] at or shortly before the arm's present position."""
     times = np.linspace(0.0, path.duration, LOOKS)
     apart = np.abs(path.positions(times) - positions).max(axis=1)
     first = int((apart <= apart.min() + AMBIGUOUS).argmax())

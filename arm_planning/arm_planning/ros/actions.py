@@ -27,8 +27,8 @@ STOP = 'stop'  # the event that stops everything
 STOPPED = 'everything was stopped meanwhile'
 REPLAN_ATTEMPTS = 5  # how often a goal that does not say so is planned anew at most, as in MoveIt
 STATE_WAITS, STATE_PERIOD = 10, 0.1
-"""How often joint states that are unknown or too old are looked for again, or rest is waited for
-after a jog, and time between two looks in [s]; MoveIt waits for states for a second, too."""
+"""Number of retries, and time between two in [s], while joint states are missing or too old, or
+the arm still moves after a jog; MoveIt also waits for states for a second."""
 
 Prepare = Callable[[Any, bool, Callable[[], bool]], Callable[[], PlannedMotion]]
 Answer = Callable[[MoveItErrorCodes, PlannedMotion | None, bool], Any]
@@ -36,7 +36,7 @@ Answer = Callable[[MoveItErrorCodes, PlannedMotion | None, bool], Any]
 
 @dataclass(slots=True, eq=False)
 class _Goal(ServedGoal):
-    """A goal from its request to its end."""
+    """An action goal from its request to its result."""
 
     stops: int  # how often everything was stopped before its request
     execution: Execution | None = None
@@ -99,7 +99,7 @@ class ExecuteAction:
 
 @dataclass(frozen=True, slots=True)
 class MotionKind:
-    """What an action asks for, and how it is answered."""
+    """How one kind of action reads its goals and fills in its results."""
 
     action: Any  # its class
     name: str  # its name
@@ -146,7 +146,7 @@ def single_motion(planning: PlanningThreads, warn: Callable[[str], object]) -> M
 
 
 def sequence(planning: PlanningThreads) -> MotionKind:
-    """Return sequence_move_group, of Pilz' planner."""
+    """Return sequence_move_group, as in Pilz' planner."""
 
     def prepare(
         asked: Any,  # noqa: ANN401
@@ -172,7 +172,7 @@ def sequence(planning: PlanningThreads) -> MotionKind:
 
 @dataclass(slots=True, eq=False)
 class _MotionGoal(_Goal):
-    """A goal of which a plan is executed; why it was stopped before it is planned anew."""
+    """A goal whose plan is executed, and why it was stopped before replanning."""
 
     work: Future[Any] | None = None
     planned: PlannedMotion | None = None
@@ -185,7 +185,7 @@ class _MotionGoal(_Goal):
 
 
 class MotionAction:
-    """Plans in the thread of a group; executes beside other goals whose joints are others."""
+    """Plans in the thread of a group; executes in parallel with goals of other joints."""
 
     def __init__(
         self,
@@ -236,7 +236,7 @@ class MotionAction:
         goal.work = self._background.submit(work, lambda done: self._planned(goal, done), lane)
 
     def _refuse(self, goal: _MotionGoal, refusal: PlanningError) -> None:
-        """End a goal that has no plan; one that was on its way has stopped there."""
+        """End a goal for which planning failed; its motion, if any, has stopped already."""
         before = f'; the arm was stopped on its way: {goal.stop}' if goal.stop else ''
         self._end(goal, refusal.code, f'{refusal}{before}')
 
@@ -276,7 +276,7 @@ class MotionAction:
             goal.begun += 1
 
     def _executed(self, goal: _MotionGoal, code: PlanningCode, reason: str) -> None:
-        """Continue, end, or plan anew where the scene has changed and the options ask for it."""
+        """Continue, end, or replan if the scene has changed and the options request it."""
         if code is PlanningCode.SUCCESS and goal.planned is not None:
             if goal.is_canceled and goal.begun < len(goal.planned.trajectories):
                 self._end(goal, PlanningCode.PREEMPTED, 'canceled')
@@ -342,7 +342,7 @@ class MotionAction:
 
 
 def _ending(node: Node, name: str, goal: _Goal) -> tuple[Ending, MoveItErrorCodes]:
-    """Return status, as MoveIt's, and code of a goal that has ended; a failure is logged."""
+    """Return MoveIt's status and error code of an ended goal, and log a failure."""
     code, reason = goal.outcome
     if code is not PlanningCode.SUCCESS:
         node.get_logger().warning(f'{name}: {code.name}: {reason}')
@@ -354,7 +354,7 @@ def _ending(node: Node, name: str, goal: _Goal) -> tuple[Ending, MoveItErrorCode
 
 
 def _failure(node: Node, name: str, goal: _Goal, error: Exception) -> MoveItErrorCodes:
-    """Return the code of a goal that could not begin, or not be answered."""
+    """Return the error code of a goal that could not begin or be answered."""
     refusal = as_refusal(error)
     goal.outcome = refusal.code, str(refusal)
     return _ending(node, name, goal)[1]

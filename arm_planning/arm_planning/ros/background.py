@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Work that takes time beside the executor of a node: no callback ever waits for it."""
+"""Runs long work in threads beside the executor of a node, so that no callback waits for it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def error_code(code: PlanningCode = PlanningCode.SUCCESS, reason: str = '') -> M
 
 
 def as_refusal(error: BaseException) -> PlanningError:
-    """Return an error as one with a code; a defect is CRASH, with its place."""
+    """Return an error as a PlanningError; an unexpected one gets CRASH and its source line."""
     if isinstance(error, PlanningError):
         return error
     place = traceback.extract_tb(error.__traceback__)[-1]
@@ -36,10 +36,10 @@ def as_refusal(error: BaseException) -> PlanningError:
 
 
 class Background:
-    """Threads beside the executor of a node, one for each lane; in a lane work is done in turn.
+    """Threads beside the executor of a node, one per lane; each lane runs its work in order.
 
     Attributes:
-        is_closing: Whether the node ends; work that takes long ends early then.
+        is_closing: Whether the node is shutting down; long work then ends early.
     """
 
     def __init__(self, node: Node, name: str) -> None:
@@ -55,7 +55,7 @@ class Background:
     def submit(
         self, work: Callable[[], Any], then: Callable[[Future[Any]], None], lane: str = ''
     ) -> Future[Any]:
-        """Run work in a lane, and what follows with its future in the executor of the node."""
+        """Run work in a lane, then a callback with its future in the executor of the node."""
         future = self._lane(lane).submit(work)
 
         def hand_over(done: Future[Any]) -> None:
@@ -74,9 +74,9 @@ class Background:
         refuse: Callable[[Any, PlanningError], None],
         lane: Callable[[Any], str] = lambda _: '',
     ) -> None:
-        """Offer a service whose answers are made in the thread of a lane.
+        """Offer a service whose responses are computed in the thread of a lane.
 
-        ``begin`` gets the request in the executor, and returns what makes the response.
+        ``begin`` gets the request in the executor, and returns a function that makes the response.
         """
 
         def respond(response: Any, outcome: Future[Any]) -> Any:  # noqa: ANN401
@@ -95,7 +95,7 @@ class Background:
         create_deferred_service(self._node, kind, name, submit, respond)
 
     def close(self) -> None:
-        """Drop what has not begun, and wait for what has."""
+        """Drop queued work, and wait for running work."""
         self.is_closing = True
         for pool in self._pools.values():
             pool.shutdown(wait=True, cancel_futures=True)

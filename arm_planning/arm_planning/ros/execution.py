@@ -36,12 +36,12 @@ MAX_WATCH_PERIOD = 0.2  # above it this process was held up; the rest counts for
 STOP_TIMEOUT = 5.0  # time in which controllers must have stopped in [s]; then they are asked again
 
 FINDING_TIMEOUT = 5.0
-"""Time in [s] in which actions of controllers must be found: who has just started knows none."""
+"""Time-out for discovering the actions of controllers in [s]; discovery takes time after start."""
 
 STATE_TIMEOUT = 1.0  # age at which the speed override of a controller counts no more in [s]
 
 FORGOTTEN = (CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID, CancelGoal.Response.ERROR_GOAL_TERMINATED)
-"""Answers to a cancel of controllers that do not follow the goal any more."""
+"""Cancel responses of controllers that no longer follow the goal."""
 
 INVALIDATED = PlanningCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
 
@@ -50,7 +50,7 @@ Done = Callable[[PlanningCode, str], None]
 
 @dataclass(slots=True, eq=False)
 class Execution:
-    """A trajectory on its way."""
+    """A trajectory under execution."""
 
     trajectory: Any  # the trajectory_msgs/JointTrajectory
     done: Done  # called once, with how it ended
@@ -76,7 +76,7 @@ class Execution:
 
 
 class TrajectoryExecution:
-    """Has controllers follow trajectories, and watches them; belongs to the node's executor."""
+    """Sends trajectories to controllers and monitors them; runs in the node's executor."""
 
     def __init__(
         self,
@@ -88,12 +88,12 @@ class TrajectoryExecution:
         followers: Collection[str] = (),
         continuous: Collection[str] = (),
     ) -> None:
-        """Create clients of the controllers, whose actions may come later.
+        """Create clients of the controllers, whose actions may start later.
 
         Args:
-            received: Returns where joints are in [rad], by joint; raises PlanningError where
-                that is not known.
-            followers: Joints that follow others, which no controller takes.
+            received: Returns joint positions in [rad], by joint; raises PlanningError if
+                they are unknown.
+            followers: Mimic joints, which no controller accepts.
         """
         self._followers, self._continuous = frozenset(followers), frozenset(continuous)
         self._node, self._controllers, self._received = node, controllers, received
@@ -127,11 +127,11 @@ class TrajectoryExecution:
 
     @property
     def running(self) -> Sequence[Execution]:
-        """What is on its way and not about to stop."""
+        """Executions under way that are not stopping."""
         return [each for each in self._running if each.ending is None]
 
     def explain(self, execution: Execution, change: str) -> None:
-        """Store why a controller gave up: a change of the scene, or its own words for none."""
+        """Store why a controller aborted: a change of the scene, or if empty its own message."""
         if not execution.in_doubt:
             return  # a client canceled it, or it took too long
         execution.in_doubt = False
@@ -146,15 +146,15 @@ class TrajectoryExecution:
         done: Done,
         names: Sequence[str] = (),
     ) -> Execution:
-        """Execute a trajectory, once the actions of its controllers are found.
+        """Execute a trajectory, as soon as the actions of its controllers are found.
 
         Args:
-            done: Called once, when it has ended, or its controllers are not there.
-            names: Controllers that may follow it; empty for all.
+            done: Called once, when execution has ended or a controller was not found.
+            names: Controllers that may be used; empty for all.
 
         Raises:
-            PlanningError: It is no trajectory, does not begin where the robot is, no controller
-                moves a joint, or one of its joints is on its way already.
+            PlanningError: The trajectory is invalid or does not start at the robot's state, no
+                controller moves a joint, or another execution moves one of its joints.
         """
         if not self._limits.is_allowed:
             raise PlanningError(
@@ -185,11 +185,11 @@ class TrajectoryExecution:
         return execution
 
     def _missing(self, execution: Execution) -> str:
-        """Return the first of its controllers whose action is not found; empty for none."""
+        """Return the first controller whose action is not found; empty if all are found."""
         return next((name for name in execution.held if not self._is_found(name)), '')
 
     def _is_found(self, name: str) -> bool:
-        """Whether the action of a controller is there, and its answers reach its client."""
+        """Whether the action of a controller exists, and its responses reach our client."""
         if not self._clients[name].server_is_ready():
             self._matches.pop(name, None)
             return False
@@ -217,7 +217,7 @@ class TrajectoryExecution:
         self.on_start()
 
     def _look_again(self, execution: Execution) -> None:
-        """Send what was held when its controllers are found by now, or refuse it at last."""
+        """Send a waiting trajectory once its controllers are found; refuse it after a time-out."""
         if missing := self._missing(execution):
             if time.monotonic() > execution.deadline:
                 action = self._node.resolve_topic_name(self._controllers[missing].action(missing))
@@ -257,13 +257,13 @@ class TrajectoryExecution:
             handle.cancel_goal_async()
 
     def stop_all(self, reason: str) -> None:
-        """Stop all executions, and count it in :attr:`stops` for those that were to follow."""
+        """Stop all executions, and increment :attr:`stops` so that no queued one follows."""
         self.stops += 1
         for execution in list(self._running):
             self.stop(execution, PlanningCode.PREEMPTED, reason)
 
     def _check_start(self, execution: Execution) -> None:
-        """Refuse to begin far from where its joints are; take the way from there."""
+        """Refuse a start far from the present positions; else prepend the motion from there."""
         trajectory, tolerance = execution.trajectory, self._limits.start_tolerance
         places = dict(self._received(trajectory.joint_names))
         start = trajectory.points[0].positions
@@ -281,7 +281,7 @@ class TrajectoryExecution:
         execution.way = from_start(trajectory, [places[each] for each in trajectory.joint_names])
 
     def _parts(self, trajectory: Any, names: Sequence[str]) -> dict[str, JointTrajectory]:  # noqa: ANN401
-        """Return what each controller is to follow."""
+        """Return the part of the trajectory for each controller."""
         if unknown := [name for name in names if name not in self._controllers]:
             raise PlanningError(
                 PlanningCode.CONTROL_FAILED,
@@ -336,7 +336,7 @@ class TrajectoryExecution:
         self._conclude(execution)
 
     def _conclude(self, execution: Execution) -> None:
-        """End it when all of its controllers have ended."""
+        """End an execution when all of its controllers have ended."""
         if execution.waits_for or execution.in_doubt or execution not in self._running:
             return
         if execution.is_complete and execution.ending and execution.ending[0] is INVALIDATED:
@@ -353,11 +353,11 @@ class TrajectoryExecution:
         self._states[name] = time.monotonic(), message
 
     def _speed(self, name: str) -> float:
-        """Return the speed override of a controller: 0 in a pause, 1 where it is unknown.
+        """Return the speed override of a controller: 0 while paused, 1 if unknown.
 
-        It notes whether the reference of the controller moves, too. Many releases of
-        joint_trajectory_controller do not fill the field: a 0 is a pause only after another
-        number.
+        Also record whether the reference of the controller moves. Many releases of
+        joint_trajectory_controller leave the field at 0, so 0 means a pause only after a
+        nonzero value.
         """
         at, message = self._states.get(name, (-math.inf, b''))
         if time.monotonic() - at > STATE_TIMEOUT:
@@ -373,18 +373,18 @@ class TrajectoryExecution:
         return min(factor, 1.0) if name in self._scaling and factor >= 0.0 else 1.0
 
     def _lost(self, execution: Execution) -> str:
-        """Return the first of the controllers under way whose action is gone; empty for none."""
+        """Return the first active controller whose action disappeared; empty if none did."""
         if execution.ending is not None:
             return ''
         awaited = sorted(execution.waits_for)
         return next((name for name in awaited if not self._clients[name].server_is_ready()), '')
 
     def _is_overdue(self, execution: Execution, passed: float) -> bool:
-        """Whether an execution takes too long; what a speed override costs does not count.
+        """Whether an execution takes too long, not counting delays by a speed override.
 
-        Neither does a pause of this process. A controller whose reference moves is not overdue:
-        a busy computer holds its cycles up, and it goes on later. The duration of a gripper is
-        not watched: it ends its goal when it stalls.
+        Pauses of this process do not count either. A controller whose reference moves is not
+        overdue: a busy computer only delays its cycles. Grippers have no time limit: they end
+        their goal when they stall.
         """
         pause = max(passed - MAX_WATCH_PERIOD, 0.0)
         execution.deadline += pause
@@ -413,7 +413,7 @@ class TrajectoryExecution:
                 self.stop(execution, PlanningCode.CONTROL_FAILED, reason)
 
     def _watch_execution(self, execution: Execution, passed: float) -> None:
-        """Stop an execution that cannot go on, or takes too long, for the time passed in [s]."""
+        """Stop an execution that cannot continue or takes too long; ``passed`` is in [s]."""
         if execution.held:
             self._look_again(execution)
         elif lost := self._lost(execution):
@@ -433,9 +433,9 @@ class TrajectoryExecution:
             self._give_up(execution)
 
     def _give_up(self, execution: Execution) -> None:
-        """Report that a controller may still move, and ask it again.
+        """Report that a controller may still move, and cancel its goal again.
 
-        Its joints are free when it answers, does not know the goal any more, or is gone.
+        Its joints are released when it responds, no longer knows the goal, or is gone.
         """
         self.explain(execution, '')
         if not execution.is_over and execution.ending is not None:
@@ -460,12 +460,12 @@ class TrajectoryExecution:
 
 
 def _code(result: Any) -> int:  # noqa: ANN401
-    """Return the error code of a result; those of grippers have none."""
+    """Return the error code of a result; gripper results have none."""
     return int(getattr(result, 'error_code', 0))
 
 
 def _words(ended: Any) -> str:  # noqa: ANN401
-    """Return why a controller did not reach the end; some say little."""
+    """Return why a controller did not reach the end; some give no details."""
     code = _code(ended.result)
     if words := getattr(ended.result, 'error_string', ''):
         return str(words)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""MoveIt's requests of motions as requests of the core."""
+"""Converts MoveIt's motion plan requests to requests of the core."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ from .scene import SceneSnapshot
 OMPL, PILZ = PIPELINES
 
 START_BOUNDS_ERROR = 0.01
-"""How far a joint may be beyond a limit at the start in [rad]: drives stand off by some; MoveIt's
-start_state_max_bounds_error. As much is allowed when the motion begins."""
+"""How far a joint may be beyond a limit at the start in [rad], because drives rest slightly off;
+MoveIt's start_state_max_bounds_error. Execution allows the same when the motion begins."""
 
 ROUNDING = 1e-9  # by how much joint constraints may miss each other for rounding in [rad] or [m]
 
@@ -54,10 +54,10 @@ BAD_GOAL = PlanningCode.INVALID_GOAL_CONSTRAINTS
 
 
 class RequestReader:
-    """Reads requests of one group in one scene, with the robot at one place.
+    """Reads requests for one group in one scene, with the robot at rest.
 
     Attributes:
-        start: Where the joints of the group are in [rad]; on a limit where they are just beyond.
+        start: Positions of the group's joints in [rad], clamped if they are just beyond a limit.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class RequestReader:
         self.start = frozen(np.where(np.abs(start - within) <= START_BOUNDS_ERROR, within, start))
 
     def request(self, message: Any) -> MotionRequest:  # noqa: ANN401  # messages have no type
-        """Return a moveit_msgs/MotionPlanRequest; its start state is where the robot is."""
+        """Convert a moveit_msgs/MotionPlanRequest; the motion starts at :attr:`start`."""
         if message.pipeline_id not in {'', *PIPELINES}:
             known = ', '.join(PIPELINES)
             raise PlanningError(
@@ -109,7 +109,7 @@ class RequestReader:
         )
 
     def _planner_id(self, message: Any) -> str:  # noqa: ANN401
-        """Return our name of the planner that a request asks for."""
+        """Return our name of the requested planner."""
         planners = self._settings.planners
         if (message.pipeline_id or self._settings.default_pipeline) == PILZ:
             return message.planner_id or self._settings.default_industrial
@@ -122,7 +122,7 @@ class RequestReader:
         return DEFAULT_PLANNER
 
     def goal(self, message: Any) -> Goal:  # noqa: ANN401
-        """Return a moveit_msgs/Constraints as a goal."""
+        """Convert moveit_msgs/Constraints to a goal."""
         if message.visibility_constraints:
             raise _bad_goal('visibility constraints are not supported')
         positions, turns = message.position_constraints, message.orientation_constraints
@@ -138,7 +138,7 @@ class RequestReader:
         return self._pose_goal(positions, turns)
 
     def constraints(self, message: Any) -> PathConstraints | None:  # noqa: ANN401
-        """Return a moveit_msgs/Constraints of a path; None where it is empty."""
+        """Convert moveit_msgs/Constraints to path constraints; None if they are empty."""
         if message.visibility_constraints:
             raise _bad_goal('visibility constraints are not supported')
         joints = self._joint_ranges(message.joint_constraints)
@@ -149,7 +149,7 @@ class RequestReader:
         return PathConstraints(joints, turns, places)
 
     def pose(self, message: Any, frame: str, what: str) -> Pose:  # noqa: ANN401
-        """Return a geometry_msgs/Pose of a frame in the root link."""
+        """Convert a geometry_msgs/Pose given in a frame to a pose in the root link."""
         with coded(BAD_GOAL):
             place = pose_of(message.position, message.orientation, what)
         return combined(self._snapshot.frame(frame, self._positions), place)
@@ -203,7 +203,7 @@ class RequestReader:
         return ranges
 
     def _leading(self, message: Any) -> tuple[str, float, float, float]:  # noqa: ANN401
-        """Return joint, position and tolerances of a constraint, of the joint that is followed."""
+        """Return joint, position and tolerances of a constraint; mimic joints give the source."""
         name, position = message.joint_name, message.position
         below, above = message.tolerance_below, message.tolerance_above
         mimic = self._model.kinematics.mimics.get(name)
@@ -292,7 +292,7 @@ class RequestReader:
         )
 
     def _via(self, message: Any) -> CircPoint | None:  # noqa: ANN401
-        """Return the point of a circle, which Pilz' planner has as a path constraint."""
+        """Return the auxiliary point of CIRC, given as a path constraint as in Pilz' planner."""
         kinds = [kind for kind in CircPointKind if kind.value == message.name]
         if not kinds:
             return None
@@ -309,7 +309,7 @@ class RequestReader:
 
 
 def planning_time(given: float) -> float:
-    """Return the time for planning in [s]; 0 and less is one that was not given, as in MoveIt."""
+    """Return the planning time in [s]; 0 or less means not given, as in MoveIt."""
     if not math.isfinite(given):
         raise PlanningError(
             PlanningCode.FAILURE, f'allowed_planning_time is {given:g} s; it must be finite'
@@ -318,7 +318,7 @@ def planning_time(given: float) -> float:
 
 
 def scaling_factor(what: str, value: float, default: float = 1.0) -> float:
-    """Return a scaling factor; 0 is one that was not given."""
+    """Return a scaling factor; 0 means not given."""
     if not 0.0 <= value <= 1.0:
         raise PlanningError(
             PlanningCode.FAILURE,

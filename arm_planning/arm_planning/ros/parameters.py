@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of move_group, of its node and of a package; the controllers that they name."""
+"""Parameters of move_group, from its node and from a package, and the controllers they name."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from .robot_groups import RobotGroups
 
 @dataclass(frozen=True, slots=True)
 class ControllerKind:
-    """What a controller takes."""
+    """Action type of a controller."""
 
     name: str  # MoveIt's name of it
     action: Any  # class of its action
@@ -62,19 +62,19 @@ class Controller:
     max_effort: float = 0.0  # greatest effort of a GripperCommand in [N]; 0 for its own
 
     def goal(self, part: JointTrajectory) -> Any:  # noqa: ANN401  # messages have no type
-        """Return the goal of its action for the part of a trajectory that is for its joints."""
+        """Return the action goal for the part of a trajectory that moves its joints."""
         goal = self.kind.goal(part)
         if self.kind.single and self.max_effort:
             goal.command.max_effort = self.max_effort
         return goal
 
     def action(self, name: str) -> str:
-        """Return the name of its action, by its own."""
+        """Return the name of its action, derived from its own name."""
         return f'{name}/{self.namespace}'
 
 
 def _grip(part: JointTrajectory) -> Any:  # noqa: ANN401  # messages have no type
-    """Return where the trajectory ends: how a gripper gets there is its own affair."""
+    """Return the end of the trajectory; the gripper plans its own motion."""
     goal = GripperCommand.Goal()
     (goal.command.position,) = part.points[-1].positions
     return goal
@@ -111,7 +111,7 @@ KINDS = {
 
 @dataclass(frozen=True, slots=True)
 class ExecutionLimits:
-    """When an execution is refused or ended; MoveIt's parameters ``trajectory_execution.*``."""
+    """Limits that refuse or stop an execution; MoveIt's parameters ``trajectory_execution.*``."""
 
     # how far the robot may be from the start in [rad]; 0 for anywhere
     start_tolerance: float = 0.01
@@ -126,7 +126,7 @@ OMPL_CONFIG = r'^(ompl\.planner_configs\.)[^.]+\.'  # before a key of a planner 
 
 @dataclass(frozen=True, slots=True)
 class MoveGroupParameters:
-    """What move_group was given."""
+    """Parameters of move_group."""
 
     description: Description  # what describes the robot
     settings: MoveItSettings  # what parameters of MoveIt's names say
@@ -166,7 +166,7 @@ def declare_parameters(node: Node, package: MoveItPackage | None = None) -> Move
 
 
 def declare_others(node: Node, names: Sequence[str]) -> None:
-    """Declare what was given and not declared, so that tools list it; log it once."""
+    """Declare the remaining overrides, so that tools list them, and log them once."""
     read = [name for name in names if known_of(name) is not None]
     declare_given(node, read, "MoveIt's, read at the start")
     in_tables = {name for name in names if '.' in name}  # keys of tables are looked at by name
@@ -180,7 +180,7 @@ def declare_others(node: Node, names: Sequence[str]) -> None:
 def _complete(
     node: Node, urdf: str, limits: Mapping[str, Mapping[str, object]], places: Mapping[str, Place]
 ) -> Mapping[str, Mapping[str, object]]:
-    """Return limits of all joints: one without a table has those of the description."""
+    """Return limits of all joints; joints without a table get those of the URDF."""
     tree = read_urdf(urdf)
     joints = [joint.name for joint in tree.movable() if joint.independent]
     table = {name: limits.get(name, {}) for name in joints}
@@ -237,7 +237,7 @@ def declare_controllers(
 ) -> dict[str, Controller]:
     """Declare the controllers; by default those of bring-up, one for each group.
 
-    Those that are default come first: they get the joints that several move.
+    Controllers marked ``default`` come first: they get joints that several can move.
     """
     defaults = {f'{group}_controller': list(each) for group, each in robot.group_joints().items()}
     names = ParameterReader(node, f'{MANAGER}.').texts(

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Motions that are planned for clients: the threads that plan, and what they see of it."""
+"""Plans motions for clients: the planning threads, responses, and display of plans."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from .trajectories import state_message, trajectory_message
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannedMotion:
-    """What a client gets of a plan."""
+    """Planning result for a client."""
 
     start: StateMessage  # where it begins
     # the motion; a sequence has one for each change of the group
@@ -53,7 +53,7 @@ class PlannedMotion:
 
 @dataclass(frozen=True, slots=True)
 class _GroupRun:
-    """Items of a sequence that follow each other and move the same group: one trajectory."""
+    """Consecutive items of a sequence that move the same group: one trajectory."""
 
     group: str  # name of the group
     first: int  # number of the first item
@@ -64,7 +64,7 @@ SEEDS = count()  # seeds of planners: a second attempt at a plan searches in ano
 
 
 class GroupPlanners:
-    """The planner of each group of a robot, made anew when joints beside it have moved."""
+    """The planner of each group of a robot, rebuilt when joints outside the group have moved."""
 
     def __init__(
         self, robot: RobotGroups, cartesian_limits: CartesianLimits | None = None
@@ -73,7 +73,7 @@ class GroupPlanners:
         self._planners: dict[str, tuple[RobotModel, Planner]] = {}
 
     def at(self, group: str, positions: Array) -> tuple[RobotModel, Planner]:
-        """Return model and planner of a group, with the joints beside it at positions in [rad]."""
+        """Return model and planner of a group, with joints outside it at positions in [rad]."""
         model = self._robot.model_at(group, positions)
         known = self._planners.get(group)
         if known is None or known[0] is not model:
@@ -83,7 +83,7 @@ class GroupPlanners:
 
 
 class PlanningThreads:
-    """Plans in a thread for each group: groups do not wait for others."""
+    """Plans in one thread per group, so that groups do not wait for each other."""
 
     def __init__(
         self,
@@ -125,11 +125,11 @@ class PlanningThreads:
         scene_diff: Any = None,  # noqa: ANN401
         is_canceled: Callable[[], bool] = lambda: False,
     ) -> Callable[[], PlannedMotion]:
-        """Return what plans a motion; called in the executor, what it returns in the thread.
+        """Return a function that plans a motion in the thread; call this one in the executor.
 
         Args:
-            scene_diff: A moveit_msgs/PlanningScene that counts for this plan only.
-            is_canceled: Whether the plan is canceled, which ends a search at once.
+            scene_diff: A moveit_msgs/PlanningScene that applies to this plan only.
+            is_canceled: Returns whether the goal is canceled; if so, the search ends at once.
         """
         if not message.group_name:
             known = ', '.join(self._monitor.robot.names)
@@ -148,7 +148,7 @@ class PlanningThreads:
         scene_diff: Any = None,  # noqa: ANN401
         is_canceled: Callable[[], bool] = lambda: False,
     ) -> Callable[[], PlannedMotion]:
-        """Return what plans a sequence, as :meth:`prepare`; without items nothing moves."""
+        """Return a function that plans a sequence, as :meth:`prepare`; no items, no motion."""
         if not items:
             return lambda: PlannedMotion(StateMessage(), [], 0.0, ['no items: nothing moves'])
         runs = _group_runs(items)
@@ -162,7 +162,7 @@ class PlanningThreads:
         )
 
     def _begin(self, run: _GroupRun, positions: Array) -> Array:
-        """Return all positions with those at which the first item of a group begins."""
+        """Return all joint positions, with those at which the first item of a group begins."""
         state = run.items[0].req.start_state
         if state.attached_collision_objects:
             raise PlanningError(
@@ -181,7 +181,7 @@ class PlanningThreads:
         )
 
     def display(self, planned: PlannedMotion) -> None:
-        """Show a motion to listeners."""
+        """Publish a motion for display."""
         self._displayed.publish(
             DisplayTrajectory(
                 model_id=self._monitor.robot.name,
@@ -246,9 +246,9 @@ class PlanningThreads:
         positions: Array,
         is_canceled: Callable[[], bool],
     ) -> Callable[[int, Any, Array | None], MotionRequest]:
-        """Return what reads an item of a sequence, by its number, message and start.
+        """Return a function that reads an item of a sequence, given its number, message and start.
 
-        The start, the end of the item before, stands for what the message leaves out.
+        The start, which is the end of the previous item, replaces what the message leaves out.
         """
 
         def read(number: int, message: Any, start: Array | None) -> MotionRequest:  # noqa: ANN401
@@ -292,7 +292,7 @@ class PlanningThreads:
 
 
 def sequence_group(items: Sequence[Any]) -> str:
-    """Return the group whose thread plans the moveit_msgs/MotionSequenceItem of a sequence."""
+    """Return the group in whose thread the items of a sequence are planned."""
     return str(items[0].req.group_name) if items else ''
 
 
@@ -307,7 +307,7 @@ def sequence_response(code: MoveItErrorCodes, planned: PlannedMotion | None) -> 
 
 
 def _noted(snapshot: SceneSnapshot, plan: Callable[[], PlannedMotion]) -> PlannedMotion:
-    """Plan, and add the notes on objects of the scene to the answer."""
+    """Plan, and add the notes on objects of the scene to the result."""
     try:
         planned = plan()
     except PlanningError as error:
@@ -320,7 +320,7 @@ def _changed(
     diff: Any,  # noqa: ANN401
     positions: Array,
 ) -> SceneSnapshot:
-    """Return a scene with the change of a request, whether or not that sets is_diff."""
+    """Apply the scene change of a request, whether or not it sets is_diff."""
     if diff is None:
         return snapshot
     diff.is_diff = True

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A robot with all of its joints, and the groups of its SRDF in which motions are planned."""
+"""The whole robot with all of its joints, and the SRDF groups for which motions are planned."""
 
 from __future__ import annotations
 
@@ -28,22 +28,22 @@ from ..exceptions import PlanningCode, PlanningError
 
 
 class _Placed(threading.local):
-    """The models that one thread was given last, by group."""
+    """The models that one thread last requested, by group."""
 
     def __init__(self) -> None:
         self.models: dict[str, RobotModel] = {}
 
 
 class RobotGroups:
-    """The robot as a whole, and a model of each group, made when it is first asked for.
+    """The whole robot, and a model of each group, built on first use.
 
-    It is for any thread.
+    Thread-safe.
 
     Attributes:
-        all_joints: Names of all joints, those that follow others too.
-        continuous: Names of the joints of which whole turns do not count.
+        all_joints: Names of all joints, including mimic joints.
+        continuous: Names of the continuous joints, whose whole turns do not count.
         scene: The robot alone; all joints move.
-        world_frames: Frames in which the root link is held, by the SRDF.
+        world_frames: Frames to which the SRDF fixes the root link.
     """
 
     def __init__(
@@ -91,11 +91,11 @@ class RobotGroups:
         return self.kinematics.joints
 
     def group_joints(self) -> Mapping[str, Sequence[str]]:
-        """Return the joints of each group that can move."""
+        """Return the movable joints of each group."""
         return self._joints
 
     def model(self, group: str) -> RobotModel:
-        """Return the model of a group, or refuse one that is unknown or cannot be moved."""
+        """Return the model of a group; refuse a group that is unknown or cannot be moved."""
         if group not in self.names:
             raise PlanningError(
                 PlanningCode.INVALID_GROUP_NAME,
@@ -115,9 +115,9 @@ class RobotGroups:
             return self._models[group]
 
     def model_at(self, group: str, positions: Array) -> RobotModel:
-        """Return the model of a group with the joints beside it where they are in [rad].
+        """Return the model of a group, with joints outside it at ``positions`` in [rad].
 
-        It is the same one for a thread for as long as these stay.
+        A thread gets the same model as long as these joints do not move.
         """
         placed = self._thread.models
         before = placed.get(group) or self.model(group)
@@ -126,7 +126,7 @@ class RobotGroups:
         return placed[group]
 
     def positions(self, by_joint: Mapping[str, float]) -> Array:
-        """Return the positions of all joints; those that are not given stand at 0 or nearby."""
+        """Return the positions of all joints; joints not given are at 0 or the nearest limit."""
         positions = np.array(self._standing)
         for place, name in enumerate(self.joints):
             positions[place] = by_joint.get(name, positions[place])

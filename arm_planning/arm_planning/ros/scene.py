@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The scene that clients share, and its messages; :mod:`.scene_changes` is the way back."""
+"""The shared planning scene, and its conversion to messages; :mod:`.scene_changes` reads them."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ MIN_FULLNESS = 0.9  # share of its hull that a mesh fills at least without a not
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjectDetails:
-    """What collisions do not need of an object."""
+    """Details of an object that collision checks do not use."""
 
     type_key: str = ''  # key of its type in a database
     type_db: str = ''  # which database
@@ -68,15 +68,15 @@ class ObjectDetails:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AttachedDetails:
-    """What collisions do not need of an attached body."""
+    """Details of an attached body that collision checks do not use."""
 
     detach_posture: Any  # the trajectory_msgs/JointTrajectory that lets it go
     weight: float  # its weight in [kg]
 
 
 OuterFrames = Callable[[str, Array], Pose]
-"""Returns where a frame that neither robot nor scene has is in the root link, by its name and the
-positions of all joints; raises PlanningError."""
+"""Returns the pose in the root link of a frame that is in neither robot nor scene, by its name and
+the positions of all joints; raises PlanningError."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,12 +99,12 @@ class SceneSnapshot:
 
     @property
     def root(self) -> str:
-        """The link in which objects of the world are."""
+        """The link in which poses of world objects are expressed."""
         return self.scene.kinematics.root
 
     @property
     def notes(self) -> Sequence[str]:
-        """Warnings about objects that count as larger than they are."""
+        """Warnings about objects that are checked as larger than they are."""
         return [
             f'object {name!r} counts as the convex hull of its mesh, of which it fills'
             f' {100.0 * each.fullness:.0f} %; give it several meshes of convex parts where that'
@@ -114,10 +114,10 @@ class SceneSnapshot:
         ]
 
     def link_of(self, frame: str) -> tuple[str, Pose]:
-        """Return the link that carries a frame, and where the frame is in it.
+        """Return the link that carries a frame, and the pose of the frame in that link.
 
-        It is a link, an object or attached body, a subframe of one as ``object/subframe``, or a
-        frame that was named; empty for the root link. Others are refused.
+        The frame is a link, an object, an attached body, a subframe as ``object/subframe``, or a
+        named frame; empty is the root link. Other frames are refused.
         """
         name = frame.removeprefix('/')
         if name in self.scene.kinematics.frames:
@@ -138,7 +138,7 @@ class SceneSnapshot:
         return link, combined(pose, self.details[thing].subframes[subframe]) if separator else pose
 
     def frame(self, frame: str, positions: Array) -> Pose:
-        """Return where a frame of :meth:`link_of`, or one of others, is in the root link."""
+        """Return the pose in the root link of a frame of :meth:`link_of`, or of an outer frame."""
         try:
             link, pose = self.link_of(frame)
         except PlanningError:
@@ -162,7 +162,7 @@ ALL_COMPONENTS = (1 << 10) - 1  # all bits of moveit_msgs/PlanningSceneComponent
 
 
 def collision_message(snapshot: SceneSnapshot, robot_name: str) -> SceneMessage:
-    """Return a scene as controllers take it: of meshes the corners of the hulls that count."""
+    """Return a scene for controllers: meshes are sent as the corners of their hulls."""
     bare = {name: ObjectDetails() for name in snapshot.details}
     message = scene_message(replace(snapshot, details=bare), robot_name, StateMessage())
     held = message.robot_state.attached_collision_objects
@@ -175,9 +175,9 @@ def collision_message(snapshot: SceneSnapshot, robot_name: str) -> SceneMessage:
 def scene_message(
     snapshot: SceneSnapshot, robot_name: str, state: StateMessage, components: int = ALL_COMPONENTS
 ) -> SceneMessage:
-    """Return a scene as a moveit_msgs/PlanningScene, whole or the parts that are asked for.
+    """Return a scene as a moveit_msgs/PlanningScene, whole or only the requested parts.
 
-    Attached bodies are added to the state; the parts are bits of PlanningSceneComponents.
+    Attached bodies are added to the state; parts are bits of PlanningSceneComponents.
     """
     has = PlanningSceneComponents
     objects = {name: each for name, each in snapshot.scene.objects.items() if name != OCTOMAP_NAME}
@@ -263,7 +263,7 @@ def object_message(thing: CollisionObject, details: ObjectDetails, frame: str) -
 
 
 def matrix_message(allowed: AllowedCollisionMatrix) -> MatrixMessage:
-    """Return what may touch as a moveit_msgs/AllowedCollisionMatrix."""
+    """Return allowed collisions as a moveit_msgs/AllowedCollisionMatrix."""
     names = sorted({name for pair in allowed.entries for name in pair} | set(allowed.defaults))
     return MatrixMessage(
         entry_names=names,
@@ -318,7 +318,7 @@ def _primitive(shape: Box | Sphere | Cylinder | Cone) -> SolidPrimitive:
 
 
 def _as_primitives(placed: PlacedShape) -> Sequence[PlacedShape]:
-    """Return shapes that a message has: a capsule is a cylinder with a sphere on either end."""
+    """Return shapes that messages know: a capsule becomes a cylinder and two spheres."""
     shape, pose = placed.shape, placed.pose
     if not isinstance(shape, Capsule):
         return (placed,)

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Changes of the shared scene by MoveIt's messages: a message counts as a whole or not at all.
+"""Changes of the shared scene by MoveIt's messages: each message is applied whole or not at all.
 
-:mod:`arm_model.ros` reads what may collide; here are the parts that collisions do not need, frames
-of objects, and the codes of refusals.
+:mod:`arm_model.ros` reads collision geometry; this module adds details that collision checks do
+not use, frames of objects, and error codes.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ CODES = (
     (LinkNameError, PlanningCode.INVALID_LINK_NAME),
     (ObjectNameError, PlanningCode.INVALID_OBJECT_NAME),
 )
-"""Codes of refusals of the scene, as MoveIt has them; others have FAILURE."""
+"""MoveIt's error codes of refused scenes; other refusals get FAILURE."""
 
 MIN_THICKNESS = 1e-6  # least extent of a mesh along its thinnest axis in [m] that is a volume
 
 
 def apply_scene(snapshot: SceneSnapshot, message: Any, positions: Array) -> SceneSnapshot:  # noqa: ANN401
-    """Return a scene after a moveit_msgs/PlanningScene: a change, or a whole scene."""
+    """Apply a moveit_msgs/PlanningScene, a diff or a whole scene; return the new scene."""
     before = snapshot
     if not message.is_diff:  # what a whole scene replaces besides its objects
         before = replace(before, colors={}, fixed_frames={}, octomap=None)
@@ -75,10 +75,10 @@ def apply_scene(snapshot: SceneSnapshot, message: Any, positions: Array) -> Scen
 
 
 def scene_for(snapshot: SceneSnapshot, robot_alone: PlanningScene) -> PlanningScene:
-    """Return the scene as a group of the robot moves in it.
+    """Return the scene in which a group of the robot moves.
 
-    Pairs that the first scene of the group's model allows stay allowed where the matrix of the
-    scene has neither an entry of them nor a default of a name.
+    Pairs allowed in the first scene of the group's model stay allowed if the matrix of the
+    scene has neither an entry for them nor a default for a name.
     """
     whole, alone = snapshot.scene, robot_alone.allowed.entries
     defaults = whole.allowed.defaults.keys()
@@ -100,7 +100,7 @@ def _described(
     bodies: Iterable[Any],
     colors: Mapping[str, tuple[float, float, float, float]],
 ) -> SceneSnapshot:
-    """Return a scene with what messages say of objects besides."""
+    """Return a scene with the further details of objects from messages."""
     details, attached = dict(before.details), dict(before.attached_details)
     for message in things:
         if message.primitives or message.meshes or message.planes:
@@ -200,7 +200,7 @@ def _arrays(message: Any) -> tuple[Array, Places]:  # noqa: ANN401
 
 
 def _problem(corners: Array, triangles: Places) -> str:
-    """Return why corners and triangles of a mesh are no body; empty where they are one."""
+    """Return why corners and triangles of a mesh form no body; empty if they do."""
     if not len(triangles) or not len(corners):
         return f'a mesh of {len(corners)} vertices and {len(triangles)} triangles has no volume'
     if triangles.max() >= len(corners):

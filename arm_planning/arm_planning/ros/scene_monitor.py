@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The shared scene on a node: MoveIt's topics and services that read and change it."""
+"""The shared scene on a node: MoveIt's topics and services to read and change it."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ NO_OCTOMAP = 'OcTree'  # id of an octomap without data: it takes the place of th
 STATE_TIMEOUT = 1.0  # age at which joint states count no more in [s]
 
 SPEED_PERIOD, REST_SPEED = 0.05, 0.02
-"""Time in [s] over which speeds of joints are measured, and below which in [rad/s] one rests."""
+"""Time in [s] over which joint speeds are measured, and speed in [rad/s] that counts as rest."""
 
 REST_PERIOD, REST_TOLERANCE = 0.25, 1e-3
-"""A robot whose joints move by less in such a time in [s] rests, in [rad] or [m]."""
+"""Time in [s] in which the joints of a robot at rest move less than this in [rad] or [m]."""
 
 
 class SceneMonitor:
-    """The scene, and where the joints are; belongs to the executor of its node.
+    """The scene and the joint positions; runs in the executor of its node.
 
     Attributes:
         snapshot: The scene; a value that any thread may keep.
@@ -61,7 +61,7 @@ class SceneMonitor:
     """
 
     def __init__(self, node: Node, robot: RobotGroups, frame_prefix: str = '') -> None:
-        """Offer topics and services; the prefix stands before the names of its links in TF."""
+        """Offer topics and services; the prefix precedes the robot's link names in TF."""
         self.robot = robot
         self._tf = TfListener(node, robot.kinematics, frame_prefix, on_demand=True)
         self.snapshot = SceneSnapshot(
@@ -96,7 +96,7 @@ class SceneMonitor:
         node.create_timer(REST_PERIOD, self._publish_rest)
 
     def received(self, joints: Sequence[str]) -> Mapping[str, float]:
-        """Return where joints are in [rad], by joint; refuse those that are unknown or too old."""
+        """Return joint positions in [rad], by joint; refuse unknown or outdated ones."""
         for joint in joints:
             if joint not in self.robot.all_joints:
                 known = ', '.join(self.robot.all_joints)
@@ -108,7 +108,7 @@ class SceneMonitor:
         return {joint: places[joint] for joint in joints}
 
     def is_moving(self, group: str) -> bool:
-        """Whether a joint of a group moves, such as after a jog; not where it is unknown."""
+        """Whether a joint of a group moves, such as after a jog; False if that is unknown."""
         joints = self.robot.group_joints().get(group, ())
         fresh = self._states.samples(time.monotonic() - STATE_TIMEOUT)
         known = [each for each in joints if each in fresh and each in self._before]
@@ -119,15 +119,15 @@ class SceneMonitor:
         )
 
     def positions(self, message: Any = None) -> Array:  # noqa: ANN401  # messages have no type
-        """Return the positions of all joints in [rad]: those of a moveit_msgs/RobotState first."""
+        """Return the positions of all joints in [rad]; a moveit_msgs/RobotState has precedence."""
         given = {} if message is None else joints_of(message, self.robot.all_joints)
         return self.robot.positions({**self._places(), **given})
 
     def start(self, state: Any, group: str = '') -> tuple[SceneSnapshot, Array]:  # noqa: ANN401
         """Return the scene in which a request begins, and the positions of all joints in [rad].
 
-        Joints that the moveit_msgs/RobotState leaves out are where they are; those of a group
-        must be known then. Its attached bodies come to those of the scene.
+        Joints missing in the moveit_msgs/RobotState keep their present positions, which must be
+        known for joints of the group. Its attached bodies are added to the scene.
         """
         positions = self.positions(state)
         if group:
@@ -138,7 +138,7 @@ class SceneMonitor:
         return apply_scene(self.snapshot, bodies, positions), positions
 
     def state(self, positions: Array | None = None) -> StateMessage:
-        """Return where all joints are as a moveit_msgs/RobotState, with attached bodies."""
+        """Return all joint positions as a moveit_msgs/RobotState, with attached bodies."""
         places = self.positions() if positions is None else positions
         message = state_message(self.robot.joints, places, self.snapshot.root)
         message.joint_state.header.stamp = self._node.get_clock().now().to_msg()
@@ -146,7 +146,7 @@ class SceneMonitor:
         return message
 
     def _check_received(self, joints: Sequence[str], given: Sequence[str] | None = None) -> None:
-        """Refuse joints that were never received or are too old, and are not given."""
+        """Refuse joints that are not given, and were never received or are too old."""
         now, samples = time.monotonic(), self._states.samples()
         other = '' if given is None else ', or give the start state'
         for joint in joints:
@@ -161,7 +161,7 @@ class SceneMonitor:
                 )
 
     def _outer_frame(self, frame: str, positions: Array) -> Pose:
-        """Return where a frame of TF is in the root link, by the first link that TF connects."""
+        """Return the pose of a TF frame in the root link, via the first link connected to it."""
         kinematics = self.robot.kinematics
         link = self._tf.link(frame)
         if link is not None:
@@ -190,7 +190,7 @@ class SceneMonitor:
         self._change(topic, as_scene(message))
 
     def _change(self, source: str, scene: PlanningScene) -> bool:
-        """Apply a scene; a refusal is logged, once in a row, and leaves the scene as it is."""
+        """Apply a scene; log a refusal, once if it repeats, and leave the scene as it is."""
         known = self.snapshot.notes
         try:
             self.snapshot = apply_scene(self.snapshot, scene, self.positions())
@@ -210,10 +210,10 @@ class SceneMonitor:
         return True
 
     def _publish_rest(self) -> None:
-        """Publish the scene when the robot has come to rest elsewhere: viewers show it there.
+        """Publish the scene when the robot has come to rest elsewhere, for viewers.
 
-        Not while it moves, as MoveIt may: programs that read the scene in a cycle would read it
-        all the time.
+        Unlike MoveIt, do not publish while it moves: programs that read the scene in a cycle
+        would be busy with it.
         """
         here, before = self.positions(), self._seen
         self._seen = here

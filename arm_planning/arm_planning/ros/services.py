@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Services: states, inverse kinematics, Cartesian paths, and which planners there are."""
+"""Services: state validity, forward and inverse kinematics, Cartesian paths, list of planners."""
 
 from __future__ import annotations
 
@@ -49,13 +49,13 @@ from .scene_monitor import SceneMonitor
 from .trajectories import state_message, trajectory_message
 
 CANDIDATES = 8
-"""Solutions of inverse kinematics among which one that heeds constraints is looked for."""
+"""Number of IK solutions among which to search for one that satisfies the constraints."""
 
 MAX_SOLVERS = 16  # links of groups, with the joints beside them in one place, that are kept
 
 
 class RobotServices:
-    """Answers about states and paths of the robot, in a thread of its own."""
+    """Serves kinematics, state validity and Cartesian paths, in a thread of its own."""
 
     def __init__(
         self,
@@ -83,7 +83,7 @@ class RobotServices:
         )
 
     def _fk(self, request: Any) -> Callable[[], Any]:  # noqa: ANN401  # messages have no type
-        """Prepare the poses of links, bodies and subframes in the frame that a request names."""
+        """Prepare the poses of links, bodies and subframes in the frame of the request."""
         snapshot, positions = self._monitor.start(request.robot_state)
         stamp = self._node.get_clock().now().to_msg()
         frame = request.header.frame_id or snapshot.root
@@ -130,7 +130,7 @@ class RobotServices:
         snapshot: SceneSnapshot,
         positions: Array,
     ) -> GetStateValidity.Response:
-        """Return the contacts of a state, and what becomes of constraints of a group."""
+        """Return the contacts of a state, and the results of constraints of a group."""
         contacts = Clearances(snapshot.scene).contacts(positions)
         results: list[ConstraintResult] = []
         if group:
@@ -151,7 +151,7 @@ class RobotServices:
         )
 
     def _prepared(self, answer: Any, request: Any, state: Any) -> Callable[[], Any]:  # noqa: ANN401
-        """Return what answers from the scene and the joints as they are now."""
+        """Return a function that responds from the present scene and joint positions."""
         snapshot, positions = self._monitor.start(state, request.group_name)
         stamp = self._node.get_clock().now().to_msg()
 
@@ -254,9 +254,9 @@ class RobotServices:
         rows: Array,
         scene: PlanningScene | None,
     ) -> tuple[Path, int, str]:
-        """Return the path through joint positions, through how many of them, and why no more.
+        """Return the path through joint positions, how many it reaches, and why no more.
 
-        It is as fast as the request allows, and ends in front of what is not valid between two.
+        It is as fast as the request allows, and ends before the first motion that is not valid.
         """
         limits = model.limits.scaled(
             scaling_factor(
@@ -330,7 +330,7 @@ SEARCH = 'geometric::RRTConnect'
 
 
 class PlannerQueries:
-    """Answers about planners; none has anything to set."""
+    """Serves queries about planners, which have no settings."""
 
     def __init__(self, node: Node, planners: PlannerConfigs) -> None:
         self._log, self._planners = node.get_logger(), planners
@@ -339,7 +339,7 @@ class PlannerQueries:
         node.create_service(SetPlannerParams, 'set_planner_params', self._set)
 
     def _set(self, request: Any, response: Any) -> Any:  # noqa: ANN401  # rclpy has no types here
-        """Log that it has no effect: the response has no field for that."""
+        """Log that setting parameters has no effect: the response has no field for that."""
         self._log.warning(
             f'set_planner_params: {request.planner_config or "the planners"} of group'
             f' {request.group!r} cannot be set; {", ".join(request.params.keys) or "nothing"}'

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""States and trajectories of joints as messages, and what is looked at in those of clients."""
+"""Converts joint states and trajectories to messages, and checks those of clients."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from arm_trajectory import cubics, lines, Path, quintics
 from ..exceptions import PlanningCode, PlanningError
 
 POINT_PERIOD = 0.1
-"""Longest time between two points of a trajectory in [s]: that of MoveIt's plans."""
+"""Longest time between two points of a trajectory in [s], as in MoveIt's plans."""
 
 ROWS = ('positions', 'velocities', 'accelerations')
-"""What a point has of each joint; the positions it must have."""
+"""Fields of a point with one value per joint; positions are required."""
 
 MAX_SPLITS = 5000
-"""Points that are added to a trajectory at most: those of a very slow one are farther apart."""
+"""Greatest number of points added to a trajectory; a very slow one gets them farther apart."""
 
 
 def joints_of(message: Any, known: Sequence[str]) -> Mapping[str, float]:  # noqa: ANN401
-    """Return the positions in [rad] that a moveit_msgs/RobotState has, by joint, or refuse it."""
+    """Return the positions in [rad] in a moveit_msgs/RobotState, by joint, or refuse it."""
     state = message.joint_state
     if message.multi_dof_joint_state.joint_names:
         raise _invalid('multi_dof_joint_state: the robot stands still, it has no such joint')
@@ -64,8 +64,8 @@ def trajectory_message(joints: Sequence[str], path: Path, root: str) -> RobotTra
     """Return a path as a moveit_msgs/RobotTrajectory.
 
     Its points are the ends of the path's polynomials and some in between, with velocities and
-    accelerations: a quintic between two of them is the path itself, and a viewer that shows one
-    point after the other shows a motion.
+    accelerations: quintic interpolation reproduces the path exactly, and a viewer that shows the
+    points one by one shows a smooth motion.
     """
     # of ends in the same nanosecond the last one: points of equal time are no trajectory
     ends = {round(time * 1e9): time for time in [*path.starts.tolist(), path.duration]}
@@ -93,7 +93,7 @@ def _point(path: Path, time: float) -> JointTrajectoryPoint:
 
 
 def check_trajectory(trajectory: Any) -> None:  # noqa: ANN401  # messages have no type
-    """Refuse a trajectory that no controller can follow: its points, rows, numbers or times."""
+    """Refuse a trajectory whose points, rows, numbers or times no controller can follow."""
     names = list(trajectory.joint_names)
     if not trajectory.points:
         raise _no_trajectory('the trajectory has no points')
@@ -128,7 +128,7 @@ def part_of(trajectory: Any, joints: Sequence[str]) -> JointTrajectory:  # noqa:
 
 
 def from_start(trajectory: Any, start: Sequence[float]) -> JointTrajectory:  # noqa: ANN401
-    """Return a trajectory with the way to its first point, where that is later than its begin."""
+    """Return a trajectory with the motion to its first point, if that has a time above 0."""
     first = trajectory.points[0]
     if seconds(first.time_from_start) <= 0.0:
         return trajectory
@@ -157,7 +157,7 @@ def _no_trajectory(reason: str) -> PlanningError:
 
 
 def path_of(trajectory: Any) -> Path:  # noqa: ANN401
-    """Return a trajectory of two points or more as joint_trajectory_controller interpolates it."""
+    """Return the path that joint_trajectory_controller interpolates through two or more points."""
     times = np.array([seconds(each.time_from_start) for each in trajectory.points])
     lasts = np.diff(times)
     rows = [[getattr(each, kind) for each in trajectory.points] for kind in ROWS]
