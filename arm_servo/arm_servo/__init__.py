@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Jogging, trajectories and single targets of an arm on one jerk-limited motion core.
 
-Conventions: joint vectors are in the order of the arm's joints in [rad], of joints that slide in
-[m]; velocities and accelerations in their units per [s] and [s2]. Twists (6) are linear before
-angular; scaled ones have lengths as shares of the arm's reach. ``now``, ``begin`` and ``time`` are
-on the steady clock in [s], ``period`` is the time to the next cycle in [s]. ``state`` is what was
-commanded last, ``measured`` what the drives report. A ``reason`` says what happened, with the
-remedy, and is the outcome of the motion that it ends.
+Conventions: joint vectors are in the order of the arm's joints in [rad], or for prismatic joints
+[m]; velocities and accelerations in these units per [s] and [s2]. Twists (6) are linear before
+angular; scaled twists divide lengths by the arm's reach. ``now``, ``begin`` and ``time`` are on
+the steady clock in [s], ``period`` is the time to the next cycle in [s]. ``state`` is the last
+commanded state, ``measured`` the state that the drives report. A ``reason`` states what happened
+and the remedy; it becomes the outcome of the motion that it ends.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The motion core as a motion source of arm_canopen: stepped in the CANopen cycle."""
+"""Motion source for arm_canopen that steps the motion core in the CANopen cycle."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NOT_ATTACHED = f'was not attached yet; {COMMAND}'
 
 UNUSED = f'is ready; {COMMAND}'
 PREPARATIONS = (RefusalCause.COMMANDED, RefusalCause.MODE_SELECTED)
-"""What clients do to a drive before it is moved."""
+"""Release causes of clients that prepare a drive before motion."""
 
 REMEDIES: Mapping[RefusalCause, str] = {
     RefusalCause.OFFLINE: POWER,
@@ -48,7 +48,7 @@ REMEDIES: Mapping[RefusalCause, str] = {
 
 SILENT = RefusalCause.SILENT
 SILENT_AGE_FACTOR = 0.5
-"""Share of the age of a silent drive from which on another one counts as silent, too."""
+"""Share of the age of a silent drive above which another drive counts as silent, too."""
 
 PLURAL = {
     'is': 'are',
@@ -58,12 +58,12 @@ PLURAL = {
     'moves': 'move',
     'takes': 'take',
 }
-"""Words with which reasons begin, as they are said of several drives."""
+"""Plural of the verbs that begin a reason, for several drives."""
 
 OBJECTS = {' its ': ' their ', 'takes it': 'takes them', 'it stands': 'they stand'}
-"""What reasons say of one drive, as it is said of several."""
+"""Plural of pronouns in a reason, for several drives."""
 
-Released = Mapping[str, Refusal | str]  # drives that were taken away, with what happened
+Released = Mapping[str, Refusal | str]  # released drives, with the reason
 
 
 def why_not(feedback: Sequence[AxisFeedback], released: Released) -> str:
@@ -76,9 +76,9 @@ def why_not(feedback: Sequence[AxisFeedback], released: Released) -> str:
 
 
 def too_fast(feedback: Sequence[AxisFeedback], velocities: Array) -> str:
-    """Return which joints may be faster than their drives; empty when none may.
+    """Return a message naming joints with limits above their drive's; empty for none.
 
-    A path that is faster is refused by the drive half-way, and ends in a stop beside the path.
+    A drive refuses a path above its speed limit half-way, so the arm stops off the path.
     """
     words = (
         'is limited to {:.4g} per second by 0x607F, and limits.yaml allows {:.4g}; lower'
@@ -93,9 +93,9 @@ def too_fast(feedback: Sequence[AxisFeedback], velocities: Array) -> str:
 
 
 def what_happened(feedback: Sequence[AxisFeedback], released: Released) -> tuple[str, GoalCode]:
-    """Return why an arm that followed does not go on, and the code of its trajectory.
+    """Return why the arm stopped following, and the result code of its trajectory.
 
-    What took a drive away is the cause; the state that it is in now may be a consequence.
+    The reason why a drive was released is the cause; its present state may be a consequence.
     """
     causes: list[tuple[str, Refusal | str | None]] = [
         (axis.name, released.get(axis.name) or axis.refusal) for axis in feedback
@@ -103,7 +103,7 @@ def what_happened(feedback: Sequence[AxisFeedback], released: Released) -> tuple
     silent = (each for each in feedback if each.refusal and each.refusal.cause is SILENT)
     oldest = max((axis.age for axis in silent), default=math.inf)
     for number, axis in enumerate(feedback):
-        # what cuts several drives off at once shows of some of them a few cycles later
+        # a common cause of several silent drives shows on some of them a few cycles later
         if causes[number][1] is None and axis.age > SILENT_AGE_FACTOR * oldest:
             detail = f'the last is {axis.age:.1f} s old'
             causes[number] = axis.name, Refusal(SILENT, detail)
@@ -119,7 +119,7 @@ UNKNOWN = 'accepts no set-points; see the log of the master'
 
 
 def _sentence(causes: Iterable[tuple[str, Refusal | str | None]]) -> str:
-    """Name drives with the same trouble together."""
+    """Return the causes as one message, grouping drives with the same cause."""
     names: dict[str, list[str]] = {}
     for name, cause in causes:
         if cause is not None:
@@ -137,7 +137,7 @@ def _words(cause: Refusal | str) -> str:
 
 
 def _of_several(reason: str) -> str:
-    """Return what is said of one drive, said of several."""
+    """Convert a reason for one drive to the plural."""
     verb, rest = reason.split(' ', 1)
     for one, many in OBJECTS.items():
         rest = rest.replace(one, many)
@@ -147,15 +147,15 @@ def _of_several(reason: str) -> str:
 class DriveSource:
     """Commands the drives of an arm; a :class:`arm_canopen.MotionSource`.
 
-    It follows while every drive can. When one drops out, the others stop on the path, and a
-    trajectory ends with the drive named. Afterwards it takes the arm over where the drives'
-    set-points are: at once when no drive was taken away, else when it is attached again.
+    It follows while every drive can. If one drops out, the others stop on the path, and the
+    outcome of a trajectory names the drive. Then it takes over the arm at the drives' set-points:
+    at once if no drive was released, else when the source is attached again.
     """
 
     def __init__(
         self,
         gateway: CommandGateway,
-        # attaches a source to the bus before the next cycle, and waits for nothing
+        # attaches a source to the bus before the next cycle, without blocking
         attach: Callable[[MotionSource], Future[None]],
     ) -> None:
         self._attach = attach
@@ -172,12 +172,12 @@ class DriveSource:
         return self._axes
 
     def get_ready(self) -> bool:
-        """Get back the drives that were taken away; any thread, and it waits for nothing.
+        """Attach the released drives again. Thread-safe and non-blocking.
 
-        When that fails, the drives are away as before, and the next command tries again.
+        If that fails, the drives stay released, and the next command tries again.
 
         Returns:
-            Whether there were any.
+            Whether any drive was released.
         """
         before = self._released
         if not before:
@@ -192,9 +192,9 @@ class DriveSource:
         return True
 
     def released(self, axis: str, refusal: Refusal) -> None:
-        """Come to rest, and leave the drives alone until attached again.
+        """Bring the arm to rest, and send no set-points until attached again.
 
-        What was requested before is refused, also where it would get the drive back.
+        Refuse all earlier requests, including those that would attach the drive again.
         """
         # a drive that was initialized, or got its mode, before the first motion had no client
         is_prepared = refusal.cause in PREPARATIONS and not self._has_moved
@@ -204,7 +204,7 @@ class DriveSource:
     def update(
         self, now: float, period: float, feedback: Sequence[AxisFeedback]
     ) -> Sequence[Setpoint | None]:
-        """Answer the set-points of a cycle.
+        """Return the set-points of a cycle.
 
         Returns:
             Position in [rad] and velocity in [rad/s] of each drive that follows.

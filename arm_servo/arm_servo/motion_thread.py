@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The motion core in a thread of its own, for drives that are commanded over topics.
+"""Motion core in its own thread, for drives that are commanded over topics.
 
-It watches whether the arm goes where it is sent, however late drives and joint states are.
+It monitors whether the arm follows the commands, allowing for delayed drives and joint states.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ from .controllers.controller import MotionReport, SetPoint, Source
 from .core.gateway import CommandGateway
 
 REST_TOLERANCE = 0.002
-"""How far an arm at rest may turn by itself in [rad]; more was done by others."""
+"""Greatest drift in [rad] of an arm at rest; more means that something else moved it."""
 
 MEAN_GAIN = 0.1  # share of a new measurement in the mean and in the noise of an arm at rest
 
 NOISE_ALLOWANCE, MEAN_ALLOWANCE = 8.0, 2.0
-"""How many times its noise a measurement, and the mean of many, may be off by itself."""
+"""Allowed deviations of one measurement and of the mean at rest, as multiples of the noise."""
 
 ARRIVAL_TOLERANCE = 0.02
-"""The same while it may still be on its last way, from all that was commanded."""
+"""Allowed deviation in [rad] from recent commands while the arm may still be arriving."""
 
 
 @dataclass(frozen=True, slots=True)
 class FollowingLimits:
-    """When an arm counts as not following."""
+    """Limits beyond which an arm counts as not following."""
 
     following_error_limit: float = setting(
         0.2,
@@ -51,10 +51,10 @@ class FollowingLimits:
 
 
 class FollowingWatch:
-    """Compares measured positions with all that was commanded during the delay.
+    """Compares measured positions with all commands of the last ``following_delay``.
 
     An arm that follows late is somewhere between these commands, so its error is zero at any
-    speed; one that does not follow is left behind.
+    speed; an arm that does not follow falls behind.
     """
 
     def __init__(self, joints: JointLimits, limits: FollowingLimits, period: float) -> None:
@@ -68,27 +68,27 @@ class FollowingWatch:
         self._noise = np.zeros(len(joints))
 
     def begin(self, positions: Array) -> None:
-        """Begin where the arm stands."""
+        """Start with the arm at rest at the given positions."""
         self._commands[:] = positions
         self._rest = self._mean = self._last = positions
 
     def command(self, positions: Array) -> None:
-        """Note the command of a cycle."""
+        """Record the command of a cycle."""
         self._turn = (self._turn + 1) % len(self._commands)
         self._commands[self._turn] = positions
 
     def errors(self, measured: Array) -> Array:
-        """Return how far each joint is from all of its commands in [rad]."""
+        """Return the distance in [rad] of each joint from the range of its recent commands."""
         measured = self._unwound(measured, self._commands[self._turn])
         lower, upper = self._commands.min(axis=0), self._commands.max(axis=0)
         errors: Array = np.maximum(np.maximum(lower - measured, measured - upper), 0.0)
         return errors
 
     def moved(self, measured: Array, *, quiet: bool) -> bool:
-        """Whether others have moved the arm since it came to rest; once a cycle.
+        """Return whether something else has moved the arm at rest; call once per cycle.
 
-        Drives need not stand exactly where they were sent, so what counts is where they stood.
-        Encoders are noisy: how much so is learned at rest.
+        Drives may rest slightly off their command, so the reference is the measured rest position.
+        The noise of the encoders is estimated at rest.
         """
         self._still = self._still + 1 if quiet else 0
         if self._still <= 1:
@@ -130,29 +130,29 @@ class FollowingWatch:
 
 
 RESYNC_SILENCE = 0.3
-"""Silence of all clients in [s] after which an arm that did not follow accepts commands."""
+"""Time in [s] without commands after which an arm that did not follow accepts them again."""
 
 STOP_TIMEOUT = 3.0  # longest time for the arm to come to rest at the end of the program in [s]
 
 
 class JointFeedback(JointStateStore):
-    """The measured state of an arm, of joint states that name some of its joints.
+    """Measured state of an arm, collected from joint states of some of its joints each.
 
-    :meth:`receive` is for one thread, :meth:`state` for any.
+    Call :meth:`receive` in one thread; :meth:`state` is thread-safe.
     """
 
     def __init__(self, joints: Sequence[str], timeout: float) -> None:
-        """Begin empty; a position counts no more at the age of the time-out in [s]."""
+        """Start without samples; a position expires at the age ``timeout`` in [s]."""
         super().__init__(joints)
         self._order, self._timeout = list(joints), timeout
 
     @property
     def time(self) -> float:
-        """Steady time since which every joint was received in [s]."""
+        """Steady time in [s] of the oldest joint sample; -inf if one is missing."""
         return min(-math.inf if each is None else each.time for each in self._latest())
 
     def state(self, now: float) -> tuple[RobotState | None, str]:
-        """Return the measured state, None before it is whole; and why it is no good."""
+        """Return the state (None while incomplete), and why it is unusable (empty if usable)."""
         latest, blocked = self._latest(), ''
         silent = [
             joint
@@ -178,13 +178,13 @@ class JointFeedback(JointStateStore):
 
 
 class MotionCycle:
-    """What is done in a cycle; reads no clock."""
+    """Executes one control cycle; reads no clock."""
 
     def __init__(
         self,
         gateway: CommandGateway,
         feedback: JointFeedback,
-        # takes the set-points while something moves, and the last at rest
+        # receives the set-points during motion, and the last one at rest
         output: Callable[[SetPoint], None],
         watch: FollowingWatch,
     ) -> None:
@@ -223,25 +223,25 @@ class MotionCycle:
             self._put(point)
 
     def brake(self, period: float) -> None:
-        """Slow the last set-point down, without the core; for when the core has failed."""
+        """Decelerate from the last set-point without the core, after the core has failed."""
         self._state = hard_brake(self._state, self._gateway.model.limits, period)
         self._output(SetPoint(self._state, Source.NONE, MotionReport()))
         self.at_rest = not self._state.moving
 
     def _kept(self, now: float) -> str:
-        """Return why the arm did not follow, as long as a client goes on to command it."""
+        """Return why the arm did not follow, until clients are silent for RESYNC_SILENCE."""
         if now - max(self._failed, self._gateway.refused) > RESYNC_SILENCE:
             self._failure = ''
         return self._failure
 
     def _compare(self, position: Array, now: float) -> str:
-        """Begin where others have moved the arm at rest; say when it does not follow."""
+        """Resynchronise if something else moved the arm at rest; return why it does not follow."""
         if self._watch.moved(position, quiet=self.at_rest):
             self._gateway.reset(position)
             self._watch.begin(position)
         if self.at_rest:
             return ''
-        if self._feedback.time == self._compared:  # nothing new was received
+        if self._feedback.time == self._compared:  # no new sample
             return ''
         self._compared = self._feedback.time
         self._failure, self._failed = self._watch.problem(position), now
@@ -257,13 +257,13 @@ class MotionCycle:
 
 
 class MotionThread:
-    """Runs cycles at absolute deadlines of the monotonic clock; after a stall it skips some."""
+    """Runs cycles at absolute deadlines of the monotonic clock; skips cycles after a stall."""
 
     def __init__(
         self, cycle: MotionCycle, period: float, begin: Callable[[], None] = lambda: None
     ) -> None:
-        """Prepare; ``begin`` is called once in the thread, before the first cycle."""
-        # what a cycle has raised; the arm was braked, and no cycle follows
+        """Create the thread, which calls ``begin`` once before the first cycle."""
+        # exception raised by a cycle; the arm was braked, and no cycle follows
         self.error: Exception | None = None
         self.ended = threading.Event()  # set when the last cycle is over
         self._cycle, self._period = cycle, period
@@ -279,12 +279,12 @@ class MotionThread:
         self._thread.start()
 
     def end(self) -> None:
-        """Bring the arm to rest and take no more commands; the thread ends then."""
+        """Bring the arm to rest, accept no more commands, and let the thread end."""
         self._cycle.closing = 'the program ends'
         self._ending.set()
 
     def stop(self) -> None:
-        """Bring the arm to rest, and wait for the end."""
+        """Bring the arm to rest, and wait for the thread to end."""
         self.end()
         if self._thread.is_alive():
             self._thread.join(STOP_TIMEOUT + 1.0)
@@ -296,7 +296,7 @@ class MotionThread:
         except Exception as error:  # noqa: BLE001  # the program logs it, and ends
             self.error = error
             self._failed()
-            with suppress(Exception):  # what has failed may be the output
+            with suppress(Exception):  # the output itself may have failed
                 begin = time.monotonic()
                 self._cycles(
                     lambda _, period: self._cycle.brake(period),

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What moves an arm: its interface, what comes out of it, and the simplest of its kind.
+"""Controller interface of an arm, its results, and the simplest controller.
 
-A :class:`Controller` moves the arm cycle by cycle, as :class:`SingleTarget` does; its
-:class:`MotionReport` says what limits a step, its :class:`Outcome` how it ended.
+A :class:`Controller`, such as :class:`SingleTarget`, moves the arm cycle by cycle. Its
+:class:`MotionReport` states what limits a step, its :class:`Outcome` how the motion ended.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ HALTED = 0.005  # share of the asked speed below which a limit counts as none le
 
 
 class Cause(Enum):
-    """Why a motion is slower than asked."""
+    """Why a motion is slower than commanded."""
 
     JOINT_POSITION = 'joint limit'
     JOINT_VELOCITY = 'joint speed'
@@ -34,7 +34,7 @@ class Cause(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Limiter:
-    """One thing that limits a motion."""
+    """One cause that limits a motion."""
 
     cause: Cause  # its kind
     name: str  # what it is: a joint, two links, an axis of the tool
@@ -57,19 +57,19 @@ class Limiter:
 
 @dataclass(frozen=True, slots=True)
 class MotionReport:
-    """How a command is carried out."""
+    """How much of a commanded speed is achieved, and what limits it."""
 
     factor: float = 1.0  # achieved share of the asked speed; 1 when nothing limits it
     limiters: tuple[Limiter, ...] = ()  # what limits it, the strongest first
 
     def __post_init__(self) -> None:
-        """Sort the limiters, so that the first is the one that matters."""
+        """Sort the limiters, the strongest first."""
         if len(self.limiters) > 1:
             strongest = tuple(sorted(self.limiters, key=lambda limiter: limiter.factor))
             object.__setattr__(self, 'limiters', strongest)
 
     def with_limiter(self, limiter: Limiter) -> MotionReport:
-        """Return the report with one limiter more."""
+        """Return a copy of the report with one more limiter."""
         return MotionReport(min(self.factor, limiter.factor), (limiter, *self.limiters))
 
     def __str__(self) -> str:
@@ -80,7 +80,7 @@ class MotionReport:
 
 
 class NotReadyError(ArmError):
-    """Nothing can be commanded before the arm's position is known.
+    """The arm accepts no commands before its position is known.
 
     Scenarios: a command before the first joint state, or after the set-point was dropped.
     """
@@ -125,7 +125,7 @@ class Outcome:
 
 
 CONTINUED = Outcome(GoalCode.SUCCESSFUL, 'a further target goes on from it')
-"""A single target that was not reached, as another one took its place."""
+"""Outcome of a single target that a newer one replaced before the arm reached it."""
 
 
 def refused(error: BaseException) -> Outcome:
@@ -138,7 +138,7 @@ def refused(error: BaseException) -> Outcome:
 
 @dataclass(slots=True, eq=False)
 class ArmState:
-    """What a controller sees of the arm in a cycle."""
+    """Input of a controller in one cycle."""
 
     commanded: RobotState  # what was commanded last
     measured: RobotState  # what the drives report
@@ -149,7 +149,7 @@ class ArmState:
 
 
 class Controller(ABC):
-    """What moves the arm, cycle by cycle."""
+    """Abstract base of controllers, which move the arm cycle by cycle."""
 
     source: Source  # its kind
     outcome: Outcome | None = None  # how it ended; None while it goes on
@@ -162,15 +162,15 @@ class Controller(ABC):
         """Return the next state; None to come to rest."""
 
     def conclude(self, arm: ArmState, state: RobotState) -> bool:  # of others
-        """Return whether it is over, once a state is commanded that need not be its own."""
+        """Return whether the motion is over, given the state commanded, its own or another."""
         return self.outcome is not None
 
     def stop(self, outcome: Outcome) -> None:
-        """Come to rest: on its path where it has one, else it ends at once."""
+        """Bring the arm to rest on the path, if there is one; else end at once."""
         self.end(outcome)
 
     def end(self, outcome: Outcome) -> None:
-        """End at once, unless it has ended: something else moves the arm now, or nothing."""
+        """End at once with an outcome, unless already ended; stop commanding the arm."""
         self.outcome = self.outcome or outcome
 
 
@@ -179,7 +179,7 @@ MIN_SPEED_FACTOR = 0.01  # least share of the speed that a target is approached 
 
 
 class SingleTarget(Controller):
-    """Plans to one target, anew in every cycle."""
+    """Moves to one target, and replans in every cycle."""
 
     source = Source.TARGET
 
@@ -191,7 +191,7 @@ class SingleTarget(Controller):
         self._planned_for, self._planner = 0.0, generator
 
     def plan(self, state: RobotState, speed_scaling: float) -> Plan | None:
-        """Return the way to the target as it is driven; None where there is none."""
+        """Return the motion to the target at a speed scaling; None if there is no plan."""
         speed_scaling = max(speed_scaling, MIN_SPEED_FACTOR)
         if speed_scaling != self._planned_for:
             self._planned_for = speed_scaling
@@ -213,7 +213,7 @@ class SingleTarget(Controller):
         return RobotState.at_rest(self.target) if plan.duration <= period else plan.at(period)
 
     def conclude(self, arm: ArmState, state: RobotState) -> bool:
-        """Return whether it is over: it ends where the arm rests at the target."""
+        """End when the arm rests at the target; return whether the motion has ended."""
         if not state.moving and np.allclose(state.position, self.target, atol=ARRIVAL_TOLERANCE):
             self.end(Outcome(GoalCode.SUCCESSFUL, 'the target is reached'))
         return super().conclude(arm, state)

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Jogging: a command while it is fresh, as joint speeds, and the stop behind it.
+"""Jogging: converts fresh commands to joint speeds, and stops when they expire.
 
-A command is a speed of the tool or of joints, or a pose to track.
+A command is a tool twist, joint speeds, or a pose to track.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ from .velocity_ik import BASE, IkAnswer, IkSettings, TwistTask, VelocityIk
 NO_AXES: Mask = np.zeros(6, dtype=np.bool_)  # mask of no axis of a twist
 
 RELEASED_SPEED = np.array([2e-3] * 3 + [5e-3] * 3)
-"""Speed below which a released axis is held again in [m/s] and [rad/s]."""
+"""Speeds in [m/s] and [rad/s] below which a released axis is held again."""
 
 MIN_COMMAND_FACTOR = 0.1  # least share of a command that is carried out while held axes are off
 
 SLOWED, HASTENED = 0.1, 0.4
-"""Least times in which the share of a command falls to nothing and comes back in [s]."""
+"""Least times in [s] in which the executed share of a command falls to 0 and recovers."""
 
 SOLVE_PERIOD = 16e-3
-"""How long joint speeds count at least, in whole cycles, in [s]: each plans the way there."""
+"""Least time in [s], rounded to whole cycles, for which solved joint speeds are used."""
 
 REST_SPEED_FACTOR = 0.02
-"""Share of a joint's speed below which a released jog needs no line any more."""
+"""Share of the joint speed limits below which a released jog need not stop along its line."""
 
 MAX_SLOW_DOWN_TIME = 1.0
-"""Longest time for which a released jog is slowed down along its line in [s]."""
+"""Longest time in [s] for which a released jog slows down along its line."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TwistCommand:
-    """An asked speed of the tool."""
+    """A commanded twist of the tool."""
 
     twist: Array  # linear [m/s], then angular [rad/s] (6), turning about the tip
     # link along whose axes the twist is given, and follows it; the base when None
@@ -51,7 +51,7 @@ class TwistCommand:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointCommand:
-    """Asked speeds of joints."""
+    """Commanded joint speeds."""
 
     velocity: Array  # speeds in [rad/s], in the order of the joints
     commanded: Mask  # mask of the joints that are commanded; the others are held
@@ -59,7 +59,7 @@ class JointCommand:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseCommand:
-    """A pose of the tip to go to, and to track when it moves."""
+    """A target pose of the tip, tracked if it moves."""
 
     pose: Pose  # pose of the tip in the base
     linear_speed: float = 0.4  # greatest speed of the tip on the way there in [m/s]
@@ -71,7 +71,7 @@ Command = TwistCommand | JointCommand | PoseCommand
 
 @dataclass(frozen=True, slots=True)
 class ServoSettings:
-    """How jogging behaves."""
+    """Settings of jogging."""
 
     hold: float = 8.0  # how fast held axes come back, per error, in [1/s]
     approach: float = 4.0  # how fast a pose is approached at the end, per distance, in [1/s]
@@ -85,10 +85,10 @@ class ServoSettings:
 
 
 class ServoSource:
-    """Turns a command into joint speeds, cycle by cycle.
+    """Converts a command to joint speeds, cycle by cycle.
 
-    Axes that are not commanded are held where they are: their pose is remembered, and errors are
-    brought back. An axis that was released is held from where it comes to rest.
+    It holds the axes that are not commanded: it stores their pose and corrects errors. A released
+    axis is held where it comes to rest.
     """
 
     def __init__(self, model: RobotModel, settings: ServoSettings | None = None) -> None:
@@ -104,14 +104,14 @@ class ServoSource:
         self._share = 1.0
 
     def reset(self) -> None:
-        """Forget what is held."""
+        """Discard the held pose."""
         self._held = None
         self._axes_of = None
         self._free = NO_AXES
         self._share = 1.0
 
     def step(self, state: RobotState, command: Command, period: float) -> IkAnswer:
-        """Find the joint speeds for a command."""
+        """Compute the joint speeds for a command."""
         if isinstance(command, JointCommand):
             self.reset()
             return self._ik.joints(state, command.velocity, command.commanded, period)
@@ -161,7 +161,7 @@ class ServoSource:
         return moving
 
     def _governor(self, error: Array, period: float) -> float:
-        """Return the share of the command that is carried out while held axes are off."""
+        """Return the share of the command to execute, less than 1 while held axes are off."""
         scale = self._settings.path_error
         x, y, z, *turns = error.tolist()
         off: float = max(map(abs, (x, y, z, *(self._length * turn for turn in turns))))
@@ -169,7 +169,7 @@ class ServoSource:
         return min(max(wanted, self._share - period / SLOWED), self._share + period / HASTENED)
 
     def _toward(self, state: RobotState, command: PoseCommand, period: float) -> IkAnswer:
-        """Approach a pose, slowing down so as to arrive at rest."""
+        """Compute joint speeds towards a pose that decelerate to rest there."""
         settings = self._settings
         error = _error(command.pose, self._model.pose(state.position), BASE)
         linear = _approach(
@@ -183,7 +183,7 @@ class ServoSource:
 
 
 class Jog(Controller):
-    """Carries out the latest jog command; without a fresh one it brings the arm to rest."""
+    """Executes the latest jog command; brings the arm to rest when it expires."""
 
     source = Source.JOG
 
@@ -202,12 +202,12 @@ class Jog(Controller):
         self.client: Hashable = None  # who sent the command
 
     def begin(self) -> None:
-        """Begin to jog: nothing is held yet."""
+        """Start jogging with no held axes."""
         self._servo.reset()
         self._command = self._solved = self.outcome = None
 
     def take(self, command: Command, fresh_until: float, client: Hashable) -> None:
-        """Set the command, which counts until a steady time in [s]."""
+        """Set the command, which expires at ``fresh_until``."""
         if self._command is None or not _equal(command, self._command):
             self._command = command
         self._fresh_until, self.client = fresh_until, client
@@ -230,14 +230,14 @@ class Jog(Controller):
         return self._generator.step(state, self._velocity, period)
 
     def conclude(self, arm: ArmState, state: RobotState) -> bool:
-        """Return whether it is over: it ends where the arm rests without a command."""
+        """End when the arm rests without a fresh command; return whether the jog has ended."""
         return self._stops(arm) and not state.moving
 
     def _stops(self, arm: ArmState) -> bool:
         return arm.is_paused or arm.now > self._fresh_until
 
     def _slowing(self, state: RobotState, now: float) -> Command | None:
-        """Return what slows a stale jog down along its line; None for the last of it."""
+        """Return a zero twist that slows an expired jog along its line; None when near rest."""
         calm = np.all(np.abs(state.velocity) < REST_SPEED_FACTOR * self._limits.velocity)
         if calm or not isinstance(self._command, TwistCommand):
             return None
@@ -248,7 +248,7 @@ class Jog(Controller):
 
 
 def _equal(one: Command, other: Command) -> bool:
-    """Return whether a command repeats another; poses are always followed anew."""
+    """Return whether a command equals another; a pose never counts as equal."""
     match one, other:
         case JointCommand(), JointCommand():
             same = np.array_equal(one.commanded, other.commanded)
@@ -259,7 +259,7 @@ def _equal(one: Command, other: Command) -> bool:
 
 
 def _approach(error: Array, gain: float, fastest: float, deceleration: float) -> Array:
-    """Return a velocity towards a point: even, then braking, then fading."""
+    """Return a velocity towards a point: constant, then braking, then proportional."""
     distance = float(np.linalg.norm(error))
     if distance == 0.0:
         return error
@@ -269,11 +269,11 @@ def _approach(error: Array, gain: float, fastest: float, deceleration: float) ->
 
 
 def _error(wanted: Pose, actual: Pose, axes: Array) -> Array:
-    """Return the twist from one pose to another in unit time, along some axes (6)."""
+    """Return the twist (6) along ``axes`` that leads from one pose to another in unit time."""
     angular = pin.log3(wanted.rotation @ actual.rotation.T)
     return np.concatenate((axes.T @ (wanted.position - actual.position), axes.T @ angular))
 
 
 def _moved(pose: Pose, axes: Array, twist: Array) -> Pose:
-    """Return a pose moved by a twist along some axes in unit time."""
+    """Return a pose moved by a twist along ``axes`` for unit time."""
     return Pose(pin.exp3(axes @ twist[3:]) @ pose.rotation, pose.position + axes @ twist[:3])

@@ -1,16 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Directions that an arm is losing, and the way out of a pose where they are lost.
+"""Singularity handling: damping of directions near singular poses, and escape from them.
 
 The scaled Jacobian J = sum_i s_i u_i v_i' takes joint speeds along v_i to tool speeds along u_i.
-Where s_i is small, a tool speed along u_i asks joint speeds of 1/s_i: this direction is damped,
-just so much that no joint is asked for more than its share of speed. The others are left alone.
+Where s_i is small, a tool speed along u_i requires joint speeds of 1/s_i. Such a direction is
+damped just enough that no joint exceeds its share of speed; the others are not damped.
 
-A straight arm can fold to either side, and both bring the tool back. An arm that ran through the
-straight pose would come back on the other side, where a joint limit or a link may soon be in the
-way. So the joints are braked in front of it, and leave it to the side where they were.
+A straight arm can fold to either side, and both bring the tool back. An arm that passed through
+the straight pose would fold to the other side, where a joint limit or a collision may soon stop
+it. So the joints brake before that pose, and leave it on the side from which they came.
 
-``command`` is the scaled twist that is asked (6).
+``command`` is the commanded scaled twist (6).
 """
 
 from __future__ import annotations
@@ -24,39 +24,39 @@ from arm_model import Array, JointLimits, Mask
 from arm_trajectory import brakeable
 
 SPEED_FACTOR = 0.5
-"""Share of a joint's speed that a direction on its own may ask before it is damped."""
+"""Share of a joint's speed limit that one direction may require before it is damped."""
 
 HOLD_SPEED_FACTOR = 0.05
-"""Share of a joint's speed that bringing back a held axis may ask before it is damped."""
+"""Share of a joint's speed limit that correcting a held axis may require before damping."""
 
 MIN_SINGULAR_VALUE = 0.004
-"""Singular value of the scaled Jacobian below which a direction is damped for any command."""
+"""Singular value of the scaled Jacobian below which a direction is always damped."""
 
 REGULAR_SINGULAR_VALUE = 0.4
 """Singular value of the scaled Jacobian above which a direction is never damped."""
 
 LOST_SPEED_FACTOR = 0.5  # share of the asked speed below which a direction counts as lost
-DIFFERENCE_STEP = 1e-3  # step of the differences that look for a way out in [rad]
-MIN_SPEED = 1e-6  # speed that stands for none in [rad/s]
+DIFFERENCE_STEP = 1e-3  # step of finite differences in [rad]
+MIN_SPEED = 1e-6  # speed that counts as zero in [rad/s]
 MIN_CURVATURE = 0.02  # least curvature of a way out, in scaled tool speed per squared joint speed
 
 FULL_SPEED_TWIST = 0.05
-"""Scaled twist from which on a singular pose is left at full speed in [rad/s]."""
+"""Norm of the scaled twist in [rad/s] from which the arm escapes at full speed."""
 
 MAX_ESCAPE_MOTION = 3.0
-"""How far a way out is followed while the asked direction stays lost in [rad]."""
+"""Longest escape motion in [rad] while the commanded direction stays lost."""
 
 MAX_STEP_MOTION = 0.05
-"""Motion of a joint between two steps from which on something else moved the arm in [rad]."""
+"""Joint motion between two steps in [rad] above which something else moved the arm."""
 
 MIN_SIDE_DISTANCE = 1e-3
-"""Least distance along a way out that shows on which side of a singular pose one is in [rad]."""
+"""Least distance along an escape direction in [rad] that shows the side of a singular pose."""
 
 MAX_SINGULAR_VALUE_RATE = 3.0
-"""Greatest change of a scaled singular value with a joint in [1/rad], to save a closer look."""
+"""Bound of the change of a scaled singular value per joint in [1/rad]; a quick first test."""
 
-MAX_APPROACH_RATE = 4.0  # greatest speed towards a fold per way that is left in [1/s]
-MIN_COMPONENT = 1e-5  # part of a joint in a direction that counts for none
+MAX_APPROACH_RATE = 4.0  # greatest speed towards a fold per remaining distance in [1/s]
+MIN_COMPONENT = 1e-5  # joint component of a direction that counts as zero
 JacobianAt = Callable[[Array], Array]  # scaled Jacobian of joint positions
 
 
@@ -76,7 +76,7 @@ class Directions:
         return bool(self.damping.any())
 
     def slowed(self, command: Array, fastest: float) -> Directions:
-        """Return these with the last direction damped to a speed of the joints along it."""
+        """Return a copy with the last direction damped to a joint speed ``fastest`` along it."""
         asked, least = abs(float(command @ self.tool[:, -1])), self.least
         needed = asked * least / max(fastest, MIN_SPEED) - least * least
         if needed <= self.damping[-1]:
@@ -101,13 +101,13 @@ def directions(jacobian: Array, command: Array, correction: Array, fastest: Arra
     """Decompose a Jacobian and find the damping of each direction.
 
     With d the part of the command along u_i, the undamped joint speed |d|/s_i reaches the allowed
-    speed at s_0. Below it the square of the damping is (s_0^2 - s_i^2)/4: nothing at s_0, and
-    nowhere more than 1.16 times the allowed speed.
+    speed at s_0. Below s_0 the squared damping is (s_0^2 - s_i^2)/4: zero at s_0, and the joint
+    speed is at most 1.16 times the allowed one.
 
     Args:
         jacobian: Scaled Jacobian (6, n).
-        command: Scaled twist that is asked (6).
-        correction: Scaled twist that brings held axes back (6).
+        command: Commanded scaled twist (6).
+        correction: Scaled twist that corrects held axes (6).
         fastest: Greatest joint speeds (n) in [rad/s].
     """
     tool, values, joints = np.linalg.svd(jacobian, full_matrices=False)
@@ -124,13 +124,12 @@ def directions(jacobian: Array, command: Array, correction: Array, fastest: Arra
 
 
 def distance_to_singularity(jacobian_at: JacobianAt, position: Array, found: Directions) -> float:
-    """Return how far along the last joint direction its singular value is gone, to first order.
+    """Estimate to first order how far along the last joint direction its singular value is 0.
 
-    At the border of the reach the arm folds there to one side or the other: an arm that goes on
-    comes back on the other side.
+    At the limit of the reach the arm folds there: if it goes on, it comes back on the other side.
 
     Returns:
-        The way in [rad], below zero against the direction; infinity where there is none.
+        The distance in [rad], negative against the direction; infinity if there is no zero.
     """
     along, tool = found.joints[-1], found.tool[:, -1]
     beside = float(tool @ jacobian_at(position + DIFFERENCE_STEP * along) @ along)
@@ -141,16 +140,16 @@ def distance_to_singularity(jacobian_at: JacobianAt, position: Array, found: Dir
 def way_out(
     jacobian_at: JacobianAt, position: Array, found: Directions, command: Array
 ) -> Array | None:
-    """Find joint speeds that lead out of a singular pose in the sense of a command.
+    """Find joint speeds that lead out of a singular pose in the direction of a command.
 
     Along the lost joint directions N the tool stands still at first order. At second order it
     moves along the lost tool direction u by n' H n / 2 with H = N' d(J'u)/dq N. A direction n with
-    positive curvature moves the tool as asked; one with none, that yet turns J'u, leaves the tool
-    in place and brings the lost direction back. Where every curvature is negative the tool is at
-    the border of its reach.
+    positive curvature moves the tool as commanded. One with zero curvature that still turns J'u
+    leaves the tool in place and restores the lost direction. If all curvatures are negative, the
+    tool is at the limit of its reach.
 
     Returns:
-        A unit vector of joint speeds, of either sense; None when there is none.
+        A unit vector of joint speeds, of either sign; None if no direction leads out.
     """
     lost = found.lost
     along = found.tool[:, lost] @ (found.tool[:, lost].T @ command)
@@ -188,11 +187,11 @@ class WayOut:
 
 
 class ReachLimit:
-    """Stops in front of singular poses, and leads out of them.
+    """Brakes before singular poses, and leads out of them.
 
-    It remembers the sense in which a pose is left and where it was entered, and the last place
-    where the arm could do what was asked. A singular pose is left with the share ``escape`` of a
-    joint's speed; braking plans with the share ``braking`` of acceleration and jerk.
+    It stores where the arm entered a singular pose, the sign of the escape direction, and the
+    last position where the arm could follow the command. ``escape`` is the share of the joint
+    speed limits for escaping, ``braking`` that of acceleration and jerk limits for braking.
     """
 
     def __init__(self, limits: JointLimits, escape: float, braking: float) -> None:
@@ -206,28 +205,28 @@ class ReachLimit:
         self._at: Array | None = None
 
     def forget(self) -> None:
-        """Forget: the joints are moved each for itself."""
+        """Discard the stored state, because the joints move individually."""
         self._sense = self._entered = self._good = None
 
     def slowed(
         self, jacobian_at: JacobianAt, position: Array, found: Directions, command: Array
     ) -> Directions:
-        """Brake in front of the border, so as not to fold to the other side."""
+        """Damp the last direction before the reach limit, so that the arm does not fold over."""
         self._remember(position, good=bool(command.any()) and not found.damped)
         asked = float(command @ found.tool[:, -1])
         nearest = found.least / MAX_SINGULAR_VALUE_RATE
         slow = min(self._surely_stoppable(nearest), MAX_APPROACH_RATE * nearest)
         if abs(asked) <= found.least * slow:
-            return found  # slow enough for a fold that is as near as can be
+            return found  # slow enough even for the nearest possible fold
         way = float(np.sign(asked)) * distance_to_singularity(jacobian_at, position, found)
         if not 0.0 < way < np.inf:
             return found
         return found.slowed(command, self._stoppable(found, way))
 
     def _stoppable(self, found: Directions, way: float) -> float:
-        """Return the speed along the last joint direction that ends within a way in [rad/s].
+        """Return the speed in [rad/s] along the last joint direction that can stop within ``way``.
 
-        The last of the way fades, so that the arm rests there and does not hunt about it.
+        The speed fades near the end, so that the arm rests there and does not oscillate.
         """
         parts = np.maximum(np.abs(found.joints[-1]), MIN_COMPONENT)
         acceleration = self._braking * float(np.min(self._limits.acceleration / parts))
@@ -235,13 +234,13 @@ class ReachLimit:
         return min(brakeable(way, acceleration, jerk), MAX_APPROACH_RATE * way)
 
     def _surely_stoppable(self, way: float) -> float:
-        """Return a speed in any joint direction that ends within a way in [rad/s], quickly."""
+        """Return a speed in [rad/s] that can stop within ``way`` in any direction; cheap."""
         return brakeable(way, self._least_acceleration, self._least_jerk)
 
     def way_out(
         self, jacobian_at: JacobianAt, position: Array, found: Directions, command: Array
     ) -> WayOut | None:
-        """Return the way out of a singular pose, where the command needs one and has one."""
+        """Return the way out of a singular pose; None if it is not needed or does not exist."""
         if not (found.lost.any() and command.any()):
             self._sense = self._entered = None
             return None
@@ -257,7 +256,7 @@ class ReachLimit:
         return WayOut(self._sense, fade * self._speed(self._sense, command), fade)
 
     def _remember(self, position: Array, good: bool) -> None:
-        """Remember a place where the arm could do what was asked, until others move the arm."""
+        """Store the last position where the arm followed the command, until others move it."""
         if self._at is None or np.abs(position - self._at).max() > MAX_STEP_MOTION:
             self._good = None
         self._at = position
@@ -265,12 +264,12 @@ class ReachLimit:
             self._good = position
 
     def _speed(self, way: Array, command: Array) -> float:
-        """Return how fast to follow a way out in [rad/s]: slower for a slow command."""
+        """Return the escape speed in [rad/s], which is lower for a slow command."""
         fastest = self._escape / float(np.max(np.abs(way) / self._limits.velocity))
         return fastest * min(1.0, float(np.linalg.norm(command)) / FULL_SPEED_TWIST)
 
     def _oriented(self, way: Array, position: Array) -> float:
-        """Return the sense, 1 or -1: as before, else back, else away from the nearer limits."""
+        """Return the sign of a way out: as before, else back, else away from the nearer limits."""
         if self._sense is not None:
             return 1.0 if way @ self._sense >= 0 else -1.0
         back = 0.0 if self._good is None else float(way @ (self._good - position))
@@ -279,7 +278,7 @@ class ReachLimit:
         return 1.0 if self._room(way, position) >= self._room(-way, position) else -1.0
 
     def _room(self, way: Array, position: Array) -> float:
-        """Return the speed that can be braked at the limits of each joint that a way moves."""
+        """Return the lowest speed at which all joints moved by ``way`` can still stop in time."""
         limits = self._limits
         left = np.where(way > 0.0, limits.upper - position, position - limits.lower)
         rows = zip(left, limits.acceleration, limits.jerk, limits.velocity, strict=True)

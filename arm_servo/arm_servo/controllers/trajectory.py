@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Following a trajectory: on its path, at any speed, to an end that says how it went."""
+"""Trajectory execution: along its path, at any speed scaling, with a final outcome."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ MAX_CATCH_UP_SCALING = 0.7  # speed scaling at most while the arm catches up wit
 PATH_MET_TOLERANCE = 1e-3  # how near to the path the set-points must be to have met it in [rad]
 
 PATH_LEFT_TOLERANCE = 0.02
-"""How far from the path the set-points may be once they have met it in [rad]."""
+"""Greatest distance in [rad] of the set-points from the path after they have met it."""
 
 
 class Phase(Enum):
-    """Where the execution of a trajectory is."""
+    """Phase of the execution of a trajectory."""
 
     FOLLOWING = 'following'
     SETTLING = 'settling'
@@ -48,7 +48,7 @@ class Phase(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ExecutionSettings:
-    """How trajectories are accepted and followed."""
+    """Settings for accepting and executing trajectories."""
 
     rules: GoalRules = field(default_factory=GoalRules)  # what is accepted
     # tolerances on the way, by joint or of each; 0 is none
@@ -61,7 +61,7 @@ class ExecutionSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Feedback:
-    """Where the execution is."""
+    """Feedback on the execution of a trajectory."""
 
     time: float  # time of the trajectory in [s]
     desired: RobotState  # what the trajectory says now
@@ -70,14 +70,14 @@ class Feedback:
 
 
 class Execution(Controller):
-    """One trajectory on its way.
+    """Execution of one trajectory.
 
-    Pause, speed and cancel act on the speed scaling of the path, so the arm stays on it.
+    Pause, speed and cancel act on the speed scaling of the path, so the arm stays on the path.
 
     Attributes:
-        feedback: Where it is on the path, as of the last step.
-        path: The path that it follows.
-        ending: How it ends or has ended; None while nothing is decided.
+        feedback: Feedback of the last step.
+        path: The path that the arm follows.
+        ending: Outcome that the execution has or will have; None while undecided.
     """
 
     source = Source.TRAJECTORY
@@ -93,10 +93,10 @@ class Execution(Controller):
         settings: ExecutionSettings,
         wait: float = 0.0,  # how long to wait at rest in [s]; the state is one of rest then
     ) -> None:
-        """Accept a trajectory.
+        """Check a trajectory and plan its path.
 
         Raises:
-            GoalError: It is refused.
+            GoalError: The trajectory is refused.
         """
         self._limits, self._waiting = limits, wait
         planned = build_path(goal, limits, state, settings.rules)
@@ -123,43 +123,43 @@ class Execution(Controller):
         self.feedback = Feedback(0.0, RobotState.at_rest(begin_point.position), state, timer)
 
     def contact(self, check: PathCheck, begin: float = 0.0) -> PathContact | None:
-        """Return the first contact on its path from a time of it in [s] on; for any thread."""
+        """Return the first contact on the path after path time ``begin``. Thread-safe."""
         found = check.contact(
             lambda times: self.path.positions(times + begin), max(self.path.duration - begin, 0.0)
         )
         return found and replace(found, time=found.time + begin)
 
     def foreseen(self, ahead: float, timer: TimerState | None = None) -> RobotState:
-        """Return where it will be when nothing comes in between; for any thread."""
+        """Predict the state ``ahead`` [s] from now if nothing intervenes. Thread-safe."""
         timer = timer or self.feedback.timer
         return self._state(*TrajectoryTimer.foreseen(self._limits, self.path, timer, ahead)[:3])
 
     def timer(self, speed_scaling: float) -> TimerState:
-        """Return how it runs from now on."""
+        """Return the timer state for a speed scaling from now on."""
         return self.feedback.timer._replace(wanted=self._wanted(speed_scaling))
 
     def elapse(self, time: float) -> None:
-        """Wait for less time: some has passed since it was planned."""
+        """Shorten the wait by the time that has passed since planning."""
         if self._waiting > 0.0:
             self._waiting -= time
 
     def stop(self, outcome: Outcome) -> None:
-        """Come to rest on the path, and end."""
+        """Bring the arm to rest on the path, then end with an outcome."""
         if self.phase in {Phase.FOLLOWING, Phase.SETTLING}:
             self.phase, self.ending = Phase.STOPPING, outcome
 
     def end(self, outcome: Outcome) -> None:
-        """End at once, unless it has ended: something else moves the arm now, or nothing."""
+        """End at once with an outcome, unless already ended; stop commanding the arm."""
         if self.phase is not Phase.DONE:
             self.ending = self.ending or outcome
             self._finish()
 
     def update(self, arm: ArmState, period: float) -> RobotState | None:
-        """Advance.
+        """Advance by one cycle.
 
         Returns:
-            The state to command next; None to come to rest: it does not begin yet, or there is no
-            way to follow.
+            The state to command next; None to come to rest, because the trajectory does not begin
+            yet or cannot be followed.
         """
         state, speed_scaling = arm.commanded, arm.speed_scaling
         if self.brakes and self._waits(speed_scaling, period):
@@ -175,7 +175,7 @@ class Execution(Controller):
         return following
 
     def _wanted(self, speed_scaling: float) -> float:
-        """Return the speed scaling to go to where another one is wanted."""
+        """Return the speed scaling to aim for, given the requested one."""
         if self.phase is Phase.STOPPING:
             return 0.0
         # joints that give their utmost for the path cannot catch up
@@ -186,7 +186,7 @@ class Execution(Controller):
         )
 
     def _waits(self, speed_scaling: float, period: float) -> bool:
-        """Whether it does not begin now: before its time, or at rest in a pause or a stop."""
+        """Return whether the start must wait: it is too early, or the arm is paused or stopped."""
         if self._waiting > 0.5 * period:
             return True
         if not self._begins_at_rest:
@@ -195,7 +195,7 @@ class Execution(Controller):
         return speed_scaling == 0.0 or self.phase is Phase.STOPPING
 
     def _wait(self, state: RobotState, speed_scaling: float, period: float) -> RobotState | None:
-        """Come to rest where the path begins, and wait there; all is planned already."""
+        """Come to rest where the planned path begins, and wait there."""
         self._waiting -= period
         timer = TimerState(0.0, speed_scaling, 0.0, speed_scaling, max(self._waiting, 0.0))
         self.feedback = replace(self.feedback, timer=timer)
@@ -209,7 +209,7 @@ class Execution(Controller):
         return self._catch_up.step(state, lambda _: rest, period)
 
     def _ahead(self, period: float) -> Callable[[float], RobotState]:
-        """Return where the path will be, by the time from now in [s]."""
+        """Return a function that maps time from now in [s] to the state on the path."""
         timer = self._timer
 
         def ahead(time: float) -> RobotState:
@@ -218,7 +218,7 @@ class Execution(Controller):
         return ahead
 
     def _state(self, time: float, speed_scaling: float, change: float) -> RobotState:
-        """Return the state at a time of the path that runs at a speed scaling."""
+        """Return the state at a path time, with the speed scaling and its change applied."""
         here = self.path.at(time)
         return RobotState(
             here.position,
@@ -227,7 +227,7 @@ class Execution(Controller):
         )
 
     def _check(self, state: RobotState, measured: RobotState, period: float) -> None:
-        """Check the tolerances at the present place."""
+        """Check the tolerances at the current state."""
         desired, limits = self.feedback.desired, self._limits
         error = limits.error(desired.position, measured.position)
         speed_error = desired.velocity - measured.velocity
@@ -241,7 +241,7 @@ class Execution(Controller):
             self._settle(state, self._goal_tolerance.violation(limits, error, speed_error), period)
 
     def _astray(self, error: Array) -> str | None:
-        """Return how far the set-points are from the path that they had met, if it is too far."""
+        """Describe the deviation of set-points that left the path; None if within tolerance."""
         joint = int(np.argmax(np.abs(error)))
         self._off = float(abs(error[joint]))
         self._met = self._met or self._off < PATH_MET_TOLERANCE
@@ -251,7 +251,7 @@ class Execution(Controller):
         return f'{name}: the set-point is {error[joint]:+.4f} rad off the path'
 
     def _settle(self, state: RobotState, violation: str | None, period: float) -> None:
-        """Wait at the end until the arm has arrived, or the time for that is over."""
+        """Wait at the end until the arm has arrived or the goal time has expired."""
         arrived = np.allclose(state.position, self.path.end.position, atol=ARRIVAL_TOLERANCE)
         if violation is None and arrived and not state.moving:
             late = f', {self._late}' if self._late else ''
@@ -268,7 +268,7 @@ class Execution(Controller):
             self._finish()
 
     def _advance(self, state: RobotState | None) -> None:
-        """Go on to the next phase at the end of the path, or where it stands still."""
+        """Enter the next phase at the end of the path, or when the timer has stopped."""
         if self.phase is Phase.FOLLOWING and self._timer.time >= self.path.duration:
             self.phase = Phase.SETTLING
         at_rest = self._timer.stopped or self._timer.time >= self.path.duration

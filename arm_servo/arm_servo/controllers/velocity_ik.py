@@ -1,18 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""From an asked speed of the tool or of joints to joint speeds that keep every limit.
+"""Velocity inverse kinematics: tool or joint speeds to joint speeds within all limits.
 
-A quadratic program finds the joint speeds x that come nearest to the asked twist V::
+A quadratic program finds the joint speeds x that come nearest to the commanded twist V::
 
     min  |W (J x - V)|^2 + sum_i d_i^2 (v_i' x)^2 + w (n' x - e)^2 + s |N x|^2
-    with  -b(q - lower) <= x <= b(upper - q)          brakes in front of a joint's limit
-          x0 - c <= x <= x0 + c                       what accelerations can bring about soon
-          (dd/dq) x >= -k (d - margin)                brakes in front of each near pair of links
+    with  -b(q - lower) <= x <= b(upper - q)          brakes before a joint limit
+          x0 - c <= x <= x0 + c                       reachable with limited acceleration
+          (dd/dq) x >= -k (d - margin)                brakes before each near pair of links meets
 
-Held axes weigh more in W than commanded ones, so that what a limit takes away is taken from the
-command and not paid for by a drift. d_i damps the directions that are nearly lost, and only those;
-n is the way out of a singular pose; N x moves the joints but not the tool. Whatever the arm is in,
-standing still or leaving is feasible.
+Held axes weigh more in W than commanded ones, so that a limit reduces the command instead of
+making held axes drift. d_i damps only the directions that are nearly lost; n is the way out of a
+singular pose; N x moves the joints but not the tool. In any state of the arm, standing still or
+moving away from the limit is feasible.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ from .singularity import Directions, directions, ReachLimit
 ACTIVE_FORCE = 1e-9  # force of a bound above which it counts as pressing
 
 MIN_DECELERATION_FACTOR = 0.3
-"""Least share of its deceleration that a joint plans with while others take longer to stop."""
+"""Least share of its deceleration that a joint uses while slower joints are stopping."""
 
 MIN_APPROACH_CYCLES = 3.0  # least time for the rest of the way to a limit, in cycles
 
 
 @dataclass(frozen=True, slots=True)
 class VelocityBoundsSettings:
-    """How motion brakes in front of limits."""
+    """Settings of braking before limits."""
 
     margin: float = 0.01  # least distance between links that a command may bring about in [m]
     horizon: float = 0.15  # distance at which a pair of links is taken into account in [m]
@@ -55,7 +55,7 @@ class VelocityBoundsSettings:
 
 @dataclass(slots=True, eq=False)
 class Bounds:
-    """Bounds of the joint speeds in a state."""
+    """Joint speed bounds in one state."""
 
     ways: Sequence[tuple[float, float]]  # left to the lower and upper limits, less the margins
     # least and greatest speeds that can be braked in front of the limits in [rad/s]
@@ -68,7 +68,7 @@ class Bounds:
 
 
 class VelocityBounds:
-    """Finds the bounds of an arm's joint speeds."""
+    """Computes the joint speed bounds of an arm."""
 
     def __init__(self, model: RobotModel, settings: VelocityBoundsSettings) -> None:
         limits = model.limits
@@ -92,7 +92,7 @@ class VelocityBounds:
         self._nothing = np.empty((0, len(limits))), np.empty(0)
 
     def bounds(self, state: RobotState, period: float) -> Bounds:
-        """Find the bounds in a state."""
+        """Compute the bounds in a state."""
         settings = self._settings
         near = self._model.nearest(state.position, settings.horizon, settings.pairs)
         velocities, accelerations = state.velocity.tolist(), state.acceleration.tolist()
@@ -132,10 +132,10 @@ class VelocityBounds:
         return Bounds(ways, both, lower_bounds, upper_bounds, near, rows, least)
 
     def pressing(self, bounds: Bounds, forces: Sequence[float], factor: float) -> list[Limiter]:
-        """Name the bounds and rows that press, the strongest first.
+        """Return the limiters of the active bounds and rows, the strongest first.
 
         Args:
-            forces: How hard the bounds (n) and the rows (m) press, with the sense of the bound.
+            forces: Multipliers of the bounds (n), then of the rows (m); positive at upper bounds.
         """
         count, share = len(self._limits), min(max(factor, 0.0), 1.0)
         pressing = [place for place, force in enumerate(forces) if abs(force) > ACTIVE_FORCE]
@@ -150,7 +150,7 @@ class VelocityBounds:
         return found
 
     def _bound(self, bounds: Bounds, joint: int, rising: bool, share: float) -> Limiter:
-        """Name the limit behind a bound."""
+        """Return the limiter that causes a bound."""
         name, velocity = self._limits.names[joint], self._joints[joint][2]
         bound = float(bounds.upper[joint] if rising else -bounds.lower[joint])
         fastest = bounds.brakeable[joint][1] if rising else -bounds.brakeable[joint][0]
@@ -162,7 +162,7 @@ class VelocityBounds:
 
 
 def _lead(velocity: float, acceleration: float, jerk: float) -> float:
-    """Return the way that goes by while an acceleration is taken back."""
+    """Return the distance travelled while an acceleration is reduced to zero."""
     if acceleration <= 0.0:
         return 0.0
     time = acceleration / jerk
@@ -170,7 +170,7 @@ def _lead(velocity: float, acceleration: float, jerk: float) -> float:
 
 
 def _speed(way: float, deceleration: float, jerk: float, fastest: float) -> float:
-    """Return the speed that can be braked within a way, at most the fastest."""
+    """Return the speed from which a joint can stop within ``way``, at most ``fastest``."""
     if way <= 0.0:
         return 0.0
     if fastest * (fastest / deceleration + deceleration / jerk) < 2.0 * way:
@@ -187,14 +187,14 @@ REGULARIZATION = 1e-5  # weight of the joint speeds that keeps the program defin
 SELF_MOTION_WEIGHT = 2e-3
 """Weight of joint speeds that do not move the tool.
 
-What a bound takes from one joint for a moment could be had by a swing of the elbow; it is not
-worth that. In front of a lasting limit the swing is small against what it gains.
+It prevents a swing of the elbow where a bound limits one joint only for a moment. At a lasting
+limit the swing costs little compared with its gain.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class IkSettings:
-    """How the velocity inverse kinematics weighs."""
+    """Weights of the velocity inverse kinematics."""
 
     hold_weight: float = 30.0  # weight of held axes against commanded ones
     drift_weight: float = 0.01  # weight of axes that may drift
@@ -205,7 +205,7 @@ class IkSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TwistTask:
-    """An asked speed of the tool."""
+    """A commanded tool twist and the axes to hold."""
 
     twist: Array  # linear [m/s], then angular [rad/s], along the task's axes (6)
     axes: Array  # rotation from the task's axes to the base link (3, 3)
@@ -217,7 +217,7 @@ class TwistTask:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IkAnswer:
-    """Joint speeds, and what limits them."""
+    """Joint speeds, and a report of what limits them."""
 
     velocity: Array  # joint speeds in [rad/s]
     report: MotionReport  # what limits them
@@ -226,7 +226,7 @@ class IkAnswer:
 class VelocityIk:
     """Velocity inverse kinematics of an arm.
 
-    What it remembers is in :class:`ReachLimit`.
+    Its only state is in :class:`ReachLimit`.
     """
 
     def __init__(self, model: RobotModel, settings: IkSettings | None = None) -> None:
@@ -247,7 +247,7 @@ class VelocityIk:
         self._reach_limit = ReachLimit(model.limits, settings.escape, settings.brakes.braking)
 
     def cartesian(self, state: RobotState, task: TwistTask, period: float) -> IkAnswer:
-        """Find joint speeds for a speed of the tool."""
+        """Compute the joint speeds for a tool twist."""
         weights = self._weights(task)
         bounds = self._velocity_bounds.bounds(state, period)
         # the directions of the weighted task: how well the command does while held axes stay
@@ -276,7 +276,7 @@ class VelocityIk:
     def joints(
         self, state: RobotState, velocity: Array, commanded: Mask, period: float
     ) -> IkAnswer:
-        """Find joint speeds near asked ones; joints that are not commanded are held."""
+        """Compute joint speeds near the commanded ones; hold the other joints."""
         self._reach_limit.forget()
         weight = np.where(commanded, 1.0, self._settings.hold_weight)
         jacobian, command = np.diag(weight), weight * velocity
@@ -286,7 +286,7 @@ class VelocityIk:
         )
 
     def _weights(self, task: TwistTask) -> Array:
-        """Return the weights of the axes; they change only with what is commanded."""
+        """Return the axis weights, which depend only on the commanded and drifting axes."""
         key = task.commanded.tobytes() + task.drifting.tobytes()
         if key != self._weighed:
             weights = np.where(task.commanded, 1.0, self._settings.hold_weight)
@@ -310,7 +310,7 @@ class VelocityIk:
         asked: tuple[Array, Array],
         found: Directions | None = None,
     ) -> IkAnswer:
-        """Solve, and name what limits; ``asked`` are weighted Jacobian and command."""
+        """Solve the program and report limiters; ``asked`` is the weighted (Jacobian, command)."""
         jacobian, command = asked
         hessian += self._regularization
         solution = self._minimum(hessian, gradient, bounds, bounds.lower, bounds.upper)
@@ -334,9 +334,8 @@ class VelocityIk:
         """Minimise x'Hx/2 + g'x with x in a box and rows x >= least, by daqp.
 
         Returns:
-            The variables (n), and how hard each bound (n), then each row (m) presses: above zero
-            where the upper bound presses, below zero where the lower one does. None where no x is
-            feasible.
+            The variables (n), and multipliers of the bounds (n), then of the rows (m): positive
+            at an active upper bound, negative at an active lower one. None if no x is feasible.
         """
         joints, count = len(lower), len(lower) + len(bounds.least)
         above, below = self._above[:count], self._below[:count]
@@ -348,7 +347,7 @@ class VelocityIk:
 
 
 def _losses(found: Directions, command: Array, factor: float) -> list[Limiter]:
-    """Name what the command loses to directions that the arm lacks here."""
+    """Return limiters for the parts of the command that singular directions reduce."""
     if factor > 0.99:
         return []
     parts = command @ found.tool

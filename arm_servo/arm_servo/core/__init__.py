@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The motion core: one source moves an arm, within its limits and clear of contact; no ROS.
+"""The motion core: one source moves an arm, within limits and without collision; no ROS.
 
-A :class:`MotionCore` belongs to the loop that steps it. Requests are prepared beside the cycle and
-begun in it, by a :class:`CommandGateway` for any number of threads.
+A :class:`MotionCore` belongs to the loop that steps it. A :class:`CommandGateway` accepts requests
+from any thread, prepares motions outside the cycle and starts them in the cycle.
 """

@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where any thread gives commands to the motion core, and reads what it does.
+"""Thread-safe access to the motion core: commands in, snapshots out.
 
-One mailbox leads to the cycle, and every command takes a number when it is requested. A stop
-counts from the moment of the call: whatever was requested before it is refused at every later
-step, so no stop is overtaken by what was under way.
+One queue leads to the cycle, and every command gets a sequence number when it is requested. A
+stop takes effect at the call: every later step refuses the commands requested before it, so no
+pending command overtakes a stop.
 
-Every motion goes the same way: it is requested in any thread, prepared beside the cycle from the
-state that the cycle hands out, and begun in the cycle.
+Every motion is requested in any thread, prepared outside the cycle from a state that the cycle
+provides, and started in the cycle.
 """
 
 from __future__ import annotations
@@ -61,28 +61,28 @@ MAX_QUEUED_JOGS = 1000  # jog commands that may wait for the cycle
 MAX_QUEUED_MOTIONS = 50  # motions that may wait to be prepared
 
 PREPARATION_TIME = 5e-3
-"""Time that preparing may take for any trajectory in [s]; see Preparation for the figures."""
+"""Time in [s] allowed for preparing any trajectory; see Preparation for measured times."""
 
-PREPARATION_TIME_PER_POINT = 5e-4  # time that preparing may take for each point in [s]
+PREPARATION_TIME_PER_POINT = 5e-4  # additional time for each point in [s]
 
 PREPARATION_TIME_PER_SECOND = 5e-3
-"""Time that looking for collisions may take for each second of the path in [s]."""
+"""Time in [s] allowed for collision checking per second of the path."""
 
-MAX_CHECKED_DURATION = 100.0  # part of a trajectory for whose check a begin in motion waits in [s]
+MAX_CHECKED_DURATION = 100.0  # path time whose check a start from motion waits for in [s]
 
 MAX_FORESIGHT = 0.03
-"""Time over which a jog or a single target is foreseen in [s]; later it may have turned."""
+"""Longest prediction of a jog or a single target in [s]; later it may have changed."""
 
-MIN_CYCLES_AHEAD = 3  # least cycles from the basis to the begin of a motion that is foreseen
+MIN_CYCLES_AHEAD = 3  # least cycles from the basis to the predicted start of a motion
 
 MAX_ATTEMPTS = 3
-"""How often a motion is prepared where others move the arm, or the scene changes, meanwhile."""
+"""Attempts to prepare a motion while other commands move the arm or the scene changes."""
 
 REST_MARGIN = 1.0
-"""How much longer than it brakes from full speed a jogged arm may take to come to rest for a
-trajectory in [s]."""
+"""Time in [s] that a jogged arm may take to come to rest for a trajectory, in addition to its
+braking time from full speed."""
 
-MAX_LAG = 0.1  # longest lag to which a trajectory of a stream is delayed in [s]
+MAX_LAG = 0.1  # longest lag to which trajectories of a stream are delayed in [s]
 
 CANCELED = Outcome(GoalCode.SUCCESSFUL, 'canceled before it began', canceled=True)
 NOTHING = Outcome(GoalCode.SUCCESSFUL, 'a displacement by nothing')
@@ -90,10 +90,10 @@ NOTHING = Outcome(GoalCode.SUCCESSFUL, 'a displacement by nothing')
 BEGINS = 'the arm has just begun to follow'
 
 TOGETHER = 1.0
-"""Trajectories of a topic that follow each other within so many [s] are a stream; so long it has
-to be silent before it can be let in again."""
+"""Longest time in [s] between trajectories of one stream on a topic; an interrupted stream must be
+silent for as long before it is accepted again."""
 
-GONE_AFTER = 10.0  # silence after which who had to let go has done so in [s]
+GONE_AFTER = 10.0  # silence that counts as a release by the client in [s]
 
 RULES = {
     Source.JOG: StreamRules(
@@ -110,14 +110,14 @@ RULES = {
         begin_margin=5.0,  # in which drives are got back
     ),
 }
-"""Clients that send streams: those that jog, and the topic of trajectories."""
+"""Rules for clients that send streams: jogging clients, and the trajectory topic."""
 
-Loss = tuple[str, GoalCode]  # why an arm that followed does not go on, and the code of its motion
+Loss = tuple[str, GoalCode]  # why the arm stopped following, and the result code of its motion
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cycle:
-    """What an order sees of its cycle."""
+    """Context of a queued order: the cycle that executes it."""
 
     now: float  # steady time in [s]
     period: float  # time to the next cycle in [s]
@@ -125,70 +125,70 @@ class Cycle:
 
 
 class Turn(Enum):
-    """Where the way of a motion goes on."""
+    """Where the next step of a motion runs."""
 
     CYCLE = 'in the next cycle'
     WORKER = 'in the thread that plans and checks'
 
 
 MotionSequence = Generator[Turn, Cycle, None]
-"""The steps of a motion to its begin. It yields where it goes on, and gets the cycle there."""
+"""Steps from a request to its start: yields the thread to continue in, receives the cycle."""
 
 
 @dataclass(slots=True, eq=False)
 class MotionCommand:
     """A motion from its request to its end."""
 
-    request: MotionRequest  # what is asked
-    number: int  # its place among all commands and stops
+    request: MotionRequest  # the requested motion
+    number: int  # sequence number among all commands and stops
     requested: float  # steady time of the request in [s]
-    stream: Hashable = None  # where each newer one replaces those that wait; None for nowhere
-    # the sum of displacements that it added to, which counts where this one is refused
+    stream: Hashable = None  # stream in which a newer motion replaces waiting ones; or None
+    # the sum of displacements before this one was added; restored if this one is refused
     before: MotionCommand | None = None
-    takes_drives: bool = True  # whether it gets back drives that others have
-    # its execution, or None for a single target, once it began; else why it is refused
+    takes_drives: bool = True  # whether it takes back drives from others
+    # once started: its execution, or None for a single target; else the error that refused it
     future: Future[Execution | None] = field(default_factory=Future)
-    # how it ended, whatever became of it; set once, at the latest when the cycle fails
+    # its outcome in every case; set once, at the latest when the cycle fails
     ended: Future[Outcome] = field(default_factory=Future)
-    motion: Motion | None = None  # what moves the arm for it, once it began
-    is_canceled: bool = False  # whether it is to begin no more
+    motion: Motion | None = None  # its motion, once started
+    is_canceled: bool = False  # whether it was canceled and must not start
     holds: bool = False  # whether a jog or a target is held for it
 
     @property
     def execution(self) -> Execution | None:
-        """The execution once a trajectory began."""
+        """The execution of a trajectory that has started; else None."""
         return self.motion if isinstance(self.motion, Execution) else None
 
     @property
     def source(self) -> Source:
-        """What moves the arm then."""
+        """The source that moves the arm for this command."""
         is_trajectory = isinstance(self.request, TrajectoryGoal)
         return Source.TRAJECTORY if is_trajectory else Source.TARGET
 
     def end(self, outcome: Outcome) -> None:
-        """Note how it ended, unless that is known."""
+        """Set the outcome, unless it is already set."""
         with suppress(InvalidStateError):
             self.ended.set_result(outcome)
 
 
 def start_worker() -> Executor:
-    """Start the thread that prepares motions; the cycle hands over to it, and starts none."""
+    """Create an executor with a running thread, so that the cycle need not start one."""
     worker = ThreadPoolExecutor(1, thread_name_prefix='motion preparation')
     worker.submit(lambda: None)  # an executor starts its thread with the first piece of work
     return worker
 
 
 class CommandGateway:
-    """Commands to one motion core from any thread, carried out by the thread that steps it.
+    """Queues commands from any thread for one motion core; the cycle's thread executes them.
 
-    :meth:`update`, :meth:`reset` and :meth:`abandon` are for the cycle, and the kinematics of the
-    core's model belong to it; the rest is for any thread. Times are steady times in [s].
+    Call :meth:`update`, :meth:`reset` and :meth:`abandon`, and use the kinematics of the core's
+    model, only in the cycle; all else is thread-safe. Times are steady times in [s].
     """
 
     def __init__(
         self, core: MotionCore, worker: Executor, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """Wait for the arm; the core is the gateway's now, ``clock`` the one of the cycle."""
+        """Take ownership of the core; ``clock`` is the clock of the cycle."""
         self.model: RobotModel = core.model  # the arm
         # what the core did in the last cycle
         self.snapshot = Snapshot(0.0, None, None, 'the cycle has not begun yet')
@@ -218,10 +218,10 @@ class CommandGateway:
     def command(self, request: ImmediateRequest) -> Future[None]:
         """Apply a jog, a stop, a pause or a speed override from the next cycle on.
 
-        A stop refuses from the moment of the call what was requested before it, a pause what jogs.
+        From the call on, a stop refuses all earlier requests, a pause earlier jogs and targets.
 
         Returns:
-            Nothing once it counts; the ArmError with which it was refused.
+            A future that completes when the request is applied, or carries the ArmError.
         """
         future: Future[None] = Future()
         number = self._gate.number()  # first: a stop during what follows counts
@@ -270,15 +270,15 @@ class CommandGateway:
         *,
         takes_drives: bool = True,
     ) -> MotionCommand:
-        """Prepare a motion, and begin it when its path is clear.
+        """Queue a motion: prepare it, and start it if its path is clear.
 
         Args:
-            number: Its place among all commands and stops, where it came before; by default it
-                comes now.
-            stream: Where it comes from, if it replaces those from there that wait. Displacements
-                add up; one that would lead a sum beyond limits is refused alone.
-            takes_drives: Whether it gets back drives that others have, where the arm does not
-                follow; one that is refused from where the arm stands takes none.
+            number: Sequence number, if it was drawn earlier from :attr:`number`; by default the
+                next one.
+            stream: Its stream; the motion replaces waiting ones of this stream. Displacements add
+                up; one whose sum exceeds the limits is refused alone.
+            takes_drives: Whether to take back drives from others when the arm does not follow; a
+                motion that is refused at the current position takes none.
         """
         error: ArmError | None = None
         before: MotionCommand | None = None
@@ -312,7 +312,7 @@ class CommandGateway:
         return command
 
     def cancel(self, command: MotionCommand, reason: str) -> None:
-        """End a motion: before its begin it does not begin, later the arm comes to rest."""
+        """Cancel a motion: if it has not started, drop it; else bring the arm to rest."""
 
         def stop(cycle: Cycle) -> None:
             if command.motion is not None:
@@ -333,10 +333,10 @@ class CommandGateway:
         # steady time until which it moves the arm in [s]; by default not beyond now
         expires: float = -math.inf,
     ) -> None:
-        """Record a command of a client that may send one after the other.
+        """Record a command of a client that may send a stream of them.
 
         Raises:
-            NotReadyError: The arm has stopped since the client began; it has to let go first.
+            NotReadyError: The arm was stopped during the stream; the client must release first.
         """
         if is_zero:
             self._gate.release(source, client)
@@ -344,25 +344,25 @@ class CommandGateway:
             raise NotReadyError(reason)
 
     def renew(self, source: Source) -> None:
-        """Treat the next command as a new one: a person has requested it.
+        """Accept the next command as the start of a new stream, because a person requested it.
 
-        A stream of trajectories that goes on is not let in by that.
+        An ongoing stream of trajectories stays refused.
         """
         silence = TOGETHER if source is Source.TRAJECTORY else -math.inf
         self._gate.renew(source, self._clock(), silence)
 
     def interrupt(self, reason: str) -> None:
-        """Refuse what was requested so far and has not begun, and end the streams of clients."""
+        """Refuse all requests that have not started, and end the streams of clients."""
         self._gate.interrupt(reason, self._clock())
 
     def use_scene(self, scene: PlanningScene) -> None:
-        """Use another scene from the next cycle on, for jogs, targets and trajectories.
+        """Apply a new scene from the next cycle on, for jogs, targets and trajectories.
 
-        It is measured here, beside the cycle, which takes some milliseconds for 100 objects. A
-        trajectory under way is checked again, and ends on its path where it would collide.
+        This thread measures the scene, which takes some milliseconds for 100 objects. A running
+        trajectory is checked again, and stops on its path if it would collide.
 
         Raises:
-            SceneError: The scene is of another arm.
+            SceneError: The scene belongs to another arm.
         """
         reference = self.snapshot.reference
         near = None if reference is None else reference.position
@@ -392,13 +392,13 @@ class CommandGateway:
         is_gone: bool = False,  # no drive is left to be brought to rest
         ages: Array | None = None,  # how old the measured values of each joint are in [s]
     ) -> SetPoint | None:
-        """Carry out what was commanded, and return the set-point of this cycle.
+        """Execute the queued commands, and return the set-point of this cycle.
 
-        It takes the arm over at rest when nothing is in the way. When something comes in the way
-        the arm comes to rest, a trajectory on its path, and commands are refused.
+        It takes over the arm at rest when ``blocked`` is empty. When ``blocked`` is set, the arm
+        comes to rest (a trajectory on its path) and commands are refused.
 
         Returns:
-            None while the arm does not follow.
+            The set-point; None while the arm does not follow.
         """
         if not (self.is_following or blocked) and measured is not None and begin is not None:
             self._core.reset(begin)
@@ -424,7 +424,7 @@ class CommandGateway:
         return point
 
     def abandon(self, now: float, reason: str) -> None:
-        """End all that was commanded, for a cycle that has failed: none may follow."""
+        """End all commands after the cycle has failed; another cycle may never run."""
         self.is_following, self._lost = False, ''
         self.interrupt(reason)
         with self._lock:
@@ -434,7 +434,7 @@ class CommandGateway:
         self._idle(Cycle(now, 0.0, reason), self.snapshot.measured, None)
 
     def _idle(self, cycle: Cycle, measured: RobotState | None, ages: Array | None) -> None:
-        """Pass a cycle in which the arm does not follow; commands are refused."""
+        """Run a cycle in which the arm does not follow; refuse commands."""
         if self.snapshot.set_point is not None:
             self.interrupt(cycle.blocked)
         # what moved it ended at the latest when the arm came to rest
@@ -443,7 +443,7 @@ class CommandGateway:
         self._publish(cycle, None, measured, ages)
 
     def _carry_out(self, cycle: Cycle) -> None:
-        """Carry out the orders that were there at the begin of the cycle."""
+        """Execute the orders that were queued at the start of the cycle."""
         for _ in range(len(self._orders)):
             self._orders.popleft()(cycle)
 
@@ -454,7 +454,7 @@ class CommandGateway:
         measured: RobotState | None,
         ages: Array | None,
     ) -> None:
-        """Report how motions have ended, and what was done in a cycle."""
+        """Publish the snapshot of the cycle and the outcomes of motions that have ended."""
         core, now, blocked = self._core, cycle.now, cycle.blocked
         self.snapshot = Snapshot(
             now, point, measured, blocked, core.paused, core.speed, ages, core.execution
@@ -465,19 +465,19 @@ class CommandGateway:
                 command.end(command.motion.outcome)
 
     def _check(self, source: Source, number: int) -> None:
-        """Refuse what another command or a stop has made void.
+        """Check that no later command or stop has superseded a command.
 
         Raises:
-            NotReadyError: It is void.
+            NotReadyError: The command is superseded.
         """
         if reason := self._gate.refusal(source, number):
             raise NotReadyError(reason)
 
     def _admit(self, source: Source, number: int, since: float, cycle: Cycle) -> None:
-        """Refuse a motion that is void before it began, or that the arm cannot follow.
+        """Check that a motion is not superseded and that the arm can follow.
 
         Raises:
-            NotReadyError: It is refused.
+            NotReadyError: The motion is refused.
         """
         self._check(source, number)
         if cycle.blocked:
@@ -487,21 +487,21 @@ class CommandGateway:
             raise NotReadyError(f'the cycle stood still for {age:.2f} s')
 
     def _rest(self) -> RobotState | None:
-        """Return where the arm stands while others have its drives; None where it follows."""
+        """Return where the arm stands while it does not follow; None while it follows."""
         snapshot = self.snapshot
         return snapshot.reference if snapshot.blocked else None
 
     def _is_void(self, command: MotionCommand) -> bool:
-        """Return whether a motion was canceled or stopped before its begin."""
+        """Return whether a motion was canceled or stopped before its start."""
         return command.is_canceled or bool(self._gate.refusal(command.source, command.number))
 
     def _sum(
         self, request: DisplacementRequest, replaced: Sequence[MotionCommand]
     ) -> tuple[DisplacementRequest, MotionCommand | None]:
-        """Add a displacement to those that it replaces; return the last of them, too.
+        """Add a displacement to those that it replaces; return the sum and the last one replaced.
 
         Raises:
-            CommandError: The sum, behind what is being prepared, leads beyond limits.
+            CommandError: The sum, added to the motion in preparation, exceeds the limits.
         """
         before = None
         for each in replaced:
@@ -515,7 +515,7 @@ class CommandGateway:
         return request, before
 
     def _prepare_next(self) -> None:
-        """Begin with the next motion, once the one before has begun or was refused."""
+        """Prepare the next motion, unless another one is still in preparation."""
         with self._lock:
             if self._preparing is not None or not self._waiting:
                 return
@@ -525,7 +525,7 @@ class CommandGateway:
     def _go_on(
         self, command: MotionCommand, sequence: MotionSequence, cycle: Cycle | None = None
     ) -> None:
-        """Go on with a motion, up to where another thread has its turn."""
+        """Advance a motion until another thread must continue it."""
         try:
             if command.is_canceled:
                 raise CancelledError  # noqa: TRY301
@@ -541,7 +541,7 @@ class CommandGateway:
                 self._orders.append(lambda cycle: self._go_on(command, sequence, cycle))
 
     def _sequence(self, command: MotionCommand) -> MotionSequence:
-        """Prepare a motion, and begin it; again where the arm or the scene has changed."""
+        """Prepare and start a motion; retry if the arm or the scene has changed."""
         rest = self._rest()
         if rest is not None:  # one that is refused from where the arm stands takes no drives
             basis = CommandBasis(rest, self._core.scene)
@@ -559,7 +559,7 @@ class CommandGateway:
         yield from self._attempt(command, is_last=True)
 
     def _attempt(self, command: MotionCommand, *, is_last: bool = False) -> MotionSequence:
-        """Plan and check a motion from the state of a cycle, and begin it in a later one."""
+        """Plan and check a motion from the state of one cycle, and start it in a later one."""
         ordered = self._clock()
         cycle = yield Turn.CYCLE
         self._admit(command.source, command.number, ordered, cycle)
@@ -594,14 +594,14 @@ class CommandGateway:
             command.future.set_result(command.execution)
 
     def _needs_rest(self, goal: TrajectoryGoal, basis: CommandBasis) -> bool:
-        """Return whether the arm cannot be foreseen while a trajectory is prepared."""
+        """Return whether preparation takes longer than the motion of the arm can be predicted."""
         is_foreseen = basis.source is Source.TRAJECTORY or _is_at_rest(basis)
         return not is_foreseen and _preparation_time(goal) > MAX_FORESIGHT
 
     def _wait_for_rest(self, command: MotionCommand) -> Generator[Turn, Cycle, Cycle]:
         """Bring the arm to rest for a trajectory; return the cycle in which it stands.
 
-        A jog is held, not ended: it goes on where the trajectory is refused after all.
+        A jog is held, not ended: it resumes if the trajectory is refused.
         """
         ordered = self._clock()
         cycle = yield Turn.CYCLE
@@ -621,7 +621,7 @@ class CommandGateway:
     def _timed(
         self, command: MotionCommand, goal: TrajectoryGoal, basis: CommandBasis, cycle: Cycle
     ) -> tuple[TrajectoryGoal, CommandBasis, float]:
-        """Return what is planned of a trajectory, from where, and when that begins in [s]."""
+        """Return the goal to plan, the basis to plan from, and the steady start time in [s]."""
         if basis.source is not Source.TRAJECTORY:
             self._lag = 0.0
         if _is_at_rest(basis) and not goal.age:  # it begins whenever it begins
@@ -634,10 +634,10 @@ class CommandGateway:
         return _aged(goal, lag), basis.foreseen(ahead), cycle.now + ahead
 
     def _in_step(self, goal: TrajectoryGoal, lag: float, margin: float) -> TrajectoryGoal:
-        """Delay a goal of a stream to the lag of those before it, which keeps the speed.
+        """Delay a goal of a stream to the lag of the previous goals, which keeps the speed.
 
-        Each waits for another time until it can begin. Without a margin in [s], by which the lag
-        is longer, the arm would have no time to correct what the times of arrival differ by.
+        The goals of a stream wait for different times until they can start. ``margin`` in [s]
+        extends the lag, so that the arm has time to compensate for this jitter.
         """
         self._lag = max(self._lag, min(lag + margin, MAX_LAG))
         wait = max(self._lag - lag, 0.0)
@@ -650,9 +650,9 @@ class CommandGateway:
         return replace(goal, points=points)
 
     def _refuse(self, command: MotionCommand, error: BaseException) -> None:
-        """End a motion that does not begin; a jog that was held for it goes on.
+        """End a motion that does not start; resume the jog that was held for it.
 
-        So does the sum of displacements that it added to.
+        Requeue the sum of displacements that the motion was added to.
         """
         if command.holds:
             self._orders.append(lambda _: self._core.hold(is_held=False))
@@ -669,14 +669,14 @@ class CommandGateway:
         self._end(command)
 
     def _end(self, command: MotionCommand) -> None:
-        """Go on to the next motion."""
+        """Finish preparing a motion, and prepare the next one."""
         with self._lock:
             if self._preparing is command:
                 self._preparing = None
         self._prepare_next()
 
     def _recheck(self, execution: Execution) -> None:
-        """Check the rest of a path in the present scene, in the worker's thread; for the cycle."""
+        """Let the worker check the rest of a path in the present scene. Call in the cycle."""
         begin, scene = execution.feedback.time, self._core.scene
 
         def check() -> None:
@@ -705,12 +705,12 @@ def _is_at_rest(basis: CommandBasis) -> bool:
 
 
 def _aged(goal: TrajectoryGoal, elapsed: float) -> TrajectoryGoal:
-    """Return a goal some time later; one without a stamp begins whenever it begins."""
+    """Return a goal with its age increased by ``elapsed``; a goal without stamp is unchanged."""
     return replace(goal, age=goal.age + elapsed) if goal.age else goal
 
 
 def _preparation_time(goal: TrajectoryGoal) -> float:
-    """Return how long it takes at most to prepare a goal in [s]; it is not checked yet."""
+    """Return the longest time to prepare an unchecked goal in [s]."""
     last = goal.points[-1].time if goal.points else 0.0
     duration = last - goal.age if math.isfinite(last) else 0.0
     checked = min(max(duration, 0.0), MAX_CHECKED_DURATION)

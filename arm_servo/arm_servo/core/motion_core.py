@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""One motion core: jogging, trajectories and single targets hand over to each other smoothly.
+"""The motion core: smooth hand-over between jogging, trajectories and single targets.
 
-Every source starts from the commanded state, and every step passes the same filter, so a hand-over
-is no event: positions, velocities and accelerations go on from where they are.
+Every source starts from the commanded state, and every step passes the same filter, so positions,
+velocities and accelerations are continuous at each hand-over.
 
-A jog, a stop, a pause or a speed counts at once: :meth:`MotionCore.apply`. A motion is planned
-beside the cycle by :meth:`MotionCore.plan`; :meth:`MotionCore.begin` begins it in the cycle, and
-refuses one that was planned for another state or before another command or stop.
+:meth:`MotionCore.apply` applies a jog, a stop, a pause or a speed at once. A motion is planned
+outside the cycle by :meth:`MotionCore.plan`; :meth:`MotionCore.begin` starts it in the cycle. It
+refuses a motion planned for another state, or before a later command or stop.
 """
 
 from __future__ import annotations
@@ -61,13 +61,13 @@ from .requests import (
 from .safety_filter import Neighbours, SafetyFilter
 
 PREPARED_STATE_TOLERANCE = 0.01
-"""How far the arm may be from where a trajectory was prepared in [rad]."""
+"""Greatest distance in [rad] of the arm from the state for which a trajectory was planned."""
 
 ARM_DISTANCE = 0.005  # least distance to another arm that moves, for what is no jog, in [m]
 
 UNCHECKED_CLEARANCE = 0.001
-"""Least distance between links on a path that is not checked in a new scene yet in [m]: the arm
-that is stopped there is not in contact and can be led away. Planned paths keep as much."""
+"""Least distance in [m] between links on a path not yet checked in a new scene: an arm stopped
+there is not in contact and can move away. Planned paths keep the same distance."""
 
 MAX_JOINTS = 8  # joints of the longest chain that is jogged
 
@@ -75,10 +75,10 @@ PAUSED = 'the arm is paused; resume first (~/resume of the trajectory controller
 
 
 def check_arm(model: RobotModel) -> None:
-    """Make sure that a model is an arm that the core can move.
+    """Check that the core can move the arm of a model.
 
     Raises:
-        ModelError: It is no chain, or too long.
+        ModelError: The joints form no chain, or there are too many.
     """
     if not model.serial:
         raise ModelError(
@@ -90,25 +90,25 @@ def check_arm(model: RobotModel) -> None:
 
 
 class MotionCore:
-    """Set-points for an arm, cycle by cycle: one controller moves it, and hands it over.
+    """Computes the set-points of an arm cycle by cycle; one controller at a time moves it.
 
-    Times are steady times in [s] that the owner hands over; it reads no clock. All methods are for
-    the thread of the cycle but :meth:`plan`, which is for any one other thread, and
-    :meth:`prepare_scene` and :meth:`check_displacement`, for any.
+    The caller passes steady times in [s]; the core reads no clock. Call all methods in the thread
+    of the cycle, except :meth:`plan` (one other thread at a time), :meth:`prepare_scene` and
+    :meth:`check_displacement` (any thread).
 
     Attributes:
         model: The arm.
-        scene: What may collide.
-        execution: The trajectory that was followed last, with its outcome; None before the first.
+        scene: The objects and link pairs that may collide.
+        execution: The last trajectory executed, with its outcome; None before the first.
         speed: Speed override of trajectories and targets, 0 to 1.
-        paused: Whether it is paused.
+        paused: Whether the arm is paused.
     """
 
     def __init__(self, model: RobotModel, settings: CoreSettings | None = None) -> None:
-        """Wait for :meth:`reset`.
+        """Create a core that accepts no commands before :meth:`reset`.
 
         Raises:
-            ModelError: The core cannot move such an arm.
+            ModelError: The core cannot move this arm.
         """
         check_arm(model)
         self.model = model
@@ -123,9 +123,9 @@ class MotionCore:
         self._active: Controller | None = None
         self._held = False  # whether a jog or a target comes to rest for what is prepared
         self._jogged = False  # whether the arm moves because of a jog, or out of one
-        self._unchecked: Execution | None = None  # whose path is not checked in the present scene
+        self._unchecked: Execution | None = None  # path not yet checked in the present scene
         self._state: RobotState | None = None
-        self._rested: SetPoint | None = None  # of an arm that rests, until something moves it
+        self._rested: SetPoint | None = None  # set-point at rest, until something moves the arm
         self._still = frozen(np.zeros(len(model)))
         self._sequence = 0
         self._last_change = ''
@@ -144,17 +144,17 @@ class MotionCore:
 
     @property
     def source(self) -> Source:
-        """What moves the arm."""
+        """The source that moves the arm."""
         return Source.NONE if self._active is None else self._active.source
 
     @property
     def speed_scaling(self) -> float:
-        """Speed override that counts, 0 to 1: none while it is paused."""
+        """Effective speed override, 0 to 1; 0 while paused."""
         return 0.0 if self.paused else self.speed
 
     @property
     def basis(self) -> CommandBasis:
-        """What a motion is prepared from now.
+        """The basis for preparing a motion now.
 
         Raises:
             NotReadyError: The position of the arm is not known yet.
@@ -173,10 +173,10 @@ class MotionCore:
         )
 
     def reset(self, positions: Sequence[float] | Array, reason: str = 'the arm was reset') -> None:
-        """Begin at rest where the arm is; whatever moved it ends.
+        """Restart at rest at the given positions; end any motion.
 
         Raises:
-            CommandError: The count is wrong, or a position is not finite.
+            CommandError: The number of positions is wrong, or one is not finite.
         """
         where = checked(positions, len(self.model), 'positions')
         self._changed('the arm was moved by something else')
@@ -185,17 +185,17 @@ class MotionCore:
         self._filter.reset(self._state)
 
     def keep_apart(self, neighbours: Neighbours) -> None:
-        """Heed from now on how other arms of the robot move; before the first step."""
+        """Keep clear of other arms of the robot; call before the first step."""
         self._filter.keep_apart(neighbours)
 
     def prepare_scene(self, scene: PlanningScene, near: Array | None = None) -> PreparedScene:
-        """Measure a scene beside the cycle.
+        """Prepare a scene for distance measurement, outside the cycle.
 
         Args:
-            near: Where the arm is in [rad]; None while that is not known.
+            near: Position of the arm in [rad]; None while unknown.
 
         Raises:
-            SceneError: It is of another arm.
+            SceneError: The scene belongs to another arm.
         """
         self.model.check_scene(scene)
         clearances = Clearances(scene)
@@ -206,12 +206,12 @@ class MotionCore:
         )
 
     def use_scene(self, scene: PreparedScene) -> Execution | None:
-        """Use another scene from now on, for jogs, targets and trajectories.
+        """Switch to another scene for jogs, targets and trajectories.
 
         Returns:
-            The trajectory under way, whose path is to be checked again beside the cycle; see
-            :meth:`conclude_check`. The safety filter keeps it from contact until then. None where
-            there is nothing to check.
+            The running trajectory, whose path must be checked again outside the cycle; see
+            :meth:`conclude_check`. Until then the safety filter prevents contact. None if there is
+            nothing to check.
         """
         self.model.use_scene(scene.clearances)
         self.scene = scene
@@ -221,10 +221,10 @@ class MotionCore:
         return self._unchecked
 
     def conclude_check(self, execution: Execution, scene: PreparedScene, problem: str) -> None:
-        """Go on with a trajectory whose path is clear in a scene, or end it on its path.
+        """Continue a trajectory whose path is clear in a scene; else stop it on its path.
 
         Args:
-            scene: The scene; nothing is done when it does not count any more.
+            scene: The checked scene; if it is no longer in use, the call has no effect.
         """
         if scene is not self.scene or execution is not self._unchecked:
             return
@@ -234,14 +234,14 @@ class MotionCore:
             self._end(Outcome(GoalCode.PATH_TOLERANCE_VIOLATED, problem))
 
     def hold(self, *, is_held: bool = True) -> None:
-        """Bring a jog or a single target to rest for what is prepared, or let it go on."""
+        """Hold a jog or a single target at rest while a motion is prepared, or resume it."""
         self._held = is_held
 
     def plan(self, request: MotionRequest, basis: CommandBasis) -> Motion:
-        """Plan a motion, and check its path; for one thread at a time, whichever. Nothing moves.
+        """Plan a motion and check its path, without moving. Call in one thread at a time.
 
         Args:
-            basis: The arm where the motion begins: :attr:`basis`, or foreseen from it.
+            basis: State from which the motion starts: :attr:`basis`, or a prediction from it.
 
         Raises:
             CommandError: The request is refused.
@@ -249,13 +249,13 @@ class MotionCore:
         return self._preparation.prepare(request, basis)
 
     def check_displacement(self, request: DisplacementRequest, rest: RobotState | None) -> None:
-        """Check that a displacement stays within the limits of its joints; for any thread.
+        """Check that a displacement stays within the joint limits. Thread-safe.
 
         Args:
-            rest: Where the arm stands while others have its drives; None where it follows.
+            rest: Where the arm stands while it does not follow; None while it follows.
 
         Raises:
-            CommandError: It leads beyond them.
+            CommandError: The displacement exceeds the limits.
         """
         values, moved = by_joint(self.model, request.displacements, 'displacements')
         active, limits = self._active, self.model.limits
@@ -263,7 +263,7 @@ class MotionCore:
             begin = rest.position
         else:
             begin = active.target if isinstance(active, SingleTarget) else self.state.position
-        # where the others are was not asked for, as when it is planned
+        # check the moved joints only, as in planning
         check_limits(
             limits, np.where(moved, begin + values, np.clip(begin, limits.lower, limits.upper))
         )
@@ -276,18 +276,18 @@ class MotionCore:
         *,
         in_any_scene: bool = False,
     ) -> None:
-        """Begin a motion; where the arm is off it, the arm catches up smoothly.
+        """Start a motion; if the arm is off its path, the arm catches up smoothly.
 
         Args:
-            basis: What it was planned from.
-            elapsed: Time since then in [s], by which a motion that begins later waits less.
-            in_any_scene: A motion that was planned in an old scene begins, too. The path of a
-                trajectory is then to be checked beside the cycle, as after :meth:`use_scene`.
+            basis: The basis from which the motion was planned.
+            elapsed: Time since then in [s]; shortens the wait before a delayed start.
+            in_any_scene: Whether to start a motion planned in an outdated scene, too. The caller
+                must then check a trajectory's path again, as after :meth:`use_scene`.
 
         Raises:
-            StateMovedError: Another command or a stop came after the motion was planned, or the
-                arm is elsewhere than where a trajectory was: planned again it may begin.
-            CommandError: The arm is paused, and a single target would begin later, by surprise.
+            StateMovedError: Another command or a stop came after planning, or the arm has moved
+                away from the state a trajectory was planned for; it may start if planned again.
+            CommandError: The arm is paused, and a single target would start later by surprise.
             NotReadyError: The position of the arm is not known yet.
         """
         if basis.sequence != self._sequence:
@@ -316,10 +316,10 @@ class MotionCore:
         self._active = motion
 
     def apply(self, request: ImmediateRequest, now: float) -> None:
-        """Apply a request that :func:`.check_request` has checked from now on.
+        """Apply at once a request that :func:`.check_request` has accepted.
 
         Raises:
-            CommandError: The arm is paused, and a jog would begin later, by surprise.
+            CommandError: The arm is paused, and a jog would start later by surprise.
             NotReadyError: A jog has expired, or the position of the arm is not known yet.
         """
         if isinstance(request, JogRequest):
@@ -336,14 +336,14 @@ class MotionCore:
     def command(
         self, request: MotionRequest | ImmediateRequest, now: float = 0.0
     ) -> Motion | None:
-        """Check a request and let it count, in a loop that has no other thread to plan motions.
+        """Check and execute a request in a loop that plans motions in its own thread.
 
         Returns:
-            The motion that has begun; None for anything else.
+            The motion that has started; None for immediate requests.
 
         Raises:
-            CommandError: The request is refused, or as of :meth:`apply`.
-            NotReadyError: As of :meth:`apply`; before the position is known, of any request.
+            CommandError: The request is refused; see also :meth:`apply`.
+            NotReadyError: The position is not known yet; see also :meth:`apply`.
         """
         basis = self.basis
         if isinstance(request, ImmediateRequest):
@@ -357,14 +357,14 @@ class MotionCore:
         return motion
 
     def fail(self, reason: str, code: GoalCode = GoalCode.INVALID_GOAL) -> None:
-        """Come to rest, a trajectory on its path, because something has gone wrong."""
+        """Bring the arm to rest after an error, a trajectory on its path."""
         self._end(Outcome(code, reason))
 
     def abandon(self, reason: str, measured: RobotState | None) -> None:
-        """End at once what moves the arm; something else has the drives, and other arms heed it.
+        """End any motion at once because something else commands the drives; tell other arms.
 
         Args:
-            measured: Where the drives are; None while that is not known.
+            measured: Measured state of the drives; None while unknown.
         """
         self._filter.stands(measured)
         if self.source is not Source.NONE:
@@ -375,7 +375,7 @@ class MotionCore:
         """Return the set-point of a cycle.
 
         Args:
-            measured: Measured state; by default what was commanded.
+            measured: Measured state; by default the commanded state.
 
         Raises:
             NotReadyError: The position of the arm is not known yet.
@@ -408,7 +408,7 @@ class MotionCore:
 
     @property
     def _clearance(self) -> float | None:
-        """Least distance between links on a stop in [m]; any on a path that was checked."""
+        """Return the least distance in [m] between links on a stop; None on a checked path."""
         if self._jogged:
             return self._settings.clearance
         is_unchecked = self._unchecked is not None and self._unchecked is self.execution
@@ -419,13 +419,13 @@ class MotionCore:
 
     @property
     def _apart(self) -> float | None:
-        """Least distance to other arms on a stop of all in [m]."""
+        """Return the least distance in [m] to other arms while all of them stop."""
         if self._jogged:
             return self._settings.clearance
         return ARM_DISTANCE if self._settings.check_self_collision else None
 
     def _give_up(self, limiter: Limiter, *, is_at_rest: bool) -> None:
-        """End a motion that the safety filter does not let go on; the arm comes to rest."""
+        """End a motion that the safety filter blocks; the arm comes to rest."""
         if self._active is None or self._active is self._jog:
             return
         if limiter.cause is Cause.COLLISION:
@@ -437,7 +437,7 @@ class MotionCore:
         self._active.end(Outcome(GoalCode.PATH_TOLERANCE_VIOLATED, reason))
 
     def _refusal(self, limiter: Limiter) -> str:
-        """Explain why a motion cannot go on, and what to do."""
+        """Return why a motion cannot continue, and the remedy."""
         if self._filter.is_near_neighbour:
             return (
                 f'{limiter.name} would come nearer than {ARM_DISTANCE * 1e3:g} mm to another arm; '
@@ -455,9 +455,9 @@ class MotionCore:
         return f'{limiter.name} would collide {where}'
 
     def _begin_jog(self, request: JogRequest, now: float) -> None:
-        """Jog from now on; the safety filter sees every step.
+        """Start or update a jog; the safety filter checks every step.
 
-        A zero is a stop: it is not refused, and ends only the jog of its client.
+        A zero command is a stop: it is never refused, and ends only the jog of its client.
         """
         if request.is_zero:
             if self._active is not self._jog or self._jog.client != request.client:
@@ -485,7 +485,7 @@ class MotionCore:
             self._end(Outcome(GoalCode.SUCCESSFUL, request.reason, canceled=True))
 
     def _end(self, outcome: Outcome) -> None:
-        """Bring the arm to rest; what moves it ends so."""
+        """Bring the arm to rest; end its motion with an outcome."""
         self._changed('the arm was stopped')
         if self._active is not None:
             self._active.stop(outcome)
@@ -493,25 +493,25 @@ class MotionCore:
                 self._release(outcome.reason)
 
     def _release(self, reason: str) -> None:
-        """End what moves the arm; it comes to rest unless something else takes over."""
+        """End the motion of the arm, which comes to rest unless another source takes over."""
         if self._active is not None:
             self._active.end(Outcome(GoalCode.INVALID_GOAL, reason))
         self._active, self._held = None, False
 
     def _check_held(self) -> None:
-        """Refuse what would wait, and begin when it is no longer expected."""
+        """Refuse a command that would wait during a pause and start unexpectedly later."""
         if self.paused:
             raise CommandError(PAUSED)
         if self.speed == 0.0:
             raise CommandError('the speed override is 0; raise it first (~/speed_scaling_input)')
 
     def _changed(self, what: str) -> None:
-        """Count a command or a stop: what was prepared before it is void."""
+        """Count a command or a stop, which invalidates motions prepared before it."""
         self._sequence += 1
         self._last_change = what
 
     def _check_place(self, planned: RobotState, state: RobotState) -> None:
-        """Make sure that the arm is where a trajectory was prepared; else its way is another."""
+        """Check that the arm is at the state for which a trajectory was planned."""
         off = np.abs(state.position - planned.position)
         joint = int(np.argmax(off))
         if off[joint] > PREPARED_STATE_TOLERANCE:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Motions planned and checked beside the cycle, from what that hands out."""
+"""Planning and collision checking of motions, outside the cycle."""
 
 from __future__ import annotations
 
@@ -31,34 +31,34 @@ from ..controllers.jog import ServoSettings
 from ..controllers.trajectory import Execution, ExecutionSettings
 from .requests import by_joint, check_limits, DisplacementRequest, MotionRequest
 
-Motion = Execution | SingleTarget  # what has a goal, and an outcome once it ended
+Motion = Execution | SingleTarget  # motion with a goal, and an outcome once ended
 
 
 @dataclass(frozen=True, slots=True)
 class CoreSettings:
-    """How the core behaves."""
+    """Settings of the motion core."""
 
     servo: ServoSettings = field(default_factory=ServoSettings)  # how jogging behaves
     # how trajectories are followed
     execution: ExecutionSettings = field(default_factory=ExecutionSettings)
     # least distance between links that a jog and its stop may bring about in [m]; None is any
     clearance: float | None = 0.005
-    # whether a trajectory or a single target is refused on whose way links meet
+    # whether to refuse trajectories and single targets whose path has a collision
     check_self_collision: bool = True
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PreparedScene:
-    """What measures a scene: one thing for each thread."""
+    """Collision checkers of one scene, one for each thread."""
 
     clearances: Clearances  # of the cycle
-    # looks for contact on paths, in the thread that prepares motions; None without such checks
+    # finds contact on paths, in the preparing thread; None if checks are off
     check: PathCheck | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CommandBasis:
-    """What the cycle knows when a command is prepared."""
+    """State of the cycle from which a command is prepared."""
 
     state: RobotState  # commanded state where the motion begins
     scene: PreparedScene  # what may collide
@@ -71,7 +71,7 @@ class CommandBasis:
     timer: TimerState | None = None  # how that runs; None for how it ran in its last step
 
     def foreseen(self, ahead: float) -> CommandBasis:
-        """Return the basis some time later, when nothing comes in between."""
+        """Predict the basis ``ahead`` [s] from now if nothing intervenes."""
         if self.source is Source.TRAJECTORY and self.execution is not None:
             return replace(self, state=self.execution.foreseen(ahead, self.timer))
         state = self.state
@@ -80,9 +80,9 @@ class CommandBasis:
 
 
 class Preparation:
-    """Plans motions, and looks for collisions on their paths; for one thread.
+    """Plans motions and checks their paths for collisions; use it in one thread.
 
-    A trajectory takes 2 ms, 0.2 ms a point, and about 3 ms for each second of its path.
+    Preparing a trajectory takes 2 ms, plus 0.2 ms per point and about 3 ms per second of its path.
     """
 
     def __init__(
@@ -111,7 +111,7 @@ class Preparation:
         return self._single_target(target, request.max_speed, basis)
 
     def _displaced(self, displacements: Mapping[str, float], basis: CommandBasis) -> Array:
-        """Return where displacements lead, beyond where the arm is going already."""
+        """Return the target positions of displacements, added to the current target."""
         values, moved = by_joint(self._model, displacements, 'displacements')
         if basis.target is not None:
             ends: Array = basis.target + values
@@ -119,10 +119,10 @@ class Preparation:
         return self._aimed(basis.state.position + values, moved, basis)
 
     def _aimed(self, positions: Array, moved: Mask, basis: CommandBasis) -> Array:
-        """Return positions of the joints that are moved, and where the others come to rest."""
+        """Return target positions for moved joints, and rest positions for the others."""
         rest, limits = self._generator.brake(basis.state), self._limits
         stay = basis.state.position if rest is None else rest.at(rest.duration).position
-        # where a joint comes to rest was not asked for: it need not be refused
+        # the rest position of a joint was not requested: do not refuse it
         target: Array = np.where(moved, positions, np.clip(stay, limits.lower, limits.upper))
         return target
 
@@ -150,7 +150,7 @@ class Preparation:
         """Plan a trajectory and check its path.
 
         Raises:
-            GoalError: It is refused.
+            GoalError: The trajectory is refused.
         """
         goal, begin, wait = self._begin(goal, basis.state)
         execution = Execution(
@@ -175,10 +175,10 @@ class Preparation:
     def _begin(
         self, goal: TrajectoryGoal, state: RobotState
     ) -> tuple[TrajectoryGoal, RobotState, float]:
-        """Return a goal that begins now or after a wait, where it begins, and the wait in [s].
+        """Return the goal to plan, its start state, and the wait before it in [s].
 
-        What begins later begins where the arm will have come to rest; where there is no time for
-        that, the motion goes over into it, so that its points are met at their times.
+        A goal in the future starts where the arm will have come to rest. If there is no time to
+        rest, the motion blends into the goal, which keeps the times of its points.
         """
         wait = max(-goal.age, 0.0)
         if wait == 0.0 or not state.moving:

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What passes between any thread and the cycle: requests, and the snapshot on the way back.
+"""Data exchanged between any thread and the cycle: requests in, snapshots out.
 
-A request is a value and moves nothing; a trajectory is requested by a
-:class:`arm_trajectory.TrajectoryGoal`.
+A request is a plain value; a :class:`arm_trajectory.TrajectoryGoal` requests a
+trajectory.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from ..controllers.controller import Controller, SetPoint, Source
 from ..controllers.jog import Command, JointCommand, PoseCommand, TwistCommand
 from ..controllers.trajectory import Execution
 
-ROTATION_TOLERANCE = 1e-3  # how far a rotation may be from one, for rounding of quaternions
+ROTATION_TOLERANCE = 1e-3  # allowed deviation from orthonormality, for rounding of quaternions
 
 
 class CommandType(IntEnum):
@@ -47,16 +47,16 @@ class CommandType(IntEnum):
 class JogRequest:
     """Move the tool or joints at a speed, or track a pose, until the request expires."""
 
-    command: Command  # what the arm does
+    command: Command  # the commanded motion
     expires: float  # steady time at which the request expires in [s]
-    # link, or pose in the base, about whose origin a twist turns and along whose axes it is given,
-    # and in which a pose is given; None for the tip, and for the base
+    # frame of the command, as a link or a pose in the base: reference point and axes of a twist,
+    # frame of a pose; None: reference point at the tip, axes of the base
     frame: str | Pose | None = None
-    client: Hashable = None  # who asks: standing still is a command only for the client that jogs
+    client: Hashable = None  # the client; its zero command stops only its own jog
 
     @property
     def is_zero(self) -> bool:
-        """Whether it asks for standing still."""
+        """Whether the request commands standstill."""
         if isinstance(self.command, TwistCommand):
             return not self.command.twist.any()
         return isinstance(self.command, JointCommand) and not self.command.velocity.any()
@@ -64,18 +64,18 @@ class JogRequest:
 
 @dataclass(frozen=True, slots=True)
 class DisplacementRequest:
-    """Move joints on by amounts; displacements add up while they are carried out."""
+    """Move joints by relative amounts; displacements add up during the motion."""
 
     displacements: Mapping[str, float]  # how far in [rad] by joint
     max_speed: float = math.inf  # greatest speed of a joint in [rad/s]
 
     @property
     def is_zero(self) -> bool:
-        """Whether it asks for standing still."""
+        """Whether the request commands standstill."""
         return not any(self.displacements.values())
 
     def beyond(self, before: MotionRequest) -> DisplacementRequest:
-        """Return this displacement added to an earlier one; any other motion is replaced."""
+        """Return this displacement added to an earlier one; it replaces any other motion."""
         if not isinstance(before, DisplacementRequest):
             return self
         ways = {name: before.displacements.get(name, 0.0) for name in self.displacements}
@@ -96,18 +96,16 @@ class StopRequest:
     """Come to rest: a trajectory on its path, anything else in the shortest time."""
 
     reason: str = 'stopped'  # why, for the outcome of the motion that this ends
-    # what is stopped; other sources go on. None for whatever moves the arm
+    # sources to stop; others continue. None stops every source
     sources: tuple[Source, ...] | None = None
-    motion: Controller | None = (
-        None  # the motion that is stopped; another one goes on. None for any
-    )
+    motion: Controller | None = None  # the motion to stop; others continue. None stops any
 
 
 @dataclass(frozen=True, slots=True)
 class PauseRequest:
-    """Come to rest, a trajectory on its path, and refuse jogging; or go on after that."""
+    """Pause: bring the arm to rest, a trajectory on its path, and refuse jogs; or resume."""
 
-    is_paused: bool = True  # whether to come to rest; else to go on
+    is_paused: bool = True  # True pauses, False resumes
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,30 +116,30 @@ class SpeedRequest:
 
 
 MotionRequest = DisplacementRequest | TargetRequest | TrajectoryGoal
-"""Requests that are planned, and checked for collisions, before they may begin."""
+"""Requests that are planned and checked for collisions before they start."""
 
 ImmediateRequest = JogRequest | StopRequest | PauseRequest | SpeedRequest
-"""Requests for which nothing is planned: they count from the next cycle on."""
+"""Requests that need no planning and apply from the next cycle on."""
 
 
 def check_limits(limits: JointLimits, target: Array) -> None:
-    """Check that joints may be at positions in [rad].
+    """Check that target positions in [rad] are within the joint limits.
 
     Raises:
-        CommandError: One is beyond its limits.
+        CommandError: A position exceeds its limits.
     """
     if words := limits.beyond(target, 0.0):
         raise CommandError(words)
 
 
 def by_joint(model: RobotModel, values: Mapping[str, float], what: str) -> tuple[Array, Mask]:
-    """Put numbers in the order of the joints.
+    """Sort values by joint order.
 
     Returns:
-        The numbers, 0 where none is given, and the mask of those that are.
+        The values, 0 for joints without one, and the mask of the joints with a value.
 
     Raises:
-        CommandError: No joint is named, one is unknown, or a number is not finite.
+        CommandError: No joint is named, a joint is unknown, or a value is not finite.
     """
     if not values:
         raise CommandError(f'{what}: no joint is named')
@@ -153,10 +151,10 @@ def by_joint(model: RobotModel, values: Mapping[str, float], what: str) -> tuple
 
 
 def moves_nothing(model: RobotModel, request: MotionRequest) -> bool:
-    """Return whether a motion is a displacement by nothing, which changes nothing.
+    """Return whether a motion is a displacement by zero, which has no effect.
 
     Raises:
-        CommandError: It is one, of an unknown joint or none.
+        CommandError: The zero displacement names an unknown joint or none.
     """
     if not isinstance(request, DisplacementRequest) or not request.is_zero:
         return False
@@ -165,11 +163,11 @@ def moves_nothing(model: RobotModel, request: MotionRequest) -> bool:
 
 
 def check_request(model: RobotModel, request: ImmediateRequest) -> None:
-    """Check a request for which nothing is planned.
+    """Check a request that needs no planning.
 
     Raises:
-        CommandError: A number is not finite or out of its range, the count is wrong, the link is
-            unknown, or the axes are no rotation.
+        CommandError: A number is not finite or out of range, a length is wrong, the link is
+            unknown, or the axes are not a rotation.
     """
     if isinstance(request, SpeedRequest) and not 0.0 <= request.speed <= 1.0:
         raise CommandError(f'speed override {request.speed}: it must be between 0 and 1')
@@ -191,7 +189,7 @@ def check_request(model: RobotModel, request: ImmediateRequest) -> None:
 
 
 def in_base(model: RobotModel, positions: Array, request: JogRequest) -> Command:
-    """Return the command of a request, about the tip and in the base."""
+    """Convert the command of a request to the base frame, with the tip as reference point."""
     command, frame = request.command, request.frame
     if frame is None or isinstance(command, JointCommand):
         return command
@@ -211,12 +209,12 @@ def _check_rotation(values: Array, what: str) -> None:
 
 
 MAX_CYCLE_AGE = 0.25
-"""Age of a cycle at which the cycle stands still: commands are refused, as they would surprise."""
+"""Age in [s] of the last cycle from which it counts as stalled, and commands are refused."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """What the core did in a cycle."""
+    """Snapshot of the motion core after one cycle."""
 
     time: float  # steady time of the cycle in [s]
     set_point: SetPoint | None  # what was commanded; None while the arm does not follow
@@ -224,25 +222,25 @@ class Snapshot:
     blocked: str  # why the arm does not follow, with the remedy; empty while it does
     paused: bool = False  # whether it is paused
     speed: float = 1.0  # speed override, 0 to 1
-    # how old the measured values of each joint were in the cycle in [s]; None where they are as
-    # old as the cycle
+    # age in [s] of each joint's measured values in this cycle; None: measured in this
+    # cycle
     ages: Array | None = None
     # the trajectory that was followed last; None before the first
     execution: Execution | None = None
 
     @property
     def source(self) -> Source:
-        """What moves the arm."""
+        """The source that moves the arm."""
         return Source.NONE if self.set_point is None else self.set_point.source
 
     @property
     def speed_scaling(self) -> float:
-        """Speed override that counts, 0 to 1: none while it is paused."""
+        """Effective speed override, 0 to 1; 0 while paused."""
         return 0.0 if self.paused else self.speed
 
     @property
     def reference(self) -> RobotState | None:
-        """Where the arm is to be: where it stands while it does not follow; None while unknown."""
+        """The commanded state, or the measured one while not following; None while unknown."""
         if self.set_point is not None:
             return self.set_point.state
         if self.measured is None or not np.isfinite(self.measured.position).all():
@@ -250,7 +248,7 @@ class Snapshot:
         return RobotState.at_rest(self.measured.position)
 
     def stale(self, age: float) -> str:
-        """Return that the cycle does not run; empty when it does."""
+        """Return a message if the cycle is stalled; empty if it runs."""
         if age <= MAX_CYCLE_AGE:
             return ''
         begun = f'{age:.1f} s ago' if self.time else 'never'

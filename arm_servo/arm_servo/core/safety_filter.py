@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The last word on every set-point: the arm can always still stop within its limits.
+"""Safety filter of every set-point: the arm can always stop within its limits.
 
-Arms of one robot that move at the same time know of each other how they would come to rest, and
-keep apart also while all of them stop: :class:`MovingArms`.
+:class:`MovingArms` shares the stopping motions of arms of one robot that move at the same time,
+and keeps them apart even while all of them stop.
 """
 
 from __future__ import annotations
@@ -31,42 +31,42 @@ from arm_trajectory import hard_brake, OnlineTrajectoryGenerator, Plan
 from ..controllers.controller import Cause, Limiter
 
 LeastOnStop = Callable[[Plan, float, float], LeastClearance]
-"""Measures a stop, of its begin in [s] and the distance of interest in [m]."""
+"""Measures least clearance on a stop, from its start time [s] and distance of interest [m]."""
 
 CONTACT_TOLERANCE = 1e-4
-"""Change of a distance that is let pass, in all, in [m]: sliding along is no approach."""
+"""Total decrease of a distance that is tolerated, in [m]: sliding along is no approach."""
 
 MIN_SAMPLES, MAX_SAMPLES = 6, 40
-"""How many places of a stop distances are looked at, at least and at most."""
+"""Least and greatest number of samples of a stop at which distances are measured."""
 
-MAX_STRIDE = 0.1  # way of all joints between two looks in [rad]
+MAX_STRIDE = 0.1  # sum of joint motions between two samples in [rad]
 
 NEAR_ARM = 0.1
-"""Distance to other arms in [m] below which an arm may be stopped off its path, so that its stops
-must be clear of everything."""
+"""Distance to other arms in [m] below which an arm may have to stop off its path, so that its
+stops must be checked for all collisions."""
 
-ROUNDING_TOLERANCE = 1e-7  # rounding of ruckig's positions that is let pass in [rad]
+ROUNDING_TOLERANCE = 1e-7  # tolerated rounding of ruckig's positions in [rad]
 
 
 class ClearanceFloor:
-    """How near links may come on a stop: as near as asked, or as they cannot help.
+    """Least allowed distance between links on a stop: the clearance, or what is unavoidable.
 
-    Links that are nearer than they should be may stay as they are, not come nearer.
+    Links that are already too near may keep their distance, but must not come nearer.
     """
 
     def __init__(self, least: LeastOnStop, brake: Callable[[RobotState], Plan | None]) -> None:
         self._least, self._brake = least, brake
-        self._clearance = 0.0  # for which the floor was found
+        self._clearance = 0.0  # clearance for which the floor was measured
         self._floor: float | None = None
 
     def forget(self) -> None:
-        """Measure anew how near links may be."""
+        """Discard the floor, so that it is measured again."""
         self._floor = None
 
     def too_near(
         self, stop: Plan, begin: float, state: RobotState, now: float, clearance: float | None
     ) -> LeastClearance | None:
-        """Return which links a stop would bring too near, and how near; None for none."""
+        """Return the links that a stop brings too near, and their distance; None if clear."""
         if clearance is None:
             self._floor = None
             return None
@@ -78,7 +78,7 @@ class ClearanceFloor:
             self._floor = min(self._floor, clearance)
         near = self._least(stop, begin, clearance)
         if near.distance < self._floor - CONTACT_TOLERANCE:
-            # what stopping now brings about cannot be had better
+            # no stop can do better than stopping now
             present = self._brake(state)
             least = self._floor - CONTACT_TOLERANCE
             least = least if present is None else min(self._floor, self._distance(present, now))
@@ -89,7 +89,7 @@ class ClearanceFloor:
         return None
 
     def allows(self, plan: Plan, begin: float) -> bool:
-        """Whether links stay apart on another stop than the one that was looked at last."""
+        """Return whether links also stay apart on an alternative stop."""
         if self._floor is None:
             return True
         return self._distance(plan, begin) >= self._floor - CONTACT_TOLERANCE
@@ -99,11 +99,11 @@ class ClearanceFloor:
 
 
 class SafetyFilter:
-    """Lets a step pass only when the shortest stop behind it stays within the limits.
+    """Passes a step only if the shortest stop after it stays within the limits.
 
-    A joint that could not stop any more brakes instead; where links would come too near, all do.
-    As the step before has passed, there is always a stop to fall back on. An arm that begins
-    beyond a limit, or in contact, may go back and may not go further.
+    A joint that could no longer stop brakes instead; if links would come too near, all joints
+    brake. Because the previous step passed, a safe stop always exists. An arm that starts beyond
+    a limit or in contact may move back, but not further.
     """
 
     def __init__(self, model: RobotModel, generator: OnlineTrajectoryGenerator) -> None:
@@ -123,22 +123,22 @@ class SafetyFilter:
 
     @property
     def is_alone(self) -> bool:
-        """Whether there are no other arms to heed, also at rest."""
+        """Whether there are no other arms, moving or at rest."""
         return self._neighbours is None
 
     def keep_apart(self, neighbours: Neighbours) -> None:
-        """Heed from now on how other arms move."""
+        """Keep clear of other arms from now on."""
         self._neighbours, self._lock = neighbours, neighbours.lock
         self._apart = ClearanceFloor(neighbours.least, self._generator.brake)
 
     def stands(self, state: RobotState | None) -> None:
-        """Publish to other arms where the arm is while something else has its drives."""
+        """Share the arm's position with other arms while something else commands its drives."""
         if self._neighbours is not None:
             with self._lock:
                 self._neighbours.stands(state)
 
     def reset(self, state: RobotState) -> None:
-        """Begin at a state."""
+        """Restart from a state."""
         stop = self._generator.brake(state)
         self._lower, self._upper = -self._anywhere, self._anywhere
         self._floor.forget()
@@ -148,7 +148,7 @@ class SafetyFilter:
             self._remember(stop)
 
     def forget(self) -> None:
-        """Measure anew how near links may be: what may collide has changed."""
+        """Measure the allowed distances again, because the scene has changed."""
         self._floor.forget()
 
     def step(
@@ -164,12 +164,12 @@ class SafetyFilter:
         """Return the step if it is safe, else a braking one.
 
         Args:
-            clearance: Least distance between links on a stop in [m]; None where what moves the
-                arm keeps to a path that was checked. Near other arms it counts as 0 then.
-            apart: Least distance to other arms that move, while all stop, in [m]; None is any.
+            clearance: Least distance in [m] between links on a stop; None on a path that was
+                checked, treated as 0 near other arms.
+            apart: Least distance in [m] to other moving arms while all stop; None: no limit.
 
         Returns:
-            The state to command, and what held the wanted one up.
+            The state to command, and the limiter if it is not the wanted state.
         """
         with self._lock:  # no other arm steps meanwhile
             if self._neighbours is not None and self._neighbours.version != self._version:
@@ -205,14 +205,14 @@ class SafetyFilter:
             return self._brake(state, period, now), limiter
 
     def _may_meet(self, stop: Plan, begin: float, apart: float | None) -> bool:
-        """Whether another arm may soon be in the way of a stop."""
+        """Return whether another arm is near a stop, or may soon be."""
         if self._neighbours is None or apart is None:
             return False
         within = apart + NEAR_ARM
         return self._neighbours.least(stop, begin, within).distance < within
 
     def _beyond(self, wanted: RobotState) -> tuple[Mask, Plan | None]:
-        """Return which joints can no longer stop within their limits, and the stop of all."""
+        """Return a mask of joints that can no longer stop within limits, and the stop of all."""
         coasting = wanted.acceleration * np.abs(wanted.acceleration) / (2.0 * self._limits.jerk)
         peak = np.maximum(np.abs(wanted.velocity + coasting), np.abs(wanted.velocity))
         beyond: Mask = peak > self._fastest
@@ -225,7 +225,7 @@ class SafetyFilter:
         return beyond | too_low | too_high, stop
 
     def _limit(self, wanted: RobotState, joint: int) -> Limiter:
-        """Name the limit that a joint would break."""
+        """Return the limiter for the limit that a joint would exceed."""
         name, speed = self._limits.names[joint], float(abs(wanted.velocity[joint]))
         if speed > self._fastest[joint]:
             return Limiter(Cause.JOINT_VELOCITY, name, speed, 0.0)
@@ -236,7 +236,7 @@ class SafetyFilter:
         return Limiter(Cause.JOINT_POSITION, name, float(min(ways)), 0.0)
 
     def _remember(self, stop: Plan) -> None:
-        """Allow as much beyond the limits as the present stop needs, and no more."""
+        """Reduce the tolerated overshoot of limits to what the present stop needs."""
         if self._lower is self._limits.lower and self._upper is self._limits.upper:
             return
         lower, upper = stop.extremes
@@ -246,12 +246,12 @@ class SafetyFilter:
             self._lower, self._upper = self._limits.lower, self._limits.upper  # for good
 
     def _announce(self, stop: Plan, begin: float) -> None:
-        """Publish to other arms how this one would come to rest now."""
+        """Share with other arms how this one would stop now."""
         if self._neighbours is not None:
             self._neighbours.stops(stop, begin)
 
     def _least(self, stop: Plan, _begin: float, clearance: float) -> LeastClearance:
-        """Return the least distance between links on a stop, if it is small."""
+        """Return the least distance between links on a stop, at most ``clearance``."""
         least, clearances = LeastClearance(clearance), self._model.clearances
         if clearances.apart(*stop.extremes, clearance):
             return least
@@ -267,7 +267,7 @@ class SafetyFilter:
         return least
 
     def _eased(self, state: RobotState, period: float, now: float) -> RobotState | None:
-        """Brake with the joints in step, which keeps the direction, where that is clear too."""
+        """Brake with synchronised joints, which keeps the direction; None if that is not safe."""
         plan = self._generator.to_velocity(state, np.zeros(len(self._limits)))
         if plan is None or period >= plan.duration:
             return None
@@ -293,26 +293,26 @@ class SafetyFilter:
 
 
 MIN_LOOKS, MAX_LOOKS = 4, 12
-"""Into how many parts two stops are cut at first, at least and at most."""
+"""Least and greatest number of parts into which two stops are first divided."""
 
-MAX_PART_STRIDE = 0.15  # way of all joints in such a part in [rad]
+MAX_PART_STRIDE = 0.15  # sum of joint motions in such a part in [rad]
 
 MAX_HALVINGS = 24
-"""How many parts are halved at most, those first in which the arms may be nearest."""
+"""Greatest number of halvings; the part in which the arms may be nearest comes first."""
 
-PRECISION = 5e-5  # how well the least distance is to be known in [m]
+PRECISION = 5e-5  # required accuracy of the least distance in [m]
 
 HORIZON = 0.05
-"""Distance beyond that of interest up to which it is measured, and not only bounded, in [m]."""
+"""Margin in [m] beyond the distance of interest within which distances are measured exactly."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Stop:
-    """How an arm would come to rest from a moment on."""
+    """Stopping motion of an arm from a given time on."""
 
-    end: Array  # where it would stand in [rad]
-    plan: Plan | None = None  # the way there; None where it stands
-    begin: float = 0.0  # steady time of its begin in [s]
+    end: Array  # rest positions in [rad]
+    plan: Plan | None = None  # motion to rest; None for an arm at rest
+    begin: float = 0.0  # steady start time in [s]
 
     @classmethod
     def of(cls, plan: Plan, begin: float) -> _Stop:
@@ -329,7 +329,7 @@ class _Stop:
         return (self.end, self.end) if self.plan is None else self.plan.extremes
 
     def places(self, times: Array) -> Array:
-        """Return positions at steady times (m, n) in [rad]."""
+        """Return positions (m, n) in [rad] at steady times (m) in [s]."""
         if self.plan is None or times[0] >= self.until:
             return np.broadcast_to(self.end, (len(times), len(self.end)))
         since = np.clip(times - self.begin, 0.0, self.plan.duration)
@@ -338,7 +338,7 @@ class _Stop:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Look:
-    """One moment of the stops."""
+    """Sample of the stops at one time."""
 
     time: float  # steady time in [s]
     places: Array  # positions of all joints in [rad]
@@ -348,9 +348,9 @@ class _Look:
 def _nearest(
     looks: Sequence[_Look], rates: Array, look: Callable[[Array], Sequence[_Look]]
 ) -> _Look:
-    """Return the look at which the arms are nearest, of more looks where that is not sure.
+    """Return the sample at which the arms are nearest, sampling more where needed.
 
-    Between two looks a pair comes no nearer than half of what its distances are more than its way.
+    Between two samples a pair is no nearer than half of (sum of its distances - its motion).
     """
     best = min(looks, key=lambda each: float(each.distances.min()))
     number = count()
@@ -375,14 +375,14 @@ def _nearest(
 
 
 class MovingArms:
-    """Where arms of one robot would come to rest, and how near they come to each other then.
+    """Stopping motions of the arms of one robot, and the distances between them.
 
-    Each arm lets the others know its shortest stop in every step, and takes a step only when its
-    own stop behind it stays clear of theirs, at the same times. So there is always a way for all
-    of them to come to rest without contact: the stops of the steps before.
+    In every step each arm shares its shortest stop, and executes the step only if its own stop
+    after it stays clear of the others' stops at the same times. So all arms can always come to
+    rest without contact: by the stops of the previous steps.
 
     Attributes:
-        lock: Held while an arm looks at the others and lets them know its stop: loops of several
+        lock: Held while an arm reads the other stops and shares its own: loops of several
             threads take turns.
     """
 
@@ -399,13 +399,13 @@ class MovingArms:
         self.stops: list[_Stop | None] = [None for _ in models]
 
     def neighbours(self, joints: Sequence[str]) -> Neighbours:
-        """Return the other arms as one of them sees them."""
+        """Return the view of the other arms for the arm with these joints."""
         return Neighbours(self, self._groups.index(tuple(joints)))
 
     def use_scene(self, scene: PlanningScene) -> None:
-        """Use attached bodies, allowed collisions and joints beside the arms of a scene.
+        """Apply attached bodies, allowed collisions and non-arm joints of a scene.
 
-        It is measured here, in the thread of the caller.
+        The measurement runs in the thread of the caller.
         """
         given, present = self._given, self._clearances.scene
         if scene is given:
@@ -428,7 +428,7 @@ class MovingArms:
             self.version += 1
 
     def least(self, number: int, plan: Plan, begin: float, within: float) -> LeastClearance:
-        """Return the least distance of an arm that stops to the others, which stop too."""
+        """Return the least distance in [m] of a stopping arm to the others, which stop too."""
         stops = [*self.stops]
         stops[number] = _Stop.of(plan, begin)
         known = [
@@ -471,7 +471,7 @@ class MovingArms:
         return least
 
     def _counts(self, stops: Sequence[_Stop | None]) -> Mask:
-        """Return the pairs that no arm moves whose place is not known."""
+        """Return a mask of the pairs that no arm of unknown position moves."""
         moved = self._clearances.scene.distance_rate_bounds > 0.0
         counts: Mask = np.ones(len(moved), dtype=bool)
         for columns, stop in zip(self._columns, stops, strict=True):
@@ -480,7 +480,7 @@ class MovingArms:
         return counts
 
     def _ends(self) -> Array:
-        """Return where all joints would stand in [rad]."""
+        """Return the positions of all joints in [rad] at the end of the stops."""
         places = np.zeros(self._clearances.scene.distance_rate_bounds.shape[1])
         for columns, stop in zip(self._columns, self.stops, strict=True):
             if stop is not None:
@@ -489,7 +489,7 @@ class MovingArms:
 
 
 class Neighbours:
-    """The other arms as one of them sees them; for its loop, while it holds :attr:`lock`."""
+    """View of the other arms for one arm; use it in the arm's loop, holding :attr:`lock`."""
 
     def __init__(self, arms: MovingArms, number: int) -> None:
         self._arms, self._number = arms, number
@@ -497,17 +497,17 @@ class Neighbours:
 
     @property
     def version(self) -> int:
-        """Number of the scene that counts."""
+        """Version number of the scene in use."""
         return self._arms.version
 
     def least(self, stop: Plan, begin: float, within: float) -> LeastClearance:
-        """Return the least distance to the others on a stop, while they stop too."""
+        """Return the least distance in [m] to the others on a stop, while they stop too."""
         return self._arms.least(self._number, stop, begin, within)
 
     def stops(self, plan: Plan, begin: float) -> None:
-        """Publish to the others the stop behind a step."""
+        """Share the stop after a step with the other arms."""
         self._arms.stops[self._number] = _Stop.of(plan, begin)
 
     def stands(self, state: RobotState | None) -> None:
-        """Publish to the others where the arm is while something else may move it."""
+        """Share the arm's position with the others while something else may move it."""
         self._arms.stops[self._number] = None if state is None else _Stop(state.position)

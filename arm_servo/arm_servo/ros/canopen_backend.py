@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The back end for drives on a CAN bus: arm_canopen's master with motion cores in its cycle."""
+"""Back end for drives on a CAN bus: runs motion cores in the cycle of arm_canopen's master."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ ATTACH_PERIOD = 0.2  # time between two tries to attach when the bus starts in [
 
 
 def serve_canopen(stop: threading.Event, offers: Offers) -> None:
-    """Run the master with motion cores until stopped; the drives are disabled then.
+    """Run the master with motion cores until stopped, then disable the drives.
 
     Raises:
-        BackendError: The bus cannot be configured or opened, or has a master.
+        BackendError: The bus cannot be configured or opened, or already has a master.
     """
     try:
         serve_buses(stop, lambda master: CanopenMotion(master, offers).nodes)
@@ -51,14 +51,14 @@ def serve_canopen(stop: threading.Event, offers: Offers) -> None:
 
 
 class CanopenMotion:
-    """The nodes of a robot whose drives are on one bus."""
+    """Nodes and motion cores of a robot whose drives are on one bus."""
 
     def __init__(self, master: MasterProcess, offers: Offers) -> None:
-        """Build cores and nodes; nothing moves yet.
+        """Build cores and nodes, without moving.
 
         Raises:
-            ParameterError: A parameter is misspelt, of another kind or out of its range.
-            ModelError: The parameters do not make an arm, or it has joints without a drive.
+            ParameterError: A parameter is misspelt, of the wrong type or out of range.
+            ModelError: The parameters do not define an arm, or a joint has no drive.
         """
         self._master = master
         with ExitStack() as stack:
@@ -93,7 +93,7 @@ class CanopenMotion:
             manager.get_logger().warning(note)
 
     def _drive(self, _: Node, model: RobotModel, settings: CoreSettings) -> CommandGateway:
-        """Build the core of a group over its drives; nothing moves yet.
+        """Build the core of a group for its drives, without moving.
 
         Raises:
             ModelError: A joint has no drive, or the core cannot move such a group.

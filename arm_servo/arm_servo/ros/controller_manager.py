@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""controller_manager as MoveIt and rqt ask for it, and joint_state_broadcaster.
+"""The services of controller_manager that MoveIt and rqt use, and joint_state_broadcaster.
 
-The manager lists controllers and switches them; the broadcaster publishes ``joint_states`` and
+The manager lists and switches controllers; the broadcaster publishes ``joint_states`` and
 ``dynamic_joint_states``.
 """
 
@@ -47,7 +47,7 @@ def declare_manager(node: Node, model: RobotModel) -> tuple[str, bool]:
 
 @dataclass(slots=True)
 class Controller:
-    """A controller as the manager shows it."""
+    """A controller as listed by the manager."""
 
     name: str  # its name
     kind: str  # its type
@@ -58,7 +58,7 @@ class Controller:
     active: bool = True  # whether it is
 
     def state(self) -> ControllerState:
-        """Return it as a message."""
+        """Return the controller as a message."""
         return ControllerState(
             name=self.name,
             state='active' if self.active else 'inactive',
@@ -116,18 +116,18 @@ class ControllerManager:
 
 
 MAX_AGE = 0.5
-"""Age at which a measured value is published no more in [s]: as long as a drive may be silent."""
+"""Age in [s] from which a measured value is not published: as long as a drive may be silent."""
 
 
 class JointSamples(JointStateStore):
-    """What is known of the arm's joints, of drives beside them, and of joints that mimic these."""
+    """Measured values of the arm's joints, of other drives, and of mimic joints."""
 
     def __init__(self, joints: Sequence[str], mimics: Mapping[str, Mimic]) -> None:
         super().__init__()
         self._order, self._mimics = list(joints), mimics
 
     def fresh(self, snapshot: Snapshot, now: float) -> dict[str, JointSample]:
-        """Return what was measured lately, the arm's joints first."""
+        """Return the measured values that have not expired, the arm's joints first."""
         fresh = {
             name: sample
             for name, sample in (self._of_the_arm(snapshot) | dict(self.samples())).items()
@@ -168,7 +168,7 @@ def declare_broadcaster(node: Node) -> tuple[str, float, bool]:
 
 
 class JointStateBroadcaster:
-    """Publishes what the drives measure, stamped when the oldest of it was measured."""
+    """Publishes the drives' measurements, stamped with the time of the oldest one."""
 
     def __init__(
         self,
@@ -192,13 +192,13 @@ class JointStateBroadcaster:
         node.create_timer(1.0 / self.rate, self._publish)
 
     def entry(self) -> Controller:
-        """Return it as the manager shows it."""
+        """Return the broadcaster as the manager lists it."""
         kind = 'joint_state_broadcaster/JointStateBroadcaster'
         rate = round(self.rate)
         return Controller(self._node.get_name(), kind, rate, self.set_active, active=self.active)
 
     def set_active(self, active: bool) -> None:  # a callback of the manager
-        """Publish, or stop publishing."""
+        """Start or stop publishing."""
         self.active = active
 
     def _receive(self, message: JointState) -> None:

@@ -32,7 +32,7 @@ from .motion_goals import MotionGoal, MotionGoals
 
 @dataclass(frozen=True, slots=True)
 class GripperState:
-    """Where a gripper is."""
+    """Measured state of a gripper."""
 
     joints: Sequence[str]  # names of its joints
     measured: RobotState  # what was measured of them
@@ -42,7 +42,7 @@ class GripperState:
 
 @dataclass(frozen=True, slots=True)
 class GripperInterface:
-    """An action of a gripper; its goals and messages have no type."""
+    """Interface of one gripper action; its goals and messages are untyped."""
 
     action: Any
     name: str
@@ -51,7 +51,7 @@ class GripperInterface:
 
 
 def _parallel_request(goal: Any, joints: Sequence[str]) -> TargetRequest:  # noqa: ANN401
-    """Return what a goal asks; one joint need not be named."""
+    """Convert a goal to a target request; a single joint need not be named."""
     command = goal.command
     names = list(command.name) or list(joints[:1])
     if len(names) != len(command.position):
@@ -75,7 +75,7 @@ def _finite(positions: Mapping[str, float]) -> Mapping[str, float]:
 
 
 def _message(kind: Any, state: GripperState) -> Any:  # noqa: ANN401
-    """Return a state as a message, which may lack some of the fields."""
+    """Convert a state to a message that may lack some of the fields."""
     measured = state.measured
     fields = {
         'position': float(measured.position[0]),
@@ -97,7 +97,7 @@ SINGLE = GripperInterface(
     lambda goal, joints: TargetRequest(_finite({joints[0]: goal.command.position})),
     lambda goal: bool(goal.command.max_effort),
 )
-"""The position of the one joint."""
+"""The GripperCommand action, for a gripper of one joint."""
 
 PARALLEL = GripperInterface(
     ParallelGripperCommand,
@@ -105,12 +105,12 @@ PARALLEL = GripperInterface(
     _parallel_request,
     lambda goal: any(goal.command.effort),
 )
-"""Positions of joints, and how fast at most."""
+"""The ParallelGripperCommand action: joint positions and speed limits."""
 
 
 @dataclass(frozen=True, slots=True)
 class GripperParameters:
-    """How the gripper controller behaves."""
+    """Parameters of the gripper controller."""
 
     goal_tolerance: float = setting(0.002, 0.0, 10.0, 'how far a joint may be off [rad] or [m]')
     stall_velocity_threshold: float = setting(
@@ -141,8 +141,8 @@ class _Goal(MotionGoal):
 class GripperController:
     """``~/gripper_cmd`` and ``~/parallel_gripper_cmd``: positions of the joints of a gripper.
 
-    A newer goal, of either action, takes over. The drives are commanded positions: efforts of
-    goals are not limits here, which a warning says.
+    A newer goal of either action takes over. The drives get position commands: efforts in
+    goals are not applied as limits, and a warning says so.
     """
 
     def __init__(
@@ -152,7 +152,7 @@ class GripperController:
         parameters: GripperParameters,
         check_active: Callable[[], None],  # raises an ArmError where no motion may begin
     ) -> None:
-        """Offer them; the first only for a gripper of one joint."""
+        """Offer the actions; ``~/gripper_cmd`` only for a gripper of one joint."""
         self._node, self._gateway = node, gateway
         self._parameters = parameters
         self._check_active = check_active
@@ -217,13 +217,13 @@ class GripperController:
             goal.handle.publish_feedback(_message(interface.action.Feedback, goal.state))
 
     def _succeeds(self, state: GripperState) -> bool:
-        """Whether a goal that can go on is reached, or ends with something held."""
+        """Return whether a goal is reached, or the gripper stalls on an object and may."""
         return state.reached or (state.stalled and self._parameters.allow_stalling)
 
     def _hold(self) -> None:
-        """Hold the drives where they are, once a goal that was not reached has come to rest.
+        """Hold the measured position once the gripper rests after a goal that it did not reach.
 
-        They may be blocked, and would push on towards the place of the last set-point.
+        Blocked drives would otherwise keep pushing towards the last set-point.
         """
         snapshot, command = self._gateway.snapshot, self._abandoned
         point, measured = snapshot.set_point, snapshot.measured
@@ -249,7 +249,7 @@ class GripperController:
             )
 
     def _look(self, goal: _Goal, measured: RobotState) -> GripperState:
-        """Return where the gripper is, and whether it stalls or is there."""
+        """Return the measured state, and whether the gripper stalls or has reached the goal."""
         now, command, parameters = time.monotonic(), goal.command, self._parameters
         moves = bool((np.abs(measured.velocity) > parameters.stall_velocity_threshold).any())
         if goal.last_place is not None:  # joint states may have no velocities
@@ -266,7 +266,7 @@ class GripperController:
         return GripperState(self._joints, measured, stalled, reached)
 
     def _is_pushed(self, command: MotionCommand | None) -> bool:
-        """Whether set-points move the gripper, or have done so: not before it, or in a pause."""
+        """Return whether set-points move the gripper, or the motion has ended; not in a pause."""
         if command is None or command.motion is None:
             return False
         point = self._gateway.snapshot.set_point
@@ -278,14 +278,14 @@ class GripperController:
         )
 
     def _there(self, command: MotionCommand, measured: RobotState) -> bool:
-        """Whether all joints of a goal are within its tolerance."""
+        """Return whether all joints are within tolerance of the goal."""
         positions = dict(zip(self._joints, measured.position.tolist(), strict=True))
         targets = getattr(command.request, 'positions', {})
         tolerance = self._parameters.goal_tolerance
         return all(abs(positions[name] - target) <= tolerance for name, target in targets.items())
 
     def _problem(self, goal: _Goal, outcome: Outcome | None) -> str:
-        """Return why a goal cannot go on; empty while it can."""
+        """Return why a goal has failed; empty while it can continue."""
         if outcome is CONTINUED:
             return 'a newer goal took over'
         if outcome and (outcome.code is not GoalCode.SUCCESSFUL or outcome.canceled):

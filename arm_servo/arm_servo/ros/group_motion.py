@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The groups of a robot that are moved: the motion core of each, and the nodes that command it.
+"""Motion cores of a robot's moving groups, and the nodes that command them.
 
-The nodes refuse misspelt parameters. Two programs for one arm cannot run together, and the log
-says so.
+The nodes refuse misspelt parameters. Two programs must not move one arm; the log reports an
+error if they do.
 """
 
 from __future__ import annotations
@@ -32,29 +32,29 @@ TRAJECTORY_KIND = 'joint_trajectory_controller/JointTrajectoryController'
 
 @dataclass(frozen=True, slots=True)
 class Offers:
-    """What is offered for an arm; one of it at least."""
+    """Interfaces to offer for an arm; at least one."""
 
     jogging: bool = True  # servo_node
     trajectories: bool = True  # the trajectory controller
 
 
 MakeGateway = Callable[[Node, RobotModel, CoreSettings], CommandGateway]
-"""Builds the core of a group over its drives; its first node may say how."""
+"""Builds the core of a group for its drives; parameters of the given node may configure it."""
 
 MakeNode = Callable[[str], Node]  # makes the node of a name
 
 
 @dataclass(frozen=True, slots=True)
 class MovedGroup:
-    """A group of a robot, its core and the nodes that command it."""
+    """A moving group of a robot, its core, and the nodes that command it."""
 
     nodes: Sequence[Node]
     gateway: CommandGateway  # commands to the core
-    set_active: Callable[[bool], None] | None  # of the trajectory controller, if there is one
+    set_active: Callable[[bool], None] | None  # switches the trajectory controller, if any
     is_checked: bool = True  # whether the group is checked for collision
 
     def entries(self, period: float) -> list[Controller]:
-        """Return the trajectory controller, if there is one, as MoveIt and rqt look for it."""
+        """Return the entry of the trajectory controller, if any, for MoveIt and rqt."""
         if self.set_active is None:
             return []
         interfaces = [f'{joint}/position' for joint in self.gateway.model.joints]
@@ -66,7 +66,7 @@ class MovedGroup:
 def build_arm(
     model: RobotModel, controller: Node | None, servo: Node | None, make_gateway: MakeGateway
 ) -> MovedGroup:
-    """Offer a trajectory controller and a servo, or one of both.
+    """Offer a trajectory controller, a servo, or both for an arm.
 
     Args:
         controller: Node of the trajectory controller; None for none.
@@ -104,7 +104,7 @@ def build_arm(
 def build_tool(model: RobotModel, node: Node, make_gateway: MakeGateway) -> MovedGroup:
     """Offer a gripper and a trajectory controller of an end effector on one node.
 
-    Its links may touch, as a gripper holds something, unless ``check_self_collision`` is set.
+    Its links may touch, as when gripping, unless ``check_self_collision`` is set.
 
     Raises:
         ParameterError: A parameter is misspelt, of another kind or out of its range.
@@ -126,10 +126,10 @@ def build_tool(model: RobotModel, node: Node, make_gateway: MakeGateway) -> Move
 def build_groups(
     models: GroupModels, main: str, make_node: MakeNode, offers: Offers, make_gateway: MakeGateway
 ) -> list[MovedGroup]:
-    """Make the nodes and cores of all groups, the main arm first; nothing moves yet.
+    """Create the nodes and cores of all groups, the main arm first, without moving.
 
     Args:
-        main: Name of the main arm's trajectory controller; that of another group is
+        main: Name of the main arm's trajectory controller; the other groups use
             ``<group>_controller``.
 
     Raises:
@@ -162,7 +162,7 @@ def build_groups(
 
 
 def by_check(groups: Sequence[MovedGroup]) -> tuple[list[CommandGateway], list[CommandGateway]]:
-    """Return the gateways of the groups that are checked for collision, and of the others."""
+    """Return the gateways of the collision-checked groups, and of the other groups."""
     checked, others = (
         [each.gateway for each in groups if each.is_checked is wanted] for wanted in (True, False)
     )
@@ -180,18 +180,18 @@ OF_OTHERS = (
         )
     ),
 )
-"""Parameters that have no effect on some nodes, and look like those that have."""
+"""Parameters that have no effect on some nodes, but resemble parameters that have."""
 
 OF_PROGRAM = {'backend', 'jogging', 'trajectories'}  # read by motion_node before its nodes
 
 
 def check_names(nodes: Sequence[Node]) -> None:
-    """Refuse misspelt parameters of the nodes of a program, and log once those of none of them.
+    """Refuse misspelt parameters of a program's nodes; log unknown parameters once.
 
-    Configurations of MoveIt and ros2_control have many of the latter, and work as they are.
+    MoveIt and ros2_control configurations contain many unknown parameters, which do no harm.
 
     Raises:
-        ParameterError: A name looks like one that there is.
+        ParameterError: An unknown name resembles a declared one.
     """
     unknown = {name for node in nodes for name in refuse_misspelt(node, OF_OTHERS)} - OF_PROGRAM
     unused = [name for name in unknown if not any(node.has_parameter(name) for node in nodes)]
@@ -200,12 +200,12 @@ def check_names(nodes: Sequence[Node]) -> None:
         nodes[0].get_logger().info(f'parameters without effect here: {names}')
 
 
-WATCH_PERIOD = 1.0  # time between two looks at the graph in [s]
+WATCH_PERIOD = 1.0  # time between two checks of the graph in [s]
 OWN_SERVICE = 'pause'  # service that the trajectory controller of this package has, and no other
 
 
 def watch_other_programs(nodes: Sequence[Node], outputs: Sequence[str] = ()) -> None:
-    """Log an error for each program that moves the arm, too, when it appears."""
+    """Log an error whenever another program that moves the same arm appears."""
     known: set[str] = set()
 
     def look() -> None:
@@ -221,7 +221,7 @@ def watch_other_programs(nodes: Sequence[Node], outputs: Sequence[str] = ()) -> 
 
 
 def same_names(nodes: Sequence[Node]) -> list[str]:
-    """Return what is wrong where another node has the name of one of these."""
+    """Return a problem for each of these nodes whose name another node uses, too."""
     graph = [
         f'{namespace.rstrip("/")}/{name}'
         for name, namespace in nodes[0].get_node_names_and_namespaces()
@@ -236,7 +236,7 @@ def same_names(nodes: Sequence[Node]) -> list[str]:
 
 
 def _around_output(node: Node, output: str) -> list[str]:
-    """Return what is wrong with others that publish set-points, or that receive them."""
+    """Return problems with other publishers or with the subscribers of a set-point topic."""
     topic = node.resolve_topic_name(output)
     publishers = node.get_publishers_info_by_topic(topic)
     conflicts = []

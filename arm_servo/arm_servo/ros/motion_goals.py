@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Action goals that are motions of an arm: every goal becomes a command, and ends with a reason.
+"""Action goals that move an arm: every goal becomes a command, and its result has a reason.
 
-rclpy runs a goal in a callback or coroutine, which would keep the executor from everything else;
-here timers watch the commands. A goal that cannot be carried out is accepted and aborted at once,
-since a rejection could carry neither code nor reason.
+rclpy runs a goal in a callback or coroutine, which would block the executor; here timers poll the
+commands instead. A goal that cannot be executed is accepted and aborted at once, since a rejection
+could carry neither code nor reason.
 
-What is refused of topics is remembered: for the status as long as it is fresh, for the log once.
+Refused topic commands appear in the status while they are recent, and once in the log.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ from node_runner.action_goals import Ending, GoalServer, ServedGoal
 from ..controllers.controller import Outcome, Source
 from ..core.gateway import CommandGateway, MotionCommand
 
-START_TIMEOUT = 5.0  # time in which a goal must be planned and taken by the cycle in [s]
-REST_TIMEOUT = 10.0  # time after which a goal is answered although no rest was seen in [s]
+START_TIMEOUT = 5.0  # time in which a goal must be planned and started in [s]
+REST_TIMEOUT = 10.0  # time after which a result is sent although the arm moves in [s]
 
 
 @dataclass(slots=True, eq=False)
 class MotionGoal(ServedGoal):
     """A goal from its request to its end."""
 
-    number: int  # its place among all commands and stops
+    number: int  # sequence number among all commands and stops
     command: MotionCommand | None = None  # None for a goal that is refused at once
     begin: float = field(default_factory=time.monotonic)
     outcome: Outcome | None = None  # how it ended; None while it goes on
-    rest_by: float = math.inf  # steady time at which it is answered although the arm moves
-    unrest: str = ''  # says in the answer that no rest was seen; empty where it was
+    rest_by: float = math.inf  # steady time at which the result is sent although the arm moves
+    unrest: str = ''  # states in the result that the arm did not rest; empty if it did
 
 
 GoalT = TypeVar('GoalT', bound=MotionGoal)
@@ -58,7 +58,7 @@ class MotionGoals(GoalServer[GoalT]):
         name: str,
         *,
         accept: Callable[[int], GoalT],  # makes the record of a goal from its number
-        # requests the motion of a goal with its number; raises an ArmError where it is refused
+        # requests the motion of a numbered goal; raises an ArmError if it is refused
         request: Callable[[GoalT], MotionCommand],
         canceled: str,  # reason of an outcome that a client has asked for
         conclude: Callable[[GoalT], tuple[Ending, Any]],
@@ -81,11 +81,11 @@ class MotionGoals(GoalServer[GoalT]):
         )
 
     def outcome(self, goal: GoalT, timeout: float = START_TIMEOUT) -> Outcome | None:
-        """Return how the motion of a goal ended; None while it goes on.
+        """Return the outcome of a goal's motion; None while it continues.
 
         Args:
             goal: A goal whose motion was requested.
-            timeout: Time in which the cycle must begin with it in [s]; it is canceled then.
+            timeout: Time in [s] in which the motion must start; then the goal is canceled.
         """
         command = goal.command
         if command is None:
@@ -102,10 +102,10 @@ class MotionGoals(GoalServer[GoalT]):
         goal.command = self._request(goal)
 
     def has_stopped(self, goal: GoalT) -> bool:
-        """Return whether a goal that is ending can be answered.
+        """Return whether the result of an ended goal can be sent.
 
-        The arm has come to rest for it, others move the arm, or ``REST_TIMEOUT`` is over, which
-        the answer says.
+        That is when the arm is at rest, something else moves the arm, or ``REST_TIMEOUT`` has
+        expired, which the result reports.
         """
         has_ended = goal.command is None or goal.command.ended.done()  # first: a cycle may come
         now, snapshot = time.monotonic(), self._gateway.snapshot
@@ -129,48 +129,48 @@ class MotionGoals(GoalServer[GoalT]):
 STATUS_PERIOD = 0.5  # how long a refusal stands in the status in [s]
 
 REPEAT_PERIOD = 5.0
-"""Time without a refusal after which one that was logged is logged again in [s]."""
+"""Time in [s] without a refusal after which the same refusal is logged again."""
 
 NUMBER_PATTERN = re.compile(r'(?<![\w.])\d+(\.\d+)?')
-"""What differs from message to message of one stream, such as the age of its stamps."""
+"""Numbers, which differ between messages of one stream, such as the age of a stamp."""
 
 
 class LoggedReasons:
-    """Which reasons of one stream are in the log already."""
+    """Reasons of one stream that are already in the log."""
 
     def __init__(self, period: float = REPEAT_PERIOD) -> None:
-        """Log one again that has not come for a period in [s]."""
+        """Log a reason again if it has not occurred for ``period`` in [s]."""
         self._logged, self._period = ('', -math.inf), period
 
     def is_new(self, reason: str, now: float) -> bool:
-        """Return whether a reason is to be logged; one that differs in numbers only is not."""
+        """Return whether to log a reason; one that differs only in numbers counts as logged."""
         kind, (logged, seen) = NUMBER_PATTERN.sub('', reason), self._logged
         self._logged = (kind, now)
         return kind != logged or now - seen >= self._period
 
 
 class Refusals:
-    """Remembers the last refusal; any thread may note one, a single thread reports."""
+    """Stores the last refusal. Any thread may record one; a single thread reports them."""
 
     def __init__(self) -> None:
         self._last = ('', -math.inf)
         self._logged = LoggedReasons()
 
     def note(self, reason: str, now: float) -> None:
-        """Note why a command was refused."""
+        """Record why a command was refused."""
         self._last = (reason, now)
 
     def clear(self, sent: float) -> None:
-        """Note that a command of a time in [s] was taken: a refusal since then stands."""
+        """Clear refusals older than an accepted command that was sent at ``sent`` in [s]."""
         if self._last[1] <= sent:
             self._last = ('', -math.inf)
 
     def fresh(self, now: float) -> str:
-        """Return the refusal for the status; empty when there is none."""
+        """Return the recent refusal for the status; empty if there is none."""
         reason, since = self._last
         return reason if now - since <= STATUS_PERIOD else ''
 
     def to_log(self, now: float) -> str:
-        """Return the refusal if it is not in the log; one that differs in numbers only is."""
+        """Return the refusal unless it is logged already; differing numbers do not matter."""
         reason = self.fresh(now)
         return reason if reason and self._logged.is_new(reason, now) else ''

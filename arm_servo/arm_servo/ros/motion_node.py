@@ -22,7 +22,7 @@ from .topics_backend import serve_topics
 
 NAME = 'motion_node'
 
-SWITCH_INTERVAL = 0.0005  # how long a busy callback may keep the interpreter from the cycle in [s]
+SWITCH_INTERVAL = 0.0005  # longest time a busy callback may delay the cycle in [s]
 
 HELP = """\
 Jog an arm and send it trajectories: moveit_servo's and joint_trajectory_controller's interfaces.
@@ -46,7 +46,7 @@ servo_node and trajectory_controller for the same arm.
 
 
 def _serve_canopen(stop: threading.Event, offers: Offers) -> None:
-    from .canopen_backend import serve_canopen  # arm_canopen is not loaded where it has no use
+    from .canopen_backend import serve_canopen  # load arm_canopen only if needed
 
     serve_canopen(stop, offers)
 
@@ -56,7 +56,7 @@ BACKENDS: Mapping[str, Serve] = {'canopen': _serve_canopen, 'topics': serve_topi
 
 
 def _serve_declared(stop: threading.Event, _: Offers) -> None:
-    """Run what the parameters of the node ``motion_node`` say; it is there for them only."""
+    """Run as set by the parameters of node ``motion_node``, which exists only for them."""
     node = Node(NAME)
     try:
         read = ParameterReader(node)
@@ -76,7 +76,7 @@ def _run(name: str, serve: Serve, *, jogging: bool = True, trajectories: bool = 
     """Run until Ctrl-C or SIGTERM.
 
     Returns:
-        Exit code: 0, or 1 when parameters, the arm or the bus are refused.
+        Exit code: 0, or 1 if parameters, the arm or the bus are refused.
     """
     sys.setswitchinterval(SWITCH_INTERVAL)
     offers = Offers(jogging, trajectories)
@@ -84,7 +84,7 @@ def _run(name: str, serve: Serve, *, jogging: bool = True, trajectories: bool = 
 
 
 def main() -> int:
-    """Run what the parameters say."""
+    """Run as set by the parameters."""
     return _run(NAME, _serve_declared)
 
 
@@ -94,17 +94,17 @@ def motion_master() -> int:
 
 
 def motion_controller() -> int:
-    """Run motion_node with drives elsewhere."""
+    """Run motion_node with drives in another process."""
     return _run('motion_controller', serve_topics)
 
 
 def trajectory_controller() -> int:
-    """Run motion_node with drives elsewhere, for trajectories only: beside a servo, or none."""
+    """Run motion_node for trajectories only, with drives in another process."""
     return _run('trajectory_controller', serve_topics, jogging=False)
 
 
 def servo_node() -> int:
-    """Run motion_node with drives elsewhere, for jogging only: beside ros2_control."""
+    """Run motion_node for jogging only, with drives in another process (ros2_control)."""
     return _run('servo_node', serve_topics, trajectories=False)
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the nodes would refuse of a parameter file."""
+"""Offline check of a parameter file, as the nodes would check it."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ EVERY_NODE = '/**'  # name in a parameter file that stands for all nodes
 
 
 def check_parameters(models: GroupModels, document: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return what motion_node would refuse.
+    """Return the errors that motion_node would report for a parameter file.
 
-    They are asked themselves: the parameters are declared by the same functions, on nodes that
-    are not there. This needs rclpy, and starts nothing.
+    The nodes' own functions declare the parameters, on stand-ins instead of nodes. This needs
+    rclpy, but starts no node.
 
     Args:
         document: A parameter file: nodes, ``ros__parameters``, parameters.
 
     Returns:
-        Name of the node, and why it refuses: the first mistake of each.
+        For each node with errors, its name and the first error.
     """
     from node_runner import ParameterError, refuse_misspelt
 
@@ -49,7 +49,7 @@ def check_parameters(models: GroupModels, document: Mapping[str, Any]) -> list[t
 
 
 def _nodes(models: GroupModels, document: Mapping[str, Any]) -> dict[str, Declare]:
-    """Return what declares the parameters of each node."""
+    """Return the function that declares the parameters of each node, by node name."""
     from arm_model.ros import same_robot
     from node_runner import ParameterReader
 
@@ -95,7 +95,7 @@ def _nodes(models: GroupModels, document: Mapping[str, Any]) -> dict[str, Declar
 
 
 def _given(document: Mapping[str, Any], node: str) -> dict[str, Any]:
-    """Return the parameters of a node; later ones of the file count more, as in rcl."""
+    """Return the parameters of a node; later entries of the file win, as in rcl."""
     given: dict[str, Any] = {}
     names = {EVERY_NODE, node, f'/{node}', f'{EVERY_NODE}/{node}'}
     for name, table in document.items():
@@ -105,7 +105,7 @@ def _given(document: Mapping[str, Any], node: str) -> dict[str, Any]:
 
 
 class ParameterSheet:
-    """What declarations need of a node; made of the tables of a parameter file."""
+    """Stand-in for a node, with the parameter interface; filled from a parameter file."""
 
     def __init__(self, name: str, table: Mapping[str, Any]) -> None:
         self._name = name
@@ -121,26 +121,26 @@ class ParameterSheet:
     def declare_parameter(
         self, name: str, value: object, *_descriptor: object, **_: object
     ) -> SimpleNamespace:
-        """Keep a parameter."""
+        """Declare a parameter, and return it."""
         self._declared[name] = SimpleNamespace(name=name, value=value)
         return self.get_parameter(name)
 
     def has_parameter(self, name: str) -> bool:
-        """Whether it was declared."""
+        """Return whether a parameter was declared."""
         return name in self._declared
 
     def get_parameter(self, name: str) -> SimpleNamespace:
-        """Return what was declared."""
+        """Return a declared parameter."""
         parameter: SimpleNamespace = self._declared[name]
         return parameter
 
     def get_parameters_by_prefix(self, prefix: str) -> dict[str, SimpleNamespace]:
-        """Return what was declared below a prefix; empty for all."""
+        """Return the parameters below a prefix; an empty prefix returns all."""
         return {name: it for name, it in self._declared.items() if name.startswith(prefix)}
 
 
 def flat(table: Mapping[str, Any], prefix: str = '') -> dict[str, Any]:
-    """Return tables in tables as names with dots."""
+    """Flatten nested tables to one table with dotted names."""
     names: dict[str, Any] = {}
     for name, value in table.items():
         if isinstance(value, dict):

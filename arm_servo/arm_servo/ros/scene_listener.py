@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The scene of the planner, and where joints are, for the groups that are moved here.
+"""Updates the planning scene and the positions of other joints for the groups moved here.
 
-A group that moves by itself (another arm) is checked against where it came to rest; while it
-moves, :class:`MovingArms` keeps the two apart. Other joints beside the group (a gripper, a neck, a
-lift) are checked where they are, or were half a second ago.
+Another arm, which moves independently, is checked at its last rest position; while it moves,
+:class:`MovingArms` keeps the two apart. Other joints outside the group (a gripper, a neck, a lift)
+are checked at their measured positions, up to half a second old.
 """
 
 from __future__ import annotations
@@ -38,24 +38,24 @@ from ..core.safety_filter import MovingArms
 from .motion_goals import LoggedReasons
 
 SceneChange = Callable[[Scene, Array], Scene]
-"""Makes a scene of the one before and the positions of the group's joints in [rad]."""
+"""Computes a new scene from the previous one and the group's joint positions in [rad]."""
 
 MOVING_PERIOD = 0.5  # time between two scenes for a joint beside the group that moves in [s]
 
 PLACE_TOLERANCE = 1e-3
-"""How far a joint that stands still may seem to move in [rad] or [m]: noise of its sensor."""
+"""Greatest apparent motion of a joint at rest in [rad] or [m], from sensor noise."""
 
 
 @dataclass(frozen=True, slots=True)
 class JointPlaces:
-    """One look at the joints of a robot."""
+    """Snapshot of the joint positions of a robot."""
 
-    # where they are in [rad] or [m], by joint
+    # positions in [rad] or [m], by joint
     places: Mapping[str, float] = field(default_factory=dict)
-    moving: Collection[str] = frozenset()  # those that move
+    moving: Collection[str] = frozenset()  # joints that move
 
     def next(self, places: Mapping[str, float], commanded: Collection[str]) -> JointPlaces:
-        """Return the next look; a joint that was not there before counts as one that moves."""
+        """Return the next snapshot; a joint without an earlier position counts as moving."""
         moved = {
             joint
             for joint, place in places.items()
@@ -65,15 +65,15 @@ class JointPlaces:
 
 
 class SceneUpdater:
-    """Has the newest scene count for one group, as it is with the joints beside the group.
+    """Applies the newest scene to one group, with the joints outside the group where they are.
 
-    :meth:`change` is for one thread, :meth:`update` for another: it takes as long as it needs.
+    Call :meth:`change` in one thread and :meth:`update`, which may take long, in another.
     """
 
     def __init__(
         self,
         gateway: CommandGateway,
-        arms: Mapping[str, Sequence[str]],  # joints of the arms that move by themselves, by group
+        arms: Mapping[str, Sequence[str]],  # joints of independently moving arms, by group
         moving: MovingArms | None = None,
     ) -> None:
         self.gateway = gateway
@@ -86,37 +86,37 @@ class SceneUpdater:
         if self._unchecked:
             self._planned = model.scene.with_allowed(model.allowed)
         self._moved = -math.inf
-        self._changes: deque[SceneChange] = deque()  # the last whole scene, and those after it
+        self._changes: deque[SceneChange] = deque()  # the last whole scene, and later diffs
 
     @property
     def waits(self) -> bool:
-        """Whether a scene does not count yet."""
+        """Whether a scene change is pending."""
         return bool(self._changes)
 
     @property
     def others(self) -> Mapping[str, float]:
-        """Where the joints beside the group count in [rad], by joint."""
+        """Positions in [rad] used for the joints outside the group, by joint."""
         return self._planned.kinematics.others
 
     @property
     def is_placed(self) -> bool:
-        """Whether it is known where the group is, so that a scene can be applied."""
+        """Whether the position of the group is known, so that a scene can be applied."""
         return self.gateway.snapshot.reference is not None
 
     def change(self, change: SceneChange, *, is_whole: bool) -> None:
-        """Change the scene after the changes that wait; a whole scene replaces those."""
+        """Queue a scene change; a whole scene replaces the queued changes."""
         if is_whole:
             self._changes = deque([change])
         else:
             self._changes.append(change)
 
     def update(self, joints: JointPlaces, now: float) -> None:
-        """Apply the next change, if it is known where the group is.
+        """Apply the next change and new joint positions, if the group's position is known.
 
-        An equal scene changes nothing.
+        An equal scene has no effect.
 
         Raises:
-            ArmError: The scene is refused; the one before counts.
+            ArmError: The scene is refused; the previous one stays in use.
         """
         reference = self.gateway.snapshot.reference
         if reference is None:
@@ -144,11 +144,11 @@ class SceneUpdater:
             self._scene = scene
 
     def _moved_by(self, groups: Iterable[str]) -> frozenset[Pair]:
-        """Return the pairs of links that groups move."""
+        """Return the pairs of links that the given groups move."""
         return frozenset().union(*(self._moved_by_others[group] for group in groups))
 
     def _elsewhere(self, joints: JointPlaces, now: float) -> Mapping[str, float]:
-        """Return the joints beside the group that count where they are not any more."""
+        """Return new positions of joints outside the group that differ from those in use."""
         of_arms = {name for names in self._arms.values() for name in names}
         waits = now - self._moved < MOVING_PERIOD
         found = {
@@ -164,29 +164,29 @@ class SceneUpdater:
 
 
 TOPIC = 'collision_scene'
-"""Where move_group of arm_planning publishes what may collide, latched: after each change, meshes
-as the hulls that it has made, for programs that have a control cycle to keep."""
+"""Topic on which arm_planning's move_group publishes the collision scene, latched, after each
+change; meshes come as precomputed hulls, for programs with a control cycle."""
 
 FOREIGN_TOPIC = 'monitored_planning_scene'
-"""Where any move_group publishes its scene; it counts where nothing publishes the other topic."""
+"""Scene topic of any move_group; used if nothing publishes the other topic."""
 
 FOREIGN_DEPTH = 100  # messages of MoveIt's monitor that may wait, as it keeps as many
 
 ASK_AFTER = 1.0  # time from the start in [s] in which a whole scene may come by itself
 
-LOOK_PERIOD = 0.1  # time between two looks where the joints are in [s]
+LOOK_PERIOD = 0.1  # period of reading the joint positions in [s]
 ANSWER_TIMEOUT = 5.0
-"""Time in [s] for which a whole scene is awaited before it is requested again, and missed."""
+"""Time in [s] to wait for a requested whole scene before it is requested again."""
 
 PLACE_TIMEOUT = 1.0  # time for which a scene waits for a group's position without a warning in [s]
 OTHERS_TIMEOUT = 5.0  # time for which joints beside a group are awaited without a warning in [s]
 
 
 class SceneListener:
-    """Applies scenes and diffs to all groups, with the joints beside them where they are.
+    """Applies scenes, scene diffs and the positions of other joints to all groups.
 
-    Scenes are built and measured in a thread of their own: neither the executor nor a cycle waits.
-    What is refused is logged, once while it comes again and again.
+    A separate thread builds and measures scenes, so neither the executor nor a cycle waits. A
+    repeated refusal is logged once.
     """
 
     def __init__(
@@ -202,13 +202,13 @@ class SceneListener:
         worker: Executor | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Subscribe; to joint states only where there are joints besides those of the groups."""
+        """Subscribe to scenes, and to joint states if there are joints outside the groups."""
         self._node, self._clock = node, clock
         self._worker = worker or ThreadPoolExecutor(1, thread_name_prefix='scenes')
         arms = {gateway.model.group: gateway.model.joints for gateway in gateways}
         free = [gateway for gateway in gateways if gateway.model.moved_by_others]
         moving = MovingArms([gateway.model for gateway in free]) if free else None
-        if moving is not None:  # arms that move by themselves know of each other
+        if moving is not None:  # independently moving arms share their stops
             for gateway in free:
                 gateway.keep_apart(moving.neighbours(gateway.model.joints))
         self._updaters = [
@@ -225,7 +225,7 @@ class SceneListener:
         self._due = self._begin + ASK_AFTER  # when it is requested next
         self._missed = math.inf  # since when it is known to be missing
         self._client = node.create_client(GetPlanningScene, 'get_planning_scene')
-        self._unplaced = list(self._updaters)  # those of which no warning has said so
+        self._unplaced = list(self._updaters)  # no warning logged yet
         self._assuming = list(self._updaters)  # the same for joints beside them
         self._placed: dict[SceneUpdater, float] = {}  # since when
         self._joints = JointPlaces()
@@ -249,7 +249,7 @@ class SceneListener:
         node.create_timer(LOOK_PERIOD, self._look)
 
     def _take_volatile(self, data: bytes) -> None:
-        """Take a scene that comes in no other way."""
+        """Handle a volatile scene message, if no latched topic provides it."""
         publishers = self._node.get_publishers_info_by_topic(FOREIGN_TOPIC)
         if all(each.qos_profile.durability != LATCHED.durability for each in publishers):
             self._take_foreign(data)
@@ -259,7 +259,7 @@ class SceneListener:
             self._take(deserialize_message(data, PlanningScene))
 
     def _ask(self) -> None:
-        """Request the whole scene, until it comes, of a move_group that began before this node."""
+        """Request the whole scene of a move_group that started earlier, until it arrives."""
         now = self._clock()
         if self._is_complete or now < self._due:
             return
@@ -294,7 +294,7 @@ class SceneListener:
     def _change(
         self, message: PlanningScene, model: RobotModel, scene: Scene, positions: Array
     ) -> Scene:
-        """Apply a message; in the thread of the scenes."""
+        """Apply a message to a scene; runs in the scene thread."""
         try:
             return apply_planning_scene(scene, message, positions, world_frames=model.world_frames)
         except Exception:
@@ -306,7 +306,7 @@ class SceneListener:
         self._states.receive(message.name, message.position, [], self._clock())
 
     def _look(self) -> None:
-        """Read where the joints are, and submit what is new."""
+        """Read the joint positions, and submit updates to the scene thread."""
         places = {name: each.position for name, each in self._states.samples().items()}
         commanded = set[str]()
         for gateway in self._gateways:
@@ -330,7 +330,7 @@ class SceneListener:
                 self._worker.submit(self._update, updater, joints, now)
 
     def _update(self, updater: SceneUpdater, joints: JointPlaces, now: float) -> None:
-        """Apply what is new for a group; in the thread of the scenes."""
+        """Apply pending updates to a group; runs in the scene thread."""
         try:
             updater.update(joints, now)
         except Exception as error:  # noqa: BLE001  # a scene must not end the thread
@@ -344,7 +344,7 @@ class SceneListener:
                 )
 
     def _warn_of_whole(self) -> None:
-        """Say that objects may be missing."""
+        """Warn that objects may be missing from the scene."""
         if not self._is_complete and self._clock() - self._missed > ANSWER_TIMEOUT:
             self._node.get_logger().warning(
                 f'{FOREIGN_TOPIC}: no whole scene came in {ANSWER_TIMEOUT:g} s: only what diffs'
@@ -355,7 +355,7 @@ class SceneListener:
             )
 
     def _warn_of_groups(self) -> None:
-        """Name once each group for which a scene waits, as it is not known where it is."""
+        """Warn once for each group whose scene waits because its position is unknown."""
         for updater in self._unplaced.copy():
             waited = self._clock() - self._received
             if updater.waits and not updater.is_placed and waited > PLACE_TIMEOUT:
@@ -367,7 +367,7 @@ class SceneListener:
                 )
 
     def _warn_of_others(self) -> None:
-        """Name once the joints beside each group of which it is not known where they are."""
+        """Warn once of the joints outside each group whose positions are unknown."""
         now = self._clock()
         for updater in self._assuming.copy():
             if updater.is_placed and now - self._placed.setdefault(updater, now) > OTHERS_TIMEOUT:

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""MoveIt's servo node: topics and services of moveit_servo on the motion core.
+"""Servo node with the topics and services of moveit_servo, on the motion core.
 
-Its status has moveit_servo's code, and in words what limits the motion.
+Its status has moveit_servo's code, and a message that says what limits the motion.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ CODES = {
     ),
     Cause.JOINT_POSITION: (ServoStatus.JOINT_BOUND, ServoStatus.JOINT_BOUND),
 }
-"""Codes of what slows a motion down, and of what halts it; speed and acceleration have none."""
+"""Status codes (slowed, halted) of each cause; speed and acceleration limits have none."""
 
 
 def code_of(report: MotionReport) -> int:
-    """Return the code for what limits most."""
+    """Return the status code of the strongest limiter."""
     for limiter in report.limiters:
         if limiter.cause in CODES:
             return int(CODES[limiter.cause][limiter.factor < HALTED_SPEED_FACTOR])
@@ -60,10 +60,10 @@ def code_of(report: MotionReport) -> int:
 def status_of(
     snapshot: Snapshot, refusal: str, paused: str, capped: str, age: float = 0.0
 ) -> tuple[int, str]:
-    """Return code and message.
+    """Return status code and message.
 
     Args:
-        refusal: Why the last command was refused, with the remedy; empty when it was not.
+        refusal: Why the last command was refused, with the remedy; empty if it was accepted.
     """
     if refusal := refusal or snapshot.stale(age):
         return ServoStatus.INVALID, refusal
@@ -96,7 +96,7 @@ MAX_STAMP_AHEAD = 0.1  # how far ahead of this clock a stamp may be in [s]
 class Servo:
     """``~/delta_twist_cmds``, ``~/delta_joint_cmds``, ``~/pose_target_cmds``, and services.
 
-    Until a client chooses a type, every command is taken for what it is.
+    Until a client selects a command type, commands of every type are accepted.
     """
 
     def __init__(
@@ -195,8 +195,8 @@ class Servo:
     def _send(
         self, request: JogRequest | DisplacementRequest, client: tuple[CommandType, str]
     ) -> None:
-        """Command a motion."""
-        # the events executor hands out no publisher, so topic and frame stand for the client
+        """Send a request to the motion core."""
+        # the events executor provides no publisher, so topic and frame identify the client
         note = partial(self._note, time.monotonic())
         if isinstance(request, JogRequest):
             request = replace(request, client=client)
@@ -209,7 +209,7 @@ class Servo:
         command.ended.add_done_callback(self._note_end)
 
     def _admitted(self, kind: CommandType, message: Any) -> float:  # noqa: ANN401
-        """Return how long ago a message was sent in [s]."""
+        """Check that a message is acceptable now; return its age in [s]."""
         if self._paused:
             raise CommandError(self._paused)
         if self._kind is not None and self._kind is not kind:
@@ -233,7 +233,7 @@ class Servo:
         return max(age, 0.0)
 
     def _note(self, sent: float, future: Future[Any]) -> None:
-        """Remember what became of a command; in the cycle, so nothing is logged here."""
+        """Record whether a command was accepted; runs in the cycle, so it must not log."""
         error = None if future.cancelled() else future.exception()
         if error is not None:
             self._refuse(str(error))
@@ -241,7 +241,7 @@ class Servo:
             self._refusals.clear(sent)
 
     def _note_end(self, future: Future[Outcome]) -> None:
-        """Remember why a displacement did not get to its end."""
+        """Record why a displacement did not reach its end."""
         if future.result().code is GoalCode.PATH_TOLERANCE_VIOLATED:
             self._refuse(future.result().reason)
 

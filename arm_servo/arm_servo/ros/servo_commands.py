@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The servo's parameters, under moveit_servo's names, and its messages as requests."""
+"""The servo's parameters, with moveit_servo's names, and conversion of messages to requests."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ from ..core.requests import by_joint, DisplacementRequest, JogRequest
 PREFIX = 'moveit_servo.'
 
 DEFAULT_LINEAR_SPEED, DEFAULT_ANGULAR_SPEED = 0.4, 0.8
-"""Scales of the tool's speeds in [m/s] and [rad/s]."""
+"""Default scales of tool speed in [m/s] and [rad/s]."""
 
 
 CLEARANCE_FACTOR = 0.5
-"""Share of the distance at which jogs come to rest in front of links that a stop may use up."""
+"""Clearance of a stop, as a share of the distance to links at which jogs come to rest."""
 
 
 class Units(Enum):
-    """What the numbers of commands are."""
+    """Units of the numbers in commands."""
 
     UNITLESS = 'unitless'
     SPEED = 'speed_units'
@@ -49,7 +49,7 @@ class Units(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Scales:
-    """How numbers of commands become speeds; may be changed while the servo runs."""
+    """Scales that convert command values to speeds; may change while the servo runs."""
 
     units: Units  # what the numbers are
     # 0 is no cap
@@ -65,7 +65,7 @@ class Scales:
 
 @dataclass(frozen=True, slots=True)
 class ServoParameters:
-    """How the servo behaves."""
+    """Parameters of the servo."""
 
     # least distance between links that a jog may bring about in [m]; None is any
     clearance: float | None
@@ -122,7 +122,7 @@ def declare_servo(node: Node, model: RobotModel) -> ServoParameters:
 
 
 def _joint_margins(read: ParameterReader, limits: JointLimits) -> tuple[float, ...]:
-    """Read how far from the limits of the joints jogs come to rest: Jazzy's list, or Humble's."""
+    """Read the margins of jogs to the joint limits: Jazzy's list, or Humble's number."""
     meaning = 'distance from the position limits at which jogs come to rest [rad]'
     one = read.number('joint_limit_margin', 0.0, (0.0, 10.0), f'{meaning}, of all joints')
     margins = read.numbers('joint_limit_margins', f'{meaning}: one for all, or one each') or (one,)
@@ -141,7 +141,7 @@ def _joint_margins(read: ParameterReader, limits: JointLimits) -> tuple[float, .
 
 
 def read_scales(node: Node) -> Scales:
-    """Return the scales as they are set now.
+    """Return the current scales.
 
     Raises:
         ModelError: command_in_type is unknown.
@@ -169,7 +169,7 @@ MAX_DURATION = 60.0  # longest duration of a joint jog in [s]
 
 
 class CommandConverter:
-    """Makes requests of messages; what is wrong with one is raised before anything moves.
+    """Converts messages to requests; raises an error for an invalid message.
 
     A request expires some time after its message was sent; both are steady times in [s].
     """
@@ -178,13 +178,13 @@ class CommandConverter:
         self, model: RobotModel, frames: TfListener, parameters: ServoParameters, scales: Scales
     ) -> None:
         self.scales = scales
-        self.capped = ''  # what was cut off the last command, in words; empty when nothing was
+        self.capped = ''  # how the last command was capped, as text; empty if it was not
         self._model = model
         self._frames = frames
         self._parameters = parameters
 
     def twist(self, message: Any, sent: float) -> JogRequest:  # noqa: ANN401  # messages have no type
-        """Return the request of a TwistStamped.
+        """Convert a TwistStamped to a request.
 
         Raises:
             CommandError: A number is not finite, or the frame is unknown.
@@ -203,10 +203,10 @@ class CommandConverter:
         return JogRequest(TwistCommand(twist, link, axes), expires, about)
 
     def jog(self, message: Any, sent: float) -> JogRequest | DisplacementRequest:  # noqa: ANN401
-        """Return the request of a JointJog: speeds for a duration, or displacements.
+        """Convert a JointJog to a request: speeds for a duration, or displacements.
 
         Raises:
-            CommandError: Lengths differ, a number is not finite, or it has both or neither.
+            CommandError: Lengths differ, a number is not finite, or both or neither are given.
         """
         names = list(message.joint_names)
         if len(set(names)) < len(names):
@@ -237,10 +237,10 @@ class CommandConverter:
         )
 
     def pose(self, message: Any, sent: float) -> JogRequest:  # noqa: ANN401
-        """Return the request of a PoseStamped.
+        """Convert a PoseStamped to a request.
 
         Raises:
-            CommandError: A number is not finite, the quaternion is none, or the frame is unknown.
+            CommandError: A number is not finite, the quaternion invalid or the frame unknown.
         """
         position = checked(xyz(message.pose.position), 3, 'position')
         goal = Pose(rotation_of(xyzw(message.pose.orientation)), position)
@@ -256,11 +256,11 @@ class CommandConverter:
         return JogRequest(command, expires, self._place(frame) if frame else None)
 
     def _place(self, frame: str) -> str | Pose:
-        """Return a link, whose pose changes with the arm, or the pose of another frame."""
+        """Return a link name for a frame that moves with the arm, else the pose of the frame."""
         return self._frames.link(frame) or self._frames.pose(frame)
 
     def _scaled(self, twist: Array) -> Array:
-        """Return a twist in [m/s] and [rad/s]; what is cut off is in ``capped``."""
+        """Return a twist in [m/s] and [rad/s]; store in ``capped`` what the caps cut off."""
         scales = self.scales
         most = np.array([scales.linear, scales.rotational])
         if scales.units is Units.UNITLESS:

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The back end for drives elsewhere: joint states in, a loop for each group, set-points out.
+"""Back end for drives in other processes: joint states in, one loop per group, set-points out.
 
-Set-points are messages to a controller elsewhere, as moveit_servo sends them.
+It publishes set-points to another controller, as moveit_servo does.
 """
 
 from __future__ import annotations
@@ -57,12 +57,12 @@ from .scene_listener import SceneListener
 from .servo_commands import PREFIX
 
 ARRAY_TOPIC = 'forward_position_controller/commands'
-"""Default of command_out_topic, the name that ros2_controllers' examples use; that of a group
-beside the main one begins with the group's name."""
+"""Default of command_out_topic, as in the examples of ros2_controllers; groups other than the main
+one prefix it with their name."""
 
 
 def serve_topics(stop: threading.Event, offers: Offers) -> None:
-    """Move a robot until stopped; it comes to rest before that ends."""
+    """Run until stopped, then bring the robot to rest."""
     nodes: list[Node] = []
     with ExitStack() as stack:
 
@@ -92,10 +92,10 @@ def serve_topics(stop: threading.Event, offers: Offers) -> None:
 
 
 def build_motion(make_node: MakeNode, offers: Offers) -> Sequence[MotionThread]:
-    """Put interfaces, cores, feedback and output together; nothing runs yet.
+    """Assemble interfaces, cores, feedback and output, without starting them.
 
     Args:
-        make_node: Makes the nodes; they live until the program ends.
+        make_node: Creates the nodes, which live until the program ends.
 
     Returns:
         The loop of each group.
@@ -127,7 +127,7 @@ def build_motion(make_node: MakeNode, offers: Offers) -> Sequence[MotionThread]:
 
 
 def _beside_a_controller(servo: Node) -> MotionThread:
-    """Put a servo together that jogs the arm of a trajectory controller elsewhere."""
+    """Assemble a servo that jogs the arm of a trajectory controller in another process."""
     model = declare_robot(servo)
     for note in model.notes:
         servo.get_logger().warning(note)
@@ -147,7 +147,7 @@ def _beside_a_controller(servo: Node) -> MotionThread:
 
 
 class TopicDrives:
-    """Drives elsewhere under a core: joint states in, set-points out."""
+    """Connects a motion core to drives in another process: joint states in, set-points out."""
 
     def __init__(
         self,
@@ -185,12 +185,12 @@ TRAJECTORY = 'trajectory_msgs/JointTrajectory'
 ARRAY = 'std_msgs/Float64MultiArray'
 
 THREAD_PRIORITY = 40
-"""SCHED_FIFO priority of the loop, unless a parameter says another; that of moveit_servo."""
+"""Default SCHED_FIFO priority of the loop, as in moveit_servo."""
 
 
 @dataclass(frozen=True, slots=True)
 class OutputParameters:
-    """What is published."""
+    """Parameters of the published set-points."""
 
     topic: str  # where to
     kind: str  # :data:`TRAJECTORY` or :data:`ARRAY`
@@ -203,7 +203,7 @@ def declare_output(node: Node, prefix: str, topic: str, kind: str) -> OutputPara
     """Declare moveit_servo's parameters of the output.
 
     Raises:
-        ModelError: The type is unknown, or does not carry what is to be in it.
+        ModelError: The type is unknown, or cannot carry the selected fields.
     """
     read = ParameterReader(node, prefix)
     parameters = OutputParameters(
@@ -228,7 +228,7 @@ def declare_output(node: Node, prefix: str, topic: str, kind: str) -> OutputPara
 
 @dataclass(frozen=True, slots=True)
 class LoopParameters:
-    """How the loop runs."""
+    """Parameters of the control loop."""
 
     thread_priority: int  # SCHED_FIFO priority of its thread; 0 is none
     following: FollowingLimits  # when the arm counts as not following
@@ -240,7 +240,7 @@ class LoopParameters:
 
 
 def declare_loop(node: Node, prefix: str) -> LoopParameters:
-    """Declare how the loop runs."""
+    """Declare the parameters of the control loop."""
     read = ParameterReader(node, prefix)
     return read.settings(
         LoopParameters,
@@ -250,7 +250,7 @@ def declare_loop(node: Node, prefix: str) -> LoopParameters:
 
 
 class TopicOutput:
-    """Publishes set-points; for the thread of the cycle."""
+    """Publishes set-points; call it in the thread of the cycle."""
 
     def __init__(
         self, node: Node, parameters: OutputParameters, joints: list[str], period: float

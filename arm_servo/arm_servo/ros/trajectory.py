@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The trajectory controller's topics, services and action on a node.
+"""Topics, services and action of the trajectory controller.
 
-Every goal of FollowJointTrajectory ends with a code and the reason.
+Every result of FollowJointTrajectory has a code and a reason.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ START_TIMEOUT_PER_POINT = 0.01  # time to plan each point of a goal in [s]
 
 
 class TrajectoryAction:
-    """The action server."""
+    """Action server of FollowJointTrajectory."""
 
     def __init__(
         self,
@@ -120,7 +120,7 @@ class TrajectoryAction:
         return FollowJointTrajectory.Result(error_code=int(code), error_string=reason)
 
 
-TOPIC = 'joint_trajectory'  # stands for all who publish there: their names are not known
+TOPIC = 'joint_trajectory'  # identifies all its publishers, whose names are unknown
 
 SOURCE_WORDS = {
     Source.TRAJECTORY: 'the trajectory',
@@ -130,7 +130,7 @@ SOURCE_WORDS = {
 
 
 class TrajectoryPause:
-    """Holds whatever moves the arm, and lets it go on."""
+    """Pauses and resumes all motion of the arm."""
 
     def __init__(self, node: Node, gateway: CommandGateway) -> None:
         self._gateway = gateway
@@ -156,7 +156,7 @@ class TrajectoryPause:
 
 
 def words_of_pause(snapshot: Snapshot) -> str:
-    """Return what a pause does."""
+    """Describe the effect of a pause."""
     if snapshot.paused:
         return 'is paused already; ~/resume goes on'
     if snapshot.source is Source.NONE:
@@ -167,7 +167,7 @@ def words_of_pause(snapshot: Snapshot) -> str:
 
 
 def words_of_resume(snapshot: Snapshot) -> str:
-    """Return what goes on."""
+    """Describe the motion that resumes after a pause."""
     if not snapshot.paused:
         return 'was not paused'
     if snapshot.speed == 0.0:
@@ -178,7 +178,7 @@ def words_of_resume(snapshot: Snapshot) -> str:
 
 
 class TrajectoryController:
-    """``~/follow_joint_trajectory``, ``~/joint_trajectory`` and what belongs to them."""
+    """``~/follow_joint_trajectory``, ``~/joint_trajectory`` and their services."""
 
     def __init__(
         self,
@@ -216,7 +216,7 @@ class TrajectoryController:
             self._override(parameters.speed)
 
     def set_active(self, active: bool) -> None:  # a callback of the manager
-        """Accept trajectories, or stop on the path and accept none."""
+        """Accept trajectories; if inactive, stop on the path and refuse them."""
         self.active = active
         if active:
             self._gateway.renew(Source.TRAJECTORY)
@@ -233,10 +233,10 @@ class TrajectoryController:
         return self._gateway.request(goal, number)
 
     def check_active(self) -> None:
-        """Make sure that it is active.
+        """Check that the controller is active.
 
         Raises:
-            NotReadyError: It was deactivated.
+            NotReadyError: The controller was deactivated.
         """
         if not self.active:
             name = self._node.get_name()
@@ -295,7 +295,7 @@ class TrajectoryController:
             reason = self._news.popleft()
             if self._logged.is_new(reason, time.monotonic()):
                 self._node.get_logger().warning(reason)
-        if not self._state.get_subscription_count():  # it costs a tenth of a processor
+        if not self._state.get_subscription_count():  # publishing takes a tenth of a processor
             return
         snapshot = self._gateway.snapshot
         wanted, measured = snapshot.reference, snapshot.measured

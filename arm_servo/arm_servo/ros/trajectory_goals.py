@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The trajectory controller's parameters, under joint_trajectory_controller's names, and messages.
+"""Parameters and message conversion of the trajectory controller.
 
-Trajectories, tolerances and states are converted between ROS messages and the core.
+The parameters have joint_trajectory_controller's names. Messages are trajectories and states.
 """
 
 from __future__ import annotations
@@ -32,24 +32,24 @@ from ..controllers.trajectory import ExecutionSettings
 RATE_RANGE = (0.1, 1000.0)  # span of rates in [Hz]
 
 GOAL_TOLERANCE = 0.05
-"""Default tolerance at the goal in [rad]: an arm that has not arrived is no success."""
+"""Default goal tolerance in [rad], so that an arm that has not arrived is reported."""
 
 GOAL_RANGE_SHARE = 0.02
-"""Share of the range of an arm's joint that the default is at most: 0.05 m is far on a slide."""
+"""Upper bound of the default as a share of a joint's range, for short prismatic joints."""
 
 GOAL_TIME = 5.0
-"""Default of the time to come within it in [s]: a client of a stuck arm gets a result."""
+"""Default goal time tolerance in [s], so that a client of a stuck arm gets a result."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryParameters:
-    """How the trajectory controller behaves."""
+    """Parameters of the trajectory controller."""
 
     execution: ExecutionSettings  # how trajectories are accepted and followed
     monitor_rate: float  # rate of the action's feedback in [Hz]
     state_rate: float  # rate of ~/controller_state in [Hz]
     speed: float  # speed scaling at the start, 0 to 1
-    check: bool  # whether motions on whose way links meet are refused
+    check: bool  # whether to refuse motions whose path has a collision
     rest_speed: float  # above which a joint moves in [rad/s] or [m/s]
 
 
@@ -59,12 +59,12 @@ def declare_trajectory(
     """Declare the parameters of the trajectory controller.
 
     Args:
-        limits: Their limits; None for an end effector, whose joints may end at what they hold.
-        checks: Default of whether motions on whose way links meet are refused.
+        limits: Joint limits; None for an end effector, which may stop at the object it grips.
+        checks: Default of whether to refuse motions whose path has a collision.
 
     Raises:
-        ModelError: The parameter ``joints`` names others, or an interface is asked for that there
-            is not.
+        ModelError: The parameter ``joints`` names other joints, or an interface is not
+            supported.
     """
     read = ParameterReader(node)
     named = read.texts('joints', list(joints), "names of the joints: those of the arm's group")
@@ -118,7 +118,7 @@ def _goal_tolerances(joints: Sequence[str], limits: JointLimits | None) -> Seque
 
 
 def declare_check(read: ParameterReader, *, default: bool = True) -> bool:
-    """Declare whether motions on whose way links meet are refused."""
+    """Declare whether to refuse motions whose path has a collision."""
     return read.flag(
         'check_self_collision',
         'refuse trajectories and displacements on whose way links of the arm collide',
@@ -133,7 +133,7 @@ def _constraint(read: ParameterReader, joint: str, kind: str, default: float) ->
 
 
 def _declare_interfaces(read: ParameterReader) -> None:
-    """Accept parameters of ros2_control's configurations, and refuse what is not offered."""
+    """Declare ros2_control's interface parameters, and refuse unsupported values."""
     wanted = read.texts('command_interfaces', ['position'], 'position is what is commanded')
     if set(wanted) - {'position', 'velocity'} or 'position' not in wanted:
         raise ModelError(f'command_interfaces {wanted}: positions are commanded, use [position]')
@@ -149,10 +149,10 @@ def goal_of_trajectory(
     message: Any,  # noqa: ANN401  # message classes have no type
     now: float,  # ROS time in [s]
 ) -> TrajectoryGoal:
-    """Return the goal that a JointTrajectory is.
+    """Convert a JointTrajectory to a goal.
 
     Raises:
-        GoalError: It has efforts, which nothing would follow.
+        GoalError: The message contains efforts, which are not supported.
     """
     stamp = seconds(message.header.stamp)
     if any(len(point.effort) for point in message.points):
@@ -176,10 +176,10 @@ def goal_of_action(
     request: Any,  # noqa: ANN401
     now: float,  # ROS time in [s]
 ) -> TrajectoryGoal:
-    """Return the goal that a goal of FollowJointTrajectory is.
+    """Convert a FollowJointTrajectory goal message to a goal.
 
     Raises:
-        GoalError: It has parts that nothing would follow.
+        GoalError: The message contains fields that are not supported.
     """
     if request.multi_dof_trajectory.points or request.multi_dof_trajectory.joint_names:
         raise GoalError(GoalCode.INVALID_JOINTS, 'multi_dof_trajectory: the arm has none')
@@ -198,7 +198,7 @@ def goal_of_action(
 
 
 def point_of(state: RobotState, time: float = 0.0) -> JointTrajectoryPoint:
-    """Return a state as a point."""
+    """Convert a state to a trajectory point."""
     point = JointTrajectoryPoint(
         positions=state.position.tolist(),
         velocities=state.velocity.tolist(),
@@ -210,7 +210,7 @@ def point_of(state: RobotState, time: float = 0.0) -> JointTrajectoryPoint:
 
 
 def difference(limits: JointLimits, wanted: RobotState, actual: RobotState) -> RobotState:
-    """Return wanted less actual; accelerations are not measured, so theirs are zero."""
+    """Return wanted minus actual; accelerations, which are not measured, are zero."""
     return RobotState(
         limits.error(wanted.position, actual.position),
         wanted.velocity - actual.velocity,

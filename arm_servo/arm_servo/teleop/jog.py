@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a person wants to be moved in shares of full speed, and what that means to a servo."""
+"""Jog commands of a person, as shares of full speed, and their conversion to servo commands."""
 
 from __future__ import annotations
 
@@ -9,54 +9,54 @@ from enum import auto, Enum
 import math
 
 Vector = tuple[float, float, float]
-"""Along or about x, y and z."""
+"""Linear or angular components along x, y and z."""
 
 UNITLESS = 'unitless'  # command_in_type of a servo that multiplies by its scales itself
 
 
 ServoReport = tuple[int, str]
-"""Code of a servo's status, where 0 is well and a negative one refuses; and the same in words."""
+"""Status of a servo: code (0: no warning, negative: refused) and message."""
 
 
 class Frame(Enum):
-    """Along whose axes the tool is jogged."""
+    """Frame along whose axes the tool is jogged."""
 
     BASE = 'base'
     TOOL = 'tool'
 
 
 class ServoRequest(Enum):
-    """What else a person can request besides a motion."""
+    """Requests of a person other than motions."""
 
     TOGGLE_PAUSE = auto()
-    """Pause the servo, or let it go on."""
+    """Pause or resume the servo."""
 
     STOP_ROBOT = auto()
-    """Stop the whole robot, whatever moves it."""
+    """Stop every motion of the robot."""
 
 
 @dataclass(frozen=True, slots=True)
 class CartesianJog:
-    """Move the tool, by shares of its full linear and rotational speed, -1 to 1."""
+    """Move the tool at shares of its full linear and rotational speed, -1 to 1."""
 
     linear: Vector = (0.0, 0.0, 0.0)
     angular: Vector = (0.0, 0.0, 0.0)
     frame: Frame = Frame.BASE
 
     def scaled(self, linear: float, angular: float) -> CartesianJog:
-        """Return the same motion, slower or faster by these factors."""
+        """Return the motion with linear and angular speed multiplied by these factors."""
         return CartesianJog(_times(self.linear, linear), _times(self.angular, angular), self.frame)
 
 
 @dataclass(frozen=True, slots=True)
 class JointJog:
-    """Move a joint by its place, 0 for the first, by a share of the full joint speed, -1 to 1."""
+    """Move a joint, given by its index from 0, at a share of full joint speed, -1 to 1."""
 
     joint: int
     velocity: float = 0.0
 
     def scaled(self, factor: float) -> JointJog:
-        """Return the same motion, slower or faster by a factor."""
+        """Return the motion with its speed multiplied by a factor."""
         return replace(self, velocity=self.velocity * factor)
 
 
@@ -64,7 +64,7 @@ Jog = CartesianJog | JointJog
 
 
 def rest_of(jog: Jog | None) -> Jog:
-    """Return the command that ends a motion, in the kind of the motion."""
+    """Return the zero command, of the same type, that ends a motion."""
     match jog:
         case JointJog(joint):
             return JointJog(joint)
@@ -83,7 +83,7 @@ class Scales:
     unitless: bool = True  # the servo multiplies by these itself; else it receives speeds
 
     def to_message(self, jog: Jog) -> Jog:
-        """Return the numbers that the servo is sent for a motion."""
+        """Convert a motion to the values to send to the servo."""
         if self.unitless:
             return jog
         if isinstance(jog, JointJog):
@@ -93,10 +93,10 @@ class Scales:
 
 @dataclass(frozen=True, slots=True)
 class Steps:
-    """How far a stroke moves in step mode.
+    """Distance that a key stroke moves in step mode.
 
-    A step is a motion of a certain time, so it works with every servo; begin and end have the same
-    ramps, so the way is speed times time.
+    A step is a motion of fixed duration, so it works with every servo; start and end have the same
+    ramps, so the distance is speed times time.
     """
 
     linear: float = 1e-3  # of the tool [m]
@@ -104,10 +104,10 @@ class Steps:
     duration: float = 0.2  # least time of a step [s]
 
     def pulse(self, jog: Jog, scales: Scales) -> tuple[Jog, float]:
-        """Return the motion that makes a step, and how long it takes [s].
+        """Return the motion of one step, and its duration in [s].
 
         Args:
-            jog: The direction, with the greatest speed that is wished for.
+            jog: The direction, and the greatest speed allowed.
             scales: Full speeds of the servo.
         """
         if isinstance(jog, JointJog):

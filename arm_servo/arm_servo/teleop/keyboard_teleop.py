@@ -45,10 +45,10 @@ TOOL = {
     'f': CartesianJog(angular=(0.0, 0.0, 1.0)),
     'v': CartesianJog(angular=(0.0, 0.0, -1.0)),
 }
-"""Keys that move the tool as long as they are held."""
+"""Keys that move the tool while held."""
 
 JOINTS = {str(number): number - 1 for number in range(1, 9)}
-"""Keys that move a joint as long as they are held."""
+"""Keys that move a joint while held."""
 
 SPEEDS = {'+': 1, '=': 1, '-': -1, '_': -1}  # keys that change the speed, in steps
 
@@ -58,7 +58,7 @@ STEP_KEY = 'm'
 HELP_KEY = '?'
 
 STOP_KEYS = frozenset({'space', 'k'})
-"""Keys that stop at once, and say so even when nothing moves. Any other key stops a motion too."""
+"""Keys that stop at once, with a message even if nothing moves. Other keys stop a motion, too."""
 
 HELP = """\
   hold to move the tool              rotate it             hold to move a joint
@@ -69,7 +69,7 @@ HELP = """\
   J joint, T twist commands only (MoveIt's servo needs the choice)    ?  this help
   Space stops the whole robot; letting go, any other key stop    Q or Ctrl-C quits\
 """
-"""The map, for the eye: plain characters, fits into 82 columns."""
+"""Help text with the key map: plain characters, at most 82 columns."""
 
 Request = CommandType | ServoRequest | ProgramRequest | str
 
@@ -85,7 +85,7 @@ REQUESTS: dict[str, Request] = {
 
 
 class KeyboardTeleop(KeyMapping):
-    """Moves while a key of the map is held, or by one step for each stroke."""
+    """Converts keys to motions: while a key is held, or by one step for each stroke."""
 
     introduction = HELP
     robot: ServoLink
@@ -108,7 +108,7 @@ class KeyboardTeleop(KeyMapping):
         self._last_note = ('', 0.0)  # a key that moves nothing, and when it was struck last
 
     def wanted(self, now: float) -> Jog | None:
-        """Return the motion that is wanted; None when no key asks for one."""
+        """Return the motion that the keys request now; None for no motion."""
         if self._step is not None:
             jog, end = self._step
             return jog if now < end else None
@@ -118,13 +118,13 @@ class KeyboardTeleop(KeyMapping):
         return self._motion(key, TAP_SPEED_FACTOR if self._held.is_tap(now) else 1.0)
 
     def step(self, now: float) -> object | None:
-        """Return what to publish now; call it after every event and when it is due."""
+        """Return what to publish now; call it after every event and at the time :meth:`due`."""
         if self._step is not None and now >= self._step[1]:
             self._step = None
         return super().step(now)
 
     def due(self, now: float) -> float:
-        """Return when step() has to be called at the latest; may be infinite."""
+        """Return the latest time of the next call of :meth:`step`; may be infinite."""
         due = super().due(now)
         return due if self._step is None else min(due, self._step[1])
 
@@ -134,7 +134,7 @@ class KeyboardTeleop(KeyMapping):
         super().end()
 
     def feed(self, event: KeyEvent) -> list[Request]:
-        """Process an event; return what the person requests besides a motion."""
+        """Process a key event; return the requests other than motions."""
         key = event.key.lower() if len(event.key) == 1 else event.key
         event = replace(event, key=key)
         joints = len(self.robot.names.joints)
@@ -150,7 +150,7 @@ class KeyboardTeleop(KeyMapping):
         return [] if event.action is KeyAction.REPEATED else self._stroke(key)
 
     def status(self, now: float) -> list[StatusPart]:
-        """Return what the status line shows, what matters most first."""
+        """Return the parts of the status line, the most important first."""
         robot = self.robot
         speed = f'{self.speed * 100:.0f} %: {self.speed * robot.scales.linear:.3f} m/s'
         parts = [
@@ -206,7 +206,7 @@ class KeyboardTeleop(KeyMapping):
 
 
 def servo_part(report: ServoReport | None, *, paused: bool) -> StatusPart:
-    """Show what the servo reports; None for nothing."""
+    """Return the servo's part of the status line; ``report`` is None if there is none."""
     if paused:
         return 'paused', Style.YELLOW
     if report is None:
@@ -218,7 +218,7 @@ def servo_part(report: ServoReport | None, *, paused: bool) -> StatusPart:
 
 
 def motion_part(jog: Jog | None, joints: tuple[str, ...]) -> StatusPart:
-    """Show what moves, by the names of the joints as far as they are known."""
+    """Return the motion for the status line, with joint names where known."""
     match jog:
         case JointJog(joint, velocity):
             known = joints[joint] if joint < len(joints) else f'joint {joint + 1}'

@@ -18,16 +18,16 @@ from .jog import CartesianJog, Frame, Jog, JointJog
 from .servo_link import ServoLink
 
 FRAME_BUTTONS = {Button.SELECT: Frame.BASE, Button.START: Frame.TOOL}
-"""Buttons that choose along whose axes the tool is jogged."""
+"""Buttons that select the frame of jogging."""
 
 JOINT_BUTTONS = {Button.WEST: -1, Button.EAST: 1}
-"""Buttons that choose the joint before and the next one."""
+"""Buttons that select the previous and the next joint."""
 
 
 class GamepadTeleop(DeadmanMapping):
-    """Moves while the deadman is held and a stick is away from rest.
+    """Converts stick positions to motions while the deadman is held.
 
-    At rest it asks for nothing, so that it does not overrule a trajectory.
+    With the sticks at rest it sends no command, so that it does not interrupt a trajectory.
     """
 
     robot: ServoLink
@@ -40,14 +40,14 @@ class GamepadTeleop(DeadmanMapping):
         speeds: tuple[float, float],
         warn: Callable[[str], None] = lambda _: None,
     ) -> None:
-        """Start idle, with the shares of full speed at a stick's end, without and with turbo."""
+        """Start idle; ``speeds``: shares of full speed at full stick, without and with turbo."""
         super().__init__(robot, deadman, stream, warn)
         self.frame = Frame.BASE  # along whose axes the tool is jogged
         self.joint = 0  # place of the joint that the d-pad moves
         self._speeds = dict(zip((Grip.HELD, Grip.TURBO), speeds, strict=True))
 
     def wanted(self, now: float) -> Jog | None:
-        """Return the motion that is wanted; None without the deadman, and at rest."""
+        """Return the requested motion; None without the deadman or with all sticks at rest."""
         speed = self._speeds.get(self.grip)
         if speed is None:
             return None
@@ -58,7 +58,7 @@ class GamepadTeleop(DeadmanMapping):
         return jog if any(jog.linear) or any(jog.angular) else None
 
     def feed(self, state: GamepadState) -> list[str]:
-        """Process a state of the gamepad; return what was chosen, in words."""
+        """Process a gamepad state; return messages about new selections."""
         before, joints = self.take(state), len(self.robot.names.joints)
         for button in state.pressed_since(before):
             if button in FRAME_BUTTONS:
@@ -71,7 +71,7 @@ class GamepadTeleop(DeadmanMapping):
 
 
 def direction(state: GamepadState, frame: Frame) -> CartesianJog:
-    """Return where the sticks point, along the axes of a frame.
+    """Convert stick positions to a motion along the axes of a frame.
 
     The left stick moves along x and y, the triggers along z (right up, left down); the right stick
     turns about y and z, the d-pad's sides about x.
@@ -85,7 +85,7 @@ def direction(state: GamepadState, frame: Frame) -> CartesianJog:
 
 
 class ServoGamepad(TeleopNode):
-    """The node, with what its parameters say.
+    """Node that jogs with a gamepad, configured by its parameters.
 
     Attributes:
         link: The servo.
@@ -96,9 +96,9 @@ class ServoGamepad(TeleopNode):
         """Declare the parameters, and connect.
 
         Raises:
-            ParameterError: A parameter is misspelt or makes no sense.
-            PresetError: There is no preset of that name.
-            SettingError: Parameters make no sense together.
+            ParameterError: A parameter is misspelt or invalid.
+            PresetError: The preset is unknown.
+            SettingError: Parameters are inconsistent.
         """
         super().__init__('servo_gamepad')
         self.source, deadman = declare_gamepad(self, devices)

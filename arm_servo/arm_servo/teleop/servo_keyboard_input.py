@@ -16,14 +16,14 @@ from .servo_link import ServoLink
 
 
 class ServoKeyboardInput(TeleopNode):
-    """The node, with what its parameters say."""
+    """Node that jogs with the keyboard, configured by its parameters."""
 
     @destroyed_when_refused
     def __init__(self) -> None:
         """Declare the parameters, and connect.
 
         Raises:
-            ParameterError: A parameter is misspelt or makes no sense.
+            ParameterError: A parameter is misspelt or invalid.
         """
         super().__init__('servo_keyboard_input')
         self.source, held = declare_keyboard(self)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The servo node as a person's program commands it: motions, requests, and what it reports."""
+"""Client of the servo node for teleop programs: sends motions and requests, reads its status."""
 
 from __future__ import annotations
 
@@ -47,13 +47,13 @@ DESCRIPTION = ('robot_description', 'robot_description_semantic', 'group', 'tip_
 MOVEIT = ('move_group_name', 'command_in_type', 'scale.linear', 'scale.rotational', 'scale.joint')
 PREFIX = 'moveit_servo.'
 NAMES = (*DESCRIPTION, *(PREFIX + name for name in MOVEIT))
-"""Parameters that are asked for; MoveIt's node has some of them, that of arm_servo others."""
+"""Parameters to request; MoveIt's servo node has some of them, that of arm_servo others."""
 
 RETRY_PERIOD = 3.0  # [s]
 
 
 class ServoSettings:
-    """Asks the servo, again and again until it has answered."""
+    """Reads parameters of the servo; repeats the request until it answers."""
 
     def __init__(self, node: Node, servo: str, changed: Callable[[], None]) -> None:
         self._client = node.create_client(GetParameters, f'{servo}/get_parameters')
@@ -63,7 +63,7 @@ class ServoSettings:
         self._asked = -math.inf
 
     def serve(self, now: float) -> None:
-        """Send a pending request when its time in [s] has come."""
+        """Send a pending request if it is due at time ``now`` in [s]."""
         is_due = self._unanswered and now >= self._asked + RETRY_PERIOD
         if not is_due or not self._client.service_is_ready():
             return
@@ -73,7 +73,7 @@ class ServoSettings:
             future.add_done_callback(partial(self._take, name))
 
     def scales(self) -> Scales:
-        """Return its full speeds; those that it did not answer are moveit_servo's defaults."""
+        """Return the servo's full speeds; missing ones default to those of moveit_servo."""
         default = Scales()
         return Scales(
             self._positive('scale.linear', default.linear),
@@ -83,10 +83,10 @@ class ServoSettings:
         )
 
     def names(self, urdf: str) -> ArmNames:
-        """Return the names of the arm's parts; the description is for a servo that has none.
+        """Return the names of the arm's parts; ``urdf`` is used if the servo has no description.
 
         Raises:
-            ModelError: The texts make no arm.
+            ModelError: The descriptions do not define an arm.
         """
         if self._unanswered:
             values = {}
@@ -116,21 +116,21 @@ class ServoSettings:
 
 
 class ServoLink:
-    """Publishes jogs, and knows the arm's names from the servo, or else from the robot.
+    """Publishes jogs, and reads the names of the arm's parts from the servo or the robot.
 
     Attributes:
         say: Shows the person a message.
-        names: Names of the arm's parts, as far as they are known.
+        names: Names of the arm's parts that are known so far.
         scales: Full speeds of the servo.
         paused: Whether the person paused the servo.
         stream: Decides when to publish.
     """
 
     def __init__(self, node: Node, say: Callable[[str], None]) -> None:
-        """Declare whom to jog and how often, advertise and subscribe.
+        """Declare the parameters (servo, rate), advertise and subscribe.
 
         Raises:
-            ParameterError: A value is of another kind or out of its range.
+            ParameterError: A value has the wrong type or is out of range.
         """
         read = ParameterReader(node)
         servo = read.text('servo', 'servo_node', 'name of the servo node')
@@ -160,21 +160,21 @@ class ServoLink:
 
     @property
     def has_subscriber(self) -> bool:
-        """Whether anything subscribes to the commands."""
+        """Whether the commands have a subscriber."""
         return any(each.get_subscription_count() for each in (self._twist, self._jog))
 
     def report(self, now: float) -> ServoReport | None:
-        """Return what the servo reported lately."""
+        """Return the servo's latest status; None if it is too old."""
         if self._report is None or now - self._report[1] > STATUS_TIMEOUT:
             return None
         return self._report[0]
 
     def serve(self, now: float) -> None:
-        """Request from the servo what is not known yet."""
+        """Request parameters of the servo that are still unknown."""
         self._settings.serve(now)
 
     def publish(self, command: Jog) -> None:
-        """Publish a motion in shares of full speed, or show why not."""
+        """Publish a motion, given in shares of full speed, or show why it cannot be sent."""
         jog = self.scales.to_message(command)
         if isinstance(jog, JointJog):
             self._publish_joint(jog)
@@ -191,7 +191,7 @@ class ServoLink:
         self._twist.publish(twist)
 
     def handle(self, request: CommandType | ServoRequest, now: float) -> None:
-        """Switch the kind of commands, pause or go on, or stop the robot; its jog has ended."""
+        """Switch the command type, pause or resume, or stop the robot; its jog has ended."""
         match request:
             case CommandType():
                 message = ServoCommandType.Request(command_type=int(request))
@@ -208,7 +208,7 @@ class ServoLink:
                 self._call(self._pause, SetBool.Request(data=paused), what, granted)
 
     def flush(self) -> None:
-        """Wait until what was published has arrived, before the program ends."""
+        """Wait until published messages have arrived; call it before the program ends."""
         for publisher in (self._twist, self._jog):
             publisher.wait_for_all_acked(FLUSH_TIMEOUT)
 
