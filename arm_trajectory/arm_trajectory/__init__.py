@@ -1,16 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Trajectories of an arm before and while they are executed; pure.
+"""Trajectories of an arm, before and during execution. Pure: no ROS, no clock, no I/O.
 
 A :class:`TrajectoryGoal` becomes a :class:`Path` (:func:`build_path`): segments between its
-points, corners rounded, time scaled to the limits of the joints. :class:`PathCheck` finds where
-links meet on it. A :class:`TrajectoryTimer` scales the speed of its execution, a
-:class:`CatchUpInterpolator` leads to it, an :class:`OnlineTrajectoryGenerator` from state to
-state.
+points, with rounded corners, time-scaled to the joint limits. :class:`PathCheck` finds collisions
+on it. A :class:`TrajectoryTimer` scales the speed of its execution, a
+:class:`CatchUpInterpolator` leads an arm onto it, and an :class:`OnlineTrajectoryGenerator` plans
+from state to state.
 
-Conventions: joint vectors are in the order of the arm's joints in [rad], of joints that slide in
-[m]; velocities and accelerations in their units per [s] and [s2]. Times are in [s], ``period`` is
-that of the cycle. ``state`` is what was commanded last, ``measured`` what the drives report.
+Conventions: joint vectors are in the order of the arm's joints in [rad], or [m] for prismatic
+joints; velocities and accelerations in these units per [s] and [s2]. Times are in [s]; ``period``
+is the cycle time. ``state`` is the last commanded state, ``measured`` that reported by the drives.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A trajectory while it runs: its speed scaling, and the way of an arm that is off it.
+"""Execution of a trajectory: speed scaling, and catching up by an arm that is off the path.
 
-Speed override, pause, resume and cancel are changes of the speed scaling, with limited
-acceleration and jerk of the joints; the path stays the same. What makes a path feasible before it
-begins is the time scaling of :mod:`.time_scaling`.
+Speed override, pause, resume and cancel change the speed scaling, with limited joint acceleration
+and jerk; the path stays the same. Before a path begins, :mod:`.time_scaling` makes it
+feasible.
 """
 
 from __future__ import annotations
@@ -21,41 +21,41 @@ from .otg import OnlineTrajectoryGenerator, Plan
 from .path import Path
 
 MAX_SCALING_RATE = 10.0
-"""Greatest change of the speed scaling in [1/s], for where the path asks nothing of the joints."""
+"""Greatest rate of the speed scaling in [1/s]; applies where the joint limits allow more."""
 
-MAX_SCALING_ACCELERATION = 200.0  # greatest change of that in [1/s2]
+MAX_SCALING_ACCELERATION = 200.0  # greatest change of this rate in [1/s2]
 
 ACCELERATION_FACTOR = 0.9
-"""Share of the joints' acceleration that a change of the speed scaling may bring them to."""
+"""Share of the joint acceleration limits that the path and a scaling change may use together."""
 
-JERK_FACTOR = 0.4  # share of the joints' jerk that a change of the speed scaling may ask
-MIN_BUILD_UP_CYCLES = 5.0  # cycles at least in which a change of the speed scaling builds up
+JERK_FACTOR = 0.4  # share of the joint jerk limits that a change of the speed scaling may use
+MIN_BUILD_UP_CYCLES = 5.0  # least cycles in which a change of the speed scaling builds up
 
 MIN_ROOM_FACTOR = 0.2
-"""Share of its room that a change of the speed scaling has where the path leaves none."""
+"""Least share of the joint limits for a change of the speed scaling, if the path uses them up."""
 
-JERK_LOOKAHEAD = 0.01  # how far ahead on the path its own jerk is looked for in [s]
-FORESIGHT_STEP = 0.01  # step in which a change of the speed scaling is foreseen in [s]
+JERK_LOOKAHEAD = 0.01  # path time over which the path's own jerk is estimated in [s]
+FORESIGHT_STEP = 0.01  # time step for predicting the speed scaling in [s]
 
 
 class TimerState(NamedTuple):
-    """Where a timer is."""
+    """State of a trajectory timer."""
 
     time: float  # time of the path in [s]
     speed_scaling: float  # seconds of the path per second
     change: float  # change of the speed scaling in [1/s]
-    wanted: float  # speed scaling that it goes to
-    waiting: float = 0.0  # time until it begins in [s]
+    wanted: float  # requested speed scaling
+    waiting: float = 0.0  # time before the start in [s]
 
 
 class TrajectoryTimer:
     """Runs through a path at a speed scaling of 0 to 1 that changes smoothly.
 
-    Coming to a stop it may overrun by a little, and go back.
+    When it stops, it may overshoot slightly and go back.
     """
 
     def __init__(self, limits: JointLimits, speed_scaling: float) -> None:
-        """Start at the begin of a path."""
+        """Start at time 0 of a path."""
         self._limits = limits
         self._otg = ruckig.Ruckig(1)
         self._demand = ruckig.InputParameter(1)
@@ -68,15 +68,15 @@ class TrajectoryTimer:
 
     @property
     def state(self) -> TimerState:
-        """Where it is."""
+        """The state of the timer."""
         return TimerState(self.time, self.speed_scaling, self.change, self._wanted)
 
     def begin(self, speed_scaling: float) -> None:
-        """Begin at a speed scaling, from rest on a path that begins at rest."""
+        """Start with a speed scaling; the arm rests and the path begins at rest."""
         self._wanted = self.speed_scaling = speed_scaling
 
     def ahead(self, time: float) -> tuple[float, float, float]:
-        """Foresee time, speed scaling and change, which goes on evenly until it is as wanted."""
+        """Predict path time, speed scaling and its rate, constant until the requested scaling."""
         gap = self._wanted - self.speed_scaling
         if self.change * gap <= 0.0:
             return self.time + self.speed_scaling * time, self.speed_scaling, self.change
@@ -89,11 +89,11 @@ class TrajectoryTimer:
 
     @property
     def stopped(self) -> bool:
-        """Whether it stands still."""
+        """Whether the timer has stopped."""
         return self.speed_scaling == 0.0 and self.change == 0.0
 
     def step(self, path: Path, wanted: float, period: float) -> None:
-        """Advance."""
+        """Advance by one period towards a requested speed scaling."""
         self._wanted = wanted
         if self.speed_scaling == wanted and self.change == 0.0:
             self.time += self.speed_scaling * period
@@ -125,9 +125,9 @@ class TrajectoryTimer:
     def foreseen(
         cls, limits: JointLimits, path: Path, state: TimerState, ahead: float
     ) -> TimerState:
-        """Return where a timer will be in [s] from now when nothing comes in between.
+        """Predict the timer state ``ahead`` [s] from now if nothing intervenes.
 
-        Less than 0 is the past, at the present speed.
+        Negative ``ahead`` extrapolates into the past at the present speed.
         """
         left = ahead - state.waiting if ahead > state.waiting else min(ahead, 0.0)
         timer = cls(limits, state.speed_scaling)
@@ -142,7 +142,7 @@ class TrajectoryTimer:
         return timer.state
 
     def _room(self, path: Path, sense: float) -> tuple[float, float]:
-        """Return how fast the speed scaling may change in [1/s], and that in [1/s2]."""
+        """Return the limits of the rate of the speed scaling [1/s] and its change [1/s2]."""
         here, soon, limits = path.at(self.time), path.at(self.time + JERK_LOOKAHEAD), self._limits
         speed = np.maximum(np.abs(here.velocity), 1e-9)
         bend = np.maximum(np.abs(here.acceleration), np.abs(soon.acceleration))
@@ -167,31 +167,31 @@ class TrajectoryTimer:
 
 
 INTERCEPTION_CYCLES = (4, 10, 25, 60, 150)  # cycles after which an interception is tried
-MAX_ITERATIONS = 3  # how often the time of a later interception is improved
+MAX_ITERATIONS = 3  # iterations that refine the time of a later interception
 
 PLAN_TOLERANCE = 1e-7
-"""How exactly an interception must still be as planned in [rad], and 100 times in [rad/s]."""
+"""Tolerance in [rad] for keeping a planned interception; 100 times as much in [rad/s]."""
 
-ROUNDING_FACTOR = 1.0 + 1e-6  # rounding of velocities and accelerations that is let pass
+ROUNDING_FACTOR = 1.0 + 1e-6  # tolerated rounding of velocities and accelerations
 
 JERK_TOLERANCE = 0.1
-"""Changes of speed and place in a cycle, beyond those of an even jerk, that still count as even.
+"""Deviations of velocity and position per cycle from constant jerk that are tolerated.
 
 As shares of j T^2 and j T^3.
 """
 
-ACCELERATION_TOLERANCE = 0.01  # the same change of place where a path is met, as a share of a T^2
+ACCELERATION_TOLERANCE = 0.01  # tolerated position step at meeting a path, as a share of a T^2
 
 FOLLOWING_JERK_TOLERANCE = (0.25, 0.129)
-"""The same where the state that is followed goes on: a limited jerk that turns makes as much."""
+"""The same while already following exactly: a limited jerk that changes sign causes as much."""
 
 
 class CatchUpInterpolator:
-    """Follows a state that moves by itself, within the limits of the joints.
+    """Follows a moving reference state within the joint limits.
 
-    A step that the limits allow is taken exactly. Otherwise it plans to where the state will be
-    when it can be met, and keeps to this plan while the state goes on as foreseen. Planned anew in
-    every cycle, the interception would be put off again and again.
+    A step that the limits allow follows the reference exactly. Otherwise it plans an interception
+    with the predicted reference, and keeps the plan while the prediction holds. Replanning in
+    every cycle would postpone the interception again and again.
     """
 
     def __init__(self, limits: JointLimits, generator: OnlineTrajectoryGenerator) -> None:
@@ -199,18 +199,18 @@ class CatchUpInterpolator:
         self._generator = generator
         self._plan: Plan | None = None
         self._elapsed = 0.0
-        self.exact = False  # whether the last step is exactly on what is followed
+        self.exact = False  # whether the last step is exactly on the reference
 
     def step(
         self, state: RobotState, ahead: Callable[[float], RobotState], period: float
     ) -> RobotState | None:
-        """Advance by a step.
+        """Advance by one period.
 
         Args:
-            ahead: The state to follow, by the time from now in [s].
+            ahead: Function from time from now in [s] to the reference state.
 
         Returns:
-            The state to command next; None when there is no way to meet it.
+            The state to command next; None if the reference cannot be intercepted.
         """
         wanted = ahead(period)
         if self._allowed(state, wanted, period):
@@ -230,7 +230,7 @@ class CatchUpInterpolator:
         return self._plan.at(self._elapsed)
 
     def _kept(self, state: RobotState, ahead: Callable[[float], RobotState]) -> bool:
-        """Whether the plan still begins and ends where it should."""
+        """Return whether the plan still starts at the state and ends on the reference."""
         if self._plan is None:
             return False
         left = self._plan.duration - self._elapsed
@@ -238,7 +238,7 @@ class CatchUpInterpolator:
         return _same(now, state) and _same(self._plan.at(self._plan.duration), foreseen)
 
     def _allowed(self, state: RobotState, wanted: RobotState, period: float) -> bool:
-        """Whether a jerk within the limits leads from one state to the other."""
+        """Return whether a jerk within the limits leads from one state to the other."""
         if not self._soft(state, wanted, period):
             return False
         most = self._limits.jerk * period
@@ -256,7 +256,7 @@ class CatchUpInterpolator:
         return bool(np.all(np.abs(way) <= allowed))
 
     def _soft(self, state: RobotState, wanted: RobotState, period: float) -> bool:
-        """Whether a state is within the limits, and its acceleration near the present one."""
+        """Return whether a state is within limits, with acceleration near the present one."""
         limits = self._limits
         bend = np.abs(wanted.acceleration - state.acceleration)
         return bool(
@@ -268,7 +268,7 @@ class CatchUpInterpolator:
     def _interception(
         self, state: RobotState, ahead: Callable[[float], RobotState], period: float
     ) -> Plan | None:
-        """Plan to where the state will be when it is met: soon where that can be, else later."""
+        """Plan to intercept the reference, as early as possible; None if it cannot be met."""
         for cycles in INTERCEPTION_CYCLES:
             plan = self._planned(state, self._within(ahead(cycles * period)), cycles * period)
             if plan is not None and plan.duration <= cycles * period * (1.0 + 1e-9):
@@ -295,7 +295,7 @@ class CatchUpInterpolator:
         return self._generator.to_state(state, even)
 
     def _within(self, target: RobotState) -> RobotState:
-        """Return a state that can be met: its speed and acceleration within the limits."""
+        """Return a state with velocity and acceleration clipped to the limits."""
         limits = self._limits
         acceleration = np.clip(target.acceleration, -limits.acceleration, limits.acceleration)
         # a speed that does not overrun its limit before the acceleration is taken back

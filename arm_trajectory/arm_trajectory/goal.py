@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Trajectories as they come from outside: their values, tolerances, errors and checks.
+"""Trajectory goals as received from clients: values, tolerances, errors and checks.
 
 ::
 
     CommandError (of arm_model)   a request is refused before anything moves
-    └── GoalError                 a trajectory is refused; carries the code of the action
-        └── StateMovedError       the arm is elsewhere than where it was planned
+    └── GoalError                 a trajectory is refused; carries the action's result code
+        └── StateMovedError       the arm has moved away from the planned start
 """
 
 from __future__ import annotations
@@ -45,12 +45,12 @@ class GoalError(CommandError):
 
 
 class StateMovedError(GoalError):
-    """The arm is elsewhere than where a trajectory was planned; planned anew it may begin."""
+    """The arm has moved away from the planned start of a trajectory; plan it again."""
 
 
 @dataclass(frozen=True, slots=True)
 class GoalPoint:
-    """A point of a trajectory; empty where a field is not given."""
+    """A trajectory point; fields that are not given are empty."""
 
     time: float  # time from the start in [s]
     positions: Sequence[float]  # positions in [rad]
@@ -60,7 +60,7 @@ class GoalPoint:
 
 @dataclass(frozen=True, slots=True)
 class JointTolerance:
-    """How far a joint may be off; 0 keeps the default, -1 takes it away."""
+    """Tolerances of a joint; 0 keeps the default, -1 removes the tolerance."""
 
     position: float = 0.0  # in [rad]
     velocity: float = 0.0  # in [rad/s]
@@ -73,9 +73,9 @@ DefaultTolerances = JointTolerance | Mapping[str, JointTolerance]  # of each joi
 class TrajectoryGoal:
     """A trajectory to follow."""
 
-    joints: Sequence[str]  # names of the joints, in the order of the points' numbers
+    joints: Sequence[str]  # joint names, in the order of the points' values
     points: Sequence[GoalPoint]  # its points
-    age: float = 0.0  # how long ago it began in [s]; 0 begins now, less than 0 begins later
+    age: float = 0.0  # time since its start in [s]; 0 starts now, negative starts later
     path_tolerance: Mapping[str, JointTolerance] | None = None  # tolerances on the way, by joint
     goal_tolerance: Mapping[str, JointTolerance] | None = None  # tolerances at the end, by joint
     # time to reach the goal within tolerance after the end in [s]; 0 is the default
@@ -84,21 +84,21 @@ class TrajectoryGoal:
 
 @dataclass(frozen=True, slots=True)
 class GoalRules:
-    """What is accepted."""
+    """Rules for accepting trajectories."""
 
-    partial: bool = False  # whether joints may be missing; they stay where they are
+    partial: bool = False  # whether joints may be missing; these do not move
     # whether the last point may have a velocity; the arm comes to rest behind it
     end_velocity: bool = False
-    start: float = 0.05  # how far a first point without time may be from the arm in [rad]
+    start: float = 0.05  # greatest distance of a first point without time from the arm in [rad]
 
 
 MAX_POINTS = 5000
-"""Points of a trajectory at most: they take a second to plan, for which others wait."""
+"""Greatest number of points: they take 1 s to plan, during which other goals wait."""
 
-SPAN_TOLERANCE = 1e-6  # how far a point may be beyond a limit for rounding in [rad]
+SPAN_TOLERANCE = 1e-6  # tolerated rounding of a point beyond a limit in [rad]
 
 MIN_JOIN_TIME = 0.05
-"""Time in which a trajectory that has begun already must not be joined yet in [s]."""
+"""Least time in [s] to the point at which the arm joins a trajectory in progress."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,7 +115,7 @@ class Points:
     requested_duration: float
 
     def at(self, place: int) -> RobotState:
-        """Return the place that a point is; at rest where it does not say."""
+        """Return a point as a state; missing velocities and accelerations are 0."""
         still = np.zeros(self.positions.shape[1])
         return RobotState(
             self.positions[place],
@@ -124,7 +124,7 @@ class Points:
         )
 
     def slowed(self, factor: float) -> Points:
-        """Return the same points with more time."""
+        """Return the points with all times multiplied by ``factor``."""
         return Points(
             self.times * factor,
             self.positions,
@@ -134,7 +134,7 @@ class Points:
         )
 
     def delayed(self, by: float) -> Points:
-        """Return the same points later."""
+        """Return the points delayed by ``by`` in [s]."""
         return replace(self, times=self.times + by)
 
     def since(self, place: int) -> Points:
@@ -151,10 +151,10 @@ class Points:
 def upcoming_points(
     goal: TrajectoryGoal, limits: JointLimits, state: RobotState, rules: GoalRules
 ) -> Points:
-    """Check a goal, and return its points from now on.
+    """Check a goal, and return its points that are still to come.
 
     Raises:
-        GoalError: It is refused.
+        GoalError: The goal is refused.
     """
     points = _upcoming(_ordered(goal, limits, state, rules), goal.age)
     # by the short way: the first point of a continuous joint is at most half a turn off
@@ -175,14 +175,14 @@ def upcoming_points(
 
 
 def refuse(reason: str, code: GoalCode = GoalCode.INVALID_GOAL) -> GoalError:
-    """Return the refusal of a goal."""
+    """Return the error that refuses a goal."""
     return GoalError(code, reason)
 
 
 def _ordered(
     goal: TrajectoryGoal, limits: JointLimits, state: RobotState, rules: GoalRules
 ) -> Points:
-    """Check names, lengths, numbers and times, and put the joints in the arm's order."""
+    """Check names, lengths, values and times; return the points in the arm's joint order."""
     _check_joints(goal.joints, limits, rules)
     if not goal.points:
         raise refuse('the trajectory has no points')
@@ -251,7 +251,7 @@ def _check_point(number: int, point: GoalPoint, goal: TrajectoryGoal) -> None:
 
 
 def _check_fields(goal: TrajectoryGoal) -> None:
-    """Make sure that all points say the same: what some leave out would have to be invented."""
+    """Check that all points have the same fields, since missing values cannot be invented."""
     for name, values in (
         ('velocities', [point.velocities for point in goal.points]),
         ('accelerations', [point.accelerations for point in goal.points]),
@@ -268,14 +268,14 @@ def _check_fields(goal: TrajectoryGoal) -> None:
 
 
 def _filled(rows: Sequence[Sequence[float]], places: Sequence[int], default: Array) -> Array:
-    """Return rows for all joints; those that are not given have a default."""
+    """Return rows with values for all joints; joints without values get the default."""
     filled = np.tile(default, (len(rows), 1))
     filled[:, places] = np.array(rows, dtype=np.float64)
     return filled
 
 
 def _upcoming(points: Points, age: float) -> Points:
-    """Return the points that have not passed yet."""
+    """Return the points whose times have not passed at ``age`` in [s]."""
     times = points.times - age
     if times[-1] < 0.0:
         raise refuse(
@@ -291,13 +291,13 @@ def _upcoming(points: Points, age: float) -> Points:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tolerances:
-    """Tolerances of every joint; infinite where there are none."""
+    """Tolerances of every joint; infinite where none is set."""
 
     position: Array  # in [rad]
     velocity: Array  # in [rad/s]
 
     def violation(self, limits: JointLimits, position: Array, velocity: Array) -> str | None:
-        """Return which of the errors in [rad], [rad/s] is beyond its tolerance, in words."""
+        """Describe an error in [rad] or [rad/s] that exceeds its tolerance; None if none does."""
         for error, tolerance, what, unit in (
             (position, self.position, 'position', 'rad'),
             (velocity, self.velocity, 'velocity', 'rad/s'),
@@ -311,7 +311,7 @@ class Tolerances:
 
 
 def _distinct(error: float, tolerance: float) -> tuple[str, str]:
-    """Return an error and the tolerance that it exceeds, with digits that show that."""
+    """Format an error and the exceeded tolerance with enough digits to tell them apart."""
     for digits in range(4, 12):
         off, most = f'{error:+.{digits}f}', f'{tolerance:.{digits}f}'
         if abs(float(off)) > float(most) > 0.0:
@@ -325,13 +325,13 @@ def merge_tolerances(
     default: DefaultTolerances,
     what: str = 'tolerance',
 ) -> Tolerances:
-    """Put tolerances together: those of a goal, else the default.
+    """Merge the tolerances of a goal with the defaults.
 
     Args:
-        given: The goal's tolerances by joint: above 0 counts, 0 keeps the default, below takes it
-            away.
-        default: The default of each joint, or by joint; 0 is none.
-        what: Name of the goal's field, for the words of a refusal.
+        given: The goal's tolerances by joint: a positive value applies, 0 keeps the default, a
+            negative value removes the tolerance.
+        default: One default for all joints, or defaults by joint; 0 means no tolerance.
+        what: Name of the goal's field, for error messages.
 
     Raises:
         GoalError: A joint is unknown, or a tolerance is not a number.

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Goals made paths that the joints can follow.
+"""Converts trajectory goals to paths that the joints can follow.
 
-An arm in motion is led to the first point with the speed that the path has there: by a quintic
-where it keeps within the limits, as it is the smoothest, else by the jerk-limited way of ruckig,
-which takes longer where it must.
+An arm in motion reaches the first point with the speed that the path has there: by a quintic, the
+smoothest motion, if that stays within the limits, else by a jerk-limited motion from ruckig,
+which takes longer if necessary.
 """
 
 from __future__ import annotations
@@ -24,33 +24,33 @@ from .rounding import rounded, run_out
 from .time_scaling import Demand, Timing
 
 MAX_SPEED_EXCESS = 1.02
-"""How far the speed of a segment may exceed a limit; it is followed slower then."""
+"""Factor by which a segment may exceed a speed limit; the path is then slowed down."""
 
 MAX_DELAY = (1.1, 0.5)
-"""Share, and time in [s], by which a path may take longer than its last time_from_start.
+"""Factor, and time in [s], by which a path may exceed its last time_from_start.
 
-As much as MoveIt waits for by default: allowed_execution_duration_scaling,
+MoveIt waits as long by default: allowed_execution_duration_scaling,
 allowed_goal_duration_margin.
 """
 
-NEGLIGIBLE_DELAY = 0.01  # time by which a path may take longer without a word in [s]
+NEGLIGIBLE_DELAY = 0.01  # delay in [s] that is not reported
 
 STRAIGHT_TOLERANCE = 1e-3
-"""Bulge of a segment that counts as straight where its ends do not fit together in [rad]."""
+"""Greatest deviation in [rad] from a line at which a jerky segment is replaced by the line."""
 
 APPROACH_FACTORS = (0.2, 0.5, 1.0, 2.0, 4.0)
-"""Shares by which the way to the first point is tried longer."""
+"""Factors of additional time that are tried for the motion to the first point."""
 
 MIN_APPROACH_MARGIN = 0.25
-"""Time that such a way has beside its own in [s]: a trajectory may be joined late."""
+"""Time in [s] added to the approach time before scaling: goals may be joined late."""
 
 START_TOLERANCE = 1e-3
-"""How far from a first point without time the arm may be before it is taken there in [rad]."""
+"""Distance in [rad] to a first point without time from which the arm is moved there."""
 
-MAX_ITERATIONS = 40  # how often the time that suffices is improved
+MAX_ITERATIONS = 40  # iterations that refine the sufficient time
 
 QUANTITIES = (('rad/s', 'speed'), ('rad/s2', 'acceleration'), ('rad/s3', 'jerk'))
-"""Units and names of what is limited."""
+"""Units and names of the limited quantities."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,12 +58,12 @@ class GoalPath:
     """A path that the joints can follow."""
 
     path: Path  # the path
-    late: str  # how much later than requested it ends, and why, in words; empty for in time
+    late: str  # delay of its end and the cause, as text; empty if in time
 
 
 @dataclass(frozen=True, slots=True)
 class _TimeDeficit:
-    """Too little time: why, in a sentence and in short, when, and how many times it is enough."""
+    """Too little time: reason, short cause, path time in [s], and factor of time that suffices."""
 
     reason: str
     cause: str
@@ -74,13 +74,13 @@ class _TimeDeficit:
 def build_path(
     goal: TrajectoryGoal, limits: JointLimits, state: RobotState, rules: GoalRules
 ) -> GoalPath:
-    """Check a trajectory and make a path of it that begins at the commanded state.
+    """Check a trajectory and convert it to a path that begins at the commanded state.
 
-    Where joints could not follow as quickly as asked, the path is followed slower; it stays the
-    same. A trajectory that would take much longer then is refused.
+    Where joints cannot follow as fast as requested, the same path is followed slower. A trajectory
+    that would take much longer is refused.
 
     Raises:
-        GoalError: It is refused; the message names the joint, the point and the remedy.
+        GoalError: The goal is refused; the message names the joint, the point and the remedy.
     """
     points = upcoming_points(goal, limits, state, rules)
     points = _from_here(points, limits, state, rules)
@@ -94,7 +94,7 @@ def build_path(
 
 
 def _tried(points: Points, limits: JointLimits, state: RobotState) -> GoalPath | _TimeDeficit:
-    """Return the path through points, or why there is too little time for it."""
+    """Return the path through points, or the time deficit."""
     if state.moving:
         return _from_motion(points, limits, state)
     approach = float(points.times[0])
@@ -115,7 +115,7 @@ def _tried(points: Points, limits: JointLimits, state: RobotState) -> GoalPath |
 
 
 def _from_rest(points: Points, limits: JointLimits, state: RobotState) -> GoalPath | _TimeDeficit:
-    """Return the path through points from a state of rest, or why there is too little time."""
+    """Return the path through points from a state of rest, or the time deficit."""
     pieces = [*_first(points, state), *_between(points, limits)]
     if not pieces:  # one point, at once, where the arm is
         pieces.append(_line(1e-3, points.positions[0], points.positions[0]))
@@ -133,9 +133,9 @@ def _from_rest(points: Points, limits: JointLimits, state: RobotState) -> GoalPa
 def _from_motion(
     points: Points, limits: JointLimits, state: RobotState
 ) -> GoalPath | _TimeDeficit:
-    """Return the path through points of an arm in motion, or why there is too little time.
+    """Return the path through points from a state of motion, or the time deficit.
 
-    From the first point on it is the same wherever the arm comes from.
+    From the first point on, the path does not depend on the initial state.
     """
     lead, begin = float(points.times[0]), points.at(0)
     shifted, deficit = points.delayed(-lead), _TimeDeficit('', '', lead)
@@ -164,9 +164,9 @@ def _from_motion(
 
 
 def _after_stop(points: Points, limits: JointLimits, state: RobotState) -> GoalPath | _TimeDeficit:
-    """Return the path through points of an arm that comes to rest first.
+    """Return the path through points of an arm that comes to rest first, or the time deficit.
 
-    For a first point to which no way leads from the motion within the limits of position.
+    Used if no motion from the state to the first point stays within the position limits.
     """
     plan = OnlineTrajectoryGenerator(limits).brake(state)
     if plan is None:
@@ -188,7 +188,7 @@ def _after_stop(points: Points, limits: JointLimits, state: RobotState) -> GoalP
 def _time_scaled(
     path: Path, limits: JointLimits, *, from_rest: bool = True
 ) -> tuple[Path | None, _TimeDeficit]:
-    """Return a path with its corners rounded, as quick as can be, and what asks most of it."""
+    """Return the fastest feasible path with rounded corners, and its greatest time deficit."""
     demand = Timing(path, limits).fastest
     if demand.time_factor > MAX_SPEED_EXCESS:
         return None, _time_deficit(demand, limits, demand.time_factor)
@@ -197,7 +197,7 @@ def _time_scaled(
 
 
 def _in_time(path: Path, points: Points, deficit: _TimeDeficit) -> GoalPath | _TimeDeficit:
-    """Return a path that does not take much longer than asked, or why it does."""
+    """Return a path unless it takes much longer than requested; else the time deficit."""
     most = MAX_DELAY[0] * points.requested_duration + MAX_DELAY[1]
     if path.duration > most:
         enough = (path.duration - MAX_DELAY[1]) / MAX_DELAY[0]
@@ -209,12 +209,12 @@ def _in_time(path: Path, points: Points, deficit: _TimeDeficit) -> GoalPath | _T
 
 
 def _sufficient(points: Points, limits: JointLimits, state: RobotState, guess: float) -> float:
-    """Return how many times the time suffices, in hundredths."""
+    """Return the factor of time that suffices, rounded up to hundredths."""
     factor = _hundredths(guess)
     for _ in range(MAX_ITERATIONS):
         try:
             answer = _tried(points.slowed(factor), limits, state)
-        except GoalError:  # slower, an arm in motion would swing out beyond a limit
+        except GoalError:  # more time would make a moving arm swing out beyond a limit
             return factor
         if isinstance(answer, GoalPath):
             return factor
@@ -242,14 +242,14 @@ def _time_deficit(demand: Demand, limits: JointLimits, factor: float) -> _TimeDe
 
 
 def _run_out(points: Points, pieces: Sequence[Path], limits: JointLimits) -> list[Path]:
-    """Return how the arm comes to rest behind the last point, where that has a velocity."""
+    """Return the motion to rest after a last point that has a velocity; else no path."""
     if points.velocities is None:
         return []
     return run_out(pieces[-1].end if pieces else points.at(-1), limits)
 
 
 def _beyond(path: Path, limits: JointLimits, state: RobotState) -> GoalError | None:
-    """Return the refusal of a path that leads beyond a limit of position."""
+    """Return the error for a path that exceeds a position limit; None if it does not."""
     # an arm that is beyond a limit may come back
     lower = np.minimum(limits.lower, state.position)
     upper = np.maximum(limits.upper, state.position)
@@ -274,11 +274,11 @@ def _from_here(points: Points, limits: JointLimits, state: RobotState, rules: Go
             f'the first point is {off.max():.3f} rad away from where the arm is and has no'
             ' time_from_start; give it time, or plan from the present state'
         )
-    if state.moving:  # it has passed already, and the next one can be met
+    if state.moving:  # the point has passed; the next one can be met
         return points.since(1) if len(points.times) > 1 else points
     if float(off.max()) < START_TOLERANCE:
         return points
-    # as a part of the path it heeds the speed override; peaks of a quintic from rest to rest
+    # as a part of the path it obeys the speed override; peaks of a quintic from rest to rest
     needed = (
         1.875 * off / limits.velocity,
         np.sqrt(5.774 * off / limits.acceleration),
@@ -288,7 +288,7 @@ def _from_here(points: Points, limits: JointLimits, state: RobotState, rules: Go
 
 
 def _first(points: Points, state: RobotState) -> list[Path]:
-    """Return the way from the commanded state to the first point, unless it is there."""
+    """Return the path from the commanded state to the first point; empty if its time is 0."""
     if points.times[0] > 0.0:
         toward = points.at(0)
         if points.velocities is None and len(points.times) > 1:  # run into the line that follows
@@ -300,7 +300,7 @@ def _first(points: Points, state: RobotState) -> list[Path]:
 
 
 def _between(points: Points, limits: JointLimits) -> list[Path]:
-    """Return the way between the points; nothing for one point."""
+    """Return the path between the points; empty for one point."""
     lasts, q, v, a = (
         np.diff(points.times),
         points.positions,
@@ -326,7 +326,7 @@ def _between(points: Points, limits: JointLimits) -> list[Path]:
 
 
 def _jerky(lasts: Array, pieces: Array, limits: JointLimits) -> Mask:
-    """Return where no smooth way joins the ends (k): the rounding does it then."""
+    """Return a mask (k) of segments that exceed jerk limits, left to corner rounding."""
     places = np.repeat(np.arange(len(lasts)), 3)
     times = (lasts[:, None] * [0.0, 0.5, 1.0]).ravel()
     jerks = Path(lasts, pieces).derived(3, places, times).reshape(len(lasts), -1, len(limits))
@@ -345,9 +345,9 @@ MIN_PHASE = 1e-7  # least length of a segment with one jerk in [s]; shorter ones
 def approach_path(
     state: RobotState, begin: RobotState, duration: float, limits: JointLimits
 ) -> Path | None:
-    """Return the path from a motion to the begin of another path; None where there is none.
+    """Return the path from a state to the begin of another path; None if there is none.
 
-    It lasts ``duration`` in [s], longer where the joints need that.
+    It lasts ``duration`` in [s], or longer if the joints need more time.
     """
     # an arm that is beyond a limit may come back
     lower = np.minimum(limits.lower, state.position)
@@ -367,7 +367,7 @@ def approach_path(
 
 
 def _phases(plan: Plan) -> Path:
-    """Return a plan as polynomials with one jerk each."""
+    """Convert a plan to polynomials of constant jerk."""
     ends = plan.switches
     times = ends[np.diff(ends, prepend=0.0) > MIN_PHASE]
     times = np.concatenate(((0.0,), times[:-1], (plan.duration,)))

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Jerk-limited steps between states of motion, by ruckig from state to state.
+"""Online trajectory generation: jerk-limited motions from state to state, by ruckig.
 
-Way-points are never given to ruckig: it would send them to a service on the network.
+Waypoints are never passed to ruckig, which would send them to a service on the network.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import ruckig
 from arm_model import Array, JointLimits, Native, RobotState
 
 MIN_ACCELERATION_FACTOR = 0.05
-"""Least share of its acceleration that a joint keeps while others take longer."""
+"""Least share of its acceleration that a joint uses while slower joints need more time."""
 
-SHORTEST_CHANGE = 1e-12  # time of a change of speed that counts for none in [s]
+SHORTEST_CHANGE = 1e-12  # time of a speed change that counts as zero in [s]
 
 
 class Plan:
@@ -26,7 +26,7 @@ class Plan:
     __slots__ = ('_begin', '_lower', '_trajectory', '_upper', 'duration')
 
     def __init__(self, trajectory: Native, begin: Array | None = None) -> None:
-        """Wrap a trajectory of ruckig; one planned from zero begins at ``begin`` in [rad]."""
+        """Wrap a ruckig trajectory; ``begin`` in [rad] offsets one planned from zero."""
         self._begin = begin
         self._trajectory = trajectory
         self.duration = float(trajectory.duration)
@@ -34,7 +34,7 @@ class Plan:
         self._upper: Array | None = None
 
     def at(self, time: float) -> RobotState:
-        """Return the state at a time since the start; beyond the end it goes on evenly."""
+        """Return the state at a time since the start; after the end, velocity is constant."""
         position, velocity, acceleration = self._trajectory.at_time(time)
         places = np.array(position)
         if self._begin is not None:
@@ -52,7 +52,7 @@ class Plan:
 
     @property
     def extremes(self) -> tuple[Array, Array]:
-        """Least and greatest position of each joint on the way in [rad]."""
+        """Least and greatest position in [rad] of each joint during the motion."""
         if self._lower is None or self._upper is None:
             bounds = self._trajectory.position_extrema
             self._lower = np.array([bound.min for bound in bounds])
@@ -65,8 +65,8 @@ class Plan:
 class OnlineTrajectoryGenerator:
     """Plans jerk-limited motions of one arm.
 
-    It is ruckig with the arm's limits; None where ruckig has no answer, which its callers meet
-    with :func:`hard_brake`.
+    It runs ruckig with the arm's limits. Methods return None if ruckig finds no solution; callers
+    then use :func:`hard_brake`.
     """
 
     def __init__(self, limits: JointLimits) -> None:
@@ -91,10 +91,10 @@ class OnlineTrajectoryGenerator:
         self._to_standstill.current_position = np.zeros(count)
 
     def to_velocity(self, state: RobotState, velocity: Array) -> Plan | None:
-        """Plan to a velocity, the joints in step so that the direction is kept.
+        """Plan to a velocity with synchronised joints, which keeps the direction.
 
-        Each joint gets the share of its acceleration and jerk that its change of speed has in the
-        change of the joint that needs longest. Other than ruckig's own synchronisation this holds
+        Each joint gets a share of its acceleration and jerk: its time for the change of speed
+        relative to that of the slowest joint. Unlike ruckig's own synchronisation, this works
         when the target changes in every cycle.
         """
         demand, target = self._to_velocity, velocity.tolist()
@@ -104,7 +104,7 @@ class OnlineTrajectoryGenerator:
         longest = max(*changes, SHORTEST_CHANGE)
         unwound = []
         for change, (_, _, acceleration, (_, most, jerk)) in zip(changes, rows, strict=True):
-            # what is there is taken back in time
+            # the present acceleration is reduced in time
             share = max(change / longest, MIN_ACCELERATION_FACTOR, abs(acceleration) / most)
             unwound.append(acceleration * abs(acceleration) / (2.0 * jerk * share))
         changes = [
@@ -127,7 +127,7 @@ class OnlineTrajectoryGenerator:
         return self._plan(demand)
 
     def step(self, state: RobotState, velocity: Array, period: float) -> RobotState:
-        """Return the state after a period on the way to a velocity, as :meth:`to_velocity`."""
+        """Return the state after one period of the plan of :meth:`to_velocity`."""
         plan = self.to_velocity(state, velocity)
         if plan is None:
             return hard_brake(state, self.limits, period)
@@ -136,9 +136,9 @@ class OnlineTrajectoryGenerator:
         return plan.at(period)
 
     def brake(self, state: RobotState) -> Plan | None:
-        """Plan the shortest way to a standstill, each joint for itself.
+        """Plan the fastest stop, each joint individually.
 
-        It is planned from zero, since ruckig counts zero among the extremes of such a motion.
+        The plan starts at position zero, since ruckig includes zero in the extremes of a stop.
         """
         demand = self._to_standstill
         demand.current_velocity = state.velocity.tolist()
@@ -148,7 +148,7 @@ class OnlineTrajectoryGenerator:
     def to_state(
         self, state: RobotState, target: RobotState, shortest: float | None = None
     ) -> Plan | None:
-        """Plan to a state whose velocity and acceleration are within the limits."""
+        """Plan to a state with feasible velocity and acceleration, in ``shortest`` [s] or more."""
         demand = self._to_position
         demand.current_position = state.position.tolist()
         demand.current_velocity = state.velocity.tolist()
@@ -180,10 +180,10 @@ class OnlineTrajectoryGenerator:
 
 
 def hard_brake(state: RobotState, limits: JointLimits, period: float) -> RobotState:
-    """Slow down for a period with the greatest deceleration: for when ruckig has no answer.
+    """Decelerate for one period at the acceleration limit, if ruckig finds no solution.
 
     Returns:
-        The state at the end; the jerk limit does not hold on the way.
+        The state at the end; the jerk limit is not kept.
     """
     step = limits.acceleration * period
     velocity = np.sign(state.velocity) * np.maximum(np.abs(state.velocity) - step, 0.0)
@@ -196,10 +196,10 @@ def hard_brake(state: RobotState, limits: JointLimits, period: float) -> RobotSt
 
 
 def brakeable(way: float, acceleration: float, jerk: float) -> float:
-    """Return the velocity that can be braked to a standstill within a way, of any size.
+    """Return the greatest velocity from which a stop within a distance is possible.
 
-    A stop from velocity v with a jerk j up to the deceleration a takes the way
-    v/2 (v/a + a/j) where a is reached (v >= a^2/j), v sqrt(v/j) where it is not. A way below zero
+    A stop from velocity v with jerk j and deceleration a takes the distance
+    v/2 (v/a + a/j) if a is reached (v >= a^2/j), else v sqrt(v/j). A negative distance
     counts as zero.
     """
     way = max(way, 0.0)

@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Paths in joint space, polynomials over the time of a trajectory, and contact on them.
+"""Joint-space paths as piecewise polynomials over trajectory time, and contact on them.
 
-The time of the trajectory is not that of the clock: :class:`TrajectoryTimer` follows a path
-slower, stops on it and goes on. Velocities and accelerations of a place on a path are derivatives
-by the path's own time.
+Trajectory time differs from clock time: :class:`TrajectoryTimer` can follow a path slower, stop
+on it and continue. Velocities and accelerations on a path are derivatives with respect to
+trajectory time.
 
-:class:`PathCheck` finds contact on a way before anything moves. It looks at it in steps in which
-no link moves by more than :data:`MAX_STEP` against another, so a contact that is passed over is
-shallower than that. Distances are measured only where the distance rate bounds of the planning
+:class:`PathCheck` finds contact on a path before execution. It samples the path so that no link
+moves by more than :data:`MAX_STEP` relative to another between samples, so a missed contact is
+shallower than that. It measures distances only where the distance rate bounds of the planning
 scene do not prove that a pair is clear.
 """
 
@@ -26,20 +26,20 @@ from arm_model import Array, Clearances, Places, PlanningScene, RobotState
 # d^k/dt^k of the powers 0 to 5, as factors and exponents
 _POWERS = np.arange(6.0)
 
-# control values of a polynomial on 0..1 by its coefficients: Farin, "Curves and Surfaces for CAGD"
+# Bezier control values on 0..1 from coefficients: Farin, "Curves and Surfaces for CAGD"
 _BERNSTEIN = np.array(
     [[math.comb(row, p) / math.comb(5, p) for p in range(6)] for row in range(6)]
 )
 
-# how often the power of the row comes out of that of the column when a polynomial is moved
+# binomial coefficients for shifting a polynomial: row power from column power
 _BINOMIAL = np.array([[math.comb(column, row) for column in range(6)] for row in range(6)])
 
 
-ROUNDING_TOLERANCE = 1e-6  # rounding that is let pass in [rad]
+ROUNDING_TOLERANCE = 1e-6  # tolerated rounding in [rad]
 
 
 def shifted(coefficients: Array, by: Array) -> Array:
-    """Return the coefficients of polynomials (k, 6, n), or (6, n), that begin later by [s] (k)."""
+    """Return polynomials (k, 6, n) or (6, n) with their origin moved later by ``by`` [s] (k)."""
     powers = by[:, None, None] ** np.maximum(_POWERS - _POWERS[:, None], 0.0)
     moved: Array = (_BINOMIAL * powers) @ coefficients
     return moved
@@ -54,7 +54,7 @@ def lines(durations: Array, positions: Array) -> Array:
 
 
 def cubics(durations: Array, positions: Array, velocities: Array) -> Array:
-    """Return the coefficients (k, 6, n) of the cubics from each place to the next (k + 1, n).
+    """Return the coefficients (k, 6, n) of the cubics between successive points (k + 1, n).
 
     Positions are in [rad], velocities in [rad/s].
     """
@@ -72,7 +72,7 @@ def cubics(durations: Array, positions: Array, velocities: Array) -> Array:
 
 
 def quintics(durations: Array, positions: Array, velocities: Array, accelerations: Array) -> Array:
-    """Return the coefficients (k, 6, n) of the quintics from each place to the next (k + 1, n).
+    """Return the coefficients (k, 6, n) of the quintics between successive points (k + 1, n).
 
     Positions are in [rad], velocities in [rad/s], accelerations in [rad/s2].
     """
@@ -92,14 +92,14 @@ def quintics(durations: Array, positions: Array, velocities: Array, acceleration
 
 
 class Path:
-    """Polynomials of at most fifth degree, one after the other.
+    """Sequence of polynomial segments of at most fifth degree.
 
     Attributes:
-        starts: When they begin in [s] (k).
-        durations: How long they last in [s] (k).
-        coefficients: Of the powers 0 to 5 of the time since their begin (k, 6, n).
-        duration: How long all of it lasts in [s].
-        end: Its last place; beyond it the arm rests there.
+        starts: Start times of the segments in [s] (k).
+        durations: Durations of the segments in [s] (k).
+        coefficients: For powers 0 to 5 of the time since the segment start (k, 6, n).
+        duration: Total duration in [s].
+        end: Final state; after it the arm rests there.
     """
 
     def __init__(self, durations: Array, coefficients: Array) -> None:
@@ -111,7 +111,7 @@ class Path:
 
     @classmethod
     def between(cls, duration: float, begin: RobotState, end: RobotState) -> Path:
-        """Return the quintic that meets positions, velocities and accelerations at both ends."""
+        """Return the quintic with given position, velocity and acceleration at both ends."""
         ends = (
             np.array((getattr(begin, name), getattr(end, name)))
             for name in ('position', 'velocity', 'acceleration')
@@ -121,33 +121,33 @@ class Path:
 
     @classmethod
     def joined(cls, paths: Sequence[Path]) -> Path:
-        """Return paths one after the other; each begins where the one before ends."""
+        """Concatenate paths, each of which begins where the previous one ends."""
         return cls(
             np.concatenate([each.durations for each in paths]),
             np.concatenate([each.coefficients for each in paths]),
         )
 
     def part(self, begin: float, end: float) -> Path:
-        """Return what lies between two times in [s], exactly."""
+        """Return the part of the path between two times in [s], exactly."""
         inner = self.starts[(self.starts > begin) & (self.starts < end)]
         times = np.concatenate(((begin,), inner, (end,)))
         return Path(np.diff(times), self.cut(times))
 
     def cut(self, times: Array) -> Array:
-        """Return the coefficients (k, 6, n) of its parts between times in [s] (k + 1)."""
+        """Return the coefficients (k, 6, n) of the parts between times in [s] (k + 1)."""
         middles = 0.5 * (times[:-1] + times[1:])
         numbers = np.searchsorted(self.starts, middles, side='right') - 1
         return shifted(self.coefficients[numbers], times[:-1] - self.starts[numbers])
 
     @property
     def control_values(self) -> Array:
-        """Control values of the segments' positions (k, 6, n), in whose hull they lie."""
+        """Bezier control values (k, 6, n) of the segments, whose hull contains the positions."""
         scaled = self.coefficients * (self.durations[:, None] ** _POWERS)[:, :, None]
         control: Array = np.einsum('cp,kpn->kcn', _BERNSTEIN, scaled)
         return control
 
     def at(self, time: float) -> RobotState:
-        """Return the place at a time of the path in [s]; beyond its end it rests there."""
+        """Return the state at a path time in [s]; after the end, at rest there."""
         if time > self.duration:
             rest = np.zeros(len(self.end.position))
             return RobotState(self.end.position, rest, rest)
@@ -155,13 +155,13 @@ class Path:
         return self._state(place, max(time, 0.0) - self._starts[place])
 
     def positions(self, times: Array) -> Array:
-        """Return the positions (k, n) in [rad] at times of the path (k) in [s]."""
+        """Return the positions (k, n) in [rad] at path times (k) in [s]."""
         within = np.clip(times, 0.0, self.duration)
         places = np.maximum(np.searchsorted(self.starts, within, side='right') - 1, 0)
         return self.derived(0, places, within - self.starts[places])
 
     def _state(self, number: int, t: float) -> RobotState:
-        """Return the place at a time since the begin of a polynomial."""
+        """Return the state at a time in [s] since the start of a segment."""
         powers = t**_POWERS
         first = np.concatenate(((0.0,), _POWERS[1:] * powers[:-1]))
         second = np.concatenate(((0.0, 0.0), _POWERS[2:] * _POWERS[1:-1] * powers[:-2]))
@@ -169,7 +169,7 @@ class Path:
         return RobotState(powers @ c, first @ c, second @ c)
 
     def derived(self, order: int, places: Places, times: Array) -> Array:
-        """Return a derivative (m, n) of segments (m) at times since their begin in [s] (m).
+        """Return a derivative (m, n) of segments (m) at times (m) in [s] since their start.
 
         Order 0 is the position in [rad].
         """
@@ -183,7 +183,7 @@ class Path:
 
 @dataclass(frozen=True, slots=True)
 class Excess:
-    """A place beyond a range."""
+    """Point on a path that exceeds a position range."""
 
     joint: int  # number of the joint
     position: float  # where it is in [rad]
@@ -191,7 +191,7 @@ class Excess:
 
 
 def farthest_beyond(path: Path, lower: Array, upper: Array) -> Excess | None:
-    """Return the place where a path is farthest beyond a range; None where it keeps within."""
+    """Return the point where a path exceeds a range the most; None if it stays within."""
     scaled = path.coefficients * (path.durations[:, None] ** np.arange(6.0))[:, :, None]
     control = path.control_values
     too_low = (control < lower - ROUNDING_TOLERANCE).any(axis=1)
@@ -209,7 +209,7 @@ def farthest_beyond(path: Path, lower: Array, upper: Array) -> Excess | None:
 
 
 def _extremes(coefficients: Array) -> list[tuple[float, float]]:
-    """Return the ends and turning points of a polynomial on 0..1, and its values there."""
+    """Return (argument, value) at the ends and turning points of a polynomial on 0..1."""
     slopes = coefficients[1:] * np.arange(1.0, 6.0)
     turning = np.roots(slopes[::-1])
     inner = turning.real[
@@ -219,25 +219,25 @@ def _extremes(coefficients: Array) -> list[tuple[float, float]]:
     return [(share, float(np.polyval(coefficients[::-1], share))) for share in shares]
 
 
-MAX_STEP = 0.005  # greatest motion of a link against another from one look to the next in [m]
-COARSE_PERIOD = 0.01  # time between the places from which the steps are laid out in [s]
-MAX_SAMPLES = 50_000  # looks at one way at most: beyond 250 m of motion they are farther apart
-MAX_BATCH = 64  # looks that are proven clear at once at most
+MAX_STEP = 0.005  # greatest relative motion of two links between samples in [m]
+COARSE_PERIOD = 0.01  # sampling period from which the steps are computed in [s]
+MAX_SAMPLES = 50_000  # most samples of a path: beyond 250 m of motion they are farther apart
+MAX_BATCH = 64  # most samples that are proven clear at once
 
 CONTACT_TOLERANCE = 1e-4
-"""Overlap that is let pass in [m], for rounding; in contact already, how much more of it."""
+"""Tolerated overlap in [m] for rounding; for links already in contact, tolerated increase."""
 
 
 @dataclass(frozen=True, slots=True)
 class PathContact:
-    """Two links, or a link and an object, that meet on a way."""
+    """First contact of two links, or of a link and an object, on a path."""
 
     links: tuple[str, str]  # their names
     time: float  # when they meet in [s]
 
 
 class PathCheck:
-    """Looks for contact of links on ways; for one thread."""
+    """Finds contact of links on paths; use it in one thread."""
 
     def __init__(self, scene: PlanningScene) -> None:  # ``model.scene`` is the arm alone
         self._scene, self._clearances = scene, Clearances(scene)
@@ -245,12 +245,12 @@ class PathCheck:
     def contact(
         self, positions_at: Callable[[Array], Array], duration: float
     ) -> PathContact | None:
-        """Return the first contact on a way.
+        """Return the first contact on a path; None if it is clear.
 
-        An arm that begins in contact may part, and may not come nearer.
+        Links that start in contact may separate, but must not come nearer.
 
         Args:
-            positions_at: Joint positions in [rad] (k, n) at times in [s] (k).
+            positions_at: Function from times in [s] (k) to joint positions in [rad] (k, n).
         """
         if not self._scene.pairs:
             return None
@@ -274,7 +274,7 @@ class PathCheck:
         return None
 
     def _looks(self, positions_at: Callable[[Array], Array], duration: float) -> Array:
-        """Return the times to look at: dense where the arm moves fast."""
+        """Return the sample times, dense where the arm moves fast."""
         coarse = np.linspace(0.0, duration, math.ceil(duration / COARSE_PERIOD) + 2)
         turns = np.abs(np.diff(positions_at(coarse), axis=0))
         motion = (turns @ self._scene.distance_rate_bounds.T).max(axis=1)

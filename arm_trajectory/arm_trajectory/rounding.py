@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Corners of paths rounded, their begin and their end among them."""
+"""Rounding of the corners of a path, including its start and end."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from arm_model import Array, JointLimits, RobotState
 from .path import Path, shifted
 
 DURATION_FACTOR = 1.25
-"""How much longer than its peaks need the rounding of a corner takes: segments bend too."""
+"""Factor on the least rounding time that the peaks need, as segments are curved, too."""
 
 MIN_HALF_TIME = 0.02
-"""Least half time of a rounding in [s]: a few cycles, so that sampling does not see a corner."""
+"""Least half duration of a rounding in [s]: a few cycles, so that samples show no corner."""
 
-OVERLAP_TOLERANCE = 0.005  # how far roundings that overlap may lead off the path in [rad]
+OVERLAP_TOLERANCE = 0.005  # greatest path deviation of overlapping roundings in [rad]
 
 DEVIATION_FACTOR = 0.007
-"""Greatest way off the path of a rounded step of acceleration, as a share of E d^2."""
+"""Greatest path deviation of a rounded acceleration step, as a share of E d^2."""
 
-MERGE_TOLERANCE = 1e-7  # changes of the polynomial that are nearer than this count as one in [s]
+MERGE_TOLERANCE = 1e-7  # segment boundaries nearer than this are merged in [s]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Corners:
-    """Places where velocities or accelerations jump."""
+    """Corners: times where velocity or acceleration jumps."""
 
     times: Array  # when in [s] (k)
     jumps: Array  # jumps of the velocities in [rad/s] (k, n)
@@ -37,18 +37,18 @@ class _Corners:
 
 
 def rounded(path: Path, limits: JointLimits, *, from_rest: bool = True) -> Path:
-    """Round the corners of a path, its begin and its end among them.
+    """Round the corners of a path, including its start and end.
 
-    Where velocity or acceleration jump by D or E, the path goes over smoothly within a time 2 d
-    that keeps the peaks 3/4 D/d of acceleration, 3/2 D/d^2 and 9/8 E/d of jerk within the limits.
-    It leaves a corner of straight segments by 3/16 D d, a step of acceleration by 0.007 E d^2.
-    Where points are so dense that roundings overlap, they add up, and what is followed is their
-    smooth mean; d is less than needed where that would lead too far off. A path that does not
-    begin or end at rest gets longer by d there.
+    Where velocity jumps by D or acceleration by E, the path is smoothed over a time 2 d that keeps
+    the peaks, 3/4 D/d of acceleration and 3/2 D/d^2 or 9/8 E/d of jerk, within the limits. It
+    deviates by 3/16 D d at a corner of straight segments, by 0.007 E d^2 at an acceleration step.
+    Where points are so dense that roundings overlap, they add up, and the result is their smooth
+    mean; d is reduced if that would deviate too far. A path that does not start or end at rest
+    gets longer by d there.
 
     Args:
-        path: Polynomials, of which neighbours may meet in a corner.
-        from_rest: Whether the arm rests at its begin; else that stays as it is.
+        path: Path whose segments may meet in corners.
+        from_rest: Whether the arm is at rest at the start; else the start stays unchanged.
     """
     corners = _corners(path, from_rest=from_rest)
     halves = _halves(corners, limits)
@@ -69,7 +69,7 @@ def rounded(path: Path, limits: JointLimits, *, from_rest: bool = True) -> Path:
 
 
 def run_out(end: RobotState, limits: JointLimits) -> list[Path]:
-    """Return how a path that ends with a velocity comes to rest behind its end."""
+    """Return the motion to rest after a path that ends with a velocity."""
     still = np.zeros_like(end.velocity)
     duration = 2.0 * float(_needed(end.velocity[None], still[None], limits)[0])
     if duration == 0.0:
@@ -79,7 +79,7 @@ def run_out(end: RobotState, limits: JointLimits) -> list[Path]:
 
 
 def _corners(path: Path, *, from_rest: bool) -> _Corners:
-    """Return where polynomials meet, and begin and end against rest."""
+    """Return the corners between segments, and those to rest at start and end."""
     places, lasts = np.arange(len(path.durations)), path.durations
     at_rest = np.zeros((1, path.coefficients.shape[2]))
     jumps, bends = (
@@ -94,7 +94,7 @@ def _corners(path: Path, *, from_rest: bool) -> _Corners:
 
 
 def _needed(jumps: Array, bends: Array, limits: JointLimits) -> Array:
-    """Return half the time that jumps of velocity and acceleration need in [s], 0 for none."""
+    """Return half the rounding time in [s] for velocity and acceleration jumps; 0 for none."""
     jump, bend = np.abs(jumps), np.abs(bends)
     by_acceleration = np.max(0.75 * jump / limits.acceleration, axis=1)
     by_jerk = np.max(np.sqrt(1.5 * jump / limits.jerk), axis=1)
@@ -106,7 +106,7 @@ def _needed(jumps: Array, bends: Array, limits: JointLimits) -> Array:
 
 
 def _halves(corners: _Corners, limits: JointLimits) -> Array:
-    """Return half the time of each rounding in [s]; 0 without a corner."""
+    """Return half the duration of each rounding in [s]; 0 without a corner."""
     jump = np.maximum(np.abs(corners.jumps).max(axis=1), 1e-12)
     bend = np.maximum(np.abs(corners.bends).max(axis=1), 1e-12)
     harmless = np.minimum(
@@ -120,14 +120,14 @@ def _halves(corners: _Corners, limits: JointLimits) -> Array:
 
 
 def _rest(duration: float, position: Array) -> list[Path]:
-    """Return a rest; none that takes no time."""
+    """Return a rest at a position; empty for duration 0."""
     coefficients = np.zeros((1, 6, len(position)))
     coefficients[0, 0] = position
     return [Path(np.array([duration]), coefficients)] if duration > 0.0 else []
 
 
 def _breaks(base: Path, times: Array, halves: Array) -> Array:
-    """Return the times between which the rounded path is one polynomial in [s]."""
+    """Return the times in [s] between which the rounded path is one polynomial."""
     rounds = halves > 0.0
     end = base.duration
     ends = (times[rounds] - halves[rounds], times[rounds], times[rounds] + halves[rounds])
@@ -139,7 +139,7 @@ def _breaks(base: Path, times: Array, halves: Array) -> Array:
 
 
 def _round(pieces: Array, starts: Array, corners: _Corners, corner: int, half: float) -> None:
-    """Add the rounding of a corner to the polynomials about it."""
+    """Add the rounding of a corner to the polynomials around it."""
     time, jump, bend = corners.times[corner], corners.jumps[corner], corners.bends[corner]
     d = half
     smooth = np.array(

@@ -1,21 +1,20 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Time scaling: a path followed slower where joints could not follow, on the same places.
+"""Time scaling: slows a path down where joints could not follow; its geometry stays the same.
 
-It takes place before the path begins, once, as that of TOPP-RA does, but with limited jerk and
-never quicker than the points say. While the path runs, the speed scaling of
-:mod:`.execution` takes over.
+It runs once before execution, like TOPP-RA, but with limited jerk, and never makes a path faster
+than its points. During execution, the speed scaling of :mod:`.execution` takes over.
 
-Planners know speeds and accelerations, seldom jerks, and only at their points; what lies between
-may ask more. The path q(s) is followed as q(s(t)) with ds/dt = 1/r. The scaling r(s) >= 1 is a
-cubic B-spline, so the path stays smooth to the acceleration, and what it asks is, by the chain
-rule with u = 1/r, derivatives by s written as primes::
+Planners limit velocity and acceleration, seldom jerk, and only at their points; the demand between
+points may be higher. The path q(s) is followed as q(s(t)) with ds/dt = 1/r. The scaling r(s) >= 1
+is a cubic B-spline, so acceleration stays continuous. By the chain rule, with u = 1/r and primes
+for derivatives by s, the demand is::
 
     velocity      q' u
     acceleration  q'' u^2 + q' u u'
     jerk          q''' u^3 + 3 q'' u^2 u' + q' u (u'^2 + u u'')
 
-Where that is too much, the coefficients of the spline there grow, until nothing is.
+Where it exceeds a limit, the spline coefficients are increased until all limits hold.
 """
 
 from __future__ import annotations
@@ -29,41 +28,41 @@ from arm_model import Array, JointLimits, Places
 
 from .path import Path, quintics
 
-MAX_SPACING = 0.01  # greatest distance of the places that are looked at in [s]
-MAX_SAMPLES = 4000  # places in about a path: long ones are looked at less densely
-MIN_SEGMENT_SAMPLES = 4  # least number of parts in which each segment is looked at
+MAX_SPACING = 0.01  # greatest distance between samples in [s]
+MAX_SAMPLES = 4000  # approximate number of samples of a path: long ones are sampled less densely
+MIN_SEGMENT_SAMPLES = 4  # least number of sample intervals of each segment
 
 KNOT_SPACINGS = (0.06, 0.15, 0.4)
-"""Distances of the spline's knots that are tried in [s]: short ones lose less time."""
+"""Knot spacings of the spline in [s] that are tried: short ones lose less time."""
 
-MAX_ITERATIONS = 60  # how often the spline is improved at most
+MAX_ITERATIONS = 60  # greatest number of iterations of the spline
 
 LIMIT_FACTORS = (0.99, 0.96, 0.9)
-"""Shares of the limits that scalings aim at, until what lies between the places is within too."""
+"""Shares of the limits to aim for, tried until the path between samples is within, too."""
 
 BETWEEN_FACTORS = (1.0, 1.01, 1.03)
-"""How much greater velocity, acceleration and jerk may be between the places, as factors."""
+"""Factors by which velocity, acceleration and jerk may be greater between samples."""
 
 INTEGRAL = np.array([1.0, 11.0, 11.0, 1.0]) / 24.0
-"""Of the four parts of a uniform cubic B-spline over a cell, by its width."""
+"""Integrals of the four basis functions of a uniform cubic B-spline over a cell of width 1."""
 
 MAX_SEGMENT_DURATION = 0.02  # greatest length of the new segments in [s] of the given path
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Demand:
-    """What a path asks most."""
+    """Greatest demand of a path on a joint."""
 
-    # factor of time that it takes to come within the limits; 1 or less is within
+    # factor of time that is needed to meet the limits; at most 1 if they are met
     time_factor: float
-    joint: int  # number of the joint that asks it
+    joint: int  # index of the joint
     quantity: int  # 0 velocity, 1 acceleration, 2 jerk
     time: float  # when in [s]
     value: float  # how much in [rad/s], [rad/s2] or [rad/s3]
 
 
 class Timing:
-    """What a path asks of the joints, and the scaling that brings it within their limits."""
+    """Demand of a path on the joints, and the scaling that brings it within their limits."""
 
     def __init__(self, path: Path, limits: JointLimits) -> None:
         self._path = path
@@ -74,17 +73,17 @@ class Timing:
 
     @property
     def fastest(self) -> Demand:
-        """The greatest speed that the path asks, measured by the limits."""
+        """The greatest velocity demand of the path, relative to the limits."""
         return self._most(self._time_factors(self._rates, 1.0)[:1])
 
     @property
     def demand(self) -> Demand:
-        """What the path asks most, measured by the limits."""
+        """The greatest demand of the path, relative to the limits."""
         return self._most(self._time_factors(self._rates, 1.0))
 
     @property
     def plainest(self) -> Demand:
-        """What says best that the path asks too much: speed before acceleration before jerk."""
+        """The plainest excess demand: of velocity, else acceleration, else jerk."""
         factors = self._time_factors(self._rates, 1.0)
         beyond = [row for row in range(3) if factors[row].max() > 1.0]
         return self._most(factors[: beyond[0] + 1]) if beyond else self._most(factors)
@@ -97,7 +96,7 @@ class Timing:
         )
 
     def time_scaled(self) -> Path | None:
-        """Return the path within the limits, as quick as a spline makes it; None for no way."""
+        """Return the fastest spline-scaled path within the limits; None if there is none."""
         if self.demand.time_factor <= 1.0:
             return self._path
         for full in LIMIT_FACTORS:
@@ -112,7 +111,7 @@ class Timing:
         return None
 
     def _solved(self, knots: float, full: float) -> TimeScaling | None:
-        """Return the scaling with knots about a distance apart, if there is one."""
+        """Return a scaling with knots spaced by about ``knots`` in [s]; None if not found."""
         count = max(math.ceil(self._path.duration / knots), 1)
         scaling = TimeScaling(np.ones(count + 3), self._path.duration)
         cells, basis = scaling.basis(self._times)
@@ -129,7 +128,7 @@ class Timing:
         return None
 
     def _needed(self, r: Array, slope: Array, bend: Array, full: float) -> Array:
-        """Return the greatest factor of time at each place under a scaling."""
+        """Return the greatest time factor needed at each sample under a scaling."""
         u = 1.0 / r
         first = -slope * u**2
         second = (2.0 * slope**2 * u - bend) * u**2
@@ -147,12 +146,12 @@ class Timing:
         return needed
 
     def _time_factors(self, rates: list[Array], full: float) -> Array:
-        """Return the factors of time (3, m, n) by velocity, acceleration and jerk."""
+        """Return the time factors (3, m, n) needed for velocity, acceleration and jerk."""
         speed, acceleration, jerk = self._shares(rates, full)
         return np.array((speed, np.sqrt(acceleration), np.cbrt(jerk)))
 
     def _shares(self, rates: list[Array], full: float) -> list[Array]:
-        """Return velocity, acceleration and jerk (m, n) as shares of what they may be."""
+        """Return velocity, acceleration and jerk (m, n) as shares of the allowed values."""
         limits = self._limits
         most = (limits.velocity, limits.acceleration, limits.jerk)
         return [
@@ -162,7 +161,7 @@ class Timing:
 
 
 class TimeScaling:
-    """A cubic B-spline over a path: seconds for each second of it."""
+    """Cubic B-spline of the time scaling r over path time, in seconds per second."""
 
     def __init__(self, coefficients: Array, length: float) -> None:
         self.coefficients = coefficients
@@ -171,12 +170,12 @@ class TimeScaling:
 
     @property
     def duration(self) -> float:
-        """How long the scaled path lasts in [s]."""
+        """Duration of the scaled path in [s]."""
         cells = np.convolve(self.coefficients, INTEGRAL, 'valid')
         return float(self._width * cells.sum())
 
     def basis(self, times: Array) -> tuple[Places, Array]:
-        """Return the cells (m) of times, and the weights of their four coefficients (3, m, 4)."""
+        """Return the cells (m) of times, and the weights of their coefficients (3, m, 4)."""
         last = len(self.coefficients) - 4
         cells = np.clip((times / self._width).astype(int), 0, last)
         f = times / self._width - cells
@@ -189,13 +188,13 @@ class TimeScaling:
         return cells, np.array([value, slope, bend]).transpose(0, 2, 1) * scales[:, None, None]
 
     def derived(self, cells: Places, weights: Array) -> Array:
-        """Return the spline, or derivatives of it (..., m), by weights of :meth:`basis`."""
+        """Return the spline or its derivatives (..., m), from weights of :meth:`basis`."""
         near = self.coefficients[cells[:, None] + np.arange(4)]
         derived: Array = np.einsum('mj,...mj->...m', near, weights)
         return derived
 
     def times(self, places: Array) -> Array:
-        """Return the scaled times of places of the path that begin at 0 in [s]."""
+        """Convert path times, starting at 0, to scaled times in [s]."""
         knots = np.arange(1, len(self.coefficients) - 3) * self._width
         fine = np.unique(np.concatenate((places, knots)))
         middle, half = 0.5 * (fine[:-1] + fine[1:]), 0.5 * np.diff(fine)
@@ -209,7 +208,7 @@ class TimeScaling:
 
 
 def _places(path: Path) -> tuple[Places, Array]:
-    """Return segments and times in them, at which a path is looked at."""
+    """Return segment numbers of the samples of a path, and their times in the segments in [s]."""
     spacing = max(MAX_SPACING, path.duration / MAX_SAMPLES)
     lasts = path.durations
     counts = np.maximum(np.ceil(lasts / spacing).astype(int), MIN_SEGMENT_SAMPLES) + 1
@@ -219,7 +218,7 @@ def _places(path: Path) -> tuple[Places, Array]:
 
 
 def _scaled_path(path: Path, scaling: TimeScaling) -> Path:
-    """Return a path as the scaling makes it."""
+    """Return a path with the scaling applied."""
     lasts = path.durations
     counts = np.ceil(lasts / MAX_SEGMENT_DURATION).astype(int)
     places = np.repeat(np.arange(len(counts)), counts)
