@@ -1,16 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Robot arms as values: description, limits, kinematics, shapes and their distances; no ROS.
+"""Model of a robot arm: limits, kinematics, collision geometry and distances; no ROS.
 
-A :class:`RobotModel` is made of URDF, SRDF and limits; a :class:`RobotState` says how its joints
-move; a :class:`PlanningScene` holds what may collide, :class:`Clearances` measures it.
-:mod:`arm_model.ros` brings a model from parameters, and frames of TF.
+A :class:`RobotModel` is built from URDF, SRDF and limits; a :class:`RobotState` holds the motion
+of its joints; a :class:`PlanningScene` holds collision objects, :class:`Clearances` measures
+distances. :mod:`arm_model.ros` builds a model from parameters, and looks up TF frames.
 
-Conventions: joint vectors (n) are in the order of the group's joints in [rad], of joints that
-slide in [m]; velocities, accelerations and jerks in their units per [s], [s2] and [s3]. Poses of a
-:class:`RobotModel` are in its base link, those of a scene in the root link. Quaternions are x, y,
-z, w; twists linear before angular. ``now`` and all times are on the steady clock in [s].
-``folder`` is that of the URDF, where relative names of mesh files begin.
+Conventions: joint vectors (n) are in the order of the group's joints, in [rad] (prismatic joints
+in [m]); velocities, accelerations and jerks per [s], [s2] and [s3]. Poses of a :class:`RobotModel`
+are in its base link, those of a scene in the root link. Quaternions are x, y, z, w; twists are
+linear before angular. ``now`` and all times are on the steady clock in [s]. ``folder`` is that of
+the URDF; relative names of mesh files start there.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What all else is made of: arrays of numbers, poses of frames, states of joints."""
+"""Basic types: arrays of numbers, poses of frames, states of joints."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import pinocchio as pin
 from .exceptions import CommandError
 
 Array = NDArray[np.float64]
-"""Numbers in double precision; the shape stands in the docstring of each use."""
+"""Double-precision numbers; each use documents the shape."""
 
 Places = NDArray[np.int_]  # numbers of rows, from 0
 
@@ -33,7 +33,7 @@ def frozen(values: Sequence[float] | Array) -> Array:
 
 
 def checked(values: Sequence[float] | Array, length: int, what: str) -> Array:
-    """Return a read-only copy of finite numbers of a known count.
+    """Return a read-only copy; check that it has ``count`` finite numbers.
 
     Raises:
         CommandError: The count is wrong, or a number is not finite.
@@ -52,18 +52,18 @@ def checked(values: Sequence[float] | Array, length: int, what: str) -> Array:
 UNIT_LENGTH_TOLERANCE = 1e-3  # how far the length of a quaternion may be off
 
 ROUNDING_TOLERANCE = 1e-9
-"""How far numbers of equal poses may be apart, which come from different products."""
+"""Rounding tolerance between equal poses that were computed in different ways."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
-    """Position and orientation of a frame in another."""
+    """Pose of one frame in another."""
 
     rotation: Array  # rotation matrix (3, 3), from the frame to the other
     position: Array  # origin of the frame in the other in [m]
 
     def is_close(self, other: Pose) -> bool:
-        """Whether another pose is the same but for rounding."""
+        """Whether another pose is equal up to rounding."""
         return bool(
             np.allclose(self.rotation, other.rotation, rtol=0.0, atol=ROUNDING_TOLERANCE)
             and np.allclose(self.position, other.position, rtol=0.0, atol=ROUNDING_TOLERANCE)
@@ -74,7 +74,7 @@ ORIGIN = Pose(frozen(np.eye(3)), frozen(np.zeros(3)))  # where a frame is in its
 
 
 def combined(outer: Pose, inner: Pose) -> Pose:
-    """Return a pose in the frame in which the outer one is given."""
+    """Return the composition of two poses: the inner one in the parent frame of the outer."""
     return Pose(outer.rotation @ inner.rotation, outer.position + outer.rotation @ inner.position)
 
 
@@ -85,7 +85,7 @@ def rotation_of(quaternion: Sequence[float]) -> Array:
         quaternion: x, y, z, w.
 
     Raises:
-        CommandError: A number is not finite, or the length is not one.
+        CommandError: A number is not finite, or the length is not 1.
     """
     length = math.hypot(*quaternion)
     if not abs(length - 1.0) < UNIT_LENGTH_TOLERANCE:
@@ -95,12 +95,12 @@ def rotation_of(quaternion: Sequence[float]) -> Array:
 
 
 def inverse(pose: Pose) -> Pose:
-    """Return the pose of the outer frame in the inner."""
+    """Return the inverse pose: the outer frame in the inner."""
     return Pose(pose.rotation.T, -pose.rotation.T @ pose.position)
 
 
 def turned_twists(axes: Array, twists: Array) -> Array:
-    """Return twists along other axes.
+    """Rotate twists into other axes.
 
     Args:
         axes: Rotation (3, 3) from the other axes to those of the twists.
@@ -113,7 +113,7 @@ def turned_twists(axes: Array, twists: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotState:
-    """State of motion of every joint."""
+    """Position, velocity and acceleration of every joint."""
 
     position: Array  # positions in [rad]
     velocity: Array  # velocities in [rad/s]
@@ -121,11 +121,11 @@ class RobotState:
 
     @classmethod
     def at_rest(cls, position: Sequence[float] | Array) -> RobotState:
-        """Return the state of standing still."""
+        """Return a state at rest."""
         zero = np.zeros(len(position))
         return cls(frozen(position), frozen(zero), frozen(zero))
 
     @property
     def moving(self) -> bool:
-        """Whether a joint moves, or is about to."""
+        """Whether any joint has a velocity or an acceleration."""
         return bool(self.velocity.any() or self.acceleration.any())

@@ -1,15 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Everything that arm_model raises, and the root of what the packages above it raise.
+"""Exceptions of arm_model, and the root of those of the packages above it.
 
 ::
 
     ArmError
     ├── ModelError (ValueError)     description, SRDF and limits do not make an arm
-    │   └── LimitsError             the limits file is the matter
+    │   └── LimitsError             the limits file is invalid
     ├── SceneError (ValueError)     an object does not fit into a planning scene
     │   ├── LinkNameError           no such link
-    │   └── ObjectNameError         no such object, or its name is none or taken
+    │   └── ObjectNameError         no such object, or its name is empty or taken
     └── CommandError (ValueError)   a request is refused before anything moves
 
 Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
@@ -29,11 +29,11 @@ class ArmError(Exception):
 
 
 class ModelError(ArmError, ValueError):
-    """Description, SRDF and limits do not make an arm."""
+    """URDF, SRDF and limits do not define an arm."""
 
 
 class LimitsError(ModelError):
-    """The limits file cannot be read, or does not have what it must.
+    """The limits file cannot be read, or lacks required entries.
 
     Attributes:
         problems: What is wrong, one sentence each.
@@ -62,7 +62,7 @@ class CommandError(ArmError, ValueError):
 
 @contextmanager
 def description_refused(place: str = '') -> Iterator[None]:
-    """Raise a ModelError where URDF or SRDF cannot be used; the message names the place."""
+    """Convert errors in URDF or SRDF to a ModelError; the message names the place."""
     try:
         yield
     except DescriptionError as error:
@@ -71,7 +71,7 @@ def description_refused(place: str = '') -> Iterator[None]:
 
 @contextmanager
 def limits_refused(path: Path | str) -> Iterator[None]:
-    """Name the limits file in what is wrong with it."""
+    """Add the name of the limits file to errors about it."""
     try:
         yield
     except LimitsError as error:

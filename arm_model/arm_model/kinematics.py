@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The kinematic tree that a group moves: its joints, and the mimic joints that follow them."""
+"""The kinematic tree of a group: its joints, and the mimic joints that follow them."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from .arrays import Array, frozen, Mask, Native, Pose
 from .exceptions import CommandError, ModelError
 
 CONTINUOUS_BOUND = 1e9
-"""Range that a continuous joint is given in [rad], so that its position is one plain angle."""
+"""Position range of continuous joints in [rad], so that their positions are plain angles."""
 
 LINK = 'link '  # what the frame of a link is called in pinocchio, before the name of the link
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RelativeMotion:
-    """How the joints between two bodies move them against each other."""
+    """Effect of the joints between two bodies on their relative motion."""
 
     # sense in which each joint moves the second body against the first: 1, -1, or 0 for a joint
     # that is not between them
@@ -37,27 +37,27 @@ class RelativeMotion:
 
 
 class Kinematics:
-    """Joints of a group with the mimic joints that follow them; the others stand somewhere.
+    """Joints of a group and the mimic joints that follow them; all other joints are fixed.
 
-    It is not changed once it is made, so any thread may read it. Columns are in the order of
-    ``native``: joints of the group and followers. ``expanded`` and ``projected`` lead from the
-    group's joints to columns and back.
+    Immutable, so any thread may read it. Columns are in the order of ``native``: joints of
+    the group and mimic joints. ``expanded`` and ``projected`` convert from the group's joints
+    to columns and back.
 
     Attributes:
         native: The pinocchio model; links are frames of it.
         joints: Joints of the group, in the order of ``native``; of a chain, from the base out.
-        root: The link that stands still, in which the poses of ``native`` are.
-        frames: Number of each link's frame in ``native``, by link.
-        others: Where the joints beside the group stand in [rad], by joint; without those that
-            follow others.
-        mimics: How joints of the robot follow others, by joint.
+        root: The fixed link in which poses of ``native`` are expressed.
+        frames: Frame number of each link in ``native``, by link.
+        others: Fixed positions of joints outside the group in [rad], by joint; without mimic
+            joints.
+        mimics: Mimic relations of the robot, by joint.
     """
 
     def __init__(self, tree: KinematicTree, group: Sequence[str]) -> None:
-        """Build; other joints than the group stand at 0, or at the limit next to it.
+        """Build the tree; joints outside the group are at 0, or at the limit nearest to 0.
 
         Raises:
-            ModelError: The description makes no kinematic tree.
+            ModelError: The URDF does not define a kinematic tree.
         """
         self._tree = tree
         self._full = full = _full(tree)
@@ -112,7 +112,7 @@ class Kinematics:
         return moved
 
     def of_joints(self, joints: Sequence[str]) -> Kinematics:
-        """Return the robot with other joints moving; those that move in neither stay."""
+        """Return the kinematics of another set of joints; all others keep their positions."""
         return Kinematics(self._tree, joints).with_others(self.others)
 
     def expanded(self, positions: Array) -> Array:
@@ -123,26 +123,26 @@ class Kinematics:
         return expanded
 
     def projected(self, columns: Array) -> Array:
-        """Return derivatives with the joints of the group from those with all columns (..., n)."""
+        """Convert derivatives from all columns to the joints of the group (..., n)."""
         return columns if self._plain else columns @ self._factors
 
     def bounded(self, columns: Array) -> Array:
-        """Return bounds of derivatives from those with all columns (..., n), none negative."""
+        """Convert non-negative bounds of derivatives from all columns to the group (..., n)."""
         return columns if self._plain else columns @ np.abs(self._factors)
 
     def link_pose(self, link: str, positions: Array) -> Pose:
-        """Return the pose of a link in the root link; not for a cycle."""
+        """Return the pose of a link in the root link; too slow for a control cycle."""
         data = self.native.createData()
         pin.forwardKinematics(self.native, data, self.expanded(np.asarray(positions, dtype=float)))
         placement = pin.updateFramePlacement(self.native, data, self.frames[link])
         return Pose(frozen(placement.rotation), frozen(placement.translation))
 
     def parent_joint(self, link: str) -> int:
-        """Return the number of the joint that moves a link; 0 for a link that stands still."""
+        """Return the number of the joint that moves a link; 0 for a fixed link."""
         return int(self.native.frames[self.frames[link]].parentJoint)
 
     def _stand(self, others: Mapping[str, float]) -> None:
-        """Fix the joints beside the group at places."""
+        """Fix the joints outside the group at some positions."""
         full, places = self._full, pin.neutral(self._full)
         self.others = others
         for name, place in others.items():
@@ -156,14 +156,14 @@ class Kinematics:
         self.moves = lru_cache(maxsize=None)(self._moves)
 
     def _moves(self, body: int, other: int) -> bool:
-        """Whether a joint of the group moves two bodies, by the joints that move these."""
+        """Whether the group moves two bodies against each other, given their parent joints."""
         sign = self.relative_motion(body, other).sign
         return bool(self.bounded(np.abs(sign)).any())
 
     def _relative_motion(self, body: int, other: int) -> RelativeMotion:
-        """Return how the joints between two bodies move them, by the joints that move these.
+        """Return the relative motion of two bodies, given their parent joints.
 
-        Seen from a joint, nothing of a body is farther away than the lengths that lead there.
+        The link lengths between a joint and a body bound the distance of any point of the body.
         """
         model = self.native
         # the joints from the body in to the common trunk, and from there out to the other
@@ -186,7 +186,7 @@ class Kinematics:
         return RelativeMotion(sign, rate, turning)
 
     def _travel(self, joint: int) -> float:
-        """Return how far a sliding joint moves from its zero at most in [m]."""
+        """Return the greatest travel of a prismatic joint from its zero in [m]."""
         model = self.native
         extremes = np.maximum(np.abs(model.lowerPositionLimit), np.abs(model.upperPositionLimit))
         columns = list(model.names)[1:]

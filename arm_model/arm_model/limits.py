@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Limits of the joints' motion: from the description, narrowed by a limits file.
+"""Joint limits: from the URDF, narrowed by a limits file.
 
 The file has MoveIt's format (joint_limits.yaml)::
 
@@ -14,11 +14,11 @@ The file has MoveIt's format (joint_limits.yaml)::
         max_jerk: 70.0              # [rad/s3]
 
 Position limits (``has_position_limits``, ``min_position``, ``max_position``) and velocities may be
-narrower than those of the description, never wider. Metres stand for radians at a sliding joint.
+narrower than those of the URDF, never wider. For prismatic joints, metres replace radians.
 
-The table may stand in the parameters of a node (``move_group: {ros__parameters: ...}``), and may
-leave joints out. What neither file says has a default, which is noted: MoveIt's files have no jerk
-and often no acceleration, and some descriptions write velocity 0.
+The table may be nested in node parameters (``move_group: {ros__parameters: ...}``), and may omit
+joints. A limit that neither file sets gets a default, with a note: MoveIt's files have no jerk
+and often no acceleration, and some URDFs have velocity 0.
 """
 
 from __future__ import annotations
@@ -42,16 +42,16 @@ KEYS = {
     'jerk': ('max_jerk',),
     'position': ('min_position', 'max_position'),
 }
-"""Names of the numbers behind each ``has_..._limits`` of MoveIt's format."""
+"""Keys that belong to each ``has_..._limits`` of MoveIt's format."""
 
 DEFAULT_VELOCITY, DEFAULT_SLIDING_VELOCITY = 1.0, 0.1
-"""Velocity where description and limits file have none, or 0, in [rad/s] and in [m/s]."""
+"""Default velocity if URDF and limits file have none, or 0, in [rad/s] and in [m/s]."""
 DEFAULT_ACCELERATION = 1.0  # acceleration where the limits file has none in [rad/s2], as in MoveIt
 DEFAULT_JERK_RATIO = 20.0
-"""Jerk over acceleration where the limits file has no jerk in [1/s].
+"""Default ratio of jerk to acceleration in [1/s], if the limits file has no jerk.
 
-What MoveIt's time parameterization asks: it has points every 0.1 s, and the acceleration may
-change from one full one to the other between two of them.
+As in MoveIt's time parameterization: its points are 0.1 s apart, and the acceleration may
+reverse from full positive to full negative between two of them.
 """
 NO_JERK = f'no max_jerk in the limits file, so {DEFAULT_JERK_RATIO:g}/s of max_acceleration'
 
@@ -76,7 +76,7 @@ KNOWN_KEYS = frozenset(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointLimits:
-    """Limits of every joint of a group, in its order; radians or metres."""
+    """Limits of every joint of a group, in the group's order; radians or metres."""
 
     names: tuple[str, ...]  # names of the joints
     lower: Array  # least positions in [rad]; minus infinity for a continuous joint
@@ -92,17 +92,17 @@ class JointLimits:
         return len(self.names)
 
     def error(self, wanted: Array, actual: Array) -> Array:
-        """Return wanted less actual in [rad]; of continuous joints half a turn at most."""
+        """Return wanted minus actual in [rad]; wrapped to half a turn for continuous joints."""
         error: Array = wanted - actual
         turns = np.where(self.continuous, TURN * np.round(error / TURN), 0.0)
         return error - turns
 
     def in_nearest_turn(self, positions: Array, seed: Array) -> Array:
-        """Return positions, those of continuous joints in the turn that is nearest to a seed."""
+        """Return positions, with continuous joints shifted to the turn nearest to a seed."""
         return np.where(self.continuous, seed + self.error(positions, seed), positions)
 
     def span(self, near: Array, turn: float = math.pi) -> tuple[Array, Array]:
-        """Return ranges, those of joints without an end by a turn in [rad] about a place."""
+        """Return position ranges; endless joints get ``near`` plus and minus ``turn`` in [rad]."""
         return (
             np.where(np.isfinite(self.lower), self.lower, near - turn),
             np.where(np.isfinite(self.upper), self.upper, near + turn),
@@ -111,10 +111,10 @@ class JointLimits:
     def scaled(
         self, velocity: float, acceleration: float = 1.0, fastest: float = math.inf
     ) -> JointLimits:
-        """Return the limits with factors of velocities, and of accelerations and jerks.
+        """Return the limits with velocity scaled by one factor, acceleration and jerk by another.
 
         Args:
-            fastest: Greatest speed of any joint in [rad/s], before the factor is taken.
+            fastest: Greatest speed of any joint in [rad/s], before scaling.
         """
         return replace(
             self,
@@ -124,13 +124,13 @@ class JointLimits:
         )
 
     def beyond(self, positions: Array, tolerance: float) -> str:
-        """Return in words which joint is farthest beyond its limits; empty where none is."""
+        """Describe the joint that is farthest beyond its limits; empty if there is none."""
         off = np.maximum(self.lower - positions, positions - self.upper)
         joint = int(off.argmax())
         return self.beyond_words(joint, float(positions[joint])) if off[joint] > tolerance else ''
 
     def beyond_words(self, joint: int, position: float) -> str:
-        """Return in words that a joint, by its number, is beyond its limits."""
+        """Describe that a joint, given by its index, is beyond its limits."""
         lower, upper = self.lower[joint], self.upper[joint]
         return (
             f'{self.names[joint]} at {position:.4f} is beyond its limits {lower:.4f}..{upper:.4f}'
@@ -138,7 +138,7 @@ class JointLimits:
 
     @property
     def continuous(self) -> Mask:
-        """Mask of the joints that turn without end."""
+        """Mask of the continuous joints."""
         mask: Mask = np.isinf(self.lower) & np.isinf(self.upper)
         return mask
 
@@ -147,7 +147,7 @@ def load_limits(path: Path | str) -> Mapping[str, Any]:
     """Read the ``joint_limits`` of a limits file.
 
     Raises:
-        LimitsError: The file cannot be read, or has no table ``joint_limits``.
+        LimitsError: The file cannot be read, or lacks the table ``joint_limits``.
     """
     import yaml  # which nodes do not need: they have limits as parameters
 
@@ -162,7 +162,7 @@ def load_limits(path: Path | str) -> Mapping[str, Any]:
 
 
 def _table(document: object) -> object:
-    """Return the first ``joint_limits``, at whatever depth; None where there is none."""
+    """Return the first ``joint_limits`` at any depth; None if there is none."""
     if not isinstance(document, dict):
         return None
     if 'joint_limits' in document:
@@ -173,14 +173,14 @@ def _table(document: object) -> object:
 def merge_limits(
     names: Sequence[str], tree: KinematicTree, table: Mapping[str, Any], notes: list[str]
 ) -> JointLimits:
-    """Join a description's ranges with the table of a limits file.
+    """Merge the limits of a URDF with the table of a limits file.
 
     Args:
-        notes: Gets a line for each kind of limit that has a default, with the joints.
+        notes: Receives a line for each kind of limit that got a default, with the joints.
 
     Raises:
-        LimitsError: The table has no joint of the description, a number is not positive, misspelt
-            or wider than the description's.
+        LimitsError: The table has no joint of the URDF, or a limit is not positive, misspelt
+            or wider than in the URDF.
     """
     joints = {joint.name: joint for joint in tree.joints}
     if joints.keys().isdisjoint(table):
@@ -242,7 +242,7 @@ def _row(joint: Joint, table: Mapping[str, Any], defaults: dict[str, list[str]])
 
 
 def _positive(name: str, entry: Mapping[str, Any], kind: str) -> float:
-    """Return a number of the limits file; 0 where it has none."""
+    """Return a limit of the limits file; 0 if it is missing."""
     key = KEYS[kind][0]
     if not entry.get(f'has_{kind}_limits', key in entry):
         return 0.0
@@ -250,7 +250,7 @@ def _positive(name: str, entry: Mapping[str, Any], kind: str) -> float:
 
 
 def _span(joint: Joint, entry: Mapping[str, Any]) -> tuple[float, float]:
-    """Return the range of a joint; a limits file comes before soft limits of the description."""
+    """Return the range of a joint; a limits file has precedence over soft limits of the URDF."""
     name = joint.name
     if not entry.get('has_position_limits', 'max_position' in entry):
         return joint.range.lower, joint.range.upper

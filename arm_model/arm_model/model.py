@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A robot arm as the motion core sees it: joints, limits, kinematics, distances."""
+"""Model of a robot arm: joints, limits, kinematics, distances."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MIN_REACH = 0.01  # reach of a group that is shorter, such as a finger that slid
 
 
 class _Thread(threading.local):
-    """What one thread has computed last in a scene."""
+    """Latest results of one thread in a scene."""
 
     def __init__(self, scene: PlanningScene) -> None:
         self.data: Native = scene.kinematics.native.createData()
@@ -43,19 +43,19 @@ class RobotModel:
 
     Poses and Jacobians are expressed in the base link; twists and Jacobian rows are linear before
     angular, taken at the origin of the tip. Positions are plain angles, also of continuous joints.
-    Any thread may ask it: each has its own memory of the last position and of distances.
+    Thread-safe: each thread has its own cache of the last position and distances.
 
     Attributes:
         poses: Named poses of the SRDF, in the order of the joints.
-        world_frames: Frames to which a fixed virtual joint of the SRDF holds the root link.
-        end_effectors: Tools of the SRDF that are fixed to a link of the group.
-        notes: What was passed over in description and SRDF, in words.
-        notes_beside_contact: Those that are not about pairs of links that touch.
-        kinematics: The joints of the group, and those that follow them; for any thread.
-        allowed: What may touch by the SRDF, and what cannot help it.
+        world_frames: Frames to which a fixed virtual joint of the SRDF attaches the root link.
+        end_effectors: End effectors of the SRDF that are fixed to a link of the group.
+        notes: Warnings about ignored parts of URDF and SRDF.
+        notes_beside_contact: Warnings except those about pairs of links in contact.
+        kinematics: The joints of the group and their mimic joints; thread-safe.
+        allowed: Collisions allowed by the SRDF, and between links always in contact.
         moved_by_others: Pairs of links that other groups move against each other, by group;
             :attr:`scene` does not check them.
-        scene: What distances are measured in, at first the robot alone; for any thread.
+        scene: Scene in which distances are measured, at first the robot alone; thread-safe.
         reach: Greatest distance of the tip from the first joint's axis frame in [m].
     """
 
@@ -74,13 +74,13 @@ class RobotModel:
         """Build and check the arm.
 
         Args:
-            group: The group; by default the only one of the SRDF that is no tool.
+            group: The group; by default the only SRDF group that is not an end effector.
             tip: The tip link; by default the end of the group's chain.
-            moved_by_others: Joints of other groups that move by themselves, by group: links that
-                they move against each other are not checked, until a scene says where they are.
+            moved_by_others: Joints that other groups move, by group. Links that they move against
+                each other are not checked until a scene provides their positions.
 
         Raises:
-            ModelError: The three do not fit together; the message names what to correct.
+            ModelError: URDF, SRDF and limits contradict; the message names what to correct.
         """
         tree, semantic = read_urdf(urdf), parse_srdf(srdf)
         chosen = find_group(tree, semantic, group, tip)
@@ -136,13 +136,13 @@ class RobotModel:
         group: str | None = None,
         tip: str | None = None,
     ) -> RobotModel:
-        """Build an arm from its files; meshes with relative names lie beside the URDF.
+        """Build an arm from its files; relative mesh names start at the URDF's folder.
 
         Args:
-            limits: Limits of the joints, as MoveIt's joint_limits.yaml has them.
+            limits: Joint limits file in the format of MoveIt's joint_limits.yaml.
 
         Raises:
-            ModelError: A file cannot be read, or the three do not fit together.
+            ModelError: A file cannot be read, or the files contradict each other.
         """
         table, folder = load_limits(limits), Path(urdf).parent
         texts = _text(Path(urdf), read_urdf), _text(Path(srdf), parse_srdf)
@@ -160,23 +160,23 @@ class RobotModel:
 
     @property
     def serial(self) -> bool:
-        """Whether all joints are on one chain, which ends in the tip."""
+        """Whether all joints are on one chain that ends in the tip."""
         trunk = {self._model.names[joint] for joint in self._trunk()}
         return trunk.issuperset(self.joints)
 
     @property
     def pairs(self) -> Sequence[tuple[str, str]]:
-        """Links of each pair of shapes that is checked for collision."""
+        """Links of each pair of shapes checked for collisions."""
         return self.scene.pairs
 
     def assumption(self, known: Collection[str] = ()) -> str:
-        """Return where joints beside the group are taken to be between links that are checked.
+        """Describe the assumed positions of joints outside the group that affect checked links.
 
         Args:
-            known: Joints of which it is known where they stand.
+            known: Joints whose positions are known.
 
         Returns:
-            Words; none where there is no such joint: distances are those of the robot as it is.
+            A sentence; empty if there is no such joint, so that distances are exact.
         """
         checked = set(map(frozenset, self.pairs))
         moved: dict[str, list[str]] = {}  # what moves with each joint beside the group
@@ -198,7 +198,7 @@ class RobotModel:
 
     @property
     def frames(self) -> Sequence[str]:
-        """Names of the links that can be asked for."""
+        """Names of the links that :meth:`pose` accepts."""
         return tuple(self.kinematics.frames)
 
     def pose(self, positions: Array, link: str | None = None) -> Pose:
@@ -226,7 +226,7 @@ class RobotModel:
         return turned_twists(rotation, self.kinematics.projected(world))
 
     def lowest(self, positions: Array) -> float:
-        """Return the least height of a joint or the tip over the base link in [m], along its z."""
+        """Return the lowest z of any joint or the tip in the base link in [m]."""
         self._update(positions)
         base = self._placement(self._base_frame)
         places = [self._thread.data.oMi[joint].translation for joint in self._trunk()]
@@ -240,17 +240,17 @@ class RobotModel:
     def clearance(self, positions: Array, within: float = math.inf) -> float:
         """Return the least distance between two shapes in [m]; infinity when none are checked.
 
-        Beyond a distance of interest a lower bound is good enough.
+        Distances beyond ``within`` may be lower bounds.
         """
         distances = self.clearances.least(positions, within)
         return float(distances.min(initial=math.inf))
 
     def use_scene(self, clearances: Clearances) -> None:
-        """Measure all distances in another scene from now on; for the loop that owns the model.
+        """Measure all distances in another scene from now on; call it in the control loop.
 
         Args:
-            clearances: Of a scene with this model's kinematics; made, and asked once, beside the
-                loop: the first look measures every pair.
+            clearances: Clearances of a scene with this model's kinematics. Query it once outside
+                the loop before, because the first query measures every pair.
 
         Raises:
             SceneError: The scene is of another group or robot.
@@ -271,18 +271,18 @@ class RobotModel:
             raise CommandError(f'there is no link {link!r} in {self.name}; links: {known}')
 
     def index(self, joint: str) -> int:
-        """Return the place of a joint, or raise a CommandError."""
+        """Return the index of a joint, or raise a CommandError."""
         if joint not in self.limits.names:
             known = ', '.join(self.limits.names)
             raise CommandError(f'there is no joint {joint!r} in {self.group}; joints: {known}')
         return self.limits.names.index(joint)
 
     def with_others(self, places: Mapping[str, float]) -> RobotModel:
-        """Return a model of the group with joints beside it elsewhere; its scene goes along.
+        """Return a copy in which joints outside the group have other positions, also in the scene.
 
         Args:
-            places: Where they stand in [rad], by joint; those that are left out stay. Joints of
-                the group count nothing, so the state of the whole robot will do.
+            places: Their positions in [rad], by joint. Joints left out keep theirs; joints of the
+                group are ignored, so a state of the whole robot is accepted.
 
         Raises:
             CommandError: A position is not finite.
@@ -298,7 +298,7 @@ class RobotModel:
 
     @property
     def clearances(self) -> Clearances:
-        """What measures the present scene in this thread."""
+        """Clearances of the present scene for this thread."""
         thread = self._thread
         if thread.clearances.scene is not self.scene:
             thread.clearances = Clearances(self.scene)
@@ -320,7 +320,7 @@ class RobotModel:
         return list(self._model.supports[self._model.frames[self._tip_frame].parentJoint])[1:]
 
     def _reach(self) -> float:
-        """Sum the lengths from joint to joint out to the tip."""
+        """Sum the distances from joint to joint out to the tip."""
         lengths = [
             np.linalg.norm(self._model.jointPlacements[joint].translation)
             for joint in self._trunk()[1:]
@@ -332,7 +332,7 @@ class RobotModel:
 def _moved_by(
     tree: KinematicTree, links: Iterable[str], joints: Collection[str]
 ) -> Iterator[Pair]:
-    """Return the pairs of links that some joints move against each other."""
+    """Return the pairs of links that the given joints move against each other."""
     above = {
         link: {joint.name for joint in tree.chain(tree.root, link)} & set(joints) for link in links
     }
@@ -344,7 +344,7 @@ def _moved_by(
 def _poses(
     limits: JointLimits, poses: Mapping[str, Mapping[str, float]], notes: list[str]
 ) -> Mapping[str, Array]:
-    """Return the poses that the arm can take; the others are noted."""
+    """Return the named poses within limits; add a note for each other one."""
     found: dict[str, Array] = {}
     for name, pose in poses.items():
         if missing := [joint for joint in limits.names if joint not in pose]:
@@ -369,7 +369,7 @@ def _poses(
 
 
 def _text(path: Path, read: Callable[[str], object]) -> str:
-    """Return the text of a file that can be read, too."""
+    """Read a text file, or raise an error with its name."""
     try:
         text = path.read_text(encoding='utf-8')
     except (OSError, UnicodeDecodeError) as error:
@@ -384,7 +384,7 @@ FOLDER = Path(__file__).with_name('panda')
 
 @dataclass(frozen=True, slots=True)
 class ArmNames:
-    """What an arm's parts are called; empty for what is not known."""
+    """Names of the parts of an arm; unknown ones are empty."""
 
     joints: tuple[str, ...] = ()  # the joints, from the base to the tool
     base: str = ''  # the base link

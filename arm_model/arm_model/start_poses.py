@@ -1,17 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A pose to start from, where the SRDF names none: not singular, free, and in the ranges.
+"""Finds a start pose if the SRDF names none: not singular, free of contact, within limits.
 
-The quality of a pose is the product of three numbers from 0 to 1, so that none of them makes up
-for another one that is missing:
+The quality of a pose is the product of three numbers from 0 to 1, so that none can compensate
+for another:
 
-- dexterity: the least singular value of the tip's Jacobian, lengths as shares of the reach, as a
-  share of the greatest: 0 where a direction is lost;
+- dexterity: ratio of the least to the greatest singular value of the tip's Jacobian, with lengths
+  divided by the reach; 0 in a singularity;
 - room: of the joint that is nearest to the end of its range, 1 in the middle, 0 at the end;
-- clearance: the least distance of links as a share of :data:`GOOD_CLEARANCE`, 1 at most.
+- clearance: the least distance between links divided by :data:`GOOD_CLEARANCE`, at most 1.
 
-A pose that puts the tip or a joint below the mounting plane of the base (its xy plane) counts
-:data:`BELOW` of that: there is the table.
+A pose with the tip or a joint below the mounting plane of the base (its xy plane), where the
+table is, has its quality multiplied by :data:`BELOW`.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ SEED = 0  # of the poses: the same robot has the same pose each time
 GOOD_CLEARANCE = 0.05  # distance of links that is enough in [m]
 
 MIN_QUALITY = 0.02
-"""Quality of a pose of the SRDF at least: it is taken before any that is searched for."""
+"""Least quality of an SRDF pose that is used without a search."""
 
 BELOW = 0.01  # share of its quality that a pose below the mounting plane has
 DECIMALS = 2  # decimals of the numbers that are found: they are copied into an SRDF
 
 
 def start_pose(model: RobotModel) -> Array:
-    """Return a pose to start from: ``ready``, another good one of the SRDF, or one that is found.
+    """Return a start pose: ``ready``, another good pose of the SRDF, or a pose found by search.
 
     Raises:
         ModelError: No pose was found that is free and not singular.
@@ -61,9 +61,9 @@ def start_pose(model: RobotModel) -> Array:
 
 
 def pose_quality(model: RobotModel, positions: Array, least: float = 0.0) -> float:
-    """Return how good a pose is to start from: 0 for a singular, colliding or extreme one.
+    """Return the quality of a start pose: 0 if it is singular, in contact or at a limit.
 
-    Where it cannot be more than the least of interest, distances are not measured.
+    Distances are not measured if the quality cannot exceed the least of interest.
     """
     quality = _room(model, positions) * _dexterity(model, positions)
     quality *= BELOW if model.lowest(positions) < 0.0 else 1.0
@@ -92,7 +92,7 @@ def _room(model: RobotModel, positions: Array) -> float:
 
 
 def _samples(model: RobotModel) -> Iterator[Array]:
-    """Yield poses within the ranges; no joint is turned by more than half a turn."""
+    """Yield poses within the ranges, with no joint more than half a turn from zero."""
     draw = np.random.default_rng(SEED)
     revolute = np.maximum(model.limits.lower, -np.pi), np.minimum(model.limits.upper, np.pi)
     empty = revolute[0] >= revolute[1]  # a range beyond half a turn

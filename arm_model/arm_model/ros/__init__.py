@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The robot model in ROS: from parameters, its frames beside those of TF, scenes of messages."""
+"""The robot model in ROS: built from parameters, with TF frames and scenes from messages."""
 
 from .planning_scene import (
     allowed_collisions,

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Scenes of moveit_msgs as scenes of the model: objects, attached bodies, allowed collisions.
+"""Converts moveit_msgs scenes to the model's: objects, attached bodies, allowed collisions.
 
-All that a message changes makes one new scene. Attached bodies come before objects of the world,
-as in MoveIt: what a link takes up, a message may remove from the world besides.
+All changes of a message make one new scene. Attached bodies are applied before world objects, as
+in MoveIt: one message may attach an object and also remove it from the world.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ ADD, REMOVE, APPEND, MOVE = (  # in Python a constant of the type byte is bytes
 )
 
 MAX_CORNERS = 300
-"""Corners of the hull of a mesh at most: a controller makes it in less than a millisecond."""
+"""Greatest number of corners of a mesh hull: a controller builds it in less than a millisecond."""
 
 LENGTHS: dict[int, tuple[type[Box | Sphere | Cylinder | Cone], tuple[int, ...]]] = {
     SolidPrimitive.BOX: (Box, (SolidPrimitive.BOX_X, SolidPrimitive.BOX_Y, SolidPrimitive.BOX_Z)),
@@ -62,7 +62,7 @@ LENGTHS: dict[int, tuple[type[Box | Sphere | Cylinder | Cone], tuple[int, ...]]]
     ),
     SolidPrimitive.CONE: (Cone, (SolidPrimitive.CONE_RADIUS, SolidPrimitive.CONE_HEIGHT)),
 }
-"""Shapes, and where their lengths are in ``dimensions``, by type of primitive."""
+"""Shape, and indices of its lengths in ``dimensions``, by type of primitive."""
 
 
 def apply_planning_scene(
@@ -73,20 +73,20 @@ def apply_planning_scene(
     *,
     world_frames: Collection[str] = (),
 ) -> PlanningScene:
-    """Return a scene with what a message has in the place of what it replaces.
+    """Apply a PlanningScene message to a scene; return the new scene.
 
-    A whole scene replaces objects and attached bodies, a diff (``is_diff``) changes those that it
-    names; so do padding and scale. A matrix without names leaves what may touch as it is. Joints
-    in the message count nowhere. An octomap is the object ``<octomap>``.
+    A whole scene replaces objects, attached bodies, padding and scale; a diff (``is_diff``)
+    changes only those that it names. A matrix without names leaves allowed collisions as they
+    are. Joint states in the message are ignored. An octomap becomes the object ``<octomap>``.
 
     Args:
         positions: Joint positions in [rad], for frames that move with the arm.
-        frame_of: Returns frames that are no links; without it there are none.
+        frame_of: Returns the pose of frames that are not links; without it such frames fail.
         world_frames: Other names of the root link: those of the SRDF's virtual joint, in which
             MoveIt places its objects.
 
     Raises:
-        SceneError: The message does not fit the robot, or the scene before.
+        SceneError: The message contradicts the robot or the previous scene.
     """
     state = message.robot_state
     is_whole = not message.is_diff
@@ -120,8 +120,8 @@ def apply_planning_scene(
 def scene_change(*things: ObjectMessage | AttachedCollisionObject) -> SceneMessage:
     """Return a diff that adds, changes or removes objects and attached bodies, and nothing else.
 
-    Of attached bodies, ADD without shapes takes up an object of the world, REMOVE without an id
-    lays down all bodies of the link.
+    For attached bodies, ADD without shapes attaches an object of the world; REMOVE without an id
+    detaches all bodies of the link.
     """
     change = SceneMessage(is_diff=True)
     change.robot_state.is_diff = True
@@ -134,10 +134,10 @@ def scene_change(*things: ObjectMessage | AttachedCollisionObject) -> SceneMessa
 
 
 def allowed_collisions(message: MatrixMessage) -> AllowedCollisionMatrix:
-    """Return what may touch.
+    """Convert a matrix message to allowed collisions.
 
-    As in MoveIt, the upper triangle counts, and an entry that says what the defaults of its names
-    say is none: a client that changes a default sends back the entries that it has read.
+    As in MoveIt, the upper triangle counts, and an entry equal to the defaults of its names is
+    dropped, because a client that changes a default sends back the entries that it has read.
 
     Raises:
         SceneError: Rows or columns are missing.
@@ -170,7 +170,7 @@ def allowed_collisions(message: MatrixMessage) -> AllowedCollisionMatrix:
 
 
 def _merged(scene: PlanningScene, message: MatrixMessage) -> AllowedCollisionMatrix | None:
-    """Return the matrix of a message, and what the scene has for links that it does not name."""
+    """Return the matrix of a message, plus the scene's entries for links that it does not name."""
     if not (message.entry_names or message.default_entry_names):
         return None
     given = allowed_collisions(message)
@@ -185,7 +185,7 @@ def _merged(scene: PlanningScene, message: MatrixMessage) -> AllowedCollisionMat
 
 @dataclass(frozen=True, slots=True)
 class _Draft:
-    """Objects and attached bodies while messages change them."""
+    """Objects and attached bodies while a message is applied."""
 
     before: PlanningScene
     positions: Array
@@ -195,7 +195,7 @@ class _Draft:
     attached: dict[str, AttachedBody]
 
     def apply_octomap(self, message: OctomapWithPose) -> None:
-        """Replace the octomap as MoveIt does: without an id by none, without data it ends."""
+        """Replace the octomap as in MoveIt: no id keeps the present one, no data removes it."""
         tree = message.octomap
         if not tree.id:
             return
@@ -234,7 +234,7 @@ class _Draft:
             self.objects[name] = self._new(message)
 
     def apply_attached(self, message: AttachedCollisionObject) -> None:
-        """Attach an object, or lay it down."""
+        """Attach or detach an object."""
         thing, link = message.object, message.link_name
         name, operation = thing.id, _operation(thing)
         _refuse_reserved(name)
@@ -284,7 +284,7 @@ class _Draft:
             self.objects[each] = body.object.at(place)
 
     def _new(self, message: ObjectMessage) -> CollisionObject:
-        """Return a new object; its pose is that of its only shape, where it has none (MoveIt)."""
+        """Return a new object; without a pose it gets that of its only shape, as in MoveIt."""
         pose, shapes = self._pose(message), list(_shapes(message))
         x, y, z, w = xyzw(message.pose.orientation)
         is_unset = not any((*xyz(message.pose.position), x, y, z)) and w in {0.0, 1.0}
@@ -316,7 +316,7 @@ class _Draft:
         return self.objects[name]
 
     def _pose(self, message: ObjectMessage) -> Pose:
-        """Return where an object is, in the root link."""
+        """Return the pose of an object in the root link."""
         place = _pose(message.pose, message.id)
         frame = self._frame(message.id, message.header.frame_id)
         return place if frame is ORIGIN else combined(frame, place)
@@ -335,7 +335,7 @@ class _Draft:
         return self.frame_of(frame)
 
     def _link(self, name: str, link: str) -> Pose:
-        """Return where a link is, in the root link."""
+        """Return the pose of a link in the root link."""
         if link not in self.before.kinematics.frames:
             known = ', '.join(self.before.kinematics.frames)
             raise LinkNameError(f'attached object {name!r}: no link {link!r}; links: {known}')
@@ -361,7 +361,7 @@ def _operation(message: ObjectMessage) -> int:
 
 
 def _shapes(message: ObjectMessage) -> Iterator[PlacedShape]:
-    """Yield primitives, meshes and planes; a pose that is not given is the object's origin."""
+    """Yield primitives, meshes and planes; a missing pose is the object's origin."""
     name = message.id
     for what, things, poses, shape_of in (
         ('primitive', message.primitives, message.primitive_poses, primitive_shape),
@@ -378,10 +378,10 @@ def _shapes(message: ObjectMessage) -> Iterator[PlacedShape]:
 
 
 def primitive_shape(message: SolidPrimitive, name: str) -> Shape:
-    """Return a primitive.
+    """Convert a primitive to a shape.
 
     Raises:
-        SceneError: Its type is unknown, or it has another number of dimensions.
+        SceneError: The type is unknown, or the number of dimensions is wrong.
     """
     dimensions = [float(each) for each in message.dimensions]
     if message.type == SolidPrimitive.PRISM:
@@ -421,13 +421,13 @@ def _mesh(message: MeshMessage, name: str) -> Shape:
 
 @lru_cache(maxsize=64)
 def hull_of(vertices: bytes) -> Mesh:
-    """Return the hull of a mesh; a scene that is sent again and again has the same ones.
+    """Return the hull of a mesh, cached because scenes are sent repeatedly.
 
     Args:
-        vertices: Its corners as numbers in double precision.
+        vertices: Its corners as double-precision numbers.
 
     Raises:
-        SceneError: They are no points, or not finite.
+        SceneError: The corners are not points, or not finite.
     """
     return Mesh(np.frombuffer(vertices).reshape(-1, 3), MAX_CORNERS)
 

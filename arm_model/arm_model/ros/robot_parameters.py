@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The arm from ROS parameters, under MoveIt's names."""
+"""Builds the arm from ROS parameters with MoveIt's names."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from ..model import RobotModel
 
 @dataclass(frozen=True, slots=True)
 class GroupModels:
-    """The groups of a robot that are moved, each by itself."""
+    """Models of the groups of a robot that move independently."""
 
     arms: Sequence[RobotModel]  # arms; the first is that of the parameter ``group``
     tools: Sequence[RobotModel] = ()  # end effectors
 
     @property
     def notes(self) -> list[str]:
-        """Notes on all groups, once each; without those on pairs of tools, which may touch."""
+        """Notes on all groups without repetition, and without contacts of end effectors."""
         of_arms = [note for model in self.arms for note in model.notes]
         of_tools = [note for model in self.tools for note in model.notes_beside_contact]
         return list(dict.fromkeys((*of_arms, *of_tools)))
@@ -37,7 +37,7 @@ class GroupModels:
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """What describes a robot."""
+    """URDF, SRDF and limits of a robot."""
 
     urdf: str  # robot description as XML text
     srdf: str  # semantic description as XML text
@@ -46,10 +46,10 @@ class Description:
 
 
 def declare_description(node: Node, limits: Mapping[str, Any] | None = None) -> Description:
-    """Declare what describes a robot, for a node that has all groups.
+    """Declare the parameters that describe a robot, for a node that handles all groups.
 
     Args:
-        limits: The table ``joint_limits`` where no file of limits is given; None needs a file.
+        limits: The table ``joint_limits`` to use without a limits file; None requires a file.
 
     Raises:
         ModelError: A parameter is missing, or the limits file cannot be read.
@@ -59,10 +59,10 @@ def declare_description(node: Node, limits: Mapping[str, Any] | None = None) -> 
 
 
 def declare_robot(node: Node) -> RobotModel:
-    """Declare what describes an arm, and build it.
+    """Declare the parameters that describe an arm, and build it.
 
     Raises:
-        ModelError: A parameter is missing, or they do not make an arm.
+        ModelError: A parameter is missing, or the parameters do not define an arm.
     """
     urdf, srdf, limits, group, tip = _given(node)
     table = load_limits(Path(limits))
@@ -71,10 +71,10 @@ def declare_robot(node: Node) -> RobotModel:
 
 
 def declare_groups(node: Node) -> GroupModels:
-    """Declare what describes a robot of several groups that are moved, and build them.
+    """Declare the parameters that describe a robot with several groups, and build their models.
 
     Raises:
-        ModelError: A parameter is missing, they do not make an arm, or groups share a joint.
+        ModelError: A parameter is missing or invalid, or groups share a joint.
     """
     names = ParameterReader(node).texts(
         'other_groups', [], 'groups of the SRDF that are moved beside group, each by itself'
@@ -102,7 +102,7 @@ def declare_groups(node: Node) -> GroupModels:
 
 
 def _given(node: Node, *, needs_limits: bool = True) -> tuple[str, str, str, str, str]:
-    """Declare what describes an arm, and make sure that it is given."""
+    """Declare the parameters that describe an arm, and check that they are set."""
     urdf, srdf, limits, group, tip = _declare(node)
     for name, value in (
         ('robot_description', urdf),
@@ -119,10 +119,10 @@ def _given(node: Node, *, needs_limits: bool = True) -> tuple[str, str, str, str
 
 
 def same_robot(node: Node, model: RobotModel) -> None:
-    """Declare what describes an arm on a further node, where clients ask for it too.
+    """Declare the same arm on a further node, where clients read its parameters as well.
 
     Raises:
-        ModelError: The node is given another group or tip.
+        ModelError: The node was given another group or tip.
     """
     _urdf, _srdf, _limits, group, tip = _declare(node)
     if group not in {'', model.group} or tip not in {'', model.tip}:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Poses and times of messages; frames of TF, such as that of a camera, that are no links."""
+"""Converts poses and times of messages; looks up TF frames such as that of a camera."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from ..kinematics import Kinematics
 
 
 def xyz(vector: Any) -> Array:  # noqa: ANN401  # Vector3 or Point; message classes have no type
-    """Return a vector or a point."""
+    """Convert a vector or point message."""
     return np.array([vector.x, vector.y, vector.z])
 
 
 def xyzw(quaternion: Any) -> list[float]:  # noqa: ANN401
-    """Return the numbers of a quaternion."""
+    """Convert a quaternion message to x, y, z, w."""
     return [quaternion.x, quaternion.y, quaternion.z, quaternion.w]
 
 
 def pose_of(position: Any, orientation: Any, what: str) -> Pose:  # noqa: ANN401
-    """Return a pose of a point or vector and a quaternion; one of zeros is no turn, as in MoveIt.
+    """Convert position and quaternion to a pose; an all-zero quaternion is identity, as in MoveIt.
 
     Args:
-        what: What the message of a refusal begins with.
+        what: Beginning of the error message.
 
     Raises:
         SceneError: A number is not finite, or the length of the quaternion is not 1.
@@ -52,18 +52,18 @@ def pose_of(position: Any, orientation: Any, what: str) -> Pose:  # noqa: ANN401
 
 
 def seconds(stamp: Any) -> float:  # noqa: ANN401  # Time and Duration
-    """Return a stamp or a duration in [s]."""
+    """Convert a stamp or duration message to [s]."""
     return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
 
 
 def duration_fields(time: float) -> dict[str, int]:
-    """Return the fields of a duration."""
+    """Return the fields of a duration message."""
     total = round(time * 1e9)
     return {'sec': total // 1_000_000_000, 'nanosec': total % 1_000_000_000}
 
 
 STATIC_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""How /tf_static is published."""
+"""QoS profile of /tf_static."""
 
 TRANSFORM_TIMEOUT = 1.0  # age at which a transform of /tf counts no more in [s]
 KEPT_TIME = 5.0  # age at which a message that was not needed is left unread in [s]
@@ -81,12 +81,12 @@ class FrameTree:
         self._links[child] = parent, pose, time
 
     def age(self, frame: str, now: float) -> float:
-        """Return how old the newest transform of a frame is in [s]; infinity where it has none."""
+        """Return the age of the newest transform of a frame in [s]; infinity if it has none."""
         link = self._links.get(frame)
         return math.inf if link is None else max(now - link[2], 0.0)
 
     def pose(self, frame: str, base: str, now: float) -> Pose | None:
-        """Return the pose of a frame in another; None where they are not connected."""
+        """Return the pose of a frame in another; None if they are not connected."""
         up, over = self._to_root(frame, now), self._to_root(base, now)
         for name, pose in up.items():
             if name in over:
@@ -107,7 +107,7 @@ class FrameTree:
 
 
 class TfListener:
-    """Listens to TF; any thread may ask for frames."""
+    """Listens to TF; frames can be looked up from any thread."""
 
     def __init__(
         self,
@@ -119,17 +119,17 @@ class TfListener:
         world_frames: Collection[str] = (),
         on_demand: bool = False,
     ) -> None:
-        """Prepare.
+        """Create the listener.
 
         Args:
-            prefix: Before the names of the robot's links in TF.
-            base: Link in which :meth:`pose` is.
-            world_frames: Names of the root link where TF does not place them: those of the SRDF's
+            prefix: Prefix of the robot's link names in TF.
+            base: Link in which :meth:`pose` expresses poses.
+            world_frames: Names of the root link unless TF has these frames: those of the SRDF's
                 virtual joint.
-            on_demand: Whether messages are kept as they come and read when a frame is asked for:
-                robots publish the frames of their own links 100 times a second, and few requests
-                name others. Else it listens from the first frame on that is no link, and reads
-                each message as it comes, so that no control cycle reads many.
+            on_demand: If true, store messages unread and read them at a lookup: robots publish
+                their own links 100 times a second, and few requests name other frames. If false,
+                start listening at the first lookup of a frame that is not a link, and read each
+                message on arrival, so that no control cycle reads many.
         """
         self._node, self._prefix, self._base = node, prefix, base
         self._links, self._root = frozenset(kinematics.frames), kinematics.root
@@ -144,7 +144,7 @@ class TfListener:
             self._listen_to_static()
 
     def link(self, frame: str) -> str | None:
-        """Return the link of the robot that a frame is, with or without its prefix."""
+        """Return the robot link that a frame names, with or without the prefix."""
         name = frame.removeprefix(self._prefix)
         if name in self._world_frames and not self._is_placed(frame):
             return self._root
@@ -158,18 +158,18 @@ class TfListener:
             return self._tree.pose(frame, self._prefix + self._root, -math.inf) is not None
 
     def pose(self, frame: str) -> Pose:
-        """Return the pose of a frame of TF in the base.
+        """Return the pose of a TF frame in the base.
 
         Raises:
-            CommandError: It is unknown, not connected with the base, or too old.
+            CommandError: The frame is unknown, not connected to the base, or too old.
         """
         return self.connected(frame, self._base)[1]
 
     def connected(self, frame: str, *links: str) -> tuple[str, Pose]:
-        """Return the first of some links with which TF connects a frame, and its pose in it.
+        """Return the first of some links that TF connects to a frame, and the frame's pose in it.
 
         Raises:
-            CommandError: It is unknown, not connected with any of them, or too old.
+            CommandError: The frame is unknown, not connected to any link, or too old.
         """
         self._listen()
         with self._lock:
@@ -215,7 +215,7 @@ class TfListener:
             self._node.create_subscription(TFMessage, '/tf_static', self._learn_static, STATIC_QOS)
 
     def _arrival(self) -> tuple[float, float]:
-        """Return the steady time, and that of the clock of the stamps, in [s]."""
+        """Return the present time in [s] on the steady clock, and on the clock of the stamps."""
         return time.monotonic(), float(self._node.get_clock().now().nanoseconds) * 1e-9
 
     def _keep(self, data: bytes) -> None:
@@ -234,7 +234,7 @@ class TfListener:
             self._learn(message, *self._arrival())
 
     def _learn(self, message: TFMessage, now: float, clock: float) -> None:
-        """Store a message of /tf; what comes late is as old as its stamps say."""
+        """Store a message of /tf; a late message has the age that its stamps give."""
         for each in message.transforms:
             self._store(each, now - max(clock - seconds(each.header.stamp), 0.0))
 

@@ -14,11 +14,11 @@ from ..arrays import Array, Native
 from .planning_scene import PlanningScene
 
 AT_ONCE = 100
-"""Pairs that are measured in one step: other threads wait for it, such as a control cycle."""
+"""Greatest number of pairs measured in one step, during which other threads have to wait."""
 
 TOUCH = 2e-4
-"""Least depth of a contact with an octree in [m]: a cell that is only touched may hide one that is
-overlapped. It is more than checks of paths let pass."""
+"""Least depth of a contact with an octree in [m]: a touched cell may hide an overlapping one.
+It is more than path checks tolerate."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,11 +51,11 @@ class Contact:
 
 
 class Clearances:
-    """Measures the distances of pairs, as far as they are not known well enough.
+    """Measures distances of pairs, reusing earlier measurements as bounds.
 
-    What was measured holds on: a pair comes nearer by the motion of the joints times its distance
-    rate bounds at most. Pairs that are far apart are so measured once in many cycles. It belongs
-    to one thread.
+    A pair comes nearer at most by the joint motion times its distance rate bounds, so distant
+    pairs are measured only once in many cycles. Not thread-safe: create one instance for each
+    thread.
     """
 
     def __init__(self, scene: PlanningScene) -> None:
@@ -79,7 +79,7 @@ class Clearances:
         return self.scene.pairs
 
     def least(self, positions: Array, within: float) -> Array:
-        """Return the distance of each pair in [m]: exact below one of interest, else a bound."""
+        """Return the distance of each pair in [m]: exact below ``within``, else a lower bound."""
         turned = np.abs(positions - self._places)
         rates = self.scene.distance_rate_bounds
         bounds: Array = self._distances - np.einsum('kn,kn->k', turned, rates)
@@ -120,10 +120,10 @@ class Clearances:
         pin.updateGeometryPlacements(native, self._data, geometry, self._results, expanded)
 
     def measure(self, positions: Array, pairs: Sequence[int]) -> Sequence[Native]:
-        """Measure some pairs, by their numbers, regardless of what is known of them.
+        """Measure the pairs with these numbers, regardless of earlier measurements.
 
-        The results of coal are those for all pairs, by their numbers. Only those of the pairs
-        asked for are current; the next measurement overwrites them.
+        Returns coal's results of all pairs. Only those of the requested pairs are current; the
+        next measurement overwrites them.
         """
         geometry, results, found = self.scene.geometry, self._results, self._found
         self._place(positions)
@@ -136,7 +136,7 @@ class Clearances:
         return found
 
     def provably_clear(self, positions: Array, within: float) -> int:
-        """Count the leading rows at which nothing is as near, as far as is known unmeasured."""
+        """Count the leading rows that are proven clear without measuring."""
         turned = np.abs(positions[:, None, :] - self._places)
         rates = self.scene.distance_rate_bounds
         bounds = self._distances - np.einsum('mkn,kn->mk', turned, rates)
@@ -144,7 +144,7 @@ class Clearances:
         return int(doubtful.argmax()) if doubtful.any() else len(positions)
 
     def apart(self, lower: Array, upper: Array, within: float) -> bool:
-        """Whether nothing is as near at any positions between bounds, as far as is known."""
+        """Whether all positions between two bounds are proven clear without measuring."""
         turned = np.maximum(upper - self._places, self._places - lower)
         bounds = self._distances - np.einsum('kn,kn->k', turned, self.scene.distance_rate_bounds)
         return not (bounds < within).any()
@@ -175,7 +175,7 @@ class Clearances:
         return found
 
     def _gradients(self, positions: Array, pairs: Sequence[int]) -> Array:
-        """Return the change of distance of pairs that were measured here with each joint (m, n).
+        """Return the derivatives of the distances of measured pairs by joint position (m, n).
 
         A joint with the twist v, w about the base's origin moves a point p at v + w x p; along
         the normal n, which points from the first shape to the second, that is n v + (p x n) w.

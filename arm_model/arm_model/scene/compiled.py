@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The compiled core of motion checks: motions.c, built by the C compiler of the machine.
 
-It is built at its first use, in half a second, and kept in ``~/.cache/arm_model/compiled``
-(:mod:`robot_primitives.c_library`). Where there is no compiler, or it fails, one warning says so,
-and the same checks run in Python, several times slower. ``ARM_MODEL_COMPILED=0`` asks for that.
+The first use builds it in half a second into ``~/.cache/arm_model/compiled``
+(:mod:`robot_primitives.c_library`). If there is no compiler, or it fails, a warning is logged and
+the same checks run in Python, several times slower. ``ARM_MODEL_COMPILED=0`` selects Python.
 """
 
 from __future__ import annotations
@@ -48,10 +48,10 @@ Integers = NDArray[np.int32]
 
 
 class CompiledScene:
-    """Lower bounds of distances in a scene, each with its own proof; belongs to one thread."""
+    """Lower bounds of distances in a scene, one per pair. Not thread-safe."""
 
     def __init__(self, library: Native, scene: PlanningScene) -> None:
-        """Hand the scene over; :func:`compiled_scene` is the way in."""
+        """Copy the scene to the compiled core; use :func:`compiled_scene` instead."""
         self.library = library
         self._count = len(scene.kinematics.joints)
         self._distances: Array = np.zeros(len(scene.pairs))
@@ -76,20 +76,20 @@ class CompiledScene:
         weakref.finalize(self, library.world_free, self.handle)
 
     def least(self, positions: Array, within: float) -> Array:
-        """Return distances of all pairs in [m]: exact ones below one of interest, else bounds."""
+        """Return distances of all pairs in [m]: exact below ``within``, else lower bounds."""
         at, within = _row(positions), min(within, MUCH)
         self.library.world_least(self.handle, _pointer(at), within, _pointer(self._distances))
         return self._distances
 
     def clear(self, positions: Array, required: float) -> bool:
-        """Whether all pairs have a distance in [m]."""
+        """Whether all pairs are at least a distance in [m] apart."""
         at = _row(positions)
         return bool(self.library.world_state(self.handle, _pointer(at), required) < 0)
 
     def edge(self, begin: Array, end: Array, required: Array) -> float | None:
-        """Return the share of a straight motion at which a pair is nearer than it may be, or None.
+        """Return the share of a straight motion at which a pair is too near, or None.
 
-        ``required`` is the distance that each pair keeps in [m] (k).
+        ``required`` is the distance in [m] that each pair must keep (k).
         """
         begin, end = _row(begin), _row(end)
         return self._answer(
@@ -109,15 +109,15 @@ class CompiledScene:
         first_part: float,
         required: Array,
     ) -> float | None:
-        """Return a time of a path at which a pair is nearer than it may be, or None.
+        """Return a time of a path at which a pair is too near, or None.
 
         Args:
-            polynomials: When each begins in [s] (m), and its coefficients of the powers 0 to 5 of
-                the time since then (m, 6, n).
-            cells: Times that cut the path in [s] (c), and until each of them the greatest motion
-                of any shape in [m] (c) and how far the joints turned in [rad] (c, n).
-            first_part: Motion within the parts that are looked at first in [m].
-            required: Distance that each pair keeps in [m] (k).
+            polynomials: Start times in [s] (m), and coefficients of the powers 0 to 5 of the time
+                since then (m, 6, n).
+            cells: Times in [s] that cut the path (c), and up to each time the greatest motion of
+                any shape in [m] (c) and the joint travel in [rad] (c, n).
+            first_part: Motion of a shape within the parts that are checked first in [m].
+            required: Distance in [m] that each pair must keep (k).
         """
         starts, coefficients = map(_row, polynomials)
         times, along, turned = map(_row, cells)
@@ -144,15 +144,15 @@ class CompiledScene:
 
 
 class CompiledSearch:
-    """Two trees of RRT-Connect, from the start and from goals; belongs to one thread."""
+    """Two trees of RRT-Connect, from the start and from goals. Not thread-safe."""
 
     def __init__(
         self, scene: CompiledScene, start: Array, required: Array, max_extension: float
     ) -> None:
-        """Begin.
+        """Create the trees.
 
         Args:
-            required: Distance that each pair keeps in [m] (k).
+            required: Distance in [m] that each pair must keep (k).
             max_extension: Greatest length of an edge in [rad].
         """
         self._scene = scene  # which must not go before
@@ -166,12 +166,12 @@ class CompiledSearch:
         weakref.finalize(self, self._library.search_free, self._handle)
 
     def add_goal(self, goal: Array) -> None:
-        """Grow from a goal, too."""
+        """Add a root of the goal tree."""
         goal = _row(goal)
         self._library.search_add_goal(self._handle, _pointer(goal))
 
     def grow(self, targets: Array) -> Array | None:
-        """Grow towards samples (m, n); return the places of a path (k, n) where the trees met."""
+        """Grow towards samples (m, n); return the waypoints (k, n) if the trees meet, or None."""
         rows = _row(targets)
         count = self._library.search_grow(self._handle, _pointer(rows), len(rows))
         if count < 0:
@@ -184,9 +184,9 @@ class CompiledSearch:
 
 
 def compiled_scene(scene: PlanningScene) -> CompiledScene | None:
-    """Return a scene for the compiled core, whose octrees stand still.
+    """Return a scene for the compiled core, or None if the core cannot check it.
 
-    None without a core, without pairs, and where an octree moves with a joint.
+    None without a core, without pairs, or if an octree moves with a joint.
     """
     with LOADING:
         loaded = library()
@@ -200,7 +200,7 @@ def compiled_scene(scene: PlanningScene) -> CompiledScene | None:
 
 @lru_cache(maxsize=1)
 def library() -> Native | None:
-    """Return the compiled core, which is built if need be; None where that is not possible."""
+    """Return the compiled core, building it if necessary; None if that is not possible."""
     consequence = 'motions are checked in Python, several times slower'
     loaded: Native | None = load_c_library('arm_model', SOURCE, consequence, FLAGS)
     if loaded is None:
@@ -227,7 +227,7 @@ def library() -> Native | None:
 
 
 def _joints(scene: PlanningScene) -> Sequence[Array | Integers]:
-    """Return factors and offsets of columns, parents, which slide, placements, and axes."""
+    """Return factors and offsets of columns, parents, prismatic flags, placements, and axes."""
     kinematics, model = scene.kinematics, scene.kinematics.native
     count = len(kinematics.joints)
     offsets = kinematics.expanded(np.zeros(count))
@@ -246,7 +246,7 @@ def _joints(scene: PlanningScene) -> Sequence[Array | Integers]:
 
 
 def _screw(model: Native, joint: int) -> Array:
-    """Return the linear and angular velocity that a unit of a joint's motion makes."""
+    """Return the twist of a unit velocity of a joint: linear, angular."""
     data = model.joints[joint].createData()
     model.joints[joint].calc(data, np.zeros(model.nq))
     screw: Array = np.array(data.S).ravel()
@@ -256,7 +256,7 @@ def _screw(model: Native, joint: int) -> Array:
 def _shapes(scene: PlanningScene) -> Sequence[Array | Integers]:
     """Return kinds, movers, placements, sizes, swept, owners, starts of corners, corners, pairs.
 
-    The cells of octrees are boxes behind all other shapes, owned by their octrees.
+    The cells of octrees are boxes after all other shapes, owned by their octrees.
     """
     things = list(scene.geometry.geometryObjects)
     kinds, sizes, swept, corners = [], [], [], []
@@ -304,13 +304,13 @@ def _cells(scene: PlanningScene) -> tuple[Array, Array, Array]:
 
 
 def _numbers(placement: pin.SE3) -> Array:
-    """Return the rotation by rows, and the origin."""
+    """Return the rotation row by row, then the origin."""
     numbers: Array = np.concatenate((placement.rotation.ravel(), placement.translation))
     return numbers
 
 
 def _row(values: Array) -> Array:
-    """Return numbers as C reads them; hold them until it has."""
+    """Return numbers as a C array; keep a reference until C has read them."""
     return np.ascontiguousarray(values, dtype=np.float64)
 
 

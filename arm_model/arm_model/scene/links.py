@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Links of a description: their shapes, and which pairs of them touch at all.
+"""Links of a URDF: their collision shapes, and which pairs of links need no check.
 
-MoveIt's setup assistant writes ``disable_collisions`` for links that are adjacent, or in contact
-nearly always. :func:`with_default_collisions` makes up for that where an SRDF does not say it.
-Links that the assistant finds never in contact are still checked: a sample is no proof, and
-distances that are great cost nothing. For an SRDF that other programs read,
-:func:`sample_link_pairs` looks for contacts much longer.
+MoveIt's setup assistant writes ``disable_collisions`` for links that are adjacent, or nearly
+always in contact. :func:`with_default_collisions` adds them if an SRDF lacks them. Pairs that the
+assistant finds never in contact are still checked: sampling is no proof, and checks of distant
+pairs cost nothing. For an SRDF that other programs read, :func:`sample_link_pairs` searches for
+contacts much longer.
 """
 
 from __future__ import annotations
@@ -48,19 +48,19 @@ from .objects import (
 from .planning_scene import PlanningScene
 
 CAPSULE_TOLERANCE = 1e-6
-"""How exactly spheres must sit on a cylinder's ends in [m] to make a capsule of it."""
+"""Tolerance in [m] of spheres on a cylinder's ends to form a capsule."""
 
 PRIMITIVES = {
     'box': (Box, ('size',)),
     'cylinder': (Cylinder, ('radius', 'length')),
     'sphere': (Sphere, ('radius',)),
 }
-"""Shapes of a URDF, and the attributes that have their numbers."""
+"""Shape elements of a URDF, and their attributes."""
 
 
 @dataclass(frozen=True, slots=True)
 class LinkShapes:
-    """What the links are made of."""
+    """Collision shapes of the links."""
 
     # shapes of each link that has any, in the link's frame
     by_link: Mapping[str, Sequence[PlacedShape]]
@@ -91,7 +91,7 @@ def link_shapes(tree: KinematicTree, folder: Path | None = None) -> LinkShapes:
 
 
 def _left_out(unusable: Mapping[str, Sequence[str]], found: bool) -> Sequence[str]:
-    """Return one line that names the links whose collisions are not checked, and why."""
+    """Return a note on the links whose collisions are not checked, and why."""
     if not unusable:
         return () if found else ('no link has a <collision>, so self-collision is not checked',)
     reasons = '; '.join(f'{", ".join(links)}: {reason}' for reason, links in unusable.items())
@@ -99,7 +99,7 @@ def _left_out(unusable: Mapping[str, Sequence[str]], found: bool) -> Sequence[st
 
 
 def _loose(fullness: Mapping[str, float]) -> Sequence[str]:
-    """Return one line that names the links whose hull is much larger than they are."""
+    """Return a note on the links whose hull is much larger than the link."""
     if not fullness:
         return ()
     links = ', '.join(f'{link} ({100 * share:.0f} %)' for link, share in fullness.items())
@@ -113,7 +113,7 @@ def _loose(fullness: Mapping[str, float]) -> Sequence[str]:
 
 
 def _solids(collision: UrdfShape, folder: Path | None) -> Sequence[tuple[Shape, float]]:
-    """Return the shapes of a collision, and how full each is; a mesh has one for each body."""
+    """Return the shapes of a collision element, and how full each is; a mesh has one per body."""
     if collision.shape == 'mesh':
         name = collision.attributes.get('filename', '')
         hulls = load_hulls(find_mesh(name, folder))
@@ -136,7 +136,7 @@ def _solids(collision: UrdfShape, folder: Path | None) -> Sequence[tuple[Shape, 
 
 
 def _with_capsules(shapes: Sequence[PlacedShape]) -> Sequence[PlacedShape]:
-    """Make one capsule of each cylinder with a sphere of its radius on either end."""
+    """Replace each cylinder that has a sphere of its radius on either end by a capsule."""
     left = list(shapes)
     for cylinder in shapes:
         shape, pose = cylinder.shape, cylinder.pose
@@ -166,7 +166,7 @@ def _cap(shapes: Sequence[PlacedShape], radius: float, end: Array) -> PlacedShap
 SAMPLES = 200  # poses that are tried
 
 MIN_SHARE = 0.95
-"""Share of the poses in which links touch that touch always; the setup assistant's."""
+"""Share of poses in contact above which links count as always in contact, as in MoveIt."""
 
 SEED = 0  # of the poses: the same robot has the same pairs each time
 
@@ -184,13 +184,13 @@ FIRST_STEP, LAST_STEP = 0.2, 0.002
 def with_default_collisions(
     scene: PlanningScene, tree: KinematicTree, lower: Array, upper: Array, notes: list[str]
 ) -> PlanningScene:
-    """Return the scene in which links may touch that cannot help it.
+    """Return a scene that allows contacts between links that are always in contact.
 
-    Adjacent links count only where the SRDF names no pair and no link: who made a matrix, left
-    them in it with a purpose. What ``enable_collisions`` names is checked in any case.
+    Adjacent links are allowed only if the SRDF names no pair and no link; otherwise its author
+    left them checked on purpose. Pairs in ``enable_collisions`` are always checked.
 
     Args:
-        notes: Where pairs are named that were not in the SRDF.
+        notes: Receives a note on pairs that were not in the SRDF.
     """
     allowed = scene.allowed
     checked = set(map(frozenset, scene.pairs))
@@ -224,7 +224,7 @@ def with_default_collisions(
 
 
 def adjacent_links(tree: KinematicTree, scene: PlanningScene) -> frozenset[Pair]:
-    """Return pairs of links that a joint connects; links without a shape do not part them."""
+    """Return pairs of links that a joint connects, directly or via links without a shape."""
     above = {joint.child: joint.parent for joint in tree.joints}
 
     def solid(link: str) -> str:
@@ -237,7 +237,7 @@ def adjacent_links(tree: KinematicTree, scene: PlanningScene) -> frozenset[Pair]
 
 
 def always_in_contact(scene: PlanningScene, lower: Array, upper: Array) -> frozenset[Pair]:
-    """Return pairs of links that touch in nearly all poses."""
+    """Return pairs of links in contact in nearly all poses."""
     clearances, apart = Clearances(scene), Counter[Pair]()
     candidates = set(map(frozenset, scene.pairs))
     for positions in drawn_poses(*one_turn(lower, upper), SAMPLES):
@@ -250,7 +250,7 @@ def always_in_contact(scene: PlanningScene, lower: Array, upper: Array) -> froze
 
 
 def one_turn(lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Return ranges in which joints without an end turn once."""
+    """Return position ranges, limited to one turn for continuous joints."""
     return (
         np.where(np.isfinite(lower), lower, -HALF_TURN),
         np.where(np.isfinite(upper), upper, HALF_TURN),
@@ -258,7 +258,7 @@ def one_turn(lower: Array, upper: Array) -> tuple[Array, Array]:
 
 
 def drawn_poses(lower: Array, upper: Array, samples: int) -> Iterator[Array]:
-    """Draw poses, the same each time."""
+    """Draw random poses from a fixed seed."""
     draw = np.random.default_rng(SEED)
     return (draw.uniform(lower, upper) for _ in range(samples))
 
@@ -293,16 +293,16 @@ class LinkPairs:
         return frozenset(pair for pair, share in self.shares.items() if share >= MIN_SHARE)
 
     def never(self, margin: float) -> frozenset[Pair]:
-        """Return the pairs that came nowhere as near as a margin in [m]."""
+        """Return the pairs that never came nearer than a margin in [m]."""
         return frozenset(pair for pair, distance in self.least.items() if distance >= margin)
 
 
 @description_refused()
 def sample_link_pairs(urdf: str, samples: int, folder: Path | None = None) -> LinkPairs:
-    """Find out which links of a robot touch always, at times and never.
+    """Sample which links of a robot are always, sometimes and never in contact.
 
     Raises:
-        ModelError: The description makes no robot.
+        ModelError: The URDF does not define a robot.
     """
     tree = read_urdf(urdf)
     kinematics = Kinematics(tree, [each.name for each in tree.joints if each.independent])
@@ -336,7 +336,7 @@ def sample_link_pairs(urdf: str, samples: int, folder: Path | None = None) -> Li
 def _least_nearby(
     scene: PlanningScene, lower: Array, upper: Array, pair: Pair, starts: Array
 ) -> float:
-    """Return the least distance of a pair that random steps towards contact find in [m]."""
+    """Search for contact of a pair by random steps; return its least distance found in [m]."""
     others = [each for each in map(frozenset, scene.pairs) if each != pair]
     clearances = Clearances(scene.with_allowed(scene.allowed.with_entries(others, True)))
     draw = np.random.default_rng(SEED)

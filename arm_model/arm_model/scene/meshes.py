@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Meshes as convex hulls: found by their name in a URDF, made once, cached by their content.
+"""Convex hulls of meshes: located by their name in a URDF, computed once, cached by content.
 
-STL, DAE, OBJ and what else assimp reads. A raw mesh is only read to make its hulls: one for each
-body that lies apart from the others, or several for one that fills little of its hull. Their
-points are kept in ``$XDG_CACHE_HOME/arm_model/hulls`` (``~/.cache/arm_model/hulls``), one small
-file for each content of a mesh file; the folder may be deleted at any time, and nothing that is
-wrong with it ends a program.
+Reads STL, DAE, OBJ and the other formats of assimp. A mesh is only read to compute its hulls: one
+for each separate body, or several for a body that fills little of its hull. Their points are
+cached in ``$XDG_CACHE_HOME/arm_model/hulls`` (``~/.cache/arm_model/hulls``), one small file for
+each content of a mesh file. The folder may be deleted at any time, and errors in it never end a
+program.
 """
 
 from __future__ import annotations
@@ -28,28 +28,28 @@ from .pieces import cache_file, cut, write_whole
 MIN_THICKNESS = 1e-3  # thickness that a flat mesh is given in [m]: a hull needs a volume
 
 MAX_CORNERS = 250
-"""Corners of a hull that coal refuses for the number of neighbours of a corner: 255 at most."""
+"""Corners of a replacement hull if coal refuses one: a corner may have at most 255 neighbours."""
 
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 """Turns by this angle in [rad] spread directions evenly."""
 
 MAX_BODIES = 16
-"""Bodies of one mesh that get a hull each; one with more of them gets a single hull."""
+"""Greatest number of bodies of a mesh with one hull each; a mesh with more gets a single hull."""
 
 MAX_PARTS = 500  # parts of a mesh without a common corner of which bodies are made
 
 APART = 1e-3
-"""Distance between the bounds of two bodies at least, as a share of the size of the mesh."""
+"""Least distance between the bounds of two bodies, as a share of the size of the mesh."""
 
 MIN_FULLNESS = 0.5
-"""Share of its hull that a body fills at least; one that fills less is cut into pieces."""
+"""Least share of its hull that a body fills; a body that fills less is cut into pieces."""
 
 FAR_OUT, MAX_HALVINGS = 0.005, 8
-"""Triangles that stand out of a piece by this share of the body are halved, so many times."""
+"""Triangles that protrude from a piece by this share of the body are halved, up to so often."""
 
 
 class MeshError(ValueError):
-    """A mesh cannot be used; the message says why, and what to do."""
+    """A mesh cannot be used; the message names the reason and the remedy."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +64,7 @@ class Hull:
 
 
 def load_hulls(path: Path) -> Sequence[Hull]:
-    """Return the convex hulls of the bodies of a mesh file, from the cache if they are there."""
+    """Return the convex hulls of the bodies of a mesh file, from the cache if possible."""
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -92,7 +92,7 @@ def _hulls(digest: str, path: Path) -> Sequence[Hull]:
 
 
 def _stored(path: Path) -> Sequence[Hull]:
-    """Read a file of the cache; nothing where it was never written, or is damaged."""
+    """Read a file of the cache; return nothing if it is missing or damaged."""
     # numpy, zipfile and zlib raise what they like for files that are damaged
     with contextlib.suppress(Exception), np.load(path) as stored:
         points, counts, fullness = (stored[name] for name in ('points', 'counts', 'fullness'))
@@ -132,7 +132,7 @@ def hulls_of_file(path: Path) -> Sequence[Hull]:
 
 
 def _of_parts(triangles: Places, corners: int) -> Places:
-    """Return triangles whose corners count through the whole mesh; none where that is not known.
+    """Return triangles with corners numbered through the whole mesh; none if that is ambiguous.
 
     coal numbers the corners of each material of a mesh from 0 on. The first triangle of a material
     has the corners 0, 1 and 2, and others only such as were named before, or the next one.
@@ -149,7 +149,7 @@ def _of_parts(triangles: Places, corners: int) -> Places:
 
 
 def _hulls_of_body(points: Array, triangles: Places) -> Sequence[Hull]:
-    """Return the hull of a body, or those of its pieces where it fills little of its hull."""
+    """Return the hull of a body, or of its pieces if it fills little of its hull."""
     corners = points[triangles]
     a, b, c = corners.transpose(1, 0, 2)
     solid = abs(float((a * np.cross(b, c)).sum()) / 6.0)
@@ -168,12 +168,12 @@ def _hulls_of_body(points: Array, triangles: Places) -> Sequence[Hull]:
 
 
 def _around_triangles(triangles: Array, pieces: Sequence[Array]) -> Sequence[Native]:
-    """Return a hull for each piece of a body that no point of the body's surface is outside of.
+    """Return one hull per piece of a body, which together enclose the body's whole surface.
 
-    The corners of a body stand out of the pieces that CoACD makes, by micrometres to millimetres,
-    and no check of contacts may rest on those. So each triangle (n, 3, 3) goes whole to the piece
-    that it stands out of least, and the hulls are made again, of triangles. One that stands out
-    far, such as a long one across several pieces, is halved first.
+    CoACD's pieces leave corners of the body outside, by micrometres to millimetres, so contact
+    checks cannot rely on them. Therefore each triangle (n, 3, 3) is assigned as a whole to the
+    piece from which it protrudes least, and the hulls are rebuilt from triangles. A triangle
+    that protrudes far, such as a long one across several pieces, is halved first.
     """
     walls = [(np.array(each.normals()), np.array(each.offsets())) for each in map(convex, pieces)]
     far = FAR_OUT * np.ptp(triangles.reshape(-1, 3), axis=0).max()
@@ -204,7 +204,7 @@ def _halved(triangles: Array) -> Array:
 
 
 def _bodies(points: Array, triangles: Places) -> Sequence[Places]:
-    """Return the triangles of each body that lies apart; all of them where bodies are many."""
+    """Return the triangles of each separate body, or of the whole mesh if there are too many."""
     labels, before = np.arange(len(points)), np.arange(0)
     while not np.array_equal(labels, before):
         before = labels.copy()
@@ -232,9 +232,9 @@ def _bodies(points: Array, triangles: Places) -> Sequence[Places]:
 
 
 def convex(points: Array, most: int | None = None) -> Native:
-    """Return the convex hull of points in [m] (m, 3) as a shape of coal; flat ones get thick.
+    """Return the convex hull of points in [m] (m, 3) for coal; a flat hull is thickened.
 
-    One with more corners than wanted gets a hull around it that has as many.
+    A hull with too many corners is enclosed in one with the allowed number.
     """
     if not len(points) or not np.isfinite(points).all():
         raise MeshError('a mesh needs corners, and finite ones')
@@ -256,10 +256,10 @@ def _convex(points: Array) -> Native:
 
 
 def _around(points: Array, most: int) -> Array:
-    """Return few points whose hull is around many, and hardly larger.
+    """Return few points whose hull encloses many points, and is hardly larger.
 
-    They are the outermost ones in evenly spread directions, moved away from their middle until
-    all others are within.
+    They are the outermost points in evenly spread directions, moved outwards from their middle
+    until all others are inside.
     """
     steps = np.arange(most)
     height = 1.0 - 2.0 * (steps + 0.5) / most
@@ -277,7 +277,7 @@ def _around(points: Array, most: int) -> Array:
 
 
 def _with_volume(points: Array) -> Array:
-    """Make points that are flat, in a line or at one place a little thick (qhull would crash)."""
+    """Thicken points that are coplanar, collinear or coincident, on which qhull would crash."""
     centered = points - points.mean(axis=0)
     _, axes = np.linalg.eigh(centered.T @ centered)
     for axis in axes.T:

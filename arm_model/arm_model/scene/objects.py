@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Shapes, the objects that are made of them, and what may touch.
+"""Shapes, collision objects made of them, and the allowed collision matrix.
 
-All shapes but the cells of octrees are convex: their distances are exact.
+All shapes except the cells of octrees are convex, with exact distances.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Cylinder:
 
 @dataclass(frozen=True, slots=True)
 class Capsule:
-    """A cylinder along z with half a sphere on either end; its length in [m] is without them."""
+    """A cylinder along z with a hemisphere on either end; the length in [m] excludes both."""
 
     radius: float
     length: float
@@ -64,7 +64,7 @@ class Cone:
 
 @dataclass(frozen=True, slots=True)
 class Plane:
-    """A half-space: what lies below the plane is solid, as below a table or behind a wall."""
+    """A half-space: everything below the plane is solid, as below a table or behind a wall."""
 
     # direction that leads out of the solid; of any length
     normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
@@ -84,11 +84,11 @@ class Mesh:
         """Make the hull.
 
         Args:
-            points: Points in [m] (m, 3); what lies within their hull does not count.
-            most: Corners of the hull at most; None for any number.
+            points: Points in [m] (m, 3); points inside their hull are ignored.
+            most: Greatest number of corners of the hull; None for no limit.
 
         Raises:
-            SceneError: They are no points, or not finite.
+            SceneError: The points have the wrong shape, or are not finite.
         """
         array = np.asarray(points, dtype=np.float64)
         if array.ndim != 2 or array.shape[1] != 3:
@@ -110,10 +110,10 @@ class Mesh:
 
 
 class Cells:
-    """Cubes of an octree that have one size.
+    """Cubes of an octree with the same size.
 
     Attributes:
-        middles: Their middles (m, 3) in [m], on the grid of their edge about the origin.
+        middles: Their centers (m, 3) in [m], on a grid of the edge length about the origin.
     """
 
     __slots__ = ('edge', 'middles', 'tree')
@@ -137,19 +137,19 @@ class Cells:
 
 
 Shape = Box | Sphere | Cylinder | Capsule | Cone | Plane | Mesh | Cells
-"""What a link or an object may be made of."""
+"""Any shape of a link or an object."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlacedShape:
-    """A shape, and where it is in the frame of its link or object."""
+    """A shape, and its pose in the frame of its link or object."""
 
     shape: Shape
     pose: Pose = ORIGIN
 
 
 def native(shape: Shape) -> Native:
-    """Return a shape of coal."""
+    """Convert a shape to coal."""
     if isinstance(shape, Mesh):
         return shape.hull
     if isinstance(shape, Cells):
@@ -170,7 +170,7 @@ def native(shape: Shape) -> Native:
 
 @lru_cache(maxsize=1024)
 def padded(shape: Shape, padding: float, scale: float = 1.0) -> Native:
-    """Return a shape of coal that is scaled about its middle, then padded by a length in [m]."""
+    """Convert a shape to coal, scaled about its middle, then padded by a length in [m]."""
     solid = native(_scaled(shape, scale))
     solid.setSweptSphereRadius(padding)
     solid.computeLocalAABB()
@@ -197,7 +197,7 @@ def _scaled(shape: Shape, scale: float) -> Shape:
 
 @dataclass(frozen=True, slots=True, init=False)
 class CollisionObject:
-    """A thing that the robot must not touch."""
+    """An object that the robot must not touch."""
 
     name: str  # its name, which no link has
     shapes: tuple[PlacedShape, ...]  # its shapes, in its own frame
@@ -205,13 +205,13 @@ class CollisionObject:
     pose: Pose = field(default=ORIGIN, compare=False)
 
     def __init__(self, name: str, *shapes: Shape | PlacedShape, pose: Pose = ORIGIN) -> None:
-        """Put an object together.
+        """Create an object.
 
         Args:
-            shapes: Its shapes; without a pose of their own they are at its origin.
+            shapes: Its shapes; a shape without a pose is at the origin of the object.
 
         Raises:
-            SceneError: It has no name or no shape, or a shape is not usable.
+            SceneError: The name is empty, there is no shape, or a shape is not usable.
         """
         if not name:
             raise ObjectNameError('an object needs a name; give it one')
@@ -227,11 +227,11 @@ class CollisionObject:
         object.__setattr__(self, 'pose', pose)
 
     def at(self, pose: Pose) -> CollisionObject:
-        """Return the object at another place."""
+        """Return the object with another pose."""
         return CollisionObject(self.name, *self.shapes, pose=pose)
 
     def is_same(self, other: CollisionObject) -> bool:
-        """Whether another object has this name, and these shapes at the same places."""
+        """Whether another object has the same name, and the same shapes at the same poses."""
         return (
             (self.name, len(self.shapes)) == (other.name, len(other.shapes))
             and self.pose.is_close(other.pose)
@@ -251,17 +251,17 @@ class AttachedBody:
     touch_links: frozenset[str] = frozenset()  # links that it may touch; the link itself always
 
     def is_same(self, other: AttachedBody) -> bool:
-        """Whether another body is the same object on the same link, and may touch the same."""
+        """Whether another body is the same object on the same link with the same touch links."""
         mine, its = (self.link, self.touch_links), (other.link, other.touch_links)
         return mine == its and self.object.is_same(other.object)
 
 
 @dataclass(frozen=True, slots=True)
 class AllowedCollisionMatrix:
-    """Pairs of links and objects that are not checked, or are in any case, as MoveIt has them.
+    """Pairs of links and objects that are allowed to touch, or always checked, as in MoveIt.
 
-    An entry of a pair decides. Where there is none, the defaults of its two names do: with one
-    default, that; with two, both must allow. Where there are none, the pair is checked.
+    An entry of a pair decides. Without one, the defaults of its two names do: a single default
+    applies; of two, both must allow. Without defaults, the pair is checked.
     """
 
     # true where a pair may touch, by pair
@@ -276,7 +276,7 @@ class AllowedCollisionMatrix:
 
     @classmethod
     def of_srdf(cls, semantic: SemanticDescription) -> AllowedCollisionMatrix:
-        """Return what an SRDF allows; ``disable_collisions`` has the last word, as in MoveIt."""
+        """Return the matrix of an SRDF; ``disable_collisions`` has precedence, as in MoveIt."""
         entries = dict.fromkeys(semantic.enabled, False) | dict.fromkeys(semantic.disabled, True)
         return cls(entries, dict.fromkeys(semantic.unchecked, True))
 

@@ -1,15 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Octrees as OctoMap serializes them, as the cells that are occupied.
+"""Reads octrees serialized by OctoMap, as their occupied cells.
 
-A tree has 16 levels around the origin of the map; a leaf may be at any of them. The child with the
-number i of a node is on the positive side of x, y and z where bit 0, 1 and 2 of i are set.
+A tree has 16 levels around the origin of the map; a leaf may be at any of them. Bits 0, 1 and 2 of
+a child's number are set if the child is on the positive side of its node in x, y and z.
 
 The binary stream has two bytes for each inner node, two bits for each child from the least
 significant ones on: 0 unknown, 1 free, 2 occupied, 3 an inner node. Inner children follow in
-their order, each with all below it. The full stream has for each node its log-odds of being
-occupied, a float32 in little-endian order, in coloured trees three bytes of colour, and one byte
-with a bit for each child that there is; these follow in the same way.
+their order, each with its whole subtree. The full stream has for each node its log-odds of being
+occupied, a little-endian float32, in coloured trees three bytes of colour, and one byte with a bit
+for each existing child; the children follow in the same way.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from .objects import Cells, PlacedShape
 OCTOMAP_NAME = '<octomap>'  # name of the octomap among the objects of a scene, as in MoveIt
 
 VALUES = {'OcTree': struct.Struct('<f'), 'ColorOcTree': struct.Struct('<f3x')}
-"""What each node has in the full stream, by class of the tree."""
+"""Fields of a node in the full stream, by class of the tree."""
 
 ROOT_SIZE = 1 << 16  # edge of the whole tree, in its smallest cells
 MAX_CELLS = 100_000  # how many occupied cells a map may have
@@ -47,14 +47,14 @@ Cubes = NDArray[np.int64]  # least corner x, y, z and edge of cubes, in smallest
 def octomap_shapes(
     kind: str, data: bytes, resolution: float, *, binary: bool
 ) -> tuple[PlacedShape, ...]:
-    """Return what is occupied in a map, as cells of one size that lie together, in its frame.
+    """Return the occupied cells of a map in its frame, grouped by size and neighbourhood.
 
     Args:
-        resolution: Edge of its smallest cells in [m].
-        binary: Whether it is the binary stream, else the full one.
+        resolution: Edge of the smallest cells in [m].
+        binary: Whether the data are the binary stream, else the full one.
 
     Raises:
-        SceneError: The kind is unknown, the stream is none, or the map is too fine.
+        SceneError: The kind is unknown, the stream is invalid, or the map is too fine.
     """
     if kind not in VALUES:
         raise SceneError(f'octomap: a tree {kind!r}; send {" or ".join(VALUES)}')
@@ -88,7 +88,7 @@ def _blocks(cubes: Cubes, resolution: float) -> Iterator[Cells]:
 
 
 def _child(x: int, y: int, z: int, edge: int, number: int) -> tuple[int, int, int, int]:
-    """Return corner and edge of a child, by those of its parent."""
+    """Return corner and edge of a child from those of its parent."""
     half = edge >> 1
     return (
         x + half * (number & 1),

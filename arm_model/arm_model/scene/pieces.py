@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bodies cut into nearly convex pieces by CoACD, in a process of its own, and cached.
 
-``python -m arm_model.scene.pieces BODY PIECES`` reads and writes files of numpy: CoACD can neither
-be stopped nor be trusted with every mesh. The pieces of each body are kept in a file of
-``arm_model/pieces`` in the cache; a body that was given up has none in it.
+``python -m arm_model.scene.pieces BODY PIECES`` reads and writes numpy files: CoACD cannot be
+interrupted, nor trusted with every mesh. The pieces of each body are cached in a file in
+``arm_model/pieces``; the file of a body that was given up contains none.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from ..arrays import Array, Places
 CPU_LIMIT = 20  # seconds of a processor for one body: those of arms take 0.2 to 9
 
 TIME_LIMIT = 30.0
-"""Seconds by the clock for all bodies of a process; the next start goes on with the others."""
+"""Wall-clock limit in [s] for all bodies of a process; the next start continues with the rest."""
 
 MANY_TRIANGLES = 5000  # a body of more is remeshed first: CoACD's time grows with their number
 
@@ -45,8 +45,8 @@ SETTINGS = {
     'mcts_nodes': 10,
     'mcts_iterations': 20,
 }
-"""A finger of 17,330 triangles takes 4 s of a processor. With 60 iterations and resolution 30 it
-is 11 s, a third of the time of CoACD's defaults, for as many pieces of L, fork and ring."""
+"""A finger of 17,330 triangles takes 4 s of CPU time. With 60 iterations and resolution 30 it
+takes 11 s, a third of CoACD's defaults, and gives as many pieces for an L, a fork and a ring."""
 
 
 FORMAT = 'v5'  # version of the files in the cache: part of their names, as is the time limit
@@ -54,7 +54,7 @@ FORMAT = 'v5'  # version of the files in the cache: part of their names, as is t
 
 @dataclass(slots=True)
 class Stopwatch:
-    """How long a process has cut bodies, in [s]."""
+    """Time that a process has spent on cutting bodies, in [s]."""
 
     spent: float = 0.0
 
@@ -65,10 +65,10 @@ _watch = Stopwatch()
 def cut(corners: Array, triangles: Places) -> Sequence[Array]:
     """Return the corners of each piece; nothing for a body that is open or too intricate.
 
-    The log says once that it begins. A TimeoutError says that the next start may do it.
+    Logs once that cutting begins. Raises TimeoutError if the next start should try again.
 
     Args:
-        corners: Those of the body (n, 3), each once.
+        corners: Corners of the body (n, 3), without duplicates.
         triangles: Indices of their corners (m, 3).
     """
     if not _closed(triangles):
@@ -117,14 +117,14 @@ def cut(corners: Array, triangles: Places) -> Sequence[Array]:
 
 
 def cache_file(kind: str, digest: str) -> Path | None:
-    """Return where the shapes made of a content are kept; None for a user without a home."""
+    """Return the cache file for shapes of a mesh content; None if the user has no home."""
     cache = cache_folder('arm_model')
     name = f'{digest}-{FORMAT}-{TIME_LIMIT:g}s.npz'
     return None if cache is None else cache / kind / name
 
 
 def write_whole(path: Path, *arrays: Array, **named: object) -> None:
-    """Write a file of the cache whole or not at all: several programs start at once."""
+    """Write a cache file atomically, as several programs may start at once."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with NamedTemporaryFile(dir=path.parent, suffix='.tmp', delete=False) as file:
         unfinished = Path(file.name)
@@ -144,7 +144,7 @@ def _read(path: Path) -> Sequence[Array]:
 
 
 def _closed(triangles: Places) -> bool:
-    """Return whether each edge belongs to two triangles, which pass it in opposite directions."""
+    """Return whether each edge belongs to two triangles with opposite directions."""
     edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     ways = {(start, end) for start, end in edges.tolist()}
     return len(ways) == len(edges) and all((end, start) in ways for start, end in ways)

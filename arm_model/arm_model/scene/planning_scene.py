@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What may collide: links, objects, attached bodies, and the pairs of them that are checked."""
+"""The planning scene: links, objects, attached bodies, and the pairs checked for collisions."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class _Body:
     padded: bool | None = None
 
     def counts_against(self, other: _Body) -> bool:
-        """Whether it is to be looked at beside the other."""
+        """Whether the pair with another body must be checked."""
         return self.padded is None or self.padded is not bool(other.link)
 
     def may_touch(self, other: _Body) -> bool:
@@ -56,25 +56,25 @@ class _Body:
 
 
 class PlanningScene:
-    """The robot's shapes, objects of the world, attached bodies, and what may touch; immutable.
+    """Robot shapes, world objects, attached bodies and allowed collisions. Immutable.
 
-    ``with_...``, ``without`` and their like return another scene. Poses of objects are in the root
-    link. Any thread may read a scene; distances are measured by a :class:`Clearances` of it, one
-    for each thread. What no joint of the group moves against each other is not checked.
+    ``with_...``, ``without`` and similar methods return a new scene. Poses of objects are in the
+    root link. Scenes are thread-safe; a :class:`Clearances`, one per thread, measures distances.
+    Pairs that no joint of the group moves against each other are not checked.
 
     Attributes:
-        padding: How much thicker links and what is attached to them count against objects of the
-            world in [m], by link; against each other they do not, as in MoveIt.
-        scale: The same of factors of their lengths.
-        geometry: All shapes and their pairs, for pinocchio.
-        octrees: Cells of the shapes that are octrees, by their numbers in the geometry.
+        padding: Thickness in [m] added to links and their attached bodies in checks against world
+            objects, by link; not in checks against each other, as in MoveIt.
+        scale: Scale factors, used in the same way.
+        geometry: pinocchio geometry model with all shapes and pairs.
+        octrees: Cells of octree shapes, by their numbers in the geometry.
         pairs: Names of the link or object of each pair of shapes that is checked (k).
         pair_shapes: Numbers of both shapes in the geometry (k, 2).
-        of_cells: Mask of the pairs in which one shape is of an octree (k).
-        relative_motion_sign: Sense in which each column of the kinematics moves the second shape
-            of a pair against the first (k, columns): 1, -1, or 0.
-        distance_rate_bounds: How fast each joint changes a pair's distance at most (k, n) in
-            [m/rad], wherever the arm is.
+        of_cells: Mask of the pairs with an octree shape (k).
+        relative_motion_sign: Sign with which each column of the kinematics moves the second shape
+            of a pair relative to the first (k, columns): 1, -1, or 0.
+        distance_rate_bounds: Greatest rate at which each joint changes the distance of a pair in
+            any state (k, n) in [m/rad].
     """
 
     def __init__(
@@ -88,10 +88,10 @@ class PlanningScene:
         padding: Mapping[str, float] | None = None,
         scale: Mapping[str, float] | None = None,
     ) -> None:
-        """Put a scene together; :attr:`RobotModel.scene` is the first one.
+        """Create a scene; start from :attr:`RobotModel.scene` instead.
 
         Raises:
-            SceneError: Two things have one name, a link is unknown, or a padding is not usable.
+            SceneError: A name is not unique, a link is unknown, or a padding is not usable.
         """
         self.kinematics, self.link_shapes, self.allowed = kinematics, link_shapes, allowed
         self.objects = MappingProxyType({each.name: each for each in objects})
@@ -129,7 +129,7 @@ class PlanningScene:
         return (*self.link_shapes, *self.objects, *self.attached_bodies)
 
     def is_same(self, other: PlanningScene) -> bool:
-        """Whether another scene has the same things at the same places, and allows the same."""
+        """Whether another scene has the same content at the same poses, and the same matrix."""
         return (
             self.kinematics.joints == other.kinematics.joints
             and self.kinematics.others == other.kinematics.others
@@ -146,7 +146,7 @@ class PlanningScene:
         )
 
     def with_object(self, thing: CollisionObject) -> PlanningScene:
-        """Return the scene with an object in the world, in the place of one with its name.
+        """Return the scene with an object added to the world, or replaced if the name exists.
 
         Args:
             thing: The object; its pose is in the root link.
@@ -169,10 +169,10 @@ class PlanningScene:
     def attached(
         self, name: str, link: str, positions: Array, touch_links: Iterable[str] = ()
     ) -> PlanningScene:
-        """Return the scene with an object of the world taken up by a link, where both are.
+        """Return the scene with a world object attached to a link, at its present pose.
 
         Raises:
-            SceneError: There is no such object in the world, or no such link.
+            SceneError: The world object or the link is unknown.
         """
         if name not in self.objects:
             raise ObjectNameError(f'no object {name!r} in the world; {self._known()}')
@@ -186,10 +186,10 @@ class PlanningScene:
         )
 
     def with_attached(self, body: AttachedBody) -> PlanningScene:
-        """Return the scene with an attached body, in the place of one with its name.
+        """Return the scene with an attached body added, or replaced if the name exists.
 
         Args:
-            body: The body; the pose of its object is in the link.
+            body: The body; the pose of its object is in the frame of the link.
 
         Raises:
             SceneError: A link or an object of the world has its name, or a link is unknown.
@@ -197,7 +197,7 @@ class PlanningScene:
         return self.with_contents(attached_bodies={**self.attached_bodies, body.object.name: body})
 
     def detached(self, name: str, positions: Array) -> PlanningScene:
-        """Return the scene with an attached body laid down in the world, where it is.
+        """Return the scene with an attached body detached to the world, at its present pose.
 
         Raises:
             SceneError: No such body is attached.
@@ -211,7 +211,7 @@ class PlanningScene:
         return self.with_contents(objects={**self.objects, name: thing}, attached_bodies=bodies)
 
     def pose(self, name: str, positions: Array) -> Pose:
-        """Return where an object or attached body is, in the root link; SceneError for no such."""
+        """Return the pose of an object or attached body in the root link, or raise SceneError."""
         thing = self._thing(name)
         if name in self.objects:
             return thing.pose
@@ -229,11 +229,11 @@ class PlanningScene:
     ) -> PlanningScene:
         """Return the scene with several parts replaced in one step; None keeps a part.
 
-        An object that goes leaves nothing in the matrix: the next of its name is checked. Entries
-        of the octomap stay.
+        Removed objects lose their matrix entries, so a new object of the same name is checked.
+        Entries of the octomap stay.
 
         Raises:
-            SceneError: Two things have one name, a link is unknown, or a padding is not usable.
+            SceneError: A name is not unique, a link is unknown, or a padding is not usable.
         """
         objects = self.objects if objects is None else objects
         attached_bodies = self.attached_bodies if attached_bodies is None else attached_bodies
@@ -251,7 +251,7 @@ class PlanningScene:
         )
 
     def with_others(self, kinematics: Kinematics) -> PlanningScene:
-        """Return the scene with joints beside the group elsewhere; what they carry goes along."""
+        """Return the scene with joints outside the group moved, together with what they carry."""
         if kinematics is self.kinematics:
             return self
         moved = copy.copy(self)
@@ -259,14 +259,14 @@ class PlanningScene:
         return moved.with_contents()
 
     def between(self, groups: Sequence[Sequence[str]]) -> PlanningScene:
-        """Return what groups that move at the same time may bring together.
+        """Return a scene for collisions between groups that move at the same time.
 
-        Its joints are those of all the groups. Only pairs are checked that joints of more than one
-        of them move against each other; objects of the world, which no two groups move, are left
+        Its joints are those of all groups. It only checks pairs that joints of more than one group
+        move against each other; world objects, which no two groups move, are left
         out.
 
         Args:
-            groups: Joints of each group; no joint is in two.
+            groups: Joints of each group, without overlap.
         """
         kinematics = self.kinematics.of_joints([joint for group in groups for joint in group])
         shapes, attached = self.link_shapes, self.attached_bodies.values()
@@ -284,7 +284,7 @@ class PlanningScene:
         )
 
     def with_allowed(self, allowed: AllowedCollisionMatrix) -> PlanningScene:
-        """Return the scene with another matrix of what may touch; its names may be unknown."""
+        """Return the scene with another allowed collision matrix, which may have unknown names."""
         return self.with_contents(allowed=allowed)
 
     def allowing(self, first: str, second: str, allowed: bool = True) -> PlanningScene:
@@ -292,7 +292,7 @@ class PlanningScene:
 
         Args:
             first: Name of a link or object; ``*``, ``?`` and ``[...]`` as in file names.
-            allowed: Whether they may touch; False for pairs that are to be checked.
+            allowed: Whether the pairs may touch; False to check them.
 
         Raises:
             SceneError: No name fits one of the patterns.
@@ -344,7 +344,7 @@ class PlanningScene:
                 )
 
     def _bodies(self) -> Sequence[_Body]:
-        """Put all shapes into the geometry, and return what they belong to."""
+        """Add all shapes to the geometry, and return the bodies they belong to."""
         bodies: list[_Body] = []
         for link, shapes in self.link_shapes.items():
             body = _Body(link, link, self.kinematics.parent_joint(link))
@@ -365,7 +365,7 @@ class PlanningScene:
     def _carried(
         self, body: _Body, shapes: Sequence[PlacedShape], place: Native
     ) -> Sequence[_Body]:
-        """Add the shapes of a link or an attached body; padded ones once more, for the world."""
+        """Add the shapes of a link or attached body, and padded copies for the world."""
         padding, scale = self.padding.get(body.link, 0.0), self.scale.get(body.link, 1.0)
         if (padding, scale) == (0.0, 1.0):
             return [self._placed(body, each, place, native(each.shape)) for each in shapes]
@@ -379,7 +379,7 @@ class PlanningScene:
         ]
 
     def _placed(self, body: _Body, placed: PlacedShape, place: Native, solid: Native) -> _Body:
-        """Put a shape of a body into the geometry, at a place in its link or in the world."""
+        """Add a shape of a body to the geometry, at a pose in its link or in the world."""
         model = self.kinematics.native
         frame_id = self.kinematics.frames[body.link] if body.link else 0
         in_joint = model.frames[frame_id].placement * place * _se3(placed.pose)
@@ -403,9 +403,9 @@ class PlanningScene:
     def _bounds(
         self, bodies: Sequence[_Body], extents: Array, pairs: Sequence[tuple[int, int]]
     ) -> tuple[Array, Array]:
-        """Return signs of relative motion and bounds of distance rates of pairs.
+        """Return signs of relative motion and distance rate bounds of pairs.
 
-        A joint moves either shape against the other; the smaller bound holds.
+        Each bound is the smaller of those seen from either shape.
         """
         kinematics = self.kinematics
         columns = kinematics.native.nv
@@ -426,7 +426,7 @@ class PlanningScene:
 
 
 def _candidates(bodies: Sequence[_Body]) -> Sequence[tuple[int, int]]:
-    """Return the pairs of bodies of which one moves at least."""
+    """Return the pairs of bodies of which at least one moves."""
     moving = [number for number, body in enumerate(bodies) if body.joint]
     still = [number for number, body in enumerate(bodies) if not body.joint]
     mixed = ((min(pair), max(pair)) for pair in product(moving, still))
